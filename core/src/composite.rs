@@ -1,0 +1,83 @@
+//! Samples along a ray become a pixel: emission-absorption compositing as a stream.
+//!
+//! Source: NeRF, equation 3, in transmittance form. With the optical depth `o_i = density_i * length_i` of sample `i`,
+//! the transmittance in front of it is `T_i = exp(-(o_0 + ... + o_(i-1)))` and its weight is `T_i - T_(i+1)`. The optical
+//! depth is summed before the exponential, so thin samples are not lost one by one (`1 - exp(-o)` in `f32` is wrong by
+//! 1.3 % at 1e-6), and the weights telescope to `1 - T_end`. Exclusive: a sample does not shade itself (in published
+//! GeNVS it does).
+
+use crate::math::exp;
+
+/// A ray on its way from the camera: accumulates `C` channels and the depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compositor<const C: usize> {
+    accumulated: [f32; C],
+    weighted_depth: f32,
+    optical_depth: f32,
+    transmittance: f32,
+}
+
+/// What a ray saw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Composite<const C: usize> {
+    /// Accumulated channels with the background behind.
+    pub channels: [f32; C],
+    /// Mean depth of what was hit, divided by the accumulated weight; `empty_depth` for a ray that hit nothing.
+    pub depth: f32,
+    /// `1 - transmittance`: how much of the background is hidden, in `[0, 1]`.
+    pub opacity: f32,
+}
+
+impl<const C: usize> Compositor<C> {
+    /// A ray that has met nothing yet.
+    pub const START: Compositor<C> =
+        Compositor { accumulated: [0.0; C], weighted_depth: 0.0, optical_depth: 0.0, transmittance: 1.0 };
+
+    /// Adds the next sample, front to back: its channels, its optical depth (density times length; negative or NaN
+    /// counts as 0, infinity as opaque) and its distance along the ray. Returns the sample's weight.
+    #[inline]
+    pub fn add(&mut self, channels: &[f32; C], optical_depth: f32, depth: f32) -> f32 {
+        if !(optical_depth > 0.0) {
+            return 0.0;
+        }
+        // The sum is kept, not the product of exponentials: it loses nothing when the summands are small.
+        self.optical_depth += optical_depth;
+        let behind = exp(-self.optical_depth);
+        let weight = self.transmittance - behind;
+        self.transmittance = behind;
+        let mut channel = 0;
+        while channel < C {
+            self.accumulated[channel] += weight * channels[channel];
+            channel += 1;
+        }
+        self.weighted_depth += weight * depth;
+        weight
+    }
+
+    /// How much light passes what was met so far, in `[0, 1]`.
+    #[inline]
+    pub fn transmittance(&self) -> f32 {
+        self.transmittance
+    }
+
+    /// Whether the ray may end here: nothing behind can change a channel whose values span `range` by more than
+    /// `threshold * range`, because all that is behind together has the weight `transmittance <= threshold`.
+    #[inline]
+    pub fn is_settled(&self, threshold: f32) -> bool {
+        self.transmittance <= threshold
+    }
+
+    /// The pixel, with `background` behind everything.
+    #[inline]
+    pub fn finish(&self, background: &[f32; C], empty_depth: f32) -> Composite<C> {
+        let mut channels = self.accumulated;
+        let mut channel = 0;
+        while channel < C {
+            channels[channel] += self.transmittance * background[channel];
+            channel += 1;
+        }
+        let opacity = 1.0 - self.transmittance;
+        let depth = if opacity > 0.0 { self.weighted_depth / opacity } else { empty_depth };
+        Composite { channels, depth, opacity }
+    }
+}

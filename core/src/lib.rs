@@ -1,0 +1,40 @@
+//! The mathematics of viewfuse, at fixed sizes.
+//!
+//! Everything here is `no_std`, free of allocation and of `unsafe`, and uses only `f32` and `u32`, so that one body
+//! serves as the definition on a workstation, as the source of a GPU kernel and as firmware. The modules stand in the
+//! order of the data:
+//!
+//! ```text
+//! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
+//! sources           the poses of the source views                 Sources<S>
+//! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
+//! weighting         pose -> weight, by formula                    Scheme, weigh
+//! attention         pose -> weight, by (learned) attention        CrossAttention, PoseSelfAttention, ...
+//! random, depths    where along a ray to look                     uniform, stratified_depth, inverse_cdf
+//! lookup            what a view shows there                       bilinear, trilinear
+//! fuse              the views' latents become one                 fuse_views, fuse_visible
+//! photo             the field that needs no weights file          matched depth, signed distance, density and colour
+//! composite         samples along a ray become a pixel            Compositor<C>
+//! metrics           how good is the picture                       psnr, ssim
+//! ```
+//!
+//! A module uses only modules listed above it. Types that are checked when they are built ([`pose::Pose`],
+//! [`camera::Pinhole`], [`weights::Weights`]) go in; functions on them are total and say what degenerate input gives.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod attention;
+pub mod camera;
+pub mod composite;
+pub mod depths;
+pub mod fuse;
+pub mod lookup;
+pub mod math;
+pub mod metrics;
+pub mod pose;
+pub mod random;
+pub mod sources;
+pub mod weighting;
+pub mod weights;
+
+pub use glam::Vec3;

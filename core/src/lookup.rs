@@ -1,0 +1,55 @@
+//! Looking up grids of `C` channels between their nodes.
+//!
+//! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are continuous
+//! with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres the border
+//! node's value continues; a NaN coordinate is taken as 0. Slices shorter than the stated size are not allowed.
+
+use crate::math::{clamp, floor_to_i32};
+
+/// One axis of a look-up: the two nodes and the share of the second.
+#[inline]
+fn split(coordinate: f32, count: u32) -> (usize, usize, f32) {
+    let last = (count - 1) as f32;
+    let position = clamp(coordinate - 0.5, 0.0, last);
+    let lower = floor_to_i32(position) as usize;
+    let upper = if lower + 1 < count as usize { lower + 1 } else { lower };
+    (lower, upper, position - lower as f32)
+}
+
+#[inline]
+fn mix<const C: usize>(a: &[f32; C], b: &[f32; C], share: f32) -> [f32; C] {
+    let mut mixed = [0.0; C];
+    let mut channel = 0;
+    while channel < C {
+        mixed[channel] = a[channel] + (b[channel] - a[channel]) * share;
+        channel += 1;
+    }
+    mixed
+}
+
+/// Bilinear look-up in `grid[row][column]` of `height` rows and `width` columns, both at least 1. Columns are mixed
+/// first, then rows.
+#[inline]
+pub fn bilinear<const C: usize>(grid: &[[f32; C]], width: u32, height: u32, x: f32, y: f32) -> [f32; C] {
+    let (left, right, share_x) = split(x, width);
+    let (top, bottom, share_y) = split(y, height);
+    let (top, bottom) = (top * width as usize, bottom * width as usize);
+    mix(
+        &mix(&grid[top + left], &grid[top + right], share_x),
+        &mix(&grid[bottom + left], &grid[bottom + right], share_x),
+        share_y,
+    )
+}
+
+/// Trilinear look-up in `grid[slice][row][column]`, `size` = `[columns, rows, slices]`, all at least 1. Columns are mixed
+/// first, then rows, then slices.
+#[inline]
+pub fn trilinear<const C: usize>(grid: &[[f32; C]], size: [u32; 3], x: f32, y: f32, z: f32) -> [f32; C] {
+    let (front, back, share_z) = split(z, size[2]);
+    let slice = (size[0] * size[1]) as usize;
+    mix(
+        &bilinear(&grid[front * slice..(front + 1) * slice], size[0], size[1], x, y),
+        &bilinear(&grid[back * slice..(back + 1) * slice], size[0], size[1], x, y),
+        share_z,
+    )
+}

@@ -1,0 +1,161 @@
+//! Elementary functions with one result on every target.
+//!
+//! `libm` and GPU instructions disagree (a driver's `acos` may be off by 4096 ULP, its `sin` by 2^-11), so the
+//! functions that decide weights and colours are our own range-reduced polynomials in plain `f32` arithmetic: the
+//! same additions and multiplications in the same order everywhere. The polynomials are those of Cephes
+//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics.rs` against `f64`.
+//!
+//! This is the only module that names `libm`, and it takes only the correctly rounded square root from it
+//! (plus `log10` in `f64` for the metrics, which never run on a device).
+
+use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
+
+/// Square root, correctly rounded. Negative input gives NaN.
+#[inline]
+pub fn sqrt(x: f32) -> f32 {
+    libm::sqrtf(x)
+}
+
+/// Decimal logarithm in `f64`, for metrics on the host.
+pub(crate) fn log10(x: f64) -> f64 {
+    libm::log10(x)
+}
+
+/// Absolute value.
+#[inline]
+pub fn abs(x: f32) -> f32 {
+    if x < 0.0 { -x } else { x }
+}
+
+/// Largest whole number not above `x`, as an `i32` (saturating; NaN gives 0).
+#[inline]
+pub fn floor_to_i32(x: f32) -> i32 {
+    let truncated = x as i32;
+    if (truncated as f32) > x { truncated - 1 } else { truncated }
+}
+
+/// Smaller of two numbers; if `a` is NaN the result is `b`.
+#[inline]
+pub fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// Larger of two numbers; if `a` is NaN the result is `b`.
+#[inline]
+pub fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// `x` limited to `[low, high]`; NaN gives `low`.
+#[inline]
+pub fn clamp(x: f32, low: f32, high: f32) -> f32 {
+    min(max(x, low), high)
+}
+
+/// Hermite step: 0 at or below `low`, 1 at or above `high`, `3t² - 2t³` between. `low < high`.
+#[inline]
+pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
+    let t = clamp((x - low) / (high - low), 0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// `e^x`: relative error below 2 ULP for `x` in `[-87.3, 88.7]`; 0 below (no subnormals: devices may flush them),
+/// saturated at `e^88.7` above. NaN gives 0.
+#[inline]
+pub fn exp(x: f32) -> f32 {
+    const LOWEST: f32 = -87.3;
+    const HIGHEST: f32 = 88.7;
+    // ln 2 in two parts: the first has few enough bits that its product with the whole number is exact.
+    const LN_2_HIGH: f32 = 0.693_359_4;
+    const LN_2_LOW: f32 = -2.121_944_4e-4;
+    if !(x >= LOWEST) {
+        return 0.0;
+    }
+    let x = min(x, HIGHEST);
+    let power = floor_to_i32(x * LOG2_E + 0.5);
+    let k = power as f32;
+    let r = (x - k * LN_2_HIGH) - k * LN_2_LOW;
+    let p = 1.987_569_1e-4;
+    let p = p * r + 1.398_2e-3;
+    let p = p * r + 8.333_452e-3;
+    let p = p * r + 4.166_579_6e-2;
+    let p = p * r + 1.666_666_5e-1;
+    let p = p * r + 5.000_000_3e-1;
+    let e = p * (r * r) + r + 1.0;
+    // 2^power as a product of two normal numbers: power reaches 128.
+    let half = power / 2;
+    e * exact_power_of_two(half) * exact_power_of_two(power - half)
+}
+
+/// `2^k` exactly, for `k` in `[-126, 127]`.
+#[inline]
+pub fn exact_power_of_two(k: i32) -> f32 {
+    f32::from_bits(((k + 127) as u32) << 23)
+}
+
+/// Sine and cosine of an angle in radians: absolute error below 1.2e-7 for `|x| <= 8192`. Beyond that the argument
+/// itself is too coarse to mean much; the results stay in `[-1, 1]`. A non-finite angle gives `(0, 1)`.
+#[inline]
+pub fn sin_cos(x: f32) -> (f32, f32) {
+    // pi / 2 in three parts (Cody and Waite); the products with the first two are exact for |k| < 2^13.
+    const FIRST: f32 = 1.570_312_5;
+    const SECOND: f32 = 4.837_513e-4;
+    const THIRD: f32 = 7.549_789_4e-8;
+    let finite = abs(x) <= f32::MAX;
+    let x = if finite { x } else { 0.0 };
+    let quadrant = floor_to_i32(x * (2.0 / PI) + 0.5);
+    let k = quadrant as f32;
+    let r = clamp(((x - k * FIRST) - k * SECOND) - k * THIRD, -FRAC_PI_4, FRAC_PI_4);
+    let z = r * r;
+    let sin = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * r + r;
+    let cos = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
+    match quadrant & 3 {
+        0 => (sin, cos),
+        1 => (cos, -sin),
+        2 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
+}
+
+/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`: relative error below 3 ULP.
+/// `(0, 0)` gives 0. This form is exact at 0 and pi, where `acos` of a dot product loses half of the digits.
+#[inline]
+pub fn angle_from_components(y: f32, x: f32) -> f32 {
+    let far = abs(x);
+    if y <= 0.0 && x >= 0.0 {
+        return 0.0;
+    }
+    let (ratio, swapped) = if y > far { (far / y, true) } else { (y / far, false) };
+    let first_octant = arc_tangent_of_unit(ratio);
+    let acute = if swapped { FRAC_PI_2 - first_octant } else { first_octant };
+    if x < 0.0 { PI - acute } else { acute }
+}
+
+/// Arc tangent for an argument in `[0, 1]`.
+#[inline]
+fn arc_tangent_of_unit(x: f32) -> f32 {
+    const TAN_PI_8: f32 = 0.414_213_57;
+    let (offset, r) = if x > TAN_PI_8 { (FRAC_PI_4, (x - 1.0) / (x + 1.0)) } else { (0.0, x) };
+    let z = r * r;
+    let p = ((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
+    offset + (p * z * r + r)
+}
+
+/// `ln 2`, for callers that turn half-lives into rates.
+pub const NATURAL_LOG_OF_TWO: f32 = LN_2;
+
+/// Euclidean norm of three components without overflow or underflow: the components are divided by the largest
+/// magnitude first. Relative error below 3 ULP; all zero gives 0.
+#[inline]
+pub fn norm3(x: f32, y: f32, z: f32) -> f32 {
+    let largest = max(max(abs(x), abs(y)), abs(z));
+    if largest > 1.0e-15 && largest < 1.0e15 {
+        // Squares neither overflow nor vanish: no scaling, one rounding less.
+        return sqrt(x * x + y * y + z * z);
+    }
+    if !(largest > 0.0) {
+        return 0.0;
+    }
+    let (x, y, z) = (x / largest, y / largest, z / largest);
+    largest * sqrt(x * x + y * y + z * z)
+}

@@ -1,0 +1,85 @@
+//! How good is the picture: PSNR and SSIM of 8-bit images, in `f64`.
+//!
+//! Images are `u8`, `[row][column][channel]`, flat, of equal size. Both metrics are those of scikit-image
+//! (`peak_signal_noise_ratio`, `structural_similarity`), as in the published evaluation.
+
+use crate::math::log10;
+
+/// Mean squared difference in units of 8-bit steps squared. Equal lengths are required; of empty images it is 0.
+pub fn mean_squared_error(prediction: &[u8], truth: &[u8]) -> f64 {
+    debug_assert_eq!(prediction.len(), truth.len());
+    let mut sum = 0_u64;
+    let mut i = 0;
+    while i < truth.len() {
+        let difference = prediction[i] as i64 - truth[i] as i64;
+        sum += (difference * difference) as u64;
+        i += 1;
+    }
+    if truth.is_empty() { 0.0 } else { sum as f64 / truth.len() as f64 }
+}
+
+/// Peak signal to noise ratio in decibels for a peak of 255; infinite for equal images.
+pub fn psnr(prediction: &[u8], truth: &[u8]) -> f64 {
+    let error = mean_squared_error(prediction, truth);
+    if error == 0.0 { f64::INFINITY } else { 10.0 * log10(255.0 * 255.0 / error) }
+}
+
+/// Side of SSIM's uniform window.
+pub const SSIM_WINDOW: usize = 7;
+
+/// Mean structural similarity with a uniform 7x7 window, sample covariance (divided by 48) and the constants 0.01 and
+/// 0.03 of a range of 255, over every window that lies inside the image, averaged over the channels. `None` if the
+/// image is smaller than the window.
+pub fn ssim(prediction: &[u8], truth: &[u8], width: usize, height: usize, channel_count: usize) -> Option<f64> {
+    debug_assert!(prediction.len() == truth.len() && truth.len() == width * height * channel_count);
+    if width < SSIM_WINDOW || height < SSIM_WINDOW || channel_count == 0 {
+        return None;
+    }
+    let mut total = 0.0;
+    let mut channel = 0;
+    while channel < channel_count {
+        let mut row = 0;
+        while row + SSIM_WINDOW <= height {
+            let mut column = 0;
+            while column + SSIM_WINDOW <= width {
+                total += window_similarity(prediction, truth, width, channel_count, [row, column, channel]);
+                column += 1;
+            }
+            row += 1;
+        }
+        channel += 1;
+    }
+    let window_count = (width - SSIM_WINDOW + 1) * (height - SSIM_WINDOW + 1) * channel_count;
+    Some(total / window_count as f64)
+}
+
+/// SSIM of the window whose top left corner is `[row, column]`, in one channel. The sums are whole numbers, hence exact.
+fn window_similarity(prediction: &[u8], truth: &[u8], width: usize, channel_count: usize, at: [usize; 3]) -> f64 {
+    const COUNT: f64 = (SSIM_WINDOW * SSIM_WINDOW) as f64;
+    const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
+    const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
+    let (mut sum_p, mut sum_t, mut sum_pp, mut sum_tt, mut sum_pt) = (0_u32, 0_u32, 0_u32, 0_u32, 0_u32);
+    let mut row = at[0];
+    while row < at[0] + SSIM_WINDOW {
+        let mut column = at[1];
+        while column < at[1] + SSIM_WINDOW {
+            let i = (row * width + column) * channel_count + at[2];
+            let (p, t) = (prediction[i] as u32, truth[i] as u32);
+            sum_p += p;
+            sum_t += t;
+            sum_pp += p * p;
+            sum_tt += t * t;
+            sum_pt += p * t;
+            column += 1;
+        }
+        row += 1;
+    }
+    let (mean_p, mean_t) = (sum_p as f64 / COUNT, sum_t as f64 / COUNT);
+    let covariance = |sum: u32, a: f64, b: f64| (sum as f64 - COUNT * a * b) / (COUNT - 1.0);
+    let variance_p = covariance(sum_pp, mean_p, mean_p);
+    let variance_t = covariance(sum_tt, mean_t, mean_t);
+    let covariance_pt = covariance(sum_pt, mean_p, mean_t);
+    let numerator = (2.0 * mean_p * mean_t + C1) * (2.0 * covariance_pt + C2);
+    let denominator = (mean_p * mean_p + mean_t * mean_t + C1) * (variance_p + variance_t + C2);
+    numerator / denominator
+}

@@ -1,0 +1,34 @@
+//! Counter-based random numbers: the same on every device, in any order of evaluation.
+//!
+//! Threefry-2x32 with 20 rounds (Salmon, Moraes, Dror, Shaw: "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
+//! only 32-bit additions, rotations and exclusive-ors, which every GPU and microcontroller has. The key is the run's
+//! seed, the counter says which number it is: `(pixel, sample)`.
+
+/// Two random words for a key and a counter (Threefry-2x32-20).
+#[inline]
+pub fn threefry_2x32(key: [u32; 2], counter: [u32; 2]) -> [u32; 2] {
+    const PARITY: u32 = 0x1bd1_1bda;
+    const ROTATIONS: [u32; 8] = [13, 15, 26, 6, 17, 29, 16, 24];
+    let schedule = [key[0], key[1], PARITY ^ key[0] ^ key[1]];
+    let mut x = counter[0].wrapping_add(schedule[0]);
+    let mut y = counter[1].wrapping_add(schedule[1]);
+    let mut round = 0;
+    while round < 20 {
+        x = x.wrapping_add(y);
+        y = y.rotate_left(ROTATIONS[round % 8]) ^ x;
+        round += 1;
+        if round % 4 == 0 {
+            let injection = round / 4;
+            x = x.wrapping_add(schedule[injection % 3]);
+            y = y.wrapping_add(schedule[(injection + 1) % 3]).wrapping_add(injection as u32);
+        }
+    }
+    [x, y]
+}
+
+/// A number in `[0, 1)`, a multiple of `2^-24`, for a seed, a pixel (flat row-major index) and a sample.
+#[inline]
+pub fn uniform(seed: u64, pixel: u32, sample: u32) -> f32 {
+    let words = threefry_2x32([seed as u32, (seed >> 32) as u32], [pixel, sample]);
+    (words[0] >> 8) as f32 * (1.0 / 16_777_216.0)
+}

@@ -1,0 +1,59 @@
+//! The poses of the source views.
+
+use crate::pose::Pose;
+
+/// Why poses can not be sources.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SourcesError {
+    /// There is no source at all.
+    Empty,
+    /// There are more sources than the capacity.
+    TooMany {
+        /// How many were given.
+        count: u32,
+        /// How many fit.
+        capacity: u32,
+    },
+}
+
+/// Between one and `S` source poses, in the order of the views.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sources<const S: usize> {
+    poses: [Pose; S],
+    count: u32,
+}
+
+impl<const S: usize> Sources<S> {
+    /// The poses of the source views; their order is the order of every weight that comes from them.
+    ///
+    /// # Errors
+    /// [`SourcesError`] if there are none, or more than `S`.
+    pub fn new(poses: &[Pose]) -> Result<Sources<S>, SourcesError> {
+        const { assert!(S > 0) };
+        if poses.is_empty() {
+            return Err(SourcesError::Empty);
+        }
+        if poses.len() > S {
+            return Err(SourcesError::TooMany { count: poses.len() as u32, capacity: S as u32 });
+        }
+        let mut sources = Sources { poses: [Pose::IDENTITY; S], count: poses.len() as u32 };
+        let mut view = 0;
+        while view < poses.len() {
+            sources.poses[view] = poses[view];
+            view += 1;
+        }
+        Ok(sources)
+    }
+
+    /// How many sources there are: at least 1, at most `S`.
+    #[inline]
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// The pose of one source, `view < count`.
+    #[inline]
+    pub fn pose(&self, view: u32) -> &Pose {
+        &self.poses[view as usize]
+    }
+}

@@ -1,0 +1,182 @@
+//! How much each source view counts: a point of the probability simplex.
+//!
+//! [`Weights`] can not hold anything but finite, non-negative numbers that sum to 1. Whatever goes in, also NaN,
+//! infinities or all zeros, comes out as such numbers, by rules that every constructor states.
+
+use crate::math::{exp, max, min};
+
+/// Weights of up to `S` source views. Values at and beyond [`Weights::count`] are 0.
+///
+/// Invariant: every value is finite and at least 0, and the sum (in view order) is 1 to within `S * 2^-24`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Weights<const S: usize> {
+    values: [f32; S],
+    count: u32,
+}
+
+/// The outcome of leaving views out; see [`Weights::without_least`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Omission<const S: usize> {
+    /// The weights that remain, renormalised; views left out have weight 0.
+    pub weights: Weights<S>,
+    /// Sum of the weights that were left out.
+    pub omitted_weight: f32,
+    /// How many views with a weight above 0 were left out.
+    pub omitted_count: u32,
+}
+
+impl<const S: usize> Omission<S> {
+    /// Bound on the change of any weighted sum over the views whose inputs lie in an interval of length `range`.
+    ///
+    /// With omitted weight `d`, the sum changes by `d * (mean of the omitted - mean of the kept)`, hence by at most
+    /// `d * range`. For sums that are renormalised over the views that see a point, divide by the total weight of
+    /// those views; a change never exceeds `range`.
+    pub fn bound(&self, range: f32) -> f32 {
+        min(self.omitted_weight, 1.0) * range
+    }
+}
+
+impl<const S: usize> Weights<S> {
+    /// Every view counts the same. `count` is limited to `[1, S]`.
+    pub fn mean(count: u32) -> Weights<S> {
+        Weights::from_scores(&[1.0; S], count)
+    }
+
+    /// Proportional to non-negative scores. A score that is NaN, negative or infinite counts as 0 (an infinite one as
+    /// the largest finite number); if none is positive, every view counts the same. `count` is limited to `[1, S]`.
+    pub fn from_scores(scores: &[f32; S], count: u32) -> Weights<S> {
+        const { assert!(S > 0) };
+        let count = count.clamp(1, S as u32);
+        // Dividing by the largest first keeps the sum finite and the largest quotient exactly 1.
+        let mut largest = 0.0;
+        let mut view = 0;
+        while view < count as usize {
+            largest = max(usable(scores[view]), largest);
+            view += 1;
+        }
+        let mut values = [0.0; S];
+        let mut sum = 0.0;
+        view = 0;
+        while view < count as usize {
+            values[view] = if largest > 0.0 { usable(scores[view]) / largest } else { 1.0 };
+            sum += values[view];
+            view += 1;
+        }
+        view = 0;
+        while view < count as usize {
+            values[view] /= sum;
+            view += 1;
+        }
+        Weights { values, count }
+    }
+
+    /// Inversely proportional to non-negative errors.
+    ///
+    /// Evaluated as `smallest / error`, which neither overflows nor divides by zero: if some errors are exactly 0,
+    /// those views share all the weight (the limit). An error that is NaN, negative or infinite counts as infinite.
+    pub fn from_errors(errors: &[f32; S], count: u32) -> Weights<S> {
+        let count = count.clamp(1, S as u32);
+        let mut smallest = f32::INFINITY;
+        let mut view = 0;
+        while view < count as usize {
+            if errors[view] >= 0.0 {
+                smallest = min(errors[view], smallest);
+            }
+            view += 1;
+        }
+        let mut scores = [0.0; S];
+        view = 0;
+        while view < count as usize {
+            let error = errors[view];
+            scores[view] = if error == smallest {
+                1.0
+            } else if error > smallest {
+                smallest / error
+            } else {
+                0.0
+            };
+            view += 1;
+        }
+        Weights::from_scores(&scores, count)
+    }
+
+    /// Softmax of logits, the largest subtracted first. A NaN logit counts as minus infinity; several that are plus
+    /// infinity share all the weight.
+    pub fn from_logits(logits: &[f32; S], count: u32) -> Weights<S> {
+        let count = count.clamp(1, S as u32);
+        let mut largest = f32::NEG_INFINITY;
+        let mut view = 0;
+        while view < count as usize {
+            largest = max(logits[view], largest);
+            view += 1;
+        }
+        let mut scores = [0.0; S];
+        view = 0;
+        while view < count as usize {
+            // Equality first: infinity minus infinity is NaN.
+            scores[view] = if logits[view] == largest { 1.0 } else { exp(logits[view] - largest) };
+            view += 1;
+        }
+        Weights::from_scores(&scores, count)
+    }
+
+    /// How many views there are, those with weight 0 included.
+    #[inline]
+    pub fn count(&self) -> u32 {
+        self.count
+    }
+
+    /// All values in view order; 0 at and beyond [`Weights::count`].
+    #[inline]
+    pub fn values(&self) -> &[f32; S] {
+        &self.values
+    }
+
+    /// The weight of one view; `view < S`.
+    #[inline]
+    pub fn get(&self, view: u32) -> f32 {
+        self.values[view as usize]
+    }
+
+    /// Leaves out views of least weight whose weights together stay at or below `total`, and renormalises the rest.
+    ///
+    /// Views go in order of increasing weight, of equal weights the later one first. The view of largest weight
+    /// always stays. `total` is meant to lie in `[0, 1)`; at 0 or NaN only views of weight 0 are left out, which
+    /// changes nothing.
+    pub fn without_least(&self, total: f32) -> Omission<S> {
+        let mut kept = self.values;
+        let mut kept_count = 0;
+        let mut view = 0;
+        while view < self.count as usize {
+            kept_count += (kept[view] > 0.0) as u32;
+            view += 1;
+        }
+        let mut omitted_weight = 0.0;
+        let mut omitted_count = 0;
+        while kept_count > 1 {
+            let mut least = S;
+            view = 0;
+            while view < self.count as usize {
+                if kept[view] > 0.0 && (least == S || kept[view] <= kept[least]) {
+                    least = view;
+                }
+                view += 1;
+            }
+            if !(omitted_weight + kept[least] <= total) {
+                break;
+            }
+            omitted_weight += kept[least];
+            kept[least] = 0.0;
+            kept_count -= 1;
+            omitted_count += 1;
+        }
+        let weights = if omitted_count == 0 { *self } else { Weights::from_scores(&kept, self.count) };
+        Omission { weights, omitted_weight, omitted_count }
+    }
+}
+
+/// A score as a finite number that is not negative. NaN fails the first comparison and becomes 0.
+#[inline]
+fn usable(score: f32) -> f32 {
+    min(max(score, 0.0), f32::MAX)
+}
