@@ -130,20 +130,26 @@ fn distances<const S: usize>(sources: &Sources<S>, target: &Pose) -> ([f32; S], 
 }
 
 fn error_weights<const S: usize>(sources: &Sources<S>, target: &Pose, alpha: f32, angle: AngleKind) -> Weights<S> {
-    let (mut errors, largest) = distances(sources, target);
+    // A term whose factor is 0 is left out: it can change nothing.
+    let (mut errors, largest) = if alpha < 1.0 { distances(sources, target) } else { ([0.0; S], 0.0) };
     let mut view = 0;
     while view < sources.count() {
         let source = sources.pose(view);
-        let radians = match angle {
-            AngleKind::PrincipalAxis => source.axis_angle(target),
-            AngleKind::FullRotation => source.rotation_angle(target),
-        };
         // All centres at the target's: the published 0 / 0 is a distance term of 0.
         let translation = if largest > 0.0 { errors[view as usize] / largest } else { 0.0 };
-        errors[view as usize] = alpha * (radians * FRAC_1_PI) + (1.0 - alpha) * translation + ERROR_OFFSET;
+        let rotation = if alpha > 0.0 { angle_between(source, target, angle) * FRAC_1_PI } else { 0.0 };
+        errors[view as usize] = alpha * rotation + (1.0 - alpha) * translation + ERROR_OFFSET;
         view += 1;
     }
     Weights::from_errors(&errors, sources.count())
+}
+
+/// Angle between two cameras in radians, in `[0, pi]`.
+fn angle_between(source: &Pose, target: &Pose, kind: AngleKind) -> f32 {
+    match kind {
+        AngleKind::PrincipalAxis => source.axis_angle(target),
+        AngleKind::FullRotation => source.rotation_angle(target),
+    }
 }
 
 fn inverse_distance<const S: usize>(sources: &Sources<S>, target: &Pose, power: u32) -> Weights<S> {
