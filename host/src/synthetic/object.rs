@@ -1,0 +1,93 @@
+//! Objects: primitives, placed and painted. Their union is the minimum of their distances.
+
+use crate::synthetic::placement::Placement;
+use crate::synthetic::shape::Shape;
+use crate::synthetic::texture::Finish;
+use viewfuse_core::Vec3;
+use viewfuse_core::math::{max, min};
+
+/// One primitive of an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Part {
+    /// Its form.
+    pub shape: Shape,
+    /// Where it stands.
+    pub placement: Placement,
+    /// What it looks like.
+    pub finish: Finish,
+}
+
+/// Why parts are not an object. Parts count from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ObjectError {
+    /// There is nothing to see.
+    #[error("the object has no parts")]
+    Empty,
+    /// A size is not positive and finite, or a rounding is larger than what it rounds.
+    #[error("part {part} has an unusable size or rounding")]
+    Shape {
+        /// Which part.
+        part: usize,
+    },
+    /// A part's place is not finite.
+    #[error("part {part} is not at a finite place")]
+    Place {
+        /// Which part.
+        part: usize,
+    },
+}
+
+/// A union of parts, checked when built.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Object {
+    parts: Vec<Part>,
+    bounding_radius: f32,
+}
+
+impl Object {
+    /// The union of these parts. Where two surfaces coincide, the earlier part shows.
+    ///
+    /// # Errors
+    /// [`ObjectError`] if there is no part, or names the first one with an unusable size or place.
+    pub fn new(parts: Vec<Part>) -> Result<Object, ObjectError> {
+        if parts.is_empty() {
+            return Err(ObjectError::Empty);
+        }
+        let mut bounding_radius = 0.0;
+        for (index, part) in parts.iter().enumerate() {
+            if !part.shape.is_sound() {
+                return Err(ObjectError::Shape { part: index });
+            }
+            if !part.placement.origin_world().is_finite() {
+                return Err(ObjectError::Place { part: index });
+            }
+            let reach = part.placement.origin_world().length() + part.shape.bounding_radius();
+            bounding_radius = max(bounding_radius, reach);
+        }
+        Ok(Object { parts, bounding_radius })
+    }
+
+    /// The parts, in the order given.
+    pub fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    /// Radius of a ball around the world's origin that holds the object.
+    pub fn bounding_radius(&self) -> f32 {
+        self.bounding_radius
+    }
+
+    /// Signed distance (world units) from a world point to the object, limited to `most`; a lower bound of it inside
+    /// overlapping parts and beside ellipsoids. Parts farther than `most` cost next to nothing.
+    pub fn distance(&self, point_world: Vec3, most: f32) -> f32 {
+        let mut nearest = most;
+        for part in &self.parts {
+            let offset = point_world - part.placement.origin_world();
+            let reach = part.shape.bounding_radius() + max(nearest, 0.0);
+            if offset.dot(offset) < reach * reach {
+                nearest = min(nearest, part.shape.distance(part.placement.rotate_to_local(offset)));
+            }
+        }
+        nearest
+    }
+}
