@@ -6,6 +6,10 @@ use crate::synthetic::texture::Finish;
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{max, min};
 
+/// Farthest that a part may reach from the world's origin: coordinates there are exact to about the distance at which a
+/// ray counts as arrived.
+pub const LARGEST_DISTANCE: f32 = 100.0;
+
 /// One primitive of an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
@@ -29,8 +33,14 @@ pub enum ObjectError {
         /// Which part.
         part: usize,
     },
-    /// A part's place is not finite.
-    #[error("part {part} is not at a finite place")]
+    /// A colour, a gloss or a texture's size is not usable.
+    #[error("part {part} has an unusable colour, gloss or texture size")]
+    Finish {
+        /// Which part.
+        part: usize,
+    },
+    /// A part's place is not finite or farther away than [`LARGEST_DISTANCE`].
+    #[error("part {part} is not within {LARGEST_DISTANCE} of the origin")]
     Place {
         /// Which part.
         part: usize,
@@ -41,6 +51,9 @@ pub enum ObjectError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     parts: Vec<Part>,
+    /// Of each part, around its own origin.
+    bounding_radii: Vec<f32>,
+    /// Of all together, around the world's origin.
     bounding_radius: f32,
 }
 
@@ -48,28 +61,38 @@ impl Object {
     /// The union of these parts. Where two surfaces coincide, the earlier part shows.
     ///
     /// # Errors
-    /// [`ObjectError`] if there is no part, or names the first one with an unusable size or place.
+    /// [`ObjectError`] if there is no part, or names the first one with an unusable size, finish or place.
     pub fn new(parts: Vec<Part>) -> Result<Object, ObjectError> {
         if parts.is_empty() {
             return Err(ObjectError::Empty);
         }
         let mut bounding_radius = 0.0;
+        let mut bounding_radii = Vec::with_capacity(parts.len());
         for (index, part) in parts.iter().enumerate() {
             if !part.shape.is_sound() {
                 return Err(ObjectError::Shape { part: index });
             }
-            if !part.placement.origin_world().is_finite() {
-                return Err(ObjectError::Place { part: index });
+            if !part.finish.is_sound() {
+                return Err(ObjectError::Finish { part: index });
             }
             let reach = part.placement.origin_world().length() + part.shape.bounding_radius();
+            if !(reach <= LARGEST_DISTANCE) {
+                return Err(ObjectError::Place { part: index });
+            }
             bounding_radius = max(bounding_radius, reach);
+            bounding_radii.push(part.shape.bounding_radius());
         }
-        Ok(Object { parts, bounding_radius })
+        Ok(Object { parts, bounding_radii, bounding_radius })
     }
 
     /// The parts, in the order given.
     pub fn parts(&self) -> &[Part] {
         &self.parts
+    }
+
+    /// The parts, each with the radius of a ball around its own origin that holds it.
+    pub fn bounded_parts(&self) -> impl Iterator<Item = (&Part, f32)> {
+        self.parts.iter().zip(self.bounding_radii.iter().copied())
     }
 
     /// Radius of a ball around the world's origin that holds the object.
@@ -81,9 +104,9 @@ impl Object {
     /// overlapping parts and beside ellipsoids. Parts farther than `most` cost next to nothing.
     pub fn distance(&self, point_world: Vec3, most: f32) -> f32 {
         let mut nearest = most;
-        for part in &self.parts {
+        for (part, radius) in self.bounded_parts() {
             let offset = point_world - part.placement.origin_world();
-            let reach = part.shape.bounding_radius() + max(nearest, 0.0);
+            let reach = radius + max(nearest, 0.0);
             if offset.dot(offset) < reach * reach {
                 nearest = min(nearest, part.shape.distance(part.placement.rotate_to_local(offset)));
             }

@@ -111,7 +111,7 @@ impl Shape {
                 size(radius) && size(half_height) && rounding >= 0.0 && rounding <= min(radius, half_height)
             }
             Shape::Torus { ring_radius, tube_radius } => size(ring_radius) && size(tube_radius),
-            Shape::Capsule { half_length, radius } => size(radius) && half_length >= 0.0 && half_length <= f32::MAX,
+            Shape::Capsule { half_length, radius } => size(radius) && (0.0..=f32::MAX).contains(&half_length),
         }
     }
 }

@@ -8,6 +8,12 @@ use viewfuse_core::Vec3;
 use viewfuse_core::math::{angle_from_components, floor_to_i32, sqrt};
 use viewfuse_core::random::threefry_2x32;
 
+/// Smallest size of a texture's cells, in world units: a hundred times the rounding error of a coordinate.
+pub const SMALLEST_CELL: f32 = 1.0e-5;
+
+/// Most slices of each colour: far more than a picture can show.
+pub const LARGEST_PAIR_COUNT: u32 = 1 << 12;
+
 /// A pattern of two colours, or one colour alone. Sizes are in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Texture {
@@ -68,6 +74,26 @@ pub struct Finish {
     pub texture: Texture,
     /// Strength of the highlight, 0 (matt) to about 0.3 (varnish).
     pub gloss: f32,
+}
+
+impl Finish {
+    /// Whether the gloss is finite and not negative, and the texture's colours and sizes are finite, its sizes at least
+    /// [`SMALLEST_CELL`] and the radius of spots in `(0, 0.5]`.
+    pub fn is_sound(&self) -> bool {
+        let size = |length: f32| (SMALLEST_CELL..=f32::MAX).contains(&length);
+        let both = |colours: [Vec3; 2]| colours[0].is_finite() && colours[1].is_finite();
+        let texture = match self.texture {
+            Texture::Plain { colour } => colour.is_finite(),
+            Texture::Checker { colours, size: edge } => both(colours) && size(edge),
+            Texture::Stripes { colours, across, width } => both(colours) && across.is_finite() && size(width),
+            Texture::Slices { colours, pair_count } => both(colours) && pair_count <= LARGEST_PAIR_COUNT,
+            Texture::Spots { colours, cell, radius, .. } => {
+                both(colours) && size(cell) && radius > 0.0 && radius <= 0.5
+            }
+            Texture::Mottle { colours, cell, .. } => both(colours) && size(cell.x) && size(cell.y) && size(cell.z),
+        };
+        texture && (0.0..=f32::MAX).contains(&self.gloss)
+    }
 }
 
 impl Texture {

@@ -37,9 +37,9 @@ pub struct Hit {
 pub fn trace(object: &Object, ray: &Ray) -> Option<Hit> {
     ball_interval(ray.origin_world, ray.direction_world, object.bounding_radius())?;
     let mut nearest: Option<(f32, usize)> = None;
-    for (index, part) in object.parts().iter().enumerate() {
+    for (index, (part, radius)) in object.bounded_parts().enumerate() {
         let limit = nearest.map_or(f32::MAX, |(distance, _)| distance);
-        if let Some(distance) = march(part, ray, limit) {
+        if let Some(distance) = march(part, radius, ray, limit) {
             nearest = Some((distance, index));
         }
     }
@@ -51,15 +51,17 @@ pub fn trace(object: &Object, ray: &Ray) -> Option<Hit> {
 
 /// Whether anything of `object` lies on `ray`.
 pub fn is_blocked(object: &Object, ray: &Ray) -> bool {
-    object.parts().iter().any(|part| march(part, ray, f32::MAX).is_some())
+    object.bounded_parts().any(|(part, radius)| march(part, radius, ray, f32::MAX).is_some())
 }
 
 /// Distance along the ray to a part's surface, if it is less than `limit`.
-fn march(part: &Part, ray: &Ray, limit: f32) -> Option<f32> {
-    let origin = part.placement.to_local(ray.origin_world);
-    let direction = part.placement.rotate_to_local(ray.direction_world);
-    let (enter, leave) = ball_interval(origin, direction, part.shape.bounding_radius())?;
+fn march(part: &Part, bounding_radius: f32, ray: &Ray, limit: f32) -> Option<f32> {
+    // The ball looks the same from all sides: most parts are passed by without turning the ray into their coordinates.
+    let offset = ray.origin_world - part.placement.origin_world();
+    let (enter, leave) = ball_interval(offset, ray.direction_world, bounding_radius)?;
     let leave = min(leave, limit);
+    let origin = part.placement.rotate_to_local(offset);
+    let direction = part.placement.rotate_to_local(ray.direction_world);
     let mut t = enter;
     for _ in 0..LARGEST_STEP_COUNT {
         if t >= leave {
