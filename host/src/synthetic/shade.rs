@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! light = albedo * (around * openness + lamps) + gloss * highlight
-//! lamps = 0.62 * lit * max(n . key, 0) + 0.2 * max(n . fill, 0)
+//! lamps = KEY_LIGHT * lit * max(n . key, 0) + FILL_LIGHT * max(n . fill, 0)
 //! ```
 //!
 //! The lamps are fixed to the world and infinitely far away. The key lamp casts shadows (`lit` is 0 or 1; supersampling
