@@ -1,0 +1,1 @@
+//! Tests of viewfuse. What several of them share lives here.
