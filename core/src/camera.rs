@@ -133,26 +133,103 @@ impl Camera {
     /// The ray through the continuous image coordinate `(x, y)`; pixel centres are at halves.
     #[inline]
     pub fn ray(&self, x: f32, y: f32) -> Ray {
-        let Pinhole { focal, principal, .. } = self.pinhole;
-        let direction_camera = Vec3::new((x - principal[0]) / focal[0], (y - principal[1]) / focal[1], 1.0);
-        let direction_world = self.pose.rotate_to_world(direction_camera);
+        let direction_world = self.block(0).towards(x, y);
         Ray { origin_world: self.pose.centre_world(), direction_world: direction_world / direction_world.length() }
+    }
+
+    /// Where a world point appears; see [`CameraBlock::project`].
+    #[inline]
+    pub fn project(&self, point_world: Vec3) -> Projection {
+        self.block(0).project(point_world)
+    }
+
+    /// The camera as plain data for kernels. `first_texel` is where its image starts in a buffer of several images.
+    #[inline]
+    pub fn block(&self, first_texel: u32) -> CameraBlock {
+        let (right, down, forward) = (self.pose.right_world(), self.pose.down_world(), self.pose.forward_world());
+        let centre = self.pose.centre_world();
+        let Pinhole { focal, principal, width, height } = self.pinhole;
+        CameraBlock {
+            right: [right.x, right.y, right.z, centre.x],
+            down: [down.x, down.y, down.z, centre.y],
+            forward: [forward.x, forward.y, forward.z, centre.z],
+            intrinsics: [focal[0], focal[1], principal[0], principal[1]],
+            width,
+            height,
+            first_texel,
+            padding: 0,
+        }
+    }
+}
+
+/// A camera as plain data: what a kernel reads from a buffer. Made from a checked [`Camera`] by [`Camera::block`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct CameraBlock {
+    /// The camera's x axis in world coordinates; behind it the centre's x.
+    pub right: [f32; 4],
+    /// The camera's y axis in world coordinates; behind it the centre's y.
+    pub down: [f32; 4],
+    /// The principal axis in world coordinates; behind it the centre's z.
+    pub forward: [f32; 4],
+    /// Focal lengths x, y and principal point x, y, in pixels.
+    pub intrinsics: [f32; 4],
+    /// Width of the image in pixels, at least 1.
+    pub width: u32,
+    /// Height of the image in pixels, at least 1.
+    pub height: u32,
+    /// Index of the image's first texel in a buffer of several images.
+    pub first_texel: u32,
+    /// Zero.
+    pub padding: u32,
+}
+
+const _: () = assert!(size_of::<CameraBlock>() == 80);
+
+impl CameraBlock {
+    /// The camera's centre in world coordinates.
+    #[inline]
+    pub fn centre_world(&self) -> Vec3 {
+        Vec3::new(self.right[3], self.down[3], self.forward[3])
+    }
+
+    /// The world direction from the centre through the image coordinate `(x, y)`, of length such that its component
+    /// along the principal axis is 1: the point at camera depth `z` is `centre + z * towards(x, y)`.
+    #[inline]
+    pub fn towards(&self, x: f32, y: f32) -> Vec3 {
+        let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;
+        let (across, below) = ((x - principal_x) / focal_x, (y - principal_y) / focal_y);
+        axis(&self.right) * across + axis(&self.down) * below + axis(&self.forward)
     }
 
     /// Where a world point appears. Points at or behind the camera's plane are masked (`in_front` is false, the
     /// coordinates are 0) instead of being mirrored into the image, and never divide by zero.
     #[inline]
     pub fn project(&self, point_world: Vec3) -> Projection {
-        let Pinhole { focal, principal, width, height } = self.pinhole;
-        let p = self.pose.to_camera(point_world);
+        let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;
+        let offset = point_world - self.centre_world();
+        let depth = axis(&self.forward).dot(offset);
         // The smallest depth whose reciprocal and products stay finite for any point that is worth looking at.
-        if !(p.z > 1.0e-20) {
-            return Projection { x: 0.0, y: 0.0, depth: p.z, in_front: false, in_image: false };
+        if !(depth > 1.0e-20) {
+            return Projection { x: 0.0, y: 0.0, depth, in_front: false, in_image: false };
         }
-        let inverse_depth = 1.0 / p.z;
-        let x = focal[0] * (p.x * inverse_depth) + principal[0];
-        let y = focal[1] * (p.y * inverse_depth) + principal[1];
-        let in_image = x >= 0.0 && y >= 0.0 && x <= width as f32 && y <= height as f32;
-        Projection { x, y, depth: p.z, in_front: true, in_image }
+        let inverse_depth = 1.0 / depth;
+        let x = focal_x * (axis(&self.right).dot(offset) * inverse_depth) + principal_x;
+        let y = focal_y * (axis(&self.down).dot(offset) * inverse_depth) + principal_y;
+        let in_image = x >= 0.0 && y >= 0.0 && x <= self.width as f32 && y <= self.height as f32;
+        Projection { x, y, depth, in_front: true, in_image }
     }
+
+    /// Index in the texel buffer of the pixel that contains an image coordinate inside the image.
+    #[inline]
+    pub fn texel_at(&self, x: f32, y: f32) -> usize {
+        let column = (x as u32).min(self.width - 1);
+        let row = (y as u32).min(self.height - 1);
+        (self.first_texel + row * self.width + column) as usize
+    }
+}
+
+#[inline]
+fn axis(row: &[f32; 4]) -> Vec3 {
+    Vec3::new(row[0], row[1], row[2])
 }

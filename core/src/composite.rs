@@ -6,7 +6,7 @@
 //! 1.3 % at 1e-6), and the weights telescope to `1 - T_end`. Exclusive: a sample does not shade itself (in published
 //! GeNVS it does).
 
-use crate::math::exp;
+use crate::math::{exp, max};
 
 /// A ray on its way from the camera: accumulates `C` channels and the depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,26 @@ impl<const C: usize> Compositor<C> {
         }
         // The sum is kept, not the product of exponentials: it loses nothing when the summands are small.
         self.optical_depth += optical_depth;
-        let behind = exp(-self.optical_depth);
+        self.pass(channels, exp(-self.optical_depth), depth)
+    }
+
+    /// Adds the next sample of a *solid* with a soft boundary, front to back: the ray's opacity becomes at least the
+    /// sample's occupancy in `[0, 1]` (NaN counts as 0). Returns the sample's weight.
+    ///
+    /// This is the volume rendering of nested solids, one for each level of occupancy: the transmittance is 1 minus
+    /// the largest occupancy met, whatever the step, where a density would depend on it. For one ray use either this
+    /// or [`Compositor::add`].
+    #[inline]
+    pub fn add_solid(&mut self, channels: &[f32; C], occupancy: f32, depth: f32) -> f32 {
+        if !(1.0 - occupancy < self.transmittance) {
+            return 0.0;
+        }
+        self.pass(channels, max(1.0 - occupancy, 0.0), depth)
+    }
+
+    /// Adds a sample behind which the transmittance is `behind`.
+    #[inline]
+    fn pass(&mut self, channels: &[f32; C], behind: f32, depth: f32) -> f32 {
         let weight = self.transmittance - behind;
         self.transmittance = behind;
         let mut channel = 0;

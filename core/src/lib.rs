@@ -31,6 +31,7 @@ pub mod fuse;
 pub mod lookup;
 pub mod math;
 pub mod metrics;
+pub mod photo;
 pub mod pose;
 pub mod random;
 pub mod sources;

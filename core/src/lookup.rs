@@ -6,9 +6,9 @@
 
 use crate::math::{clamp, floor_to_i32};
 
-/// One axis of a look-up: the two nodes and the share of the second.
+/// One axis of a look-up among `count` nodes: the two nodes around a coordinate and the share of the second.
 #[inline]
-fn split(coordinate: f32, count: u32) -> (usize, usize, f32) {
+pub fn split(coordinate: f32, count: u32) -> (usize, usize, f32) {
     let last = (count - 1) as f32;
     let position = clamp(coordinate - 0.5, 0.0, last);
     let lower = floor_to_i32(position) as usize;
@@ -31,9 +31,22 @@ fn mix<const C: usize>(a: &[f32; C], b: &[f32; C], share: f32) -> [f32; C] {
 /// first, then rows.
 #[inline]
 pub fn bilinear<const C: usize>(grid: &[[f32; C]], width: u32, height: u32, x: f32, y: f32) -> [f32; C] {
+    bilinear_from(grid, 0, width, height, x, y)
+}
+
+/// As [`bilinear`], in a grid whose first node is `grid[first]`: one of several in a buffer.
+#[inline]
+pub fn bilinear_from<const C: usize>(
+    grid: &[[f32; C]],
+    first: usize,
+    width: u32,
+    height: u32,
+    x: f32,
+    y: f32,
+) -> [f32; C] {
     let (left, right, share_x) = split(x, width);
     let (top, bottom, share_y) = split(y, height);
-    let (top, bottom) = (top * width as usize, bottom * width as usize);
+    let (top, bottom) = (first + top * width as usize, first + bottom * width as usize);
     mix(
         &mix(&grid[top + left], &grid[top + right], share_x),
         &mix(&grid[bottom + left], &grid[bottom + right], share_x),
@@ -48,8 +61,8 @@ pub fn trilinear<const C: usize>(grid: &[[f32; C]], size: [u32; 3], x: f32, y: f
     let (front, back, share_z) = split(z, size[2]);
     let slice = (size[0] * size[1]) as usize;
     mix(
-        &bilinear(&grid[front * slice..(front + 1) * slice], size[0], size[1], x, y),
-        &bilinear(&grid[back * slice..(back + 1) * slice], size[0], size[1], x, y),
+        &bilinear_from(grid, front * slice, size[0], size[1], x, y),
+        &bilinear_from(grid, back * slice, size[0], size[1], x, y),
         share_z,
     )
 }

@@ -121,24 +121,25 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
 /// `(0, 0)` gives 0. This form is exact at 0 and pi, where `acos` of a dot product loses half of the digits.
 #[inline]
 pub fn angle_from_components(y: f32, x: f32) -> f32 {
-    let far = abs(x);
-    if y <= 0.0 && x >= 0.0 {
-        return 0.0;
-    }
-    let (ratio, swapped) = if y > far { (far / y, true) } else { (y / far, false) };
-    let first_octant = arc_tangent_of_unit(ratio);
-    let acute = if swapped { FRAC_PI_2 - first_octant } else { first_octant };
-    if x < 0.0 { PI - acute } else { acute }
-}
-
-/// Arc tangent for an argument in `[0, 1]`.
-#[inline]
-fn arc_tangent_of_unit(x: f32) -> f32 {
     const TAN_PI_8: f32 = 0.414_213_57;
-    let (offset, r) = if x > TAN_PI_8 { (FRAC_PI_4, (x - 1.0) / (x + 1.0)) } else { (0.0, x) };
+    const TAN_3_PI_8: f32 = 2.414_213_7;
+    let far = abs(x);
+    // Three ranges of the acute angle, each brought within pi / 8 of 0 by one division: straight, turned back by
+    // pi / 4, turned back by pi / 2.
+    let steep = y > far * TAN_3_PI_8;
+    let middle = y > far * TAN_PI_8;
+    let (numerator, denominator, offset) = if steep {
+        (-far, y, FRAC_PI_2)
+    } else if middle {
+        (y - far, y + far, FRAC_PI_4)
+    } else {
+        (y, far, 0.0)
+    };
+    let r = if denominator > 0.0 { numerator / denominator } else { 0.0 };
     let z = r * r;
     let p = ((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
-    offset + (p * z * r + r)
+    let acute = offset + (p * z * r + r);
+    if x < 0.0 { PI - acute } else { acute }
 }
 
 /// `ln 2`, for callers that turn half-lives into rates.

@@ -9,7 +9,7 @@
 //! (of `2^-24`) plus, for the Gaussian, `4 beta d^2` of them, because an exponent is only as good as its own rounding;
 //! `tests/numerics.rs` derives the bound and measures it.
 
-use crate::math::{abs, max, min, norm3, sqrt};
+use crate::math::{abs, angle_from_components, max, min, norm3, sqrt};
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
@@ -130,25 +130,48 @@ fn distances<const S: usize>(sources: &Sources<S>, target: &Pose) -> ([f32; S], 
 }
 
 fn error_weights<const S: usize>(sources: &Sources<S>, target: &Pose, alpha: f32, angle: AngleKind) -> Weights<S> {
+    let count = sources.count();
     // A term whose factor is 0 is left out: it can change nothing.
     let (mut errors, largest) = if alpha < 1.0 { distances(sources, target) } else { ([0.0; S], 0.0) };
+    // All centres at the target's: the published 0 / 0 is a distance term of 0.
+    let translation_factor = if largest > 0.0 { (1.0 - alpha) / largest } else { 0.0 };
+    let mut angles = [0.0; S];
+    if alpha > 0.0 {
+        angles_between(sources, target, angle, &mut angles);
+    }
     let mut view = 0;
-    while view < sources.count() {
-        let source = sources.pose(view);
-        // All centres at the target's: the published 0 / 0 is a distance term of 0.
-        let translation = if largest > 0.0 { errors[view as usize] / largest } else { 0.0 };
-        let rotation = if alpha > 0.0 { angle_between(source, target, angle) * FRAC_1_PI } else { 0.0 };
-        errors[view as usize] = alpha * rotation + (1.0 - alpha) * translation + ERROR_OFFSET;
+    while view < count as usize {
+        errors[view] = alpha * (angles[view] * FRAC_1_PI) + translation_factor * errors[view] + ERROR_OFFSET;
         view += 1;
     }
-    Weights::from_errors(&errors, sources.count())
+    Weights::from_errors(&errors, count)
 }
 
-/// Angle between two cameras in radians, in `[0, pi]`.
-fn angle_between(source: &Pose, target: &Pose, kind: AngleKind) -> f32 {
+/// Angles between the sources and the target in radians, in `[0, pi]`.
+fn angles_between<const S: usize>(sources: &Sources<S>, target: &Pose, kind: AngleKind, angles: &mut [f32; S]) {
+    let count = (sources.count() as usize).min(S);
     match kind {
-        AngleKind::PrincipalAxis => source.axis_angle(target),
-        AngleKind::FullRotation => source.rotation_angle(target),
+        AngleKind::PrincipalAxis => {
+            // Two plain loops, so that the arc tangents run as vectors on a CPU.
+            let mut differences = [0.0; S];
+            let mut view = 0;
+            while view < count {
+                (differences[view], angles[view]) = sources.pose(view as u32).axis_chords_squared(target);
+                view += 1;
+            }
+            view = 0;
+            while view < count {
+                angles[view] = 2.0 * angle_from_components(sqrt(differences[view]), sqrt(angles[view]));
+                view += 1;
+            }
+        }
+        AngleKind::FullRotation => {
+            let mut view = 0;
+            while view < count {
+                angles[view] = sources.pose(view as u32).rotation_angle(target);
+                view += 1;
+            }
+        }
     }
 }
 

@@ -62,12 +62,7 @@ impl<const S: usize> Weights<S> {
             sum += values[view];
             view += 1;
         }
-        view = 0;
-        while view < count as usize {
-            values[view] /= sum;
-            view += 1;
-        }
-        Weights { values, count }
+        Weights::from_sum(values, sum, count)
     }
 
     /// Inversely proportional to non-negative errors.
@@ -84,20 +79,17 @@ impl<const S: usize> Weights<S> {
             }
             view += 1;
         }
-        let mut scores = [0.0; S];
+        // The largest score is exactly 1, so the scores need no scaling before they are summed.
+        let mut values = [0.0; S];
+        let mut sum = 0.0;
         view = 0;
         while view < count as usize {
             let error = errors[view];
-            scores[view] = if error == smallest {
-                1.0
-            } else if error > smallest {
-                smallest / error
-            } else {
-                0.0
-            };
+            values[view] = if error > smallest { smallest / error } else { (error == smallest) as u32 as f32 };
+            sum += values[view];
             view += 1;
         }
-        Weights::from_scores(&scores, count)
+        Weights::from_sum(values, sum, count)
     }
 
     /// Softmax of logits, the largest subtracted first. A NaN logit counts as minus infinity; several that are plus
@@ -118,6 +110,16 @@ impl<const S: usize> Weights<S> {
             view += 1;
         }
         Weights::from_scores(&scores, count)
+    }
+
+    /// Finite non-negative values with their sum; if the sum is 0, every view counts the same.
+    fn from_sum(mut values: [f32; S], sum: f32, count: u32) -> Weights<S> {
+        let mut view = 0;
+        while view < count as usize {
+            values[view] = if sum > 0.0 { values[view] / sum } else { 1.0 / count as f32 };
+            view += 1;
+        }
+        Weights { values, count }
     }
 
     /// How many views there are, those with weight 0 included.

@@ -1,0 +1,100 @@
+//! The field that needs no weights file: a solid carved by silhouettes and by photo-consistency, coloured by weighted
+//! fusion of what the views see.
+//!
+//! Four stages, each a few data-parallel kernels; a kernel is a function of one output element.
+//!
+//! ```text
+//! hull     where the silhouettes of all views allow matter      hull_alpha, hull_entry
+//! sweep    how deep each source pixel is: planes are swept      match_cost, sum_row, mean_column, pick_depth
+//!          through the hull, colours compared across views
+//! shade    a point in, occupancy and colour out                 sample
+//! march    a target pixel's ray through the solid               march
+//! ```
+//!
+//! Published ideas: image-based visual hulls (Matusik et al. 2000), plane sweeping with a window (Collins 1996),
+//! visibility-weighted votes (Penner and Zhang, "Soft 3D reconstruction", 2017), truncated signed distances (Curless
+//! and Levoy 1996), blending by relevance (Buehler et al., "Unstructured lumigraph rendering", 2001). The camera
+//! weights enter twice: a source's depth comes from the views most relevant *to that source*, and a target's point is
+//! shaped and coloured by the views most relevant *to the target*.
+//!
+//! Images are premultiplied RGBA in `[0, 1]`, `texels[row][column]` of each view behind one another; maps of depths
+//! have the same order. Depths are along the principal axis. Lengths scale with the scene: a *footprint* is the side of
+//! a pixel of a view at the middle of the object.
+
+pub mod hull;
+pub mod march;
+pub mod shade;
+pub mod sweep;
+
+use glam::Vec3;
+
+/// The depth of a pixel that sees nothing: beyond everything, but finite.
+pub const NO_SURFACE: f32 = 1.0e30;
+
+/// The object and its views as a whole, as plain data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct ObjectBlock {
+    /// Least corner of a box around the object, world coordinates; the fourth number is unused.
+    pub low: [f32; 4],
+    /// Greatest corner of the box.
+    pub high: [f32; 4],
+    /// How many views there are.
+    pub view_count: u32,
+    /// A point must lie inside the images of at least this many views to belong to the object.
+    pub least_containing: u32,
+    /// Half the diagonal of the box, world units.
+    pub radius: f32,
+    /// Zero.
+    pub padding: u32,
+}
+
+const _: () = assert!(size_of::<ObjectBlock>() == 48);
+
+impl ObjectBlock {
+    /// An object inside the box from `low` to `high`, seen by `view_count` views. Half of the views, and at least two,
+    /// must contain a point: some photographs crop the object, but what most do not show is unknown.
+    pub fn new(low: Vec3, high: Vec3, view_count: u32) -> ObjectBlock {
+        ObjectBlock {
+            low: [low.x, low.y, low.z, 0.0],
+            high: [high.x, high.y, high.z, 0.0],
+            view_count,
+            least_containing: view_count.div_ceil(2).max(2),
+            radius: 0.5 * (high - low).length(),
+            padding: 0,
+        }
+    }
+
+    /// The middle of the box.
+    #[inline]
+    pub fn middle(&self) -> Vec3 {
+        Vec3::new(
+            0.5 * (self.low[0] + self.high[0]),
+            0.5 * (self.low[1] + self.high[1]),
+            0.5 * (self.low[2] + self.high[2]),
+        )
+    }
+
+    /// The part of a line inside the box: parameters `(enter, leave)` of `origin + t * direction` with `t >= 0`;
+    /// `enter >= leave` where the line misses it.
+    #[inline]
+    pub fn interval(&self, origin: Vec3, direction: Vec3) -> (f32, f32) {
+        let origin = [origin.x, origin.y, origin.z];
+        let direction = [direction.x, direction.y, direction.z];
+        let (mut enter, mut leave) = (0.0_f32, NO_SURFACE);
+        let mut axis = 0;
+        while axis < 3 {
+            if direction[axis] != 0.0 {
+                let inverse = 1.0 / direction[axis];
+                let first = (self.low[axis] - origin[axis]) * inverse;
+                let second = (self.high[axis] - origin[axis]) * inverse;
+                enter = crate::math::max(crate::math::min(first, second), enter);
+                leave = crate::math::min(crate::math::max(first, second), leave);
+            } else if origin[axis] < self.low[axis] || origin[axis] > self.high[axis] {
+                leave = -1.0;
+            }
+            axis += 1;
+        }
+        (enter, leave)
+    }
+}

@@ -1,0 +1,75 @@
+//! The visual hull: where the silhouettes of all views allow matter.
+
+use super::{NO_SURFACE, ObjectBlock};
+use crate::camera::CameraBlock;
+use crate::lookup::bilinear_from;
+use glam::Vec3;
+
+/// Least alpha at which a pixel can show the object: such a source pixel gets a depth.
+pub const LEAST_ALPHA: f32 = 0.1;
+/// A point of the swept hull must have at least this alpha in every view that contains it.
+pub const SWEPT_ALPHA: f32 = 0.3;
+/// A source ray enters the hull at this alpha: below [`SWEPT_ALPHA`], so that the boundary itself is swept.
+pub const ENTRY_ALPHA: f32 = 0.6 * SWEPT_ALPHA;
+/// Step of the search for the entry, in footprints.
+pub const ENTRY_STEP: f32 = 1.5;
+
+/// Premultiplied colour and alpha that a view shows at an image coordinate.
+#[inline]
+pub fn look_up(view: &CameraBlock, texels: &[[f32; 4]], x: f32, y: f32) -> [f32; 4] {
+    bilinear_from(texels, view.first_texel as usize, view.width, view.height, x, y)
+}
+
+/// How far the silhouettes allow a point to belong to the object: the least alpha over the views that contain it, in
+/// `[0, 1]`. 0 if that falls below `least`, or if too few views contain the point.
+#[inline]
+pub fn hull_alpha(
+    object: &ObjectBlock,
+    views: &[CameraBlock],
+    texels: &[[f32; 4]],
+    point_world: Vec3,
+    least: f32,
+) -> f32 {
+    let mut alpha = 1.0;
+    let mut containing = 0;
+    let mut view = 0;
+    while view < object.view_count as usize {
+        let seen = views[view].project(point_world);
+        if seen.in_image {
+            containing += 1;
+            let here = look_up(&views[view], texels, seen.x, seen.y)[3];
+            if here < alpha {
+                alpha = here;
+                if alpha < least {
+                    return 0.0;
+                }
+            }
+        }
+        view += 1;
+    }
+    if containing < object.least_containing { 0.0 } else { alpha }
+}
+
+/// Depth at which the ray of a source pixel enters the hull; [`NO_SURFACE`] where it misses it or the pixel shows
+/// background. `pixel` is the flat index in the view's image.
+#[inline]
+pub fn hull_entry(object: &ObjectBlock, views: &[CameraBlock], texels: &[[f32; 4]], view: u32, pixel: u32) -> f32 {
+    let camera = &views[view as usize];
+    if texels[(camera.first_texel + pixel) as usize][3] < LEAST_ALPHA {
+        return NO_SURFACE;
+    }
+    let column = pixel % camera.width;
+    let row = pixel / camera.width;
+    let origin = camera.centre_world();
+    let direction = camera.towards(column as f32 + 0.5, row as f32 + 0.5);
+    let (enter, leave) = object.interval(origin, direction);
+    let step = ENTRY_STEP * 0.5 * (enter + leave) / camera.intrinsics[0];
+    let mut depth = enter;
+    while depth < leave {
+        if hull_alpha(object, views, texels, origin + direction * depth, ENTRY_ALPHA) > 0.0 {
+            return depth;
+        }
+        depth += step;
+    }
+    NO_SURFACE
+}

@@ -1,0 +1,50 @@
+//! A target pixel's ray through the solid.
+
+use super::ObjectBlock;
+use super::shade::sample;
+use crate::camera::CameraBlock;
+use crate::composite::{Composite, Compositor};
+use crate::math::{clamp, floor_to_i32};
+
+/// Length of a step, in footprints of the target.
+pub const STEP: f32 = 1.0;
+/// Most steps of a ray.
+pub const MOST_STEPS: u32 = 1024;
+
+/// Colour, depth along the principal axis and opacity of the target's ray through the image coordinate `(x, y)`.
+///
+/// The ray is marched through the object's box in equal steps of at most a footprint; it ends where the transmittance
+/// is at most `settled`, which changes no channel by more than that. The depth of a ray that meets nothing is 0.
+#[inline]
+#[allow(clippy::too_many_arguments)]
+pub fn march(
+    object: &ObjectBlock,
+    views: &[CameraBlock],
+    footprints: &[f32],
+    texels: &[[f32; 4]],
+    depths: &[f32],
+    weights: &[f32],
+    target: &CameraBlock,
+    at: [f32; 2],
+    background: &[f32; 3],
+    settled: f32,
+) -> Composite<3> {
+    let mut ray = Compositor::<3>::START;
+    let origin = target.centre_world();
+    let direction = target.towards(at[0], at[1]);
+    let (enter, leave) = object.interval(origin, direction);
+    if enter < leave {
+        let footprint = 0.5 * (enter + leave) / target.intrinsics[0];
+        let wanted = clamp((leave - enter) / (STEP * footprint), 1.0, (MOST_STEPS - 1) as f32);
+        let step_count = floor_to_i32(wanted) as u32 + 1;
+        let step = (leave - enter) / step_count as f32;
+        let mut index = 0;
+        while index < step_count && !ray.is_settled(settled) {
+            let depth = enter + (index as f32 + 0.5) * step;
+            let here = sample(object, views, footprints, texels, depths, weights, origin + direction * depth);
+            ray.add_solid(&here.colour, here.occupancy, depth);
+            index += 1;
+        }
+    }
+    ray.finish(background, 0.0)
+}

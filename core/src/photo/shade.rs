@@ -1,0 +1,131 @@
+//! A point in, occupancy and colour out.
+
+use super::hull::look_up;
+use super::{NO_SURFACE, ObjectBlock};
+use crate::camera::CameraBlock;
+use crate::fuse::VisibleFusion;
+use crate::lookup::split;
+use crate::math::{abs, exp, max, min};
+use glam::Vec3;
+
+/// Below this hull alpha a point is empty and no more views are asked.
+pub const EMPTY_ALPHA: f32 = 0.02;
+/// Signed distances are cut off at this many footprints to either side of a surface.
+pub const TRUNCATION: f32 = 4.0;
+/// Width of the logistic step from empty to full, in footprints.
+pub const SURFACE_WIDTH: f32 = 0.5;
+/// How far behind a view's surface a point still counts as seen by it, in footprints.
+pub const SEEN_BEHIND: f32 = 3.0;
+/// Neighbouring depths that differ by more than this many footprints belong to different surfaces and are not mixed.
+pub const JUMP: f32 = 4.0;
+/// Share of a view that does not see a point, so that a point seen by none still gets the colour nearest to the truth.
+pub const HIDDEN_SHARE: f32 = 1.0e-4;
+
+/// What the field is at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// How much of the point's surroundings is matter, in `[0, 1]`.
+    pub occupancy: f32,
+    /// Its colour, red green blue in `[0, 1]`.
+    pub colour: [f32; 3],
+}
+
+/// A point outside the object.
+pub const EMPTY: Sample = Sample { occupancy: 0.0, colour: [0.0; 3] };
+
+/// Depth that a view's map has at an image coordinate: bilinear over those of the four depths around it that belong to
+/// the same surface as the one with the greatest share. [`NO_SURFACE`] where the view sees nothing.
+#[inline]
+pub fn depth_at(view: &CameraBlock, depths: &[f32], x: f32, y: f32, jump: f32) -> f32 {
+    let (left, right, share_x) = split(x, view.width);
+    let (top, bottom, share_y) = split(y, view.height);
+    let first = view.first_texel as usize;
+    let (top, bottom) = (first + top * view.width as usize, first + bottom * view.width as usize);
+    let around = [depths[top + left], depths[top + right], depths[bottom + left], depths[bottom + right]];
+    let shares =
+        [(1.0 - share_x) * (1.0 - share_y), share_x * (1.0 - share_y), (1.0 - share_x) * share_y, share_x * share_y];
+    let (mut surface, mut greatest) = (NO_SURFACE, -1.0);
+    let mut nearest = NO_SURFACE;
+    let mut at = 0;
+    while at < 4 {
+        nearest = min(around[at], nearest);
+        if shares[at] > greatest {
+            greatest = shares[at];
+            surface = around[at];
+        }
+        at += 1;
+    }
+    if surface >= NO_SURFACE {
+        surface = nearest;
+        if surface >= NO_SURFACE {
+            return NO_SURFACE;
+        }
+    }
+    let (mut sum, mut share_sum) = (0.0, 0.0);
+    at = 0;
+    while at < 4 {
+        if abs(around[at] - surface) <= jump {
+            sum += shares[at] * around[at];
+            share_sum += shares[at];
+        }
+        at += 1;
+    }
+    if share_sum > 0.0 { sum / share_sum } else { surface }
+}
+
+/// The field at a point, for a target whose relevance weights are `weights[view]`. `depths` are the maps of all views.
+///
+/// Occupancy is the hull's alpha times a logistic step of the weighted mean of truncated signed distances to the views'
+/// surfaces (views far behind whose surface the point lies say nothing about it). Colour is the weighted mean over the
+/// views that see the point, soft in how far it lies behind their surfaces.
+#[inline]
+pub fn sample(
+    object: &ObjectBlock,
+    views: &[CameraBlock],
+    footprints: &[f32],
+    texels: &[[f32; 4]],
+    depths: &[f32],
+    weights: &[f32],
+    point_world: Vec3,
+) -> Sample {
+    let mut hull = 1.0;
+    let mut containing = 0;
+    let (mut distance_sum, mut distance_share) = (0.0, 0.0);
+    let mut fusion = VisibleFusion::<3>::EMPTY;
+    let mut view = 0;
+    while view < object.view_count as usize {
+        let seen = views[view].project(point_world);
+        if seen.in_image {
+            containing += 1;
+            let colour = look_up(&views[view], texels, seen.x, seen.y);
+            let alpha = colour[3];
+            hull = min(alpha, hull);
+            if hull < EMPTY_ALPHA {
+                return EMPTY;
+            }
+            let weight = weights[view];
+            if weight > 0.0 {
+                let footprint = footprints[view];
+                let depth = depth_at(&views[view], depths, seen.x, seen.y, JUMP * footprint);
+                let distance = if depth < NO_SURFACE { (depth - seen.depth) / footprint } else { TRUNCATION };
+                let behind = max(-distance, 0.0);
+                if behind < TRUNCATION {
+                    let share = weight * (1.0 - behind / TRUNCATION);
+                    distance_sum += share * min(distance, TRUNCATION);
+                    distance_share += share;
+                }
+                let visibility = exp(-(behind * behind) / (SEEN_BEHIND * SEEN_BEHIND));
+                let hidden = HIDDEN_SHARE / (1.0 + behind * behind);
+                // Towards a silhouette's edge a view's colour is less its own.
+                let share = weight * alpha * alpha * (visibility + hidden);
+                fusion.add(&[colour[0] / alpha, colour[1] / alpha, colour[2] / alpha], share);
+            }
+        }
+        view += 1;
+    }
+    if containing < object.least_containing {
+        return EMPTY;
+    }
+    let distance = if distance_share > 1.0e-4 { distance_sum / distance_share } else { -TRUNCATION };
+    Sample { occupancy: hull / (1.0 + exp(distance / SURFACE_WIDTH)), colour: fusion.mean_or([0.0; 3]) }
+}

@@ -1,0 +1,293 @@
+//! Depth of a source's pixels: planes swept through the hull, colours compared with the other views.
+//!
+//! Costs are laid out `[row][column][plane]`, planes from near to far, for the band of rows being worked on. A cost is a
+//! mean absolute difference of colour in `[0, MOST_DIFFERENCE]`; a negative one says that the place is outside the hull.
+
+use super::hull::{SWEPT_ALPHA, look_up};
+use super::{NO_SURFACE, ObjectBlock};
+use crate::camera::CameraBlock;
+use crate::math::{abs, clamp, exp, max, min};
+
+/// Largest difference that counts: beyond it, a pixel is simply another thing.
+pub const MOST_DIFFERENCE: f32 = 0.2;
+/// Weight of an imaginary view that mismatches: what no other view can confirm is no match.
+pub const NO_WITNESS: f32 = 0.02;
+/// Spacing of the planes, in footprints of the source.
+pub const PLANE_STEP: f32 = 1.5;
+/// Most planes of a sweep.
+pub const MOST_PLANES: u32 = 128;
+/// Reach of the window over which costs are averaged, in pixels to each side.
+pub const WINDOW_REACH: u32 = 2;
+/// Cost of lying deeper than the entry into the hull, per diameter of the object: among equal matches the nearest.
+pub const DEPTH_COST: f32 = 0.02;
+/// Cost of differing from the neighbours' depths by one footprint...
+pub const ROUGHNESS_COST: f32 = 0.01;
+/// ... and the difference, in footprints, beyond which it grows no more: edges of the object are allowed.
+pub const MOST_ROUGHNESS: f32 = 4.0;
+/// How far behind another view's entry into the hull a point may be seen by it, in radii of the object.
+pub const SEEN_BEHIND_ENTRY: f32 = 0.3;
+/// The cost of a place outside the hull.
+pub const OUTSIDE: f32 = -1.0;
+
+/// One source's sweep, as plain data.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct SweepBlock {
+    /// The source view.
+    pub view: u32,
+    /// How many planes there are.
+    pub plane_count: u32,
+    /// First row of the band.
+    pub first_row: u32,
+    /// Rows in the band.
+    pub row_count: u32,
+    /// Depth of the front of the first plane's cell.
+    pub near: f32,
+    /// Distance of neighbouring planes in depth.
+    pub plane_step: f32,
+    /// A footprint of the source, world units.
+    pub footprint: f32,
+    /// Zero.
+    pub padding: u32,
+}
+
+const _: () = assert!(size_of::<SweepBlock>() == 32);
+
+impl SweepBlock {
+    /// The sweep of `view` through the object's box, over all rows. A footprint is that at the middle of the box.
+    pub fn new(object: &ObjectBlock, camera: &CameraBlock, view: u32) -> SweepBlock {
+        let (mut near, mut far) = (NO_SURFACE, 0.0);
+        let mut corner = 0;
+        while corner < 8 {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { object.low[axis] } else { object.high[axis] };
+            let depth = camera.project(glam::Vec3::new(pick(0), pick(1), pick(2))).depth;
+            near = min(depth, near);
+            far = max(depth, far);
+            corner += 1;
+        }
+        // A camera inside the box starts a hundredth of the object ahead of itself.
+        near = max(near, 0.01 * object.radius);
+        far = max(far, near + 0.01 * object.radius);
+        let footprint = 0.5 * (near + far) / camera.intrinsics[0];
+        let wanted = (far - near) / (PLANE_STEP * footprint);
+        let plane_count = (clamp(wanted, 8.0, (MOST_PLANES - 1) as f32) as u32) + 1;
+        SweepBlock {
+            view,
+            plane_count,
+            first_row: 0,
+            row_count: camera.height,
+            near,
+            plane_step: (far - near) / plane_count as f32,
+            footprint,
+            padding: 0,
+        }
+    }
+
+    /// Depth of a plane.
+    #[inline]
+    pub fn depth(&self, plane: u32) -> f32 {
+        self.near + (plane as f32 + 0.5) * self.plane_step
+    }
+}
+
+/// How badly the other views' colours match a source pixel's at the depth of a plane: a mean of absolute differences,
+/// weighted by `pair_weights[view][other]` (how relevant the other view is to this one; 0 on the diagonal) and by how
+/// likely the other view sees the place. `entries` are the depths of entry into the hull of all views.
+///
+/// [`OUTSIDE`] where the pixel shows background, the place is in front of its ray's entry or outside the hull.
+#[inline]
+#[allow(clippy::too_many_arguments)]
+pub fn match_cost(
+    object: &ObjectBlock,
+    sweep: &SweepBlock,
+    views: &[CameraBlock],
+    texels: &[[f32; 4]],
+    entries: &[f32],
+    pair_weights: &[f32],
+    pixel: u32,
+    plane: u32,
+) -> f32 {
+    let camera = &views[sweep.view as usize];
+    let texel = (camera.first_texel + pixel) as usize;
+    let depth = sweep.depth(plane);
+    // Half a plane in front of the entry still touches the hull.
+    if depth + 0.5 * sweep.plane_step < entries[texel] {
+        return OUTSIDE;
+    }
+    let own = straight(&texels[texel]);
+    let (column, row) = (pixel % camera.width, pixel / camera.width);
+    let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
+    let reach = 1.0 / (SEEN_BEHIND_ENTRY * object.radius);
+    let (mut sum, mut share_sum) = (NO_WITNESS * MOST_DIFFERENCE, NO_WITNESS);
+    let mut containing = 1;
+    let mut other = 0;
+    while other < object.view_count {
+        let seen = views[other as usize].project(point);
+        if other != sweep.view && seen.in_image {
+            containing += 1;
+            let colour = look_up(&views[other as usize], texels, seen.x, seen.y);
+            if colour[3] < SWEPT_ALPHA {
+                return OUTSIDE;
+            }
+            let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
+            let entry = entries[views[other as usize].texel_at(seen.x, seen.y)];
+            let behind = max(seen.depth - entry, 0.0) * reach;
+            // Beyond 2.5 the visibility is below 0.002.
+            if weight > 0.0 && behind < 2.5 {
+                let share = weight * exp(-(behind * behind));
+                sum += share * min(mean_difference(&straight(&colour), &own), MOST_DIFFERENCE);
+                share_sum += share;
+            }
+        }
+        other += 1;
+    }
+    if containing < object.least_containing { OUTSIDE } else { sum / share_sum }
+}
+
+/// Colour of a premultiplied texel. The divisor is kept away from 0; such texels are masked elsewhere.
+#[inline]
+fn straight(texel: &[f32; 4]) -> [f32; 3] {
+    let inverse = 1.0 / max(texel[3], 1.0e-3);
+    [texel[0] * inverse, texel[1] * inverse, texel[2] * inverse]
+}
+
+#[inline]
+fn mean_difference(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    (abs(a[0] - b[0]) + abs(a[1] - b[1]) + abs(a[2] - b[2])) * (1.0 / 3.0)
+}
+
+/// Sum and count of the costs inside the hull over the window's columns, at a pixel of the band (`pixel` counts from
+/// the band's first) and a plane.
+#[inline]
+pub fn sum_row(sweep: &SweepBlock, width: u32, costs: &[f32], pixel: u32, plane: u32) -> [f32; 2] {
+    let column = pixel % width;
+    let first = pixel - min_u32(column, WINDOW_REACH);
+    let last = pixel + min_u32(width - 1 - column, WINDOW_REACH);
+    let (mut sum, mut count) = (0.0, 0.0);
+    let mut at = first;
+    while at <= last {
+        let cost = costs[(at * sweep.plane_count + plane) as usize];
+        if cost >= 0.0 {
+            sum += cost;
+            count += 1.0;
+        }
+        at += 1;
+    }
+    [sum, count]
+}
+
+/// Mean cost over the window from its rows' sums, at a pixel of the band and a plane; [`OUTSIDE`] where the pixel's own
+/// cost is.
+#[inline]
+pub fn mean_column(
+    sweep: &SweepBlock,
+    width: u32,
+    costs: &[f32],
+    row_sums: &[[f32; 2]],
+    pixel: u32,
+    plane: u32,
+) -> f32 {
+    if costs[(pixel * sweep.plane_count + plane) as usize] < 0.0 {
+        return OUTSIDE;
+    }
+    let row = pixel / width;
+    let first = row - min_u32(row, WINDOW_REACH);
+    let last = row + min_u32(sweep.row_count - 1 - row, WINDOW_REACH);
+    let (mut sum, mut count) = (0.0, 0.0);
+    let mut at = first;
+    while at <= last {
+        let [row_sum, row_count] = row_sums[((at * width + pixel % width) * sweep.plane_count + plane) as usize];
+        sum += row_sum;
+        count += row_count;
+        at += 1;
+    }
+    // The pixel itself is in its window: the count is at least 1.
+    sum / count
+}
+
+#[inline]
+fn min_u32(a: u32, b: u32) -> u32 {
+    if a < b { a } else { b }
+}
+
+/// Reach of [`NEIGHBOURS`] in pixels.
+pub const NEIGHBOUR_REACH: u32 = 2;
+/// Where the neighbours are whose depths a pixel's should resemble: columns and rows.
+const NEIGHBOURS: [[i32; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-2, -2], [2, -2], [-2, 2], [2, 2]];
+
+/// Depth of a pixel of the band: of least cost, refined between planes by a parabola.
+///
+/// To the window's mean cost is added a little for lying behind the entry into the hull and, where `guess` holds depths
+/// of the band from an earlier pass (an entry of [`NO_SURFACE`]: none), for differing from the neighbours. `entries` are
+/// those of the band. A pixel that no plane of the hull covers keeps its entry; one without an entry has none.
+#[inline]
+pub fn pick_depth(
+    object: &ObjectBlock,
+    sweep: &SweepBlock,
+    width: u32,
+    means: &[f32],
+    entries: &[f32],
+    guess: &[f32],
+    pixel: u32,
+) -> f32 {
+    let entry = entries[pixel as usize];
+    if entry >= NO_SURFACE {
+        return NO_SURFACE;
+    }
+    let (column, row) = ((pixel % width) as i32, (pixel / width) as i32);
+    let mut around = [0.0; 8];
+    let mut around_count = 0;
+    let mut neighbour = 0;
+    while neighbour < 8 {
+        let (x, y) = (column + NEIGHBOURS[neighbour][0], row + NEIGHBOURS[neighbour][1]);
+        if x >= 0 && y >= 0 && x < width as i32 && y < sweep.row_count as i32 {
+            let depth = guess[(y as u32 * width + x as u32) as usize];
+            if depth < NO_SURFACE {
+                around[around_count] = depth;
+                around_count += 1;
+            }
+        }
+        neighbour += 1;
+    }
+    let (mut best, mut best_plane) = (NO_SURFACE, 0);
+    let (mut before_best, mut after_best) = (NO_SURFACE, NO_SURFACE);
+    let mut previous = NO_SURFACE;
+    let mut plane = 0;
+    while plane < sweep.plane_count {
+        let mean = means[(pixel * sweep.plane_count + plane) as usize];
+        let mut cost = NO_SURFACE;
+        if mean >= 0.0 {
+            let depth = sweep.depth(plane);
+            cost = mean + DEPTH_COST * 0.5 * max(depth - entry, 0.0) / object.radius;
+            let mut roughness = 0.0;
+            let mut at = 0;
+            while at < around_count {
+                roughness += min(abs(depth - around[at]) / sweep.footprint, MOST_ROUGHNESS);
+                at += 1;
+            }
+            cost += ROUGHNESS_COST * roughness / max(around_count as f32, 1.0);
+        }
+        if plane == best_plane + 1 {
+            after_best = cost;
+        }
+        if cost < best {
+            best = cost;
+            best_plane = plane;
+            before_best = previous;
+            after_best = NO_SURFACE;
+        }
+        previous = cost;
+        plane += 1;
+    }
+    if best >= NO_SURFACE {
+        return entry;
+    }
+    let mut offset = 0.0;
+    if before_best < NO_SURFACE && after_best < NO_SURFACE {
+        let curvature = before_best + after_best - 2.0 * best;
+        if curvature > 1.0e-9 {
+            offset = clamp(0.5 * (before_best - after_best) / curvature, -0.5, 0.5);
+        }
+    }
+    sweep.depth(best_plane) + offset * sweep.plane_step
+}

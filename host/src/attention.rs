@@ -1,0 +1,231 @@
+//! Parameters of attention weighting, read from safetensors files.
+//!
+//! Which variant a file holds is recognised by its tensors' names, those of the published `state_dict`s and of the
+//! paper's two embeddings:
+//!
+//! | tensors | variant |
+//! |---|---|
+//! | `paper.{0,2,4}.{weight,bias}` | cross attention, Fourier embedding (42-64-64-128) |
+//! | `paper_flat.{0,2}.{weight,bias}` | cross attention, flattened pose (16-64-128) |
+//! | `query_layer.weight`, `key_layer.weight` | published learned cross attention |
+//! | `multihead_attention.*`, `weight_calculation_layer.*` | published relative-pose self attention |
+
+use crate::weighting::{MOST_SOURCES, SourceWeights};
+use safetensors::{Dtype, SafeTensors};
+use std::path::{Path, PathBuf};
+use viewfuse_core::attention::{
+    EMBEDDING, FlatEmbedding, FourierEmbedding, HIDDEN, LearnedCrossAttention, Linear, POSE_FEATURES,
+    PoseSelfAttention, cross_attention, learned_cross_attention, pose_self_attention,
+};
+use viewfuse_core::pose::Pose;
+use viewfuse_core::sources::Sources;
+
+/// Why attention parameters could not be read.
+#[derive(Debug, thiserror::Error)]
+pub enum AttentionError {
+    /// The file could not be read.
+    #[error("{}: can not be read: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file is not in the safetensors format.
+    #[error("{}: not a safetensors file: {source}", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What the reader said.
+        source: safetensors::SafeTensorError,
+    },
+    /// No known variant has these tensors.
+    #[error("{}: holds no attention weighting: none of the tensors paper.0.weight, paper_flat.0.weight, \
+             query_layer.weight, multihead_attention.in_proj_weight is there", path.display())]
+    UnknownVariant {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A tensor of the variant is missing.
+    #[error("{}: tensor '{tensor}' is missing", path.display())]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The tensor.
+        tensor: String,
+    },
+    /// A tensor is not what the variant needs.
+    #[error("{}: tensor '{tensor}' must be F32 {wanted:?}, but is {dtype:?} {shape:?}", path.display())]
+    Shape {
+        /// The file.
+        path: PathBuf,
+        /// The tensor.
+        tensor: String,
+        /// The shape that is needed.
+        wanted: Vec<usize>,
+        /// The type that is there.
+        dtype: Dtype,
+        /// The shape that is there.
+        shape: Vec<usize>,
+    },
+    /// A tensor holds NaN or infinity.
+    #[error("{}: tensor '{tensor}' is not finite at flat index {index}", path.display())]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// The tensor.
+        tensor: String,
+        /// Where.
+        index: usize,
+    },
+}
+
+/// Attention weighting with its parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub enum AttentionModel {
+    /// The paper's cross attention on Fourier features of the centre and the view direction.
+    Fourier(FourierEmbedding),
+    /// The paper's cross attention on the flattened pose.
+    Flat(FlatEmbedding),
+    /// The published learned cross attention.
+    LearnedCross(LearnedCrossAttention),
+    /// The published relative-pose self attention.
+    PoseSelf(PoseSelfAttention),
+}
+
+/// Where a model's tensors come from: name and shape to values, row-major.
+pub type TensorSource<'a, E> = dyn FnMut(&str, &[usize]) -> Result<Vec<f32>, E> + 'a;
+
+impl AttentionModel {
+    /// Reads the parameters of whichever variant the file holds.
+    ///
+    /// # Errors
+    /// [`AttentionError`], always with the file and the tensor.
+    pub fn open(path: &Path) -> Result<AttentionModel, AttentionError> {
+        let bytes = std::fs::read(path).map_err(|source| AttentionError::Io { path: path.to_path_buf(), source })?;
+        let file = SafeTensors::deserialize(&bytes)
+            .map_err(|source| AttentionError::Format { path: path.to_path_buf(), source })?;
+        let has = |name: &str| file.tensor(name).is_ok();
+        let mut read = |name: &str, shape: &[usize]| read_tensor(path, &file, name, shape);
+        if has("paper.0.weight") {
+            AttentionModel::fourier(&mut read)
+        } else if has("paper_flat.0.weight") {
+            AttentionModel::flat(&mut read)
+        } else if has("query_layer.weight") {
+            AttentionModel::learned_cross(&mut read)
+        } else if has("multihead_attention.in_proj_weight") {
+            AttentionModel::pose_self(&mut read)
+        } else {
+            Err(AttentionError::UnknownVariant { path: path.to_path_buf() })
+        }
+    }
+
+    /// The paper's cross attention, Fourier embedding.
+    ///
+    /// # Errors
+    /// Those of `tensors`.
+    pub fn fourier<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
+        Ok(AttentionModel::Fourier(FourierEmbedding {
+            first: linear::<POSE_FEATURES, HIDDEN, E>(tensors, "paper.0")?,
+            second: linear::<HIDDEN, HIDDEN, E>(tensors, "paper.2")?,
+            third: linear::<HIDDEN, EMBEDDING, E>(tensors, "paper.4")?,
+        }))
+    }
+
+    /// The paper's cross attention, flattened pose.
+    ///
+    /// # Errors
+    /// Those of `tensors`.
+    pub fn flat<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
+        Ok(AttentionModel::Flat(FlatEmbedding {
+            first: linear::<16, HIDDEN, E>(tensors, "paper_flat.0")?,
+            second: linear::<HIDDEN, EMBEDDING, E>(tensors, "paper_flat.2")?,
+        }))
+    }
+
+    /// The published learned cross attention.
+    ///
+    /// # Errors
+    /// Those of `tensors`.
+    pub fn learned_cross<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
+        let mut layer = |name: &str| {
+            let weight = tensors(name, &[POSE_FEATURES, POSE_FEATURES])?;
+            Ok(square(&weight, &[0.0; POSE_FEATURES]))
+        };
+        Ok(AttentionModel::LearnedCross(LearnedCrossAttention {
+            query: layer("query_layer.weight")?,
+            key: layer("key_layer.weight")?,
+        }))
+    }
+
+    /// The published relative-pose self attention.
+    ///
+    /// # Errors
+    /// Those of `tensors`.
+    pub fn pose_self<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
+        const N: usize = POSE_FEATURES;
+        let weight = tensors("multihead_attention.in_proj_weight", &[3 * N, N])?;
+        let bias = tensors("multihead_attention.in_proj_bias", &[3 * N])?;
+        let part = |k: usize| square(&weight[k * N * N..(k + 1) * N * N], &bias[k * N..(k + 1) * N]);
+        Ok(AttentionModel::PoseSelf(PoseSelfAttention {
+            query: part(0),
+            key: part(1),
+            value: part(2),
+            output: linear::<N, N, E>(tensors, "multihead_attention.out_proj")?,
+            logit: linear::<N, 1, E>(tensors, "weight_calculation_layer")?,
+        }))
+    }
+
+    /// The weights of the sources for a target, in the order of the sources.
+    pub fn weigh(&self, sources: &Sources<MOST_SOURCES>, target: &Pose) -> SourceWeights {
+        match self {
+            AttentionModel::Fourier(embedding) => cross_attention(embedding, sources, target),
+            AttentionModel::Flat(embedding) => cross_attention(embedding, sources, target),
+            AttentionModel::LearnedCross(parameters) => learned_cross_attention(parameters, sources, target),
+            AttentionModel::PoseSelf(parameters) => pose_self_attention(parameters, sources, target),
+        }
+    }
+}
+
+fn linear<const I: usize, const O: usize, E>(
+    tensors: &mut TensorSource<'_, E>,
+    name: &str,
+) -> Result<Linear<I, O>, E> {
+    let weight = tensors(&format!("{name}.weight"), &[O, I])?;
+    let bias = tensors(&format!("{name}.bias"), &[O])?;
+    Ok(assemble(&weight, &bias))
+}
+
+fn square(weight: &[f32], bias: &[f32]) -> Linear<POSE_FEATURES, POSE_FEATURES> {
+    assemble(weight, bias)
+}
+
+/// Row-major `[O][I]` weights and `[O]` biases as a layer.
+fn assemble<const I: usize, const O: usize>(weight: &[f32], bias: &[f32]) -> Linear<I, O> {
+    let mut layer = Linear::ZERO;
+    for (row, values) in layer.weight.iter_mut().zip(weight.chunks_exact(I)) {
+        row.copy_from_slice(values);
+    }
+    layer.bias.copy_from_slice(bias);
+    layer
+}
+
+fn read_tensor(path: &Path, file: &SafeTensors<'_>, name: &str, wanted: &[usize]) -> Result<Vec<f32>, AttentionError> {
+    let path = || path.to_path_buf();
+    let view = file.tensor(name).map_err(|_| AttentionError::Missing { path: path(), tensor: name.to_owned() })?;
+    if view.dtype() != Dtype::F32 || view.shape() != wanted {
+        return Err(AttentionError::Shape {
+            path: path(),
+            tensor: name.to_owned(),
+            wanted: wanted.to_vec(),
+            dtype: view.dtype(),
+            shape: view.shape().to_vec(),
+        });
+    }
+    let values: Vec<f32> =
+        view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(AttentionError::NotFinite { path: path(), tensor: name.to_owned(), index }),
+        None => Ok(values),
+    }
+}

@@ -1,0 +1,160 @@
+//! Devices: where kernels run.
+//!
+//! A device holds buffers and runs kernels on them, one method per kernel, so that a kernel that exists on one device
+//! only does not compile. The body of every kernel is a function in `viewfuse-core`; a device decides how its elements
+//! are spread over cores or invocations. Nothing is downloaded before the end of a render.
+
+pub mod cpu;
+
+use std::ops::Range;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::photo::ObjectBlock;
+use viewfuse_core::photo::sweep::SweepBlock;
+
+/// What a buffer can hold: plain data.
+pub trait Element: Copy + Default + Send + Sync + 'static {}
+impl<T: Copy + Default + Send + Sync + 'static> Element for T {}
+
+/// Views and object of the weight-free field in a device's memory; see [`viewfuse_core::photo`].
+pub struct PhotoScene<D: Device + ?Sized> {
+    /// The object's box and the number of views.
+    pub object: ObjectBlock,
+    /// The source cameras on the host: shapes of the buffers.
+    pub cameras: Vec<CameraBlock>,
+    /// `[view]`: the source cameras.
+    pub views: D::Buffer<CameraBlock>,
+    /// `[view]`: a pixel's side at the middle of the object, world units.
+    pub footprints: D::Buffer<f32>,
+    /// `[view][row][column]`: premultiplied RGBA.
+    pub texels: D::Buffer<[f32; 4]>,
+}
+
+/// A target picture in a device's memory.
+pub struct Pixels<D: Device + ?Sized> {
+    /// `[row][column]`: red, green, blue, opacity.
+    pub colours: D::Buffer<[f32; 4]>,
+    /// `[row][column]`: depth along the principal axis; 0 where nothing is met.
+    pub depths: D::Buffer<f32>,
+}
+
+/// Everything about a target that [`Device::march`] needs besides the scene.
+#[derive(Clone, Copy, Debug)]
+pub struct MarchTarget {
+    /// The target camera.
+    pub camera: CameraBlock,
+    /// What is behind everything, red green blue in `[0, 1]`.
+    pub background: [f32; 3],
+    /// Transmittance at which a ray may end.
+    pub settled: f32,
+}
+
+/// Something that runs kernels.
+pub trait Device {
+    /// Memory of the device that holds `T`s.
+    type Buffer<T: Element>;
+    /// What can go wrong.
+    type Error: std::error::Error + Send + Sync + 'static;
+
+    /// What the run record calls it.
+    fn name(&self) -> String;
+
+    /// A buffer with these values.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn upload<T: Element>(&self, values: &[T]) -> Result<Self::Buffer<T>, Self::Error>;
+
+    /// A buffer of `count` default values.
+    ///
+    /// # Errors
+    /// If the device has no room.
+    fn zeros<T: Element>(&self, count: usize) -> Result<Self::Buffer<T>, Self::Error>;
+
+    /// The values of a buffer.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, Self::Error>;
+
+    /// Kernel `hull_entry` for every pixel of one view: writes the view's part of `entries[view][row][column]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn hull_entry(
+        &self,
+        scene: &PhotoScene<Self>,
+        view: u32,
+        entries: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `match_cost` for every pixel and plane of a band: `costs[row][column][plane]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn match_cost(
+        &self,
+        scene: &PhotoScene<Self>,
+        sweep: &SweepBlock,
+        entries: &Self::Buffer<f32>,
+        pair_weights: &Self::Buffer<f32>,
+        costs: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `sum_row` for every pixel and plane of a band: `row_sums[row][column][plane]` = sum, count.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn sum_row(
+        &self,
+        sweep: &SweepBlock,
+        width: u32,
+        costs: &Self::Buffer<f32>,
+        row_sums: &mut Self::Buffer<[f32; 2]>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `mean_column` for every pixel and plane of a band: `means[row][column][plane]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn mean_column(
+        &self,
+        sweep: &SweepBlock,
+        width: u32,
+        costs: &Self::Buffer<f32>,
+        row_sums: &Self::Buffer<[f32; 2]>,
+        means: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `pick_depth` for the pixels of some rows of a band, counted from its first: writes their part of
+    /// `picked[view][row][column]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    #[allow(clippy::too_many_arguments)]
+    fn pick_depth(
+        &self,
+        scene: &PhotoScene<Self>,
+        sweep: &SweepBlock,
+        means: &Self::Buffer<f32>,
+        entries: &Self::Buffer<f32>,
+        guess: &Self::Buffer<f32>,
+        rows: Range<u32>,
+        picked: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `march` for every pixel of the rows `first_row .. first_row + row_count` of a target.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    #[allow(clippy::too_many_arguments)]
+    fn march(
+        &self,
+        scene: &PhotoScene<Self>,
+        depths: &Self::Buffer<f32>,
+        weights: &Self::Buffer<f32>,
+        target: &MarchTarget,
+        first_row: u32,
+        row_count: u32,
+        pixels: &mut Pixels<Self>,
+    ) -> Result<(), Self::Error>;
+}

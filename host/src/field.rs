@@ -1,0 +1,95 @@
+//! Fields: what there is at a point in space, from source views.
+//!
+//! A field turns prepared photographs into latents and latents into a target's picture. The renderer knows no more
+//! about it than this trait; the weight-free field ([`photo`]) is the first, networks are further ones.
+
+pub mod photo;
+
+use crate::device::Device;
+use crate::interrupt::Interrupted;
+use crate::photographs::SourceImages;
+use crate::progress::Progress;
+use crate::weighting::SourceWeights;
+use viewfuse_core::camera::Camera;
+
+/// Why a field could not make a picture.
+#[derive(Debug, thiserror::Error)]
+pub enum FieldError<E: std::error::Error> {
+    /// The silhouettes have no point of space in common.
+    #[error("the silhouettes of the sources have no common object: no point lies inside all of them; \
+             check the poses with `viewfuse inspect` and the background with --background")]
+    NoObject,
+    /// The device failed.
+    #[error("the device failed")]
+    Device(#[source] E),
+    /// The person stopped the work.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// A rendered target, values not yet rounded. Row-major, one entry a pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rendered {
+    /// Red, green, blue in `[0, 1]` and opacity.
+    pub colours: Vec<[f32; 4]>,
+    /// Depth along the principal axis in world units; 0 where nothing is met.
+    pub depths: Vec<f32>,
+    /// Width of the picture.
+    pub width: u32,
+    /// Height of the picture.
+    pub height: u32,
+}
+
+/// A field on a device.
+pub trait Field<D: Device> {
+    /// What depends on the photographs alone: shared by every weighting and every target.
+    type Prepared;
+    /// What depends on the weighting as well, but not on the target.
+    type Latents;
+
+    /// What the run record calls it.
+    fn name(&self) -> &'static str;
+
+    /// The least number of sources it can work with.
+    fn least_sources(&self) -> usize;
+
+    /// Takes the photographs to the device.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn prepare(
+        &self,
+        device: &D,
+        sources: &SourceImages,
+        progress: &Progress,
+    ) -> Result<Self::Prepared, FieldError<D::Error>>;
+
+    /// Encodes the sources. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn encode(
+        &self,
+        device: &D,
+        prepared: &Self::Prepared,
+        relevance: &[SourceWeights],
+        progress: &Progress,
+    ) -> Result<Self::Latents, FieldError<D::Error>>;
+
+    /// Renders a target with the sources' weights for it. `settled` is the transmittance at which a ray may end early:
+    /// no channel changes by more than that.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    #[allow(clippy::too_many_arguments)]
+    fn render(
+        &self,
+        device: &D,
+        prepared: &Self::Prepared,
+        latents: &Self::Latents,
+        weights: &SourceWeights,
+        target: &Camera,
+        settled: f32,
+        progress: &Progress,
+    ) -> Result<Rendered, FieldError<D::Error>>;
+}

@@ -1,0 +1,65 @@
+//! Output files that appear whole or not at all.
+
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// Why an output could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    /// The operating system refused.
+    #[error("{}: can not be written: {source}", path.display())]
+    Io {
+        /// The file that was to appear.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The picture could not be encoded.
+    #[error("{}: can not be encoded: {source}", path.display())]
+    Encode {
+        /// The file that was to appear.
+        path: PathBuf,
+        /// What the encoder said.
+        source: image::ImageError,
+    },
+}
+
+/// Writes `bytes` to a temporary file beside `path` and renames it into place. Missing folders are made.
+///
+/// # Errors
+/// [`WriteError::Io`]; nothing is left behind then.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+    let failed = |source| WriteError::Io { path: path.to_path_buf(), source };
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".viewfuse-");
+    // The default is readable by the owner only, which is wrong for a result.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o644));
+    }
+    let mut file = builder.tempfile_in(folder).map_err(failed)?;
+    {
+        let mut writer = BufWriter::new(file.as_file_mut());
+        writer.write_all(bytes).and_then(|()| writer.flush()).map_err(failed)?;
+    }
+    file.persist(path).map_err(|error| failed(error.error))?;
+    Ok(())
+}
+
+/// Writes a picture as PNG, whole or not at all.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_png(path: &Path, picture: &image::DynamicImage) -> Result<(), WriteError> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .map_err(|source| WriteError::Encode { path: path.to_path_buf(), source })?;
+    write_whole(path, bytes.get_ref())
+}

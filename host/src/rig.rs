@@ -1,0 +1,123 @@
+//! The cameras of a scene as a whole: what they look at, from how far, which way is up.
+
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::pose::{Pose, PoseError};
+
+/// Cameras seen as one arrangement around a subject. World coordinates and units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rig {
+    /// The point nearest to all principal axes, in the sense of least squares.
+    pub focus: Vec3,
+    /// Root mean square distance of the principal axes from the focus.
+    pub axis_miss: f32,
+    /// Mean distance of the camera centres from the focus.
+    pub distance: f32,
+    /// Which way is up: the mean of the cameras' up directions, or the axis of their ring where those cancel. Unit.
+    pub up: Vec3,
+    /// Radius of the ball around the focus that a camera sees whole or in part: the mean over the cameras of the
+    /// focus's depth times half the image's diagonal over the focal length.
+    pub subject_radius: f32,
+}
+
+impl Rig {
+    /// Looks at all cameras together. `cameras` must not be empty. A single camera, or cameras whose axes are parallel,
+    /// leave the focus undetermined along the axes: it is then put one unit, or the cameras' spread, ahead.
+    pub fn of(cameras: &[Camera]) -> Rig {
+        let count = cameras.len().max(1) as f32;
+        let centroid = cameras.iter().map(|c| c.pose.centre_world()).sum::<Vec3>() / count;
+        let spread = cameras.iter().map(|c| c.pose.centre_world().distance(centroid)).sum::<f32>() / count;
+        let axes: Vec<(Vec3, Vec3)> =
+            cameras.iter().map(|c| (c.pose.centre_world(), c.pose.forward_world())).collect();
+        let focus = nearest_point_to_lines(&axes).unwrap_or_else(|| {
+            let ahead = cameras.iter().map(|c| c.pose.forward_world()).sum::<Vec3>() / count;
+            centroid + ahead * if spread > 0.0 { spread } else { 1.0 }
+        });
+        let offsets = || cameras.iter().map(move |c| (c, focus - c.pose.centre_world()));
+        let squared_miss: f32 =
+            offsets().map(|(c, to)| (to - c.pose.forward_world() * to.dot(c.pose.forward_world())).length_squared()).sum();
+        let distance = offsets().map(|(_, to)| to.length()).sum::<f32>() / count;
+        let subject_radius =
+            offsets().map(|(c, to)| to.dot(c.pose.forward_world()).abs() * half_diagonal_slope(&c.pinhole)).sum::<f32>()
+                / count;
+        Rig { focus, axis_miss: (squared_miss / count).sqrt(), distance, up: up_direction(cameras, focus), subject_radius }
+    }
+
+    /// `count` cameras on a full circle around the focus, at the mean height and distance of the given ones, all
+    /// looking at the focus with the rig's up direction; frame 0 is on the side of the first camera.
+    ///
+    /// # Errors
+    /// [`PoseError`] if the circle degenerates (all cameras at the focus, or straight above it).
+    pub fn orbit(&self, cameras: &[Camera], pinhole: Pinhole, count: usize) -> Result<Vec<Camera>, PoseError> {
+        let height = cameras.iter().map(|c| (c.pose.centre_world() - self.focus).dot(self.up)).sum::<f32>()
+            / cameras.len().max(1) as f32;
+        let radius = (self.distance * self.distance - height * height).max(0.0).sqrt();
+        let first = cameras.first().map_or(Vec3::X, |c| c.pose.centre_world() - self.focus);
+        let start = (first - self.up * first.dot(self.up)).try_normalize().unwrap_or_else(|| self.up.any_orthonormal_vector());
+        let side = self.up.cross(start);
+        (0..count)
+            .map(|frame| {
+                let angle = std::f32::consts::TAU * frame as f32 / count as f32;
+                let centre =
+                    self.focus + self.up * height + (start * angle.cos() + side * angle.sin()) * radius;
+                Ok(Camera { pose: Pose::look_at(centre, self.focus, self.up)?, pinhole })
+            })
+            .collect()
+    }
+}
+
+/// Half the image's diagonal over the focal length: the slope of the ray through a corner.
+fn half_diagonal_slope(pinhole: &Pinhole) -> f32 {
+    let [fx, fy] = pinhole.focal();
+    (pinhole.width() as f32 / (2.0 * fx)).hypot(pinhole.height() as f32 / (2.0 * fy))
+}
+
+/// The point nearest to lines given by a point and a unit direction each, in the sense of least squares, or `None` where
+/// they are too nearly parallel to say.
+pub fn nearest_point_to_lines(lines: &[(Vec3, Vec3)]) -> Option<Vec3> {
+    let count = lines.len() as f64;
+    let centroid = lines.iter().map(|(point, _)| point.as_dvec3()).sum::<glam::DVec3>() / count.max(1.0);
+    // Sum over lines of (I - d d^T) (p - c) = 0, in f64 because the matrix is nearly singular for narrow rigs.
+    let mut matrix = glam::DMat3::ZERO;
+    let mut right = glam::DVec3::ZERO;
+    for (point, direction) in lines {
+        let d = direction.as_dvec3();
+        let across = glam::DMat3::IDENTITY - glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+        matrix += across;
+        right += across * (point.as_dvec3() - centroid);
+    }
+    // Of perfectly parallel lines the determinant is 0, of perpendicular ones about count^3 / 4.
+    if !(matrix.determinant() / (count * count * count) > 1.0e-6) {
+        return None;
+    }
+    Some((centroid + matrix.inverse() * right).as_vec3())
+}
+
+/// Mean up direction of the cameras; where rolled cameras cancel it, the axis of least variance of their centres, on
+/// the side on which the cameras are.
+fn up_direction(cameras: &[Camera], focus: Vec3) -> Vec3 {
+    let count = cameras.len().max(1) as f32;
+    let mean_up = cameras.iter().map(|c| -c.pose.down_world()).sum::<Vec3>() / count;
+    // Upright cameras at up to 70 degrees of elevation keep a third of their up directions.
+    if mean_up.length() > 0.3 {
+        return mean_up.normalize();
+    }
+    let centroid = cameras.iter().map(|c| c.pose.centre_world()).sum::<Vec3>() / count;
+    let mut covariance = glam::DMat3::ZERO;
+    for camera in cameras {
+        let d = (camera.pose.centre_world() - centroid).as_dvec3();
+        covariance += glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
+    }
+    let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+    if !(trace > 0.0) {
+        return mean_up.try_normalize().unwrap_or(Vec3::Z);
+    }
+    // Inverse iteration towards the least eigenvector; the shift keeps the matrix regular.
+    let inverse = (covariance + glam::DMat3::from_diagonal(glam::DVec3::splat(trace * 1.0e-6))).inverse();
+    let mut axis = glam::DVec3::new(0.48, 0.6, 0.64);
+    for _ in 0..64 {
+        axis = (inverse * axis).normalize();
+    }
+    let axis = axis.as_vec3();
+    if (centroid - focus).dot(axis) < 0.0 { -axis } else { axis }
+}

@@ -1,0 +1,132 @@
+//! The contact sheet: what went in and what came out, on one page.
+//!
+//! Sources in the order of their weights, each with its weight as a number and a bar; below them the prediction, its
+//! depth, and where the truth is known the truth and the error.
+
+use crate::canvas::{BLUE, CHARACTER_WIDTH, Canvas, GREY, INK, LINE_HEIGHT, PAPER};
+use image::{Rgb, RgbImage, imageops};
+
+/// One source on the sheet.
+pub struct SheetSource {
+    /// The view's name.
+    pub name: String,
+    /// Its weight; 0 for a view that was left out.
+    pub weight: f32,
+    /// Its photograph at working size.
+    pub picture: RgbImage,
+}
+
+/// Everything that a sheet shows.
+pub struct Sheet {
+    /// First line: scene, target, scheme.
+    pub title: String,
+    /// Sources in any order.
+    pub sources: Vec<SheetSource>,
+    /// The rendered picture.
+    pub prediction: RgbImage,
+    /// Its depth map as grey levels.
+    pub depth: RgbImage,
+    /// The photograph at the target with PSNR in decibels and SSIM, where there is one.
+    pub truth: Option<(RgbImage, f64, Option<f64>)>,
+}
+
+const MARGIN: u32 = 10;
+const GAP: u32 = 8;
+const THUMBNAIL_HEIGHT: u32 = 96;
+const SOURCES_PER_ROW: usize = 6;
+const BAR: u32 = 4;
+/// Shown sources; further ones have small weights and are only counted.
+const SOURCES_SHOWN: usize = 18;
+/// An absolute error of a quarter of the range is shown in the strongest colour.
+const STRONGEST_ERROR: f32 = 0.25;
+
+impl Sheet {
+    /// Draws the page.
+    pub fn draw(mut self) -> RgbImage {
+        self.sources.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let hidden = self.sources.len().saturating_sub(SOURCES_SHOWN);
+        self.sources.truncate(SOURCES_SHOWN);
+        let thumbnails: Vec<RgbImage> = self.sources.iter().map(|source| thumbnail(&source.picture)).collect();
+        let cell_width = thumbnails.iter().map(RgbImage::width).max().unwrap_or(THUMBNAIL_HEIGHT) + GAP;
+        let cell_height = THUMBNAIL_HEIGHT + BAR + 2 * LINE_HEIGHT + GAP;
+        let row_count = self.sources.len().div_ceil(SOURCES_PER_ROW) as u32;
+
+        let mut results: Vec<(String, RgbImage)> = vec![("prediction".to_owned(), self.prediction.clone())];
+        if let Some((truth, psnr, ssim)) = &self.truth {
+            let ssim = ssim.map_or(String::new(), |value| format!("  SSIM {value:.3}"));
+            results.push(("truth".to_owned(), truth.clone()));
+            results.push((format!("error  PSNR {psnr:.2} dB{ssim}"), error_map(&self.prediction, truth)));
+        }
+        results.push(("depth (near is bright)".to_owned(), self.depth.clone()));
+        // Small results are enlarged by a whole factor, so that every pixel stays visible.
+        let zoom = (256 / self.prediction.height().max(1)).clamp(1, 4);
+        let (result_width, result_height) = (self.prediction.width() * zoom, self.prediction.height() * zoom);
+        let result_cell = result_width.max(CHARACTER_WIDTH * 34) + GAP;
+
+        let title_width = CHARACTER_WIDTH * self.title.len() as u32;
+        let content_width = (cell_width * self.sources.len().min(SOURCES_PER_ROW) as u32)
+            .max(result_cell * results.len() as u32)
+            .max(title_width);
+        let sources_top = MARGIN + LINE_HEIGHT + GAP;
+        let results_top = sources_top + row_count * cell_height + LINE_HEIGHT + GAP;
+        let height = results_top + LINE_HEIGHT + result_height + MARGIN;
+        let mut canvas = Canvas::new(content_width + 2 * MARGIN, height);
+
+        canvas.text(MARGIN as i32, MARGIN as i32, &self.title, INK);
+        let heaviest = self.sources.first().map_or(1.0, |source| source.weight.max(f32::MIN_POSITIVE));
+        for (index, (source, picture)) in self.sources.iter().zip(&thumbnails).enumerate() {
+            let x = (MARGIN + (index % SOURCES_PER_ROW) as u32 * cell_width) as i32;
+            let y = (sources_top + (index / SOURCES_PER_ROW) as u32 * cell_height) as i32;
+            canvas.picture(x, y, picture);
+            canvas.frame(x, y, picture.width(), picture.height(), GREY);
+            let below = y + THUMBNAIL_HEIGHT as i32 + 2;
+            let length = (picture.width() as f32 * source.weight / heaviest).round() as u32;
+            canvas.fill(x, below, length, BAR, BLUE);
+            let weight = if source.weight > 0.0 { format!("{:.4}", source.weight) } else { "left out".to_owned() };
+            let text_top = below + BAR as i32 + 2;
+            canvas.text(x, text_top, &weight, if source.weight > 0.0 { INK } else { GREY });
+            canvas.text(x, text_top + LINE_HEIGHT as i32, &source.name, GREY);
+        }
+        if hidden > 0 {
+            let y = results_top - LINE_HEIGHT - GAP;
+            canvas.text(MARGIN as i32, y as i32, &format!("and {hidden} more sources of smaller weight"), GREY);
+        }
+        for (index, (label, picture)) in results.iter().enumerate() {
+            let x = (MARGIN + index as u32 * result_cell) as i32;
+            canvas.text(x, results_top as i32, label, INK);
+            let enlarged = imageops::resize(picture, result_width, result_height, imageops::FilterType::Nearest);
+            canvas.picture(x, (results_top + LINE_HEIGHT) as i32, &enlarged);
+            canvas.frame(x, (results_top + LINE_HEIGHT) as i32, result_width, result_height, GREY);
+        }
+        canvas.into_image()
+    }
+}
+
+fn thumbnail(picture: &RgbImage) -> RgbImage {
+    let width = (picture.width() * THUMBNAIL_HEIGHT / picture.height().max(1)).max(1);
+    imageops::resize(picture, width, THUMBNAIL_HEIGHT, imageops::FilterType::Triangle)
+}
+
+/// Mean absolute error over the channels of each pixel: white where equal, through red to black at a quarter of the
+/// range.
+pub fn error_map(prediction: &RgbImage, truth: &RgbImage) -> RgbImage {
+    RgbImage::from_fn(prediction.width(), prediction.height(), |x, y| {
+        let (p, t) = (prediction.get_pixel(x, y), truth.get_pixel(x, y));
+        let sum: u32 = p.0.iter().zip(&t.0).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
+        let level = (sum as f32 / (3.0 * 255.0 * STRONGEST_ERROR)).min(1.0);
+        let fade = |start: f32, end: f32| (f32::from(PAPER[0]) * (1.0 - ((level - start) / (end - start)).clamp(0.0, 1.0))) as u8;
+        Rgb([fade(0.5, 1.0), fade(0.0, 0.5), fade(0.0, 0.5)])
+    })
+}
+
+/// A depth map as grey levels, nearest brightest; pixels whose depth is not finite are black.
+pub fn depth_picture(depth: &[f32], width: u32, height: u32) -> RgbImage {
+    let finite = || depth.iter().copied().filter(|z| z.is_finite());
+    let (near, far) = (finite().fold(f32::INFINITY, f32::min), finite().fold(f32::NEG_INFINITY, f32::max));
+    let range = (far - near).max(f32::MIN_POSITIVE);
+    RgbImage::from_fn(width, height, |x, y| {
+        let z = depth[(y * width + x) as usize];
+        let level = if z.is_finite() { 255.0 - 195.0 * ((z - near) / range) } else { 0.0 };
+        Rgb([level as u8; 3])
+    })
+}
