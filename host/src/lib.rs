@@ -1,5 +1,41 @@
 //! viewfuse: from a handful of posed photographs, the picture from a camera that was never there.
+//!
+//! The modules stand in the order of the data; a module uses only modules listed above it.
+//!
+//! ```text
+//! interrupt, progress, files    stopping cleanly, showing progress, outputs that appear whole
+//! scene                         a folder of posed photographs: Scene, View, Photograph
+//! synthetic                     scenes made by ourselves
+//! rig                           the cameras as a whole: focus, up, orbits
+//! formula, attention, weighting pose -> weight, by name: Weighting
+//! few_shot                      which views are sources, which cameras are targets: FewShot
+//! photographs                   sources at working size without their background: SourceImages
+//! device                        where kernels run: Device, the CPU
+//! field                         photographs -> picture: Field, the field that needs no weights file
+//! render                        the way of the data from scene to picture, in one function
+//! canvas, sheet, record         contact sheets, camera maps, run records
+//! evaluate, inspect, verify     the other jobs
+//! cli                           the command line
+//! ```
 #![forbid(unsafe_code)]
 
+pub mod attention;
+pub mod canvas;
+pub mod cli;
+pub mod device;
+pub mod evaluate;
+pub mod few_shot;
+pub mod field;
+pub mod files;
+pub mod inspect;
+pub mod interrupt;
+pub mod photographs;
+pub mod progress;
+pub mod record;
+pub mod render;
+pub mod rig;
 pub mod scene;
+pub mod sheet;
 pub mod synthetic;
+pub mod verify;
+pub mod weighting;

@@ -1,1 +1,5 @@
-//! Tests of viewfuse. What several of them share lives here.
+//! What the tests of viewfuse share: scenes built on disk, seeded inputs, comparators that NaN can not slip through,
+//! and the same formulas evaluated in `f64`.
+#![forbid(unsafe_code)]
+
+pub mod scenes;

@@ -1,0 +1,247 @@
+//! What can be wrong with a scene on disk.
+//!
+//! Every message is one line and begins with the path that a person must open, followed by the line or the key in it.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+use viewfuse_core::pose::PoseError;
+
+use super::LARGEST_SIDE;
+use super::fault::{IntrinsicsFault, Place};
+
+/// Why a scene could not be read.
+#[derive(Debug, Error)]
+pub enum SceneError {
+    /// A file or folder that must be there is not.
+    #[error("{path}: no such file or folder")]
+    Missing {
+        /// What was looked for.
+        path: PathBuf,
+    },
+    /// The operating system did not let us read it, or it is not text.
+    #[error("{path}: cannot be read: {cause}")]
+    Read {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        cause: std::io::Error,
+    },
+    /// No known layout.
+    #[error(
+        "{path}: no scene here; looked for a folder with transforms.json or transforms_train.json (NeRF), with one \
+         *_par.txt (Middlebury), or with rgb/, pose/ and intrinsics.txt (SRN), or for such a .json or *_par.txt file"
+    )]
+    UnknownLayout {
+        /// The folder or file that was to be opened.
+        path: PathBuf,
+    },
+    /// More than one list of cameras in a folder.
+    #[error("{path}: holds both {first} and {second}; give the path of one of them")]
+    Ambiguous {
+        /// The folder.
+        path: PathBuf,
+        /// Name of a list.
+        first: String,
+        /// Name of another.
+        second: String,
+    },
+    /// The layout is there and lists nothing.
+    #[error("{path}: the scene has no photographs ({looked_for})")]
+    NoViews {
+        /// The folder or file that lists the views.
+        path: PathBuf,
+        /// What would have been a view.
+        looked_for: &'static str,
+    },
+    /// A pose whose photograph is missing.
+    #[error("{path}{place}: this pose has no photograph: there is no {image}")]
+    PoseWithoutImage {
+        /// The file with the pose.
+        path: PathBuf,
+        /// Where the pose stands in it.
+        place: Place,
+        /// The photograph that was looked for (where the name has no extension: with any of those that we read).
+        image: PathBuf,
+    },
+    /// A photograph whose pose is missing.
+    #[error("{path}: this photograph has no pose: there is no {pose}")]
+    ImageWithoutPose {
+        /// The photograph.
+        path: PathBuf,
+        /// The file that was looked for.
+        pose: PathBuf,
+    },
+    /// Two views of one name.
+    #[error("{path}: two views are called {name:?}; names must differ")]
+    DuplicateName {
+        /// The second of the two: its photograph, or the scene where it has none.
+        path: PathBuf,
+        /// The name of both.
+        name: String,
+    },
+    /// A word where a number should be.
+    #[error("{path}{place}: {word:?} is not a number")]
+    NotANumber {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// The word, shortened if it is long.
+        word: String,
+    },
+    /// NaN, an infinity, or a number too large to hold.
+    #[error("{path}{place}: {word:?} is not a finite number")]
+    NotFinite {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// The word.
+        word: String,
+    },
+    /// Too few or too many numbers (or rows).
+    #[error("{path}{place}: found {found} {of} instead of {expected}")]
+    WrongCount {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// What is counted.
+        of: &'static str,
+        /// How many there must be.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// The matrix is not a camera pose.
+    #[error("{path}{place}: not a camera pose: {}", describe(.reason))]
+    Pose {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// What core's check says.
+        reason: PoseError,
+    },
+    /// The numbers are not a pinhole camera.
+    #[error("{path}{place}: {fault}")]
+    Intrinsics {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// What is wrong with them.
+        fault: IntrinsicsFault,
+    },
+    /// The photograph was taken through a lens that is not a pinhole.
+    #[error(
+        "{path}: {key} is {value}: lens distortion is not supported; undistort the photographs first, for example \
+         with COLMAP's image_undistorter, and use the cameras that it writes"
+    )]
+    Distorted {
+        /// The JSON file.
+        path: PathBuf,
+        /// The key that says so.
+        key: String,
+        /// Its value.
+        value: String,
+    },
+    /// Not JSON.
+    #[error("{path}:{line}:{column}: not valid JSON: {reason}")]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What the parser says.
+        reason: String,
+    },
+    /// A key that must be there is not.
+    #[error("{path}: {key} is missing")]
+    MissingKey {
+        /// The JSON file.
+        path: PathBuf,
+        /// The key.
+        key: String,
+    },
+    /// A key holds another kind of value.
+    #[error("{path}: {key} must be {expected}")]
+    WrongType {
+        /// The JSON file.
+        path: PathBuf,
+        /// The key.
+        key: String,
+        /// What it must hold.
+        expected: &'static str,
+    },
+    /// An image file that cannot be decoded.
+    #[error("{path}: not a readable image: {cause}")]
+    Image {
+        /// The image file.
+        path: PathBuf,
+        /// What the decoder says.
+        cause: image::ImageError,
+    },
+    /// An image header that promises too much.
+    #[error("{path}: the image is {width} x {height}; at most {LARGEST_SIDE} pixels are allowed on a side")]
+    TooLarge {
+        /// The image file.
+        path: PathBuf,
+        /// Width in the header.
+        width: u32,
+        /// Height in the header.
+        height: u32,
+    },
+    /// The photograph does not have the size that the cameras are for.
+    #[error("{path}: the image is {width} x {height}, but {declared_in} is for {declared_width} x {declared_height}")]
+    SizeMismatch {
+        /// The image file.
+        path: PathBuf,
+        /// Width of the image.
+        width: u32,
+        /// Height of the image.
+        height: u32,
+        /// What states the other size: a file, with the line or key.
+        declared_in: String,
+        /// Width that the cameras are for.
+        declared_width: u32,
+        /// Height that the cameras are for.
+        declared_height: u32,
+    },
+    /// The pixels of a view without a photograph were asked for.
+    #[error("{path}: view {name:?} is a pose without a photograph")]
+    NoPhotograph {
+        /// The scene.
+        path: PathBuf,
+        /// The view's name.
+        name: String,
+    },
+    /// An index past the last view.
+    #[error("{path}: there is no view with index {view}, the scene has {view_count}")]
+    NoSuchView {
+        /// The scene.
+        path: PathBuf,
+        /// The index asked for, from 0.
+        view: usize,
+        /// How many views there are.
+        view_count: usize,
+    },
+}
+
+/// Core's reason in words; rows and columns count from 1 here, as people do.
+fn describe(reason: &PoseError) -> String {
+    match reason {
+        PoseError::NotFinite { row, column } => {
+            format!("the entry in row {}, column {} is not finite as a 32-bit number", row + 1, column + 1)
+        }
+        PoseError::TooFar => "the camera's centre is further than 1e30 from the origin".to_string(),
+        PoseError::LastRow => "the last row is not 0 0 0 1".to_string(),
+        PoseError::NotRigid { deviation } => {
+            format!("the 3x3 block is scaled or skewed: R^T R differs from the identity by {deviation}")
+        }
+        PoseError::Mirrored => "the determinant of the 3x3 block is -1: an axis is mirrored".to_string(),
+    }
+}

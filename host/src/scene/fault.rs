@@ -1,0 +1,83 @@
+//! Parts of [`super::SceneError`]: the place in a file, and what makes intrinsics unusable.
+
+use std::fmt;
+
+use thiserror::Error;
+use viewfuse_core::camera::PinholeError;
+
+/// Where in a file something is wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The file as a whole.
+    File,
+    /// A line, counted from 1.
+    Line(usize),
+    /// A key of a JSON file, such as `frames[3].fl_x`; arrays count from 0.
+    Key(String),
+}
+
+impl fmt::Display for Place {
+    /// What follows the path: nothing, `:12`, or `: frames[3].fl_x`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::File => Ok(()),
+            Place::Line(line) => write!(f, ":{line}"),
+            Place::Key(key) => write!(f, ": {key}"),
+        }
+    }
+}
+
+/// Why numbers from a file are not a pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum IntrinsicsFault {
+    /// A focal length is not a finite positive number.
+    #[error("focal lengths {x} and {y} are not both positive numbers of pixels")]
+    Focal {
+        /// Focal length along x.
+        x: f64,
+        /// Focal length along y.
+        y: f64,
+    },
+    /// A coordinate of the principal point does not fit.
+    #[error("principal point ({x}, {y}) is out of range")]
+    Principal {
+        /// Coordinate to the right.
+        x: f64,
+        /// Coordinate downwards.
+        y: f64,
+    },
+    /// A width or height is not a whole number of pixels from 1 to 2^20.
+    #[error("image size {width} x {height} is not two whole numbers from 1 to 1048576")]
+    Size {
+        /// Width as it stands in the file.
+        width: f64,
+        /// Height as it stands in the file.
+        height: f64,
+    },
+    /// An opening angle is not between 0 and pi.
+    #[error("opening angle {angle} is not between 0 and pi radians")]
+    Angle {
+        /// The angle as it stands in the file.
+        angle: f64,
+    },
+    /// The image axes are not at right angles.
+    #[error("the skew {skew} of K is not 0; only square image axes are supported")]
+    Skew {
+        /// Element (0, 1) of the matrix.
+        skew: f64,
+    },
+    /// The matrix is not upper triangular with a last row of `0 0 1`.
+    #[error("K does not have the form fx 0 cx / 0 fy cy / 0 0 1")]
+    Form,
+}
+
+impl IntrinsicsFault {
+    /// The fault that core found in these numbers, with the values it refers to.
+    pub(super) fn from_pinhole(error: PinholeError, focal: [f64; 2], principal: [f64; 2], size: [u32; 2]) -> Self {
+        match error {
+            PinholeError::Focal => IntrinsicsFault::Focal { x: focal[0], y: focal[1] },
+            PinholeError::Principal => IntrinsicsFault::Principal { x: principal[0], y: principal[1] },
+            PinholeError::Size => IntrinsicsFault::Size { width: size[0].into(), height: size[1].into() },
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Reading text, listing folders and naming files, with the path in every error.
+
+use std::cmp::Ordering;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use super::error::SceneError;
+use super::fault::Place;
+
+/// Extensions of photographs, compared without regard to case.
+pub(super) const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+
+/// Longest part of a wrong word that an error repeats: a binary file's first "word" may be the whole file.
+const LONGEST_EXCERPT: usize = 40;
+
+/// The error for a file or folder that the operating system did not open.
+pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
+    let path = path.to_path_buf();
+    if cause.kind() == io::ErrorKind::NotFound {
+        SceneError::Missing { path }
+    } else {
+        SceneError::Read { path, cause }
+    }
+}
+
+/// A text file's contents, without the byte order mark that some editors put in front.
+pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
+    let text = fs::read_to_string(path).map_err(|cause| unreadable(path, cause))?;
+    Ok(match text.strip_prefix('\u{feff}') {
+        Some(rest) => rest.to_string(),
+        None => text,
+    })
+}
+
+/// The files in a folder for whose name `wanted` holds, in natural order. Hidden files are left out: archives made on
+/// a Mac hold a `._000000.png` beside each `000000.png`.
+pub(super) fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, SceneError> {
+    let failed = |cause| unreadable(folder, cause);
+    let mut paths = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+        if !hidden && wanted(&path) && path.is_file() {
+            paths.push(path);
+        }
+    }
+    paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
+    Ok(paths)
+}
+
+/// Whether the file's name ends in one of these extensions, in either case.
+pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    let extension = path.extension().and_then(OsStr::to_str);
+    extension.is_some_and(|extension| extensions.iter().any(|wanted| extension.eq_ignore_ascii_case(wanted)))
+}
+
+/// The file's name without folder and extension.
+pub(super) fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The numbers of each line that is not blank, with the line's number from 1.
+pub(super) fn number_lines(path: &Path, text: &str) -> Result<Vec<(usize, Vec<f64>)>, SceneError> {
+    lines(text)
+        .map(|(line, content)| {
+            Ok((line, content.split_whitespace().map(|w| number(path, line, w)).collect::<Result<_, _>>()?))
+        })
+        .collect()
+}
+
+/// The lines that are not blank, numbered from 1.
+pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(index, line)| (index + 1, line)).filter(|(_, line)| !line.trim().is_empty())
+}
+
+/// A finite number from a word of a line.
+pub(super) fn number(path: &Path, line: usize, word: &str) -> Result<f64, SceneError> {
+    let (path, place) = (path.to_path_buf(), Place::Line(line));
+    let Ok(value) = word.parse::<f64>() else {
+        return Err(SceneError::NotANumber { path, place, word: excerpt(word) });
+    };
+    if value.is_finite() { Ok(value) } else { Err(SceneError::NotFinite { path, place, word: excerpt(word) }) }
+}
+
+/// The first few characters of a word.
+pub(super) fn excerpt(word: &str) -> String {
+    let mut short: String = word.chars().take(LONGEST_EXCERPT).collect();
+    if short.len() < word.len() {
+        short.push_str("...");
+    }
+    short
+}
+
+/// Compares names as people count: runs of digits by their value, so that `2` comes before `10`; the rest by
+/// character. Names that differ only in leading zeros are told apart by their characters: the order is total.
+pub(super) fn natural_order(a: &str, b: &str) -> Ordering {
+    let (mut rest_a, mut rest_b) = (a, b);
+    loop {
+        let (digits_a, digits_b) = (leading_digits(rest_a), leading_digits(rest_b));
+        if !digits_a.is_empty() && !digits_b.is_empty() {
+            let (value_a, value_b) = (digits_a.trim_start_matches('0'), digits_b.trim_start_matches('0'));
+            // Without leading zeros a longer number is a larger one; no number of digits overflows.
+            let order = value_a.len().cmp(&value_b.len()).then_with(|| value_a.cmp(value_b));
+            if order != Ordering::Equal {
+                return order;
+            }
+            (rest_a, rest_b) = (&rest_a[digits_a.len()..], &rest_b[digits_b.len()..]);
+            continue;
+        }
+        let (mut characters_a, mut characters_b) = (rest_a.chars(), rest_b.chars());
+        match (characters_a.next(), characters_b.next()) {
+            (None, None) => return a.cmp(b),
+            (first_a, first_b) if first_a != first_b => return first_a.cmp(&first_b),
+            _ => (rest_a, rest_b) = (characters_a.as_str(), characters_b.as_str()),
+        }
+    }
+}
+
+/// The ASCII digits that a text begins with.
+fn leading_digits(text: &str) -> &str {
+    &text[..text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len())]
+}

@@ -1,0 +1,185 @@
+//! Each layout is recognised, and a known point lands on the pixel that follows by hand.
+//!
+//! The camera sees the point at (0.5, -0.25, 2): the pixel is `focal * (0.25, -0.125) + principal`.
+
+use serde_json::json;
+use viewfuse::scene::{Layout, Scene, SceneError};
+use viewfuse_core::Vec3;
+use viewfuse_tests::scenes::{self, Folder, POINT_WORLD};
+
+fn open(folder: &Folder) -> Scene {
+    Scene::open(folder.path()).expect("a good scene")
+}
+
+fn names(scene: &Scene) -> Vec<&str> {
+    scene.views.iter().map(|view| view.name.as_str()).collect()
+}
+
+/// Where the view sees the point is where it must be, to 1e-4 of a pixel.
+#[track_caller]
+fn assert_pixel(scene: &Scene, view: usize, expected: [f64; 2]) {
+    let seen = scene.views[view].camera.project(Vec3::from_array(POINT_WORLD));
+    assert!(seen.in_front && (f64::from(seen.depth) - 2.0).abs() < 1e-6, "{seen:?}");
+    let error = (f64::from(seen.x) - expected[0]).abs().max((f64::from(seen.y) - expected[1]).abs());
+    assert!(error < 1e-4, "{seen:?} instead of {expected:?}");
+}
+
+#[test]
+fn srn_folder() {
+    let scene = open(&scenes::srn());
+    assert_eq!(scene.layout, Layout::Srn);
+    assert_eq!(names(&scene), ["2", "10", "target_1"]);
+    assert_eq!(scene.views.iter().map(|view| view.image.is_some()).collect::<Vec<_>>(), [true, true, false]);
+    for view in 0..3 {
+        assert_pixel(&scene, view, [8.0 + 5.0, 6.0 - 2.5]);
+    }
+}
+
+#[test]
+fn srn_photographs_at_another_scale() {
+    let folder = scenes::srn();
+    folder.write("intrinsics.txt", "40. 17. 11. 0.\n0. 0. 0.\n0.5\n1.\n24 32\n");
+    let scene = open(&folder);
+    // Half of everything, for the target pose too.
+    assert_pixel(&scene, 0, [8.5 + 5.0, 5.5 - 2.5]);
+    assert_pixel(&scene, 2, [8.5 + 5.0, 5.5 - 2.5]);
+    assert_eq!((scene.views[2].camera.pinhole.width(), scene.views[2].camera.pinhole.height()), (16, 12));
+}
+
+#[test]
+fn srn_pose_on_four_lines_and_world_to_camera() {
+    let folder = scenes::srn();
+    let by_row: Vec<String> = scenes::WORLD_FROM_CAMERA.chunks(4).map(scenes::words).collect();
+    folder.write("pose/2.txt", by_row.join("\r\n") + "\r\n\r\n");
+    assert_pixel(&open(&folder), 0, [13.0, 3.5]);
+
+    let inverse = "0 1 0 -2  0 0 1 -3  1 0 0 -1  0 0 0 1";
+    for name in ["pose/2.txt", "pose/10.txt", "target_pose/1.txt"] {
+        folder.write(name, inverse);
+    }
+    folder.write("intrinsics.txt", "20. 8. 6.\n0. 0. 0.\n0.\n1.\n12 16\n1\n");
+    for view in 0..3 {
+        assert_pixel(&open(&folder), view, [13.0, 3.5]);
+    }
+}
+
+#[test]
+fn blender_transforms() {
+    let folder = Folder::new();
+    // A focal length of 20 at a width of 16.
+    let angle = 2.0 * (8.0f64 / 20.0).atan();
+    let frame = json!({ "file_path": "./train/r_0", "rotation": 0.01, "transform_matrix": scenes::opengl_matrix() });
+    folder.image("train/r_0.png", 16, 12);
+    folder.write("transforms_train.json", json!({ "camera_angle_x": angle, "frames": [frame] }).to_string());
+    let scene = open(&folder);
+    assert_eq!((scene.layout, names(&scene)), (Layout::Transforms, vec!["r_0"]));
+    assert_pixel(&scene, 0, [8.0 + 5.0, 6.0 - 2.5]);
+}
+
+#[test]
+fn instant_ngp_transforms() {
+    let folder = scenes::transforms_folder(&scenes::transforms());
+    assert_pixel(&open(&folder), 0, [7.5 + 5.0, 6.5 - 3.0]);
+    let file = Scene::open(folder.path().join("transforms.json")).expect("the file itself");
+    assert_eq!(file.views, open(&folder).views);
+
+    // A photograph of half the size, rounded down as resampling tools do.
+    let mut halved = scenes::transforms();
+    (halved["w"], halved["h"]) = (json!(33), json!(25));
+    assert_pixel(&open(&scenes::transforms_folder(&halved)), 0, [12.5 * 16.0 / 33.0, 3.5 * 12.0 / 25.0]);
+}
+
+#[test]
+fn opening_angles_give_both_focal_lengths() {
+    let mut transforms = scenes::transforms();
+    let top = transforms.as_object_mut().expect("an object");
+    top.retain(|key, _| key == "frames");
+    top.insert("camera_angle_x".into(), json!(2.0 * (8.0f64 / 20.0).atan()));
+    top.insert("camera_angle_y".into(), json!(2.0 * (6.0f64 / 24.0).atan()));
+    assert_pixel(&open(&scenes::transforms_folder(&transforms)), 0, [8.0 + 5.0, 6.0 - 3.0]);
+}
+
+#[test]
+fn nerfstudio_transforms() {
+    let mut transforms = scenes::transforms();
+    transforms["camera_model"] = json!("OPENCV");
+    transforms["applied_transform"] = json!([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0]]);
+    transforms["ply_file_path"] = json!("sparse_pc.ply");
+    let frame = transforms["frames"][0].as_object_mut().expect("a frame");
+    // A frame's own numbers win over those at the top.
+    for (key, value) in [("fl_x", 40.0), ("fl_y", 48.0), ("cx", 8.0), ("cy", 6.0), ("w", 16.0), ("k3", 0.0)] {
+        frame.insert(key.into(), json!(value));
+    }
+    let scene = open(&scenes::transforms_folder(&transforms));
+    assert_pixel(&scene, 0, [8.0 + 10.0, 6.0 - 6.0]);
+}
+
+#[test]
+fn middlebury_list() {
+    let folder = scenes::middlebury();
+    let scene = open(&folder);
+    assert_eq!((scene.layout, names(&scene)), (Layout::Middlebury, vec!["toy0001", "toy0002"]));
+    // Half a pixel more than K says: there, (0, 0) is a pixel's centre.
+    assert_pixel(&scene, 1, [7.5 + 5.0, 5.5 - 3.0]);
+    let list = Scene::open(folder.path().join("toy_par.txt")).expect("the list itself");
+    assert_eq!(list.views, scene.views);
+}
+
+#[test]
+fn a_view_is_found_by_name_or_by_its_number() {
+    let scene = open(&scenes::middlebury());
+    assert_eq!(scene.view_named("toy0002"), Some(1));
+    assert_eq!(scene.view_named("2"), Some(1));
+    assert_eq!(scene.view_named("0001"), Some(0));
+    for nobody in ["0", "3", "", "toy", "toy2", "-1", "1.0", "99999999999999999999999999"] {
+        assert_eq!(scene.view_named(nobody), None, "{nobody}");
+    }
+
+    let folder = scenes::srn();
+    let scene = open(&folder);
+    assert_eq!(
+        (scene.view_named("1"), scene.view_named("target_1"), scene.view_named("02")),
+        (Some(2), Some(2), Some(0))
+    );
+    // An exact name wins; a number that two names end in finds neither.
+    folder.write("target_pose/2.txt", scenes::words(&scenes::WORLD_FROM_CAMERA));
+    let scene = open(&folder);
+    assert_eq!((scene.view_named("2"), scene.view_named("02")), (Some(0), None));
+}
+
+#[test]
+fn photographs_of_every_kind_become_rgba8() {
+    use image::{DynamicImage, ImageBuffer, Luma, LumaA, Rgba};
+    let cases: [(&str, DynamicImage, [u8; 4], bool); 4] = [
+        ("png", DynamicImage::ImageLuma8(ImageBuffer::from_pixel(16, 12, Luma([7]))), [7, 7, 7, 255], false),
+        ("png", DynamicImage::ImageLumaA8(ImageBuffer::from_pixel(16, 12, LumaA([7, 9]))), [7, 7, 7, 9], true),
+        // 16 bits: 257 per step of 8 bits, rounded to the nearest; colour under alpha 0 is kept (straight alpha).
+        (
+            "png",
+            DynamicImage::ImageRgba16(ImageBuffer::from_pixel(16, 12, Rgba([257 * 3 + 128, 257 * 3 + 129, 65535, 0]))),
+            [3, 4, 255, 0],
+            true,
+        ),
+        ("jpg", DynamicImage::ImageLuma8(ImageBuffer::from_pixel(16, 12, Luma([128]))), [128, 128, 128, 255], false),
+    ];
+    for (extension, image, expected, has_alpha) in cases {
+        let folder = scenes::srn();
+        let name = format!("rgb/2.{extension}");
+        folder.remove("rgb/2.png");
+        image.save(folder.file(&name)).expect("an image");
+        let photograph = open(&folder).photograph(0).expect("a photograph");
+        assert_eq!(photograph.has_alpha, has_alpha, "{image:?}");
+        assert_eq!(photograph.pixels.dimensions(), (16, 12));
+        assert!(photograph.pixels.pixels().all(|pixel| pixel.0 == expected), "{:?}", photograph.pixels.get_pixel(0, 0));
+    }
+}
+
+#[test]
+fn pixels_that_are_not_there() {
+    let folder = scenes::srn();
+    let scene = open(&folder);
+    assert!(matches!(scene.photograph(2), Err(SceneError::NoPhotograph { name, .. }) if name == "target_1"));
+    assert!(matches!(scene.photograph(3), Err(SceneError::NoSuchView { view: 3, view_count: 3, .. })));
+    folder.image("rgb/2.png", 12, 16);
+    assert!(matches!(scene.photograph(0), Err(SceneError::SizeMismatch { width: 12, height: 16, .. })));
+}
