@@ -163,7 +163,7 @@ impl Camera {
 }
 
 /// A camera as plain data: what a kernel reads from a buffer. Made from a checked [`Camera`] by [`Camera::block`].
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct CameraBlock {
     /// The camera's x axis in world coordinates; behind it the centre's x.

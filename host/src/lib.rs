@@ -15,13 +15,13 @@
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
 //! evaluate, inspect, verify     the other jobs
-//! cli                           the command line
 //! ```
+//!
+//! The command line is the binary's (`main.rs`, `cli/`).
 #![forbid(unsafe_code)]
 
 pub mod attention;
 pub mod canvas;
-pub mod cli;
 pub mod device;
 pub mod evaluate;
 pub mod few_shot;

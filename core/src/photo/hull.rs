@@ -12,7 +12,7 @@ pub const SWEPT_ALPHA: f32 = 0.3;
 /// A source ray enters the hull at this alpha: below [`SWEPT_ALPHA`], so that the boundary itself is swept.
 pub const ENTRY_ALPHA: f32 = 0.6 * SWEPT_ALPHA;
 /// Step of the search for the entry, in footprints.
-pub const ENTRY_STEP: f32 = 1.5;
+pub const ENTRY_STEP: f32 = 2.0;
 
 /// Premultiplied colour and alpha that a view shows at an image coordinate.
 #[inline]

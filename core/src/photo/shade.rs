@@ -11,9 +11,17 @@ use glam::Vec3;
 /// Below this hull alpha a point is empty and no more views are asked.
 pub const EMPTY_ALPHA: f32 = 0.02;
 /// Signed distances are cut off at this many footprints to either side of a surface.
-pub const TRUNCATION: f32 = 4.0;
+pub const TRUNCATION: f32 = 5.0;
+/// The surface is put this many footprints in front of the depths: hulls cut off a little, and sweeps prefer depth to
+/// be missing rather than wrong.
+pub const SURFACE_OFFSET: f32 = 0.5;
 /// Width of the logistic step from empty to full, in footprints.
 pub const SURFACE_WIDTH: f32 = 0.5;
+/// A point that lies further than this behind the surface of *every* view, in radii of the object, is empty: only the
+/// silhouettes' lack of views fills it.
+pub const DEEPEST: f32 = 0.15;
+/// Hull alpha from which on a point counts as wholly inside the silhouettes.
+pub const FULL_ALPHA: f32 = 0.85;
 /// How far behind a view's surface a point still counts as seen by it, in footprints.
 pub const SEEN_BEHIND: f32 = 3.0;
 /// Neighbouring depths that differ by more than this many footprints belong to different surfaces and are not mixed.
@@ -92,6 +100,7 @@ pub fn sample(
     let mut containing = 0;
     let (mut distance_sum, mut distance_share) = (0.0, 0.0);
     let mut fusion = VisibleFusion::<3>::EMPTY;
+    let mut least_behind = NO_SURFACE;
     let mut view = 0;
     while view < object.view_count as usize {
         let seen = views[view].project(point_world);
@@ -109,6 +118,7 @@ pub fn sample(
                 let depth = depth_at(&views[view], depths, seen.x, seen.y, JUMP * footprint);
                 let distance = if depth < NO_SURFACE { (depth - seen.depth) / footprint } else { TRUNCATION };
                 let behind = max(-distance, 0.0);
+                least_behind = min(behind * footprint, least_behind);
                 if behind < TRUNCATION {
                     let share = weight * (1.0 - behind / TRUNCATION);
                     distance_sum += share * min(distance, TRUNCATION);
@@ -123,9 +133,11 @@ pub fn sample(
         }
         view += 1;
     }
-    if containing < object.least_containing {
+    if containing < object.least_containing || least_behind > DEEPEST * object.radius {
         return EMPTY;
     }
     let distance = if distance_share > 1.0e-4 { distance_sum / distance_share } else { -TRUNCATION };
-    Sample { occupancy: hull / (1.0 + exp(distance / SURFACE_WIDTH)), colour: fusion.mean_or([0.0; 3]) }
+    let inside = min(hull / FULL_ALPHA, 1.0);
+    let occupancy = inside / (1.0 + exp((distance - SURFACE_OFFSET) / SURFACE_WIDTH));
+    Sample { occupancy, colour: fusion.mean_or([0.0; 3]) }
 }

@@ -13,12 +13,14 @@ pub const MOST_DIFFERENCE: f32 = 0.2;
 /// Weight of an imaginary view that mismatches: what no other view can confirm is no match.
 pub const NO_WITNESS: f32 = 0.02;
 /// Spacing of the planes, in footprints of the source.
-pub const PLANE_STEP: f32 = 1.5;
+pub const PLANE_STEP: f32 = 2.0;
 /// Most planes of a sweep.
 pub const MOST_PLANES: u32 = 128;
 /// Reach of the window over which costs are averaged, in pixels to each side.
 pub const WINDOW_REACH: u32 = 2;
-/// Cost of lying deeper than the entry into the hull, per diameter of the object: among equal matches the nearest.
+/// How far behind the entry into the hull planes are swept, in radii of the object: concavities are no deeper.
+pub const SWEPT_BEHIND_ENTRY: f32 = 0.6;
+/// Cost of lying behind the entry into the hull, per radius of the object: among equal matches the nearest.
 pub const DEPTH_COST: f32 = 0.02;
 /// Cost of differing from the neighbours' depths by one footprint...
 pub const ROUGHNESS_COST: f32 = 0.01;
@@ -94,7 +96,8 @@ impl SweepBlock {
 /// weighted by `pair_weights[view][other]` (how relevant the other view is to this one; 0 on the diagonal) and by how
 /// likely the other view sees the place. `entries` are the depths of entry into the hull of all views.
 ///
-/// [`OUTSIDE`] where the pixel shows background, the place is in front of its ray's entry or outside the hull.
+/// [`OUTSIDE`] where the pixel shows background, or the place is outside the hull, in front of its ray's entry or too far
+/// behind it.
 #[inline]
 #[allow(clippy::too_many_arguments)]
 pub fn match_cost(
@@ -111,7 +114,8 @@ pub fn match_cost(
     let texel = (camera.first_texel + pixel) as usize;
     let depth = sweep.depth(plane);
     // Half a plane in front of the entry still touches the hull.
-    if depth + 0.5 * sweep.plane_step < entries[texel] {
+    let behind_entry = depth - entries[texel];
+    if behind_entry < -0.5 * sweep.plane_step || behind_entry > SWEPT_BEHIND_ENTRY * object.radius {
         return OUTSIDE;
     }
     let own = straight(&texels[texel]);
@@ -258,7 +262,7 @@ pub fn pick_depth(
         let mut cost = NO_SURFACE;
         if mean >= 0.0 {
             let depth = sweep.depth(plane);
-            cost = mean + DEPTH_COST * 0.5 * max(depth - entry, 0.0) / object.radius;
+            cost = mean + DEPTH_COST * max(depth - entry, 0.0) / object.radius;
             let mut roughness = 0.0;
             let mut at = 0;
             while at < around_count {

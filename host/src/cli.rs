@@ -1,0 +1,63 @@
+//! The command line: what each command takes. What each does is in its own file.
+
+mod evaluate;
+mod inspect;
+mod options;
+mod render;
+mod verify;
+mod weights;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+#[derive(Parser)]
+#[command(
+    name = "viewfuse",
+    version,
+    about = "From a handful of posed photographs, the picture from a camera that was never there.",
+    long_about = "Few-shot novel view synthesis. Every source view is weighted by how relevant its camera is to the \
+        target (\"Pay Attention to Where You Looked\"), and the weighted views are fused into a picture.\n\n\
+        A scene is an SRN folder (rgb/, pose/, intrinsics.txt), a folder with transforms.json (Blender, instant-ngp, \
+        nerfstudio), or a Middlebury folder with *_par.txt.",
+    after_help = "Exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted.",
+    max_term_width = 110
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render novel views: pictures, depth maps, contact sheets and a run record.
+    Render(render::Arguments),
+    /// Show the weight that every scheme gives each source for a target.
+    Weights(weights::Arguments),
+    /// Show what was read: cameras from above, what they look at, and what looks wrong.
+    Inspect(inspect::Arguments),
+    /// Compare weighting schemes on views that are left out of the sources.
+    Evaluate(evaluate::Arguments),
+    /// Compare this build with files of reference values.
+    Verify(verify::Arguments),
+}
+
+/// Runs the command that the process was started with.
+pub(crate) fn run() -> anyhow::Result<ExitCode> {
+    let arguments = Arguments::parse();
+    viewfuse::interrupt::listen()?;
+    match arguments.command {
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Weights(arguments) => weights::run(&arguments),
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
+    }
+}
+
+/// Runs a piece of work on this many threads instead of all cores.
+fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
+    match threads {
+        None => Ok(work()),
+        Some(count) => Ok(rayon::ThreadPoolBuilder::new().num_threads(count).build()?.install(work)),
+    }
+}

@@ -1,0 +1,81 @@
+//! Options that several commands share.
+
+use clap::Args;
+use viewfuse::few_shot::Selection;
+use viewfuse::photographs::BackgroundChoice;
+use viewfuse::render::{DEFAULT_LEAVE_OUT, DEFAULT_SETTLED, RenderOptions};
+
+/// How pictures are made.
+#[derive(Args)]
+pub(crate) struct PictureOptions {
+    /// Size of the pictures; the sources are resampled to the same scale [default: the views' size, at most 512]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
+    #[arg(long, value_name = "COLOUR", default_value = "auto")]
+    background: BackgroundChoice,
+    /// Leave out the least relevant sources while their weights together stay at or below this
+    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
+    leave_out: f32,
+    /// A ray ends where less than this share of the light still passes
+    #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SETTLED, value_parser = parse_share)]
+    settled: f32,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    pub(crate) threads: Option<usize>,
+}
+
+impl PictureOptions {
+    pub(crate) fn to_render_options(&self) -> RenderOptions {
+        RenderOptions {
+            size: self.size,
+            background: self.background,
+            leave_out: self.leave_out,
+            settled: self.settled,
+        }
+    }
+}
+
+/// Which views are sources.
+#[derive(Args)]
+pub(crate) struct SourceOptions {
+    /// Source views: names, ranges A..B, `all`, each with /STEP, separated by commas [default: all but the targets]
+    #[arg(long, value_name = "VIEWS")]
+    sources: Option<String>,
+    /// At most this many sources, spread as far apart as possible
+    #[arg(long, value_name = "K", value_parser = parse_count)]
+    views: Option<usize>,
+}
+
+impl SourceOptions {
+    pub(crate) fn to_selection(&self, targets: Option<&str>, orbit: Option<usize>) -> Selection {
+        Selection {
+            targets: targets.map(str::to_owned),
+            orbit,
+            sources: self.sources.clone(),
+            view_count: self.views,
+        }
+    }
+}
+
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let sides = text.split_once(['x', 'X']).and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
+    match sides {
+        Some([width, height]) if (1..=16_384).contains(&width) && (1..=16_384).contains(&height) => Ok([width, height]),
+        _ => Err("a size is WIDTHxHEIGHT, for example 160x120, each from 1 to 16384".to_owned()),
+    }
+}
+
+fn parse_share(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(share) if (0.0..1.0).contains(&share) => Ok(share),
+        _ => Err("a share is a number of at least 0 and less than 1".to_owned()),
+    }
+}
+
+pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(count) if (1..=10_000).contains(&count) => Ok(count),
+        _ => Err("a whole number from 1 to 10000".to_owned()),
+    }
+}

@@ -1,0 +1,191 @@
+//! `viewfuse render`.
+
+use super::on_threads;
+use super::options::{PictureOptions, SourceOptions, parse_count};
+use anyhow::Context;
+use clap::Args;
+use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+use viewfuse::device::Device;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::few_shot::FewShot;
+use viewfuse::field::Field;
+use viewfuse::field::photo::PhotoField;
+use viewfuse::files::{write_png, write_whole};
+use viewfuse::photographs::{SourceImages, to_rgb8};
+use viewfuse::progress::Progress;
+use viewfuse::record::{FrameRecord, RunRecord, background_record, depth_step, source_names, times_record};
+use viewfuse::render::{Frame, RenderOptions, render};
+use viewfuse::scene::Scene;
+use viewfuse::sheet::{Sheet, SheetSource, depth_picture};
+use viewfuse::weighting::Weighting;
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
+    viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7, each from all the others, with the error\n  \
+    viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n\n\
+    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json), NAME_sheet.png for each target, and run.json.")]
+pub(crate) struct Arguments {
+    /// The scene's folder, or its transforms.json or *_par.txt
+    scene: PathBuf,
+    /// Views to render, as for --sources; left out of the sources [default: the scene's target poses]
+    #[arg(long, value_name = "VIEWS")]
+    targets: Option<String>,
+    /// Render this many views on a circle around the object
+    #[arg(long, value_name = "N", value_parser = parse_count)]
+    orbit: Option<usize>,
+    #[command(flatten)]
+    sources: SourceOptions,
+    /// Weighting scheme: mean, l1, frobenius, relative-frobenius, gaussian:beta=B, distance:power=P,
+    /// error:alpha=A[,angle=axis|full], cross-attention, attention:FILE
+    #[arg(long, value_name = "SCHEME", default_value = "error:alpha=1")]
+    weights: String,
+    #[command(flatten)]
+    picture: PictureOptions,
+    /// Seed of every random number (the weight-free field draws none)
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Folder for the results; made if missing
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let start = Instant::now();
+    let weighting: Weighting = arguments.weights.parse()?;
+    let scene = Scene::open(&arguments.scene)?;
+    let open_time = start.elapsed();
+    let (device, field) = (Cpu, PhotoField::default());
+    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.orbit);
+    let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&field))?;
+    let options = arguments.picture.to_render_options();
+    let run = Run { arguments, scene: &scene, job: &job, weighting: &weighting, options: &options, start, open_time };
+    on_threads(arguments.picture.threads, || run.render(&device, &field))??;
+    Ok(ExitCode::SUCCESS)
+}
+
+struct Run<'a> {
+    arguments: &'a Arguments,
+    scene: &'a Scene,
+    job: &'a FewShot,
+    weighting: &'a Weighting,
+    options: &'a RenderOptions,
+    start: Instant,
+    open_time: Duration,
+}
+
+impl Run<'_> {
+    fn render<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<()> {
+        let names = source_names(self.scene, self.job);
+        let progress = Progress::new("rendering");
+        let mut frames = Vec::new();
+        let mut frame_time = Duration::ZERO;
+        let (mut size, mut background) = ([0, 0], [0.0; 3]);
+        let stages = render(
+            self.scene,
+            self.job,
+            self.weighting,
+            device,
+            field,
+            self.options,
+            &progress,
+            |sources, frame| -> anyhow::Result<()> {
+                frame_time += frame.time;
+                size = [frame.picture.width(), frame.picture.height()];
+                background = sources.background;
+                self.write(sources, &names, &frame).context("writing the results")?;
+                frames.push(FrameRecord::of(&frame, &names));
+                Ok(())
+            },
+        )?;
+        drop(progress);
+        for frame in &frames {
+            println!("{}", summary(frame, &self.arguments.output));
+        }
+        let record = RunRecord {
+            viewfuse: env!("CARGO_PKG_VERSION"),
+            scene: self.arguments.scene.display().to_string(),
+            device: device.name(),
+            field: field.name(),
+            weighting: self.weighting.to_string(),
+            seed: self.arguments.seed,
+            size,
+            background: background_record(self.options, background),
+            leave_out: self.options.leave_out,
+            settled: self.options.settled,
+            sources: names,
+            times: times_record(self.open_time, stages, frame_time, self.start.elapsed()),
+            frames,
+        };
+        write_whole(&self.arguments.output.join("run.json"), &serde_json::to_vec_pretty(&record)?)?;
+        println!(
+            "{} from {} sources, {}, {} on {}: {:.2} s",
+            if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) },
+            record.sources.len(),
+            record.weighting,
+            record.field,
+            record.device,
+            record.times.total
+        );
+        Ok(())
+    }
+
+    /// Writes a frame's pictures.
+    fn write(&self, sources: &SourceImages, names: &[String], frame: &Frame) -> anyhow::Result<()> {
+        let folder = &self.arguments.output;
+        let name = &frame.target.name;
+        let (width, height) = frame.picture.dimensions();
+        write_png(&folder.join(format!("{name}.png")), &DynamicImage::ImageRgb8(frame.picture.clone()))?;
+        let depth_step = depth_step(&frame.depths);
+        let depth_map: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_fn(width, height, |x, y| {
+            Luma([(frame.depths[(y * width + x) as usize] / depth_step).round() as u16])
+        });
+        write_png(&folder.join(format!("{name}_depth.png")), &DynamicImage::ImageLuma16(depth_map))?;
+        let sheet = self.sheet(sources, names, frame);
+        write_png(&folder.join(format!("{name}_sheet.png")), &DynamicImage::ImageRgb8(sheet))?;
+        Ok(())
+    }
+
+    fn sheet(&self, sources: &SourceImages, names: &[String], frame: &Frame) -> RgbImage {
+        let (width, height) = frame.picture.dimensions();
+        let over_background = |texels: &[[f32; 4]]| -> Vec<[f32; 4]> {
+            let b = sources.background;
+            texels.iter().map(|t| [0, 1, 2, 3].map(|c| t[c] + if c < 3 { (1.0 - t[3]) * b[c] } else { 0.0 })).collect()
+        };
+        let source = |(index, name): (usize, &String)| {
+            let image = &sources.images[index];
+            let size = [image.camera.pinhole.width(), image.camera.pinhole.height()];
+            SheetSource {
+                name: name.clone(),
+                weight: frame.omission.weights.get(index as u32),
+                picture: to_rgb8(&over_background(&image.texels), size),
+            }
+        };
+        let empty_as_nan: Vec<f32> = frame.depths.iter().map(|z| if *z > 0.0 { *z } else { f32::NAN }).collect();
+        let scene = self.scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        Sheet {
+            title: format!("{scene}  target {}  weights {}", frame.target.name, self.weighting),
+            sources: names.iter().enumerate().map(source).collect(),
+            prediction: frame.picture.clone(),
+            depth: depth_picture(&empty_as_nan, width, height),
+            truth: frame.truth.as_ref().map(|truth| (truth.picture.clone(), truth.psnr, truth.ssim)),
+        }
+        .draw()
+    }
+}
+
+fn summary(frame: &FrameRecord, folder: &Path) -> String {
+    let score = match (frame.psnr, frame.ssim) {
+        (Some(psnr), Some(ssim)) => format!("  PSNR {psnr:.2} dB  SSIM {ssim:.3}"),
+        (Some(psnr), None) => format!("  PSNR {psnr:.2} dB"),
+        _ => String::new(),
+    };
+    let left_out = match frame.left_out.len() {
+        0 => String::new(),
+        count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
+    };
+    format!("{}{score}{left_out}", folder.join(format!("{}.png", frame.target)).display())
+}

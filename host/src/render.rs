@@ -1,0 +1,317 @@
+//! The way of the data, from a scene to pictures.
+
+use crate::device::Device;
+use crate::few_shot::{FewShot, Target};
+use crate::field::{Field, FieldError, Rendered};
+use crate::photographs::{Album, BackgroundChoice, PhotographsError, SourceImages, to_rgb8};
+use crate::progress::Progress;
+use crate::scene::{Scene, SceneError};
+use crate::weighting::{MOST_SOURCES, SourceWeights, Weighting};
+use image::RgbImage;
+use std::time::{Duration, Instant};
+use viewfuse_core::camera::{Camera, PinholeError};
+use viewfuse_core::metrics::{psnr, ssim};
+use viewfuse_core::sources::{Sources, SourcesError};
+use viewfuse_core::weights::{Omission, Weights};
+
+/// Longest side of a picture whose size nobody asked for.
+pub const LONGEST_DEFAULT_SIDE: u32 = 512;
+
+/// Why a render failed.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError<E: std::error::Error> {
+    /// The scene or a photograph could not be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A photograph could not be prepared.
+    #[error(transparent)]
+    Photographs(#[from] PhotographsError),
+    /// There are too few or too many sources.
+    #[error("unusable sources: {0:?}")]
+    Sources(SourcesError),
+    /// The size does not fit the scene.
+    #[error("--size {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
+             for this width it would be {width}x{fitting_height}")]
+    Shape {
+        /// Asked for.
+        width: u32,
+        /// Asked for.
+        height: u32,
+        /// The views'.
+        view_width: u32,
+        /// The views'.
+        view_height: u32,
+        /// The height that keeps the views' shape.
+        fitting_height: u32,
+    },
+    /// The size is not usable at all.
+    #[error("--size {width}x{height} is not usable: {error:?}")]
+    Size {
+        /// Asked for.
+        width: u32,
+        /// Asked for.
+        height: u32,
+        /// Why not.
+        error: PinholeError,
+    },
+    /// The field failed.
+    #[error(transparent)]
+    Field(#[from] FieldError<E>),
+}
+
+/// What a person can set about a render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Width and height of the pictures; otherwise the views' size, at most [`LONGEST_DEFAULT_SIDE`] on a side.
+    pub size: Option<[u32; 2]>,
+    /// What is behind the object.
+    pub background: BackgroundChoice,
+    /// Sources of least weight are left out while their weights together stay at or below this.
+    pub leave_out: f32,
+    /// Transmittance at which a ray may end.
+    pub settled: f32,
+}
+
+/// Largest share of the weight that is left out unless a person says otherwise.
+pub const DEFAULT_LEAVE_OUT: f32 = 0.0;
+/// Transmittance at which a ray may end unless a person says otherwise: 1/256 of the range of a channel.
+pub const DEFAULT_SETTLED: f32 = 1.0 / 256.0;
+
+impl Default for RenderOptions {
+    fn default() -> RenderOptions {
+        RenderOptions {
+            size: None,
+            background: BackgroundChoice::Auto,
+            leave_out: DEFAULT_LEAVE_OUT,
+            settled: DEFAULT_SETTLED,
+        }
+    }
+}
+
+/// How long each stage took. Stages that several frames share are counted once, in their run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageTimes {
+    /// Decoding photographs, taking out backgrounds, resampling.
+    pub photographs: Duration,
+    /// Taking the photographs to the device and finding the object.
+    pub prepare: Duration,
+    /// Encoding the sources.
+    pub encode: Duration,
+}
+
+/// One target's picture with all that led to it.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The target.
+    pub target: Target,
+    /// The sources' weights before views were left out.
+    pub weights: SourceWeights,
+    /// What was left out, and the weights that were used.
+    pub omission: Omission<MOST_SOURCES>,
+    /// The picture.
+    pub picture: RgbImage,
+    /// Depth along the principal axis in world units; 0 where nothing is met. Row-major.
+    pub depths: Vec<f32>,
+    /// The truth at the same size and its scores, where there is a photograph.
+    pub truth: Option<Truth>,
+    /// Time for this frame alone.
+    pub time: Duration,
+}
+
+/// A photograph at the target, and how the prediction compares.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// The photograph at the frame's size over the run's background.
+    pub picture: RgbImage,
+    /// Peak signal to noise ratio in decibels, of 8-bit values.
+    pub psnr: f64,
+    /// Structural similarity (uniform 7x7 window), if the picture is large enough.
+    pub ssim: Option<f64>,
+}
+
+impl Truth {
+    /// Compares a prediction with the truth.
+    pub fn compare(prediction: &RgbImage, truth: RgbImage) -> Truth {
+        let (width, height) = (truth.width() as usize, truth.height() as usize);
+        Truth { psnr: psnr(prediction, &truth), ssim: ssim(prediction, &truth, width, height, 3), picture: truth }
+    }
+}
+
+/// The ratio of the working size to the size of the scene's first view, checked.
+///
+/// # Errors
+/// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
+pub fn working_scale<E: std::error::Error>(scene: &Scene, options: &RenderOptions) -> Result<f32, RenderError<E>> {
+    let Some(view) = scene.views.first() else { return Ok(1.0) };
+    let (view_width, view_height) = (view.camera.pinhole.width(), view.camera.pinhole.height());
+    let Some([width, height]) = options.size else {
+        return Ok((LONGEST_DEFAULT_SIDE as f32 / view_width.max(view_height) as f32).min(1.0));
+    };
+    view.camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+    let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
+    if fitting_height.abs_diff(height) > 1 {
+        return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
+    }
+    Ok(width as f32 / view_width as f32)
+}
+
+/// A set of sources on a device: everything that no weighting and no target changes.
+pub struct Stage<'a, D: Device, F: Field<D>> {
+    scene: &'a Scene,
+    album: &'a Album<'a>,
+    device: &'a D,
+    field: &'a F,
+    options: &'a RenderOptions,
+    scale: f32,
+    sources: Sources<MOST_SOURCES>,
+    /// The sources at working size.
+    pub images: SourceImages,
+    prepared: F::Prepared,
+    /// How long the stages took so far.
+    pub times: StageTimes,
+}
+
+impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
+    /// Prepares these source views on the device.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn prepare(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        device: &'a D,
+        field: &'a F,
+        options: &'a RenderOptions,
+        progress: &Progress,
+    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+        let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let source_poses = Sources::new(&poses).map_err(RenderError::Sources)?;
+        let scale = working_scale(scene, options)?;
+        let mut times = StageTimes::default();
+        let images = timed(&mut times.photographs, || album.sources(sources, scale, options.background))?;
+        let prepared = timed(&mut times.prepare, || field.prepare(device, &images, progress))?;
+        Ok(Stage { scene, album, device, field, options, scale, sources: source_poses, images, prepared, times })
+    }
+
+    /// Encodes the sources under a weighting: each source as a target of the others.
+    ///
+    /// # Errors
+    /// [`RenderError::Field`].
+    pub fn encode(&mut self, weighting: &Weighting, progress: &Progress) -> Result<F::Latents, RenderError<D::Error>> {
+        let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
+        let (field, device, prepared) = (self.field, self.device, &self.prepared);
+        let latents = timed(&mut self.times.encode, || field.encode(device, prepared, &relevance, progress))?;
+        Ok(latents)
+    }
+
+    /// Weighs the sources for a target, leaves out what does not count, renders, and compares with the truth.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn frame(
+        &self,
+        weighting: &Weighting,
+        latents: &F::Latents,
+        target: &Target,
+        progress: &Progress,
+    ) -> Result<Frame, RenderError<D::Error>> {
+        let start = Instant::now();
+        let weights = weighting.weigh(&self.sources, &target.camera.pose);
+        let omission = weights.without_least(self.options.leave_out);
+        let camera = self.at_working_size(&target.camera)?;
+        let rendered = self.field.render(
+            self.device,
+            &self.prepared,
+            latents,
+            &omission.weights,
+            &camera,
+            self.options.settled,
+            progress,
+        )?;
+        let time = start.elapsed();
+        let Rendered { colours, depths, width, height } = rendered;
+        let picture = to_rgb8(&colours, [width, height]);
+        let truth = match target.truth {
+            Some(view) => {
+                let truth = self.album.truth(view, [width, height], self.images.background)?;
+                Some(Truth::compare(&picture, truth))
+            }
+            None => None,
+        };
+        Ok(Frame { target: target.clone(), weights, omission, picture, depths, truth, time })
+    }
+
+    fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError<D::Error>> {
+        let (width, height) = match (self.options.size, self.scene.views.first()) {
+            (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
+            _ => crate::photographs::scaled_size(camera, self.scale),
+        };
+        let pinhole = camera
+            .pinhole
+            .resized(width, height)
+            .map_err(|error| RenderError::Size { width, height, error })?;
+        Ok(Camera { pinhole, ..*camera })
+    }
+}
+
+fn same_size(a: &Camera, b: &Camera) -> bool {
+    a.pinhole.width() == b.pinhole.width() && a.pinhole.height() == b.pinhole.height()
+}
+
+/// The weights of all sources for each source as a target; a source's weight for itself is 0.
+fn relevance_among(sources: &Sources<MOST_SOURCES>, weighting: &Weighting, leave_out: f32) -> Vec<SourceWeights> {
+    let count = sources.count();
+    (0..count)
+        .map(|view| {
+            // The scheme sees only the others: its own pose would take nearly all the weight.
+            let others: Vec<_> = (0..count).filter(|other| *other != view).map(|other| *sources.pose(other)).collect();
+            let Ok(others) = Sources::<MOST_SOURCES>::new(&others) else {
+                return Weights::mean(count);
+            };
+            let weights = weighting.weigh(&others, sources.pose(view)).without_least(leave_out).weights;
+            let mut scores = [0.0; MOST_SOURCES];
+            for other in 0..count {
+                if other != view {
+                    scores[other as usize] = weights.get(if other < view { other } else { other - 1 });
+                }
+            }
+            Weights::from_scores(&scores, count)
+        })
+        .collect()
+}
+
+/// Renders every target of a job and hands each frame over as soon as it is done. Returns the times of what the frames
+/// share.
+///
+/// # Errors
+/// [`RenderError`]; those of `deliver` pass through.
+#[allow(clippy::too_many_arguments)]
+pub fn render<D: Device, F: Field<D>, X: From<RenderError<D::Error>>>(
+    scene: &Scene,
+    job: &FewShot,
+    weighting: &Weighting,
+    device: &D,
+    field: &F,
+    options: &RenderOptions,
+    progress: &Progress,
+    mut deliver: impl FnMut(&SourceImages, Frame) -> Result<(), X>,
+) -> Result<StageTimes, X> {
+    let truths = job.targets.iter().filter_map(|target| target.truth);
+    let album = Album::open(scene, job.sources.iter().copied().chain(truths)).map_err(RenderError::from)?;
+    let mut stage = Stage::prepare(scene, &album, &job.sources, device, field, options, progress)?;
+    let latents = stage.encode(weighting, progress)?;
+    for target in &job.targets {
+        let frame = stage.frame(weighting, &latents, target, progress)?;
+        deliver(&stage.images, frame)?;
+    }
+    Ok(stage.times)
+}
+
+/// Runs a piece of work and adds its time.
+fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *total += start.elapsed();
+    result
+}
