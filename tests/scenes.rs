@@ -150,7 +150,9 @@ fn a_view_is_found_by_name_or_by_its_number() {
 #[test]
 fn photographs_of_every_kind_become_rgba8() {
     use image::{DynamicImage, ImageBuffer, Luma, LumaA, Rgba};
-    let cases: [(&str, DynamicImage, [u8; 4], bool); 4] = [
+    let cases: [(&str, DynamicImage, [u8; 4], bool); 5] = [
+        // An alpha channel that is 255 everywhere, as SRN's photographs have, says nothing.
+        ("png", DynamicImage::ImageRgba8(ImageBuffer::from_pixel(16, 12, Rgba([1, 2, 3, 255]))), [1, 2, 3, 255], false),
         ("png", DynamicImage::ImageLuma8(ImageBuffer::from_pixel(16, 12, Luma([7]))), [7, 7, 7, 255], false),
         ("png", DynamicImage::ImageLumaA8(ImageBuffer::from_pixel(16, 12, LumaA([7, 9]))), [7, 7, 7, 9], true),
         // 16 bits: 257 per step of 8 bits, rounded to the nearest; colour under alpha 0 is kept (straight alpha).

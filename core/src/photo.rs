@@ -75,6 +75,19 @@ impl ObjectBlock {
         )
     }
 
+    /// The eight corners; bit `k` of the index says whether coordinate `k` is the greatest.
+    #[inline]
+    pub fn corners(&self) -> [Vec3; 8] {
+        let mut corners = [Vec3::ZERO; 8];
+        let mut index = 0;
+        while index < 8 {
+            let pick = |axis: usize| if index >> axis & 1 == 0 { self.low[axis] } else { self.high[axis] };
+            corners[index] = Vec3::new(pick(0), pick(1), pick(2));
+            index += 1;
+        }
+        corners
+    }
+
     /// The part of a line inside the box: parameters `(enter, leave)` of `origin + t * direction` with `t >= 0`;
     /// `enter >= leave` where the line misses it.
     #[inline]

@@ -187,10 +187,7 @@ impl AttentionModel {
     }
 }
 
-fn linear<const I: usize, const O: usize, E>(
-    tensors: &mut TensorSource<'_, E>,
-    name: &str,
-) -> Result<Linear<I, O>, E> {
+fn linear<const I: usize, const O: usize, E>(tensors: &mut TensorSource<'_, E>, name: &str) -> Result<Linear<I, O>, E> {
     let weight = tensors(&format!("{name}.weight"), &[O, I])?;
     let bias = tensors(&format!("{name}.bias"), &[O])?;
     Ok(assemble(&weight, &bias))
@@ -222,8 +219,7 @@ fn read_tensor(path: &Path, file: &SafeTensors<'_>, name: &str, wanted: &[usize]
             shape: view.shape().to_vec(),
         });
     }
-    let values: Vec<f32> =
-        view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let values: Vec<f32> = view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
     match values.iter().position(|value| !value.is_finite()) {
         Some(index) => Err(AttentionError::NotFinite { path: path(), tensor: name.to_owned(), index }),
         None => Ok(values),

@@ -4,6 +4,7 @@ mod evaluate;
 mod inspect;
 mod options;
 mod render;
+mod table;
 mod verify;
 mod weights;
 

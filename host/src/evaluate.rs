@@ -1,1 +1,195 @@
-//! To come.
+//! How good is each weighting scheme: views are left out of the sources, rendered, and compared with their photographs.
+
+use crate::device::Device;
+use crate::few_shot::{Selection, SelectionError, target_of, view_list};
+use crate::field::Field;
+use crate::photographs::Album;
+use crate::progress::Progress;
+use crate::render::{RenderError, RenderOptions, Stage, Truth};
+use crate::scene::Scene;
+use crate::weighting::Weighting;
+use image::RgbImage;
+use std::time::{Duration, Instant};
+
+/// Name of the row that copies the nearest source instead of rendering.
+pub const NEAREST_COPY: &str = "nearest copy";
+
+/// Why an evaluation failed.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError<E: std::error::Error> {
+    /// The choice of views is no job.
+    #[error(transparent)]
+    Selection(#[from] SelectionError),
+    /// A target has no photograph to compare with.
+    #[error("{scene}: view '{view}' has no photograph to compare with")]
+    NoTruth {
+        /// The scene's path.
+        scene: String,
+        /// The view.
+        view: String,
+    },
+    /// A render failed.
+    #[error(transparent)]
+    Render(#[from] RenderError<E>),
+}
+
+/// The score of one scheme at one target.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Score {
+    /// The scheme, or [`NEAREST_COPY`].
+    pub scheme: String,
+    /// The target view.
+    pub target: String,
+    /// How many sources there were.
+    pub source_count: usize,
+    /// Peak signal to noise ratio in decibels, of 8-bit values.
+    pub psnr: f64,
+    /// Structural similarity, if the picture is large enough.
+    pub ssim: Option<f64>,
+    /// Encoding and rendering for this target and scheme; encoding that targets share is divided among them.
+    pub time: Duration,
+}
+
+/// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one out) and
+/// the targets are all views; with them, the targets are all other views.
+///
+/// # Errors
+/// [`EvaluateError`].
+pub fn evaluate<D: Device, F: Field<D>>(
+    scene: &Scene,
+    selection: &Selection,
+    weightings: &[Weighting],
+    device: &D,
+    field: &F,
+    options: &RenderOptions,
+    progress: &Progress,
+) -> Result<Vec<Score>, EvaluateError<D::Error>> {
+    let groups = source_groups(scene, selection, field.least_sources())?;
+    let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
+    let album = Album::open(scene, used).map_err(RenderError::from)?;
+    let mut scores = Vec::new();
+    for (sources, targets) in &groups {
+        let mut stage = Stage::prepare(scene, &album, sources, device, field, options, progress)?;
+        for &target in targets {
+            let nearest = nearest_source(scene, sources, target);
+            let (prediction, truth) = stage.photograph_and_truth(nearest, target)?;
+            scores.push(score(
+                NEAREST_COPY,
+                scene,
+                target,
+                sources.len(),
+                &Truth::compare(&prediction, truth),
+                Duration::ZERO,
+            ));
+        }
+        for weighting in weightings {
+            let start = Instant::now();
+            let latents = stage.encode(weighting, progress)?;
+            let encode_share = start.elapsed() / targets.len().max(1) as u32;
+            for &target in targets {
+                let frame = stage.frame(weighting, &latents, &target_of(scene, target), progress)?;
+                if let Some(truth) = &frame.truth {
+                    let time = encode_share + frame.time;
+                    scores.push(score(&weighting.to_string(), scene, target, sources.len(), truth, time));
+                }
+            }
+        }
+    }
+    Ok(scores)
+}
+
+fn score(scheme: &str, scene: &Scene, target: usize, source_count: usize, truth: &Truth, time: Duration) -> Score {
+    let target = scene.views[target].name.clone();
+    Score { scheme: scheme.to_owned(), target, source_count, psnr: truth.psnr, ssim: truth.ssim, time }
+}
+
+/// Sets of sources, each with the targets that are rendered from it.
+type SourceGroups = Vec<(Vec<usize>, Vec<usize>)>;
+
+fn source_groups<E: std::error::Error>(
+    scene: &Scene,
+    selection: &Selection,
+    least_sources: usize,
+) -> Result<SourceGroups, EvaluateError<E>> {
+    let photographed = || (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some());
+    let asked = match &selection.targets {
+        Some(list) => Some(view_list(scene, list)?),
+        None => None,
+    };
+    if let Some(&view) = asked.iter().flatten().find(|&&view| scene.views[view].image.is_none()) {
+        let view = scene.views[view].name.clone();
+        return Err(EvaluateError::NoTruth { scene: scene.path.display().to_string(), view });
+    }
+    if selection.sources.is_some() {
+        let excluded = asked.clone().unwrap_or_default();
+        let sources = selection.sources_without(scene, &excluded, least_sources)?;
+        let targets = asked.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
+        if targets.is_empty() {
+            return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
+        }
+        return Ok(vec![(sources, targets)]);
+    }
+    asked
+        .unwrap_or_else(|| photographed().collect())
+        .into_iter()
+        .map(|target| Ok((selection.sources_without(scene, &[target], least_sources)?, vec![target])))
+        .collect()
+}
+
+/// The source whose centre is nearest to the target's.
+fn nearest_source(scene: &Scene, sources: &[usize], target: usize) -> usize {
+    let distance = |view: usize| scene.views[view].camera.pose.distance(&scene.views[target].camera.pose);
+    sources.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(target)
+}
+
+/// Mean scores of a scheme over targets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mean {
+    /// The scheme.
+    pub scheme: String,
+    /// Mean PSNR in decibels.
+    pub psnr: f64,
+    /// Mean SSIM over the targets that have one.
+    pub ssim: Option<f64>,
+    /// Mean time.
+    pub seconds: f64,
+    /// Over how many targets.
+    pub target_count: usize,
+}
+
+/// Means over targets of every scheme, in the order in which the schemes appear.
+pub fn means(scores: &[Score]) -> Vec<Mean> {
+    let mut schemes: Vec<&str> = Vec::new();
+    for score in scores {
+        if !schemes.contains(&score.scheme.as_str()) {
+            schemes.push(&score.scheme);
+        }
+    }
+    schemes
+        .into_iter()
+        .map(|scheme| {
+            let own: Vec<&Score> = scores.iter().filter(|score| score.scheme == scheme).collect();
+            let count = own.len() as f64;
+            let similarities: Vec<f64> = own.iter().filter_map(|score| score.ssim).collect();
+            Mean {
+                scheme: scheme.to_owned(),
+                psnr: own.iter().map(|score| score.psnr).sum::<f64>() / count,
+                ssim: (!similarities.is_empty()).then(|| similarities.iter().sum::<f64>() / similarities.len() as f64),
+                seconds: own.iter().map(|score| score.time.as_secs_f64()).sum::<f64>() / count,
+                target_count: own.len(),
+            }
+        })
+        .collect()
+}
+
+impl<D: Device, F: Field<D>> Stage<'_, D, F> {
+    /// A source's photograph and the target's, both at the target's working size over the run's background.
+    fn photograph_and_truth(
+        &self,
+        source: usize,
+        target: usize,
+    ) -> Result<(RgbImage, RgbImage), RenderError<D::Error>> {
+        let size = self.picture_size(target)?;
+        Ok((self.truth_at(source, size)?, self.truth_at(target, size)?))
+    }
+}

@@ -162,7 +162,11 @@ impl Selection {
             sources = spread(scene, &sources, count);
         }
         if sources.len() < least_sources {
-            return Err(SelectionError::TooFewSources { scene: scene_name(), count: sources.len(), least: least_sources });
+            return Err(SelectionError::TooFewSources {
+                scene: scene_name(),
+                count: sources.len(),
+                least: least_sources,
+            });
         }
         if sources.len() > MOST_SOURCES {
             return Err(SelectionError::TooManySources { count: sources.len() });

@@ -27,6 +27,7 @@ pub mod evaluate;
 pub mod few_shot;
 pub mod field;
 pub mod files;
+pub mod formula;
 pub mod inspect;
 pub mod interrupt;
 pub mod photographs;

@@ -29,8 +29,10 @@ pub enum PhotographsError {
         error: PinholeError,
     },
     /// The background covers the whole photograph, or nothing of it.
-    #[error("view '{view}' shows no object before the background ({colour}); give the background with --background, \
-             or photographs with an alpha channel")]
+    #[error(
+        "view '{view}' shows no object before the background ({colour}); give the background with --background, \
+             or photographs with an alpha channel"
+    )]
     NoSilhouette {
         /// The view.
         view: String,

@@ -30,8 +30,10 @@ pub enum RenderError<E: std::error::Error> {
     #[error("unusable sources: {0:?}")]
     Sources(SourcesError),
     /// The size does not fit the scene.
-    #[error("--size {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
-             for this width it would be {width}x{fitting_height}")]
+    #[error(
+        "--size {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
+             for this width it would be {width}x{fitting_height}"
+    )]
     Shape {
         /// Asked for.
         width: u32,
@@ -233,13 +235,27 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let Rendered { colours, depths, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);
         let truth = match target.truth {
-            Some(view) => {
-                let truth = self.album.truth(view, [width, height], self.images.background)?;
-                Some(Truth::compare(&picture, truth))
-            }
+            Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
             None => None,
         };
         Ok(Frame { target: target.clone(), weights, omission, picture, depths, truth, time })
+    }
+
+    /// A view's photograph at a size, over the run's background.
+    ///
+    /// # Errors
+    /// [`RenderError::Scene`] if it can not be read.
+    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError<D::Error>> {
+        Ok(self.album.truth(view, size, self.images.background)?)
+    }
+
+    /// Width and height of the picture that is rendered at a view's camera.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError<D::Error>> {
+        let camera = self.at_working_size(&self.scene.views[view].camera)?;
+        Ok([camera.pinhole.width(), camera.pinhole.height()])
     }
 
     fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError<D::Error>> {
@@ -247,10 +263,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
             (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
             _ => crate::photographs::scaled_size(camera, self.scale),
         };
-        let pinhole = camera
-            .pinhole
-            .resized(width, height)
-            .map_err(|error| RenderError::Size { width, height, error })?;
+        let pinhole =
+            camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
         Ok(Camera { pinhole, ..*camera })
     }
 }

@@ -27,20 +27,27 @@ impl Rig {
         let count = cameras.len().max(1) as f32;
         let centroid = cameras.iter().map(|c| c.pose.centre_world()).sum::<Vec3>() / count;
         let spread = cameras.iter().map(|c| c.pose.centre_world().distance(centroid)).sum::<f32>() / count;
-        let axes: Vec<(Vec3, Vec3)> =
-            cameras.iter().map(|c| (c.pose.centre_world(), c.pose.forward_world())).collect();
+        let axes: Vec<(Vec3, Vec3)> = cameras.iter().map(|c| (c.pose.centre_world(), c.pose.forward_world())).collect();
         let focus = nearest_point_to_lines(&axes).unwrap_or_else(|| {
             let ahead = cameras.iter().map(|c| c.pose.forward_world()).sum::<Vec3>() / count;
             centroid + ahead * if spread > 0.0 { spread } else { 1.0 }
         });
         let offsets = || cameras.iter().map(move |c| (c, focus - c.pose.centre_world()));
-        let squared_miss: f32 =
-            offsets().map(|(c, to)| (to - c.pose.forward_world() * to.dot(c.pose.forward_world())).length_squared()).sum();
+        let squared_miss: f32 = offsets()
+            .map(|(c, to)| (to - c.pose.forward_world() * to.dot(c.pose.forward_world())).length_squared())
+            .sum();
         let distance = offsets().map(|(_, to)| to.length()).sum::<f32>() / count;
-        let subject_radius =
-            offsets().map(|(c, to)| to.dot(c.pose.forward_world()).abs() * half_diagonal_slope(&c.pinhole)).sum::<f32>()
-                / count;
-        Rig { focus, axis_miss: (squared_miss / count).sqrt(), distance, up: up_direction(cameras, focus), subject_radius }
+        let subject_radius = offsets()
+            .map(|(c, to)| to.dot(c.pose.forward_world()).abs() * half_diagonal_slope(&c.pinhole))
+            .sum::<f32>()
+            / count;
+        Rig {
+            focus,
+            axis_miss: (squared_miss / count).sqrt(),
+            distance,
+            up: up_direction(cameras, focus),
+            subject_radius,
+        }
     }
 
     /// `count` cameras on a full circle around the focus, at the mean height and distance of the given ones, all
@@ -53,13 +60,13 @@ impl Rig {
             / cameras.len().max(1) as f32;
         let radius = (self.distance * self.distance - height * height).max(0.0).sqrt();
         let first = cameras.first().map_or(Vec3::X, |c| c.pose.centre_world() - self.focus);
-        let start = (first - self.up * first.dot(self.up)).try_normalize().unwrap_or_else(|| self.up.any_orthonormal_vector());
+        let start =
+            (first - self.up * first.dot(self.up)).try_normalize().unwrap_or_else(|| self.up.any_orthonormal_vector());
         let side = self.up.cross(start);
         (0..count)
             .map(|frame| {
                 let angle = std::f32::consts::TAU * frame as f32 / count as f32;
-                let centre =
-                    self.focus + self.up * height + (start * angle.cos() + side * angle.sin()) * radius;
+                let centre = self.focus + self.up * height + (start * angle.cos() + side * angle.sin()) * radius;
                 Ok(Camera { pose: Pose::look_at(centre, self.focus, self.up)?, pinhole })
             })
             .collect()

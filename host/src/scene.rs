@@ -54,7 +54,7 @@ pub struct View {
 pub struct Photograph {
     /// Straight (not premultiplied) 8-bit RGBA.
     pub pixels: image::RgbaImage,
-    /// Whether the file had an alpha channel; if not, every alpha is 255.
+    /// Whether any pixel is not opaque; if not, the background must be told from the colours.
     pub has_alpha: bool,
 }
 

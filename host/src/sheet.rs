@@ -114,7 +114,9 @@ pub fn error_map(prediction: &RgbImage, truth: &RgbImage) -> RgbImage {
         let (p, t) = (prediction.get_pixel(x, y), truth.get_pixel(x, y));
         let sum: u32 = p.0.iter().zip(&t.0).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
         let level = (sum as f32 / (3.0 * 255.0 * STRONGEST_ERROR)).min(1.0);
-        let fade = |start: f32, end: f32| (f32::from(PAPER[0]) * (1.0 - ((level - start) / (end - start)).clamp(0.0, 1.0))) as u8;
+        let fade = |start: f32, end: f32| {
+            (f32::from(PAPER[0]) * (1.0 - ((level - start) / (end - start)).clamp(0.0, 1.0))) as u8
+        };
         Rgb([fade(0.5, 1.0), fade(0.0, 0.5), fade(0.0, 0.5)])
     })
 }

@@ -14,7 +14,8 @@ pub const MOST_STEPS: u32 = 1024;
 /// Colour, depth along the principal axis and opacity of the target's ray through the image coordinate `(x, y)`.
 ///
 /// The ray is marched through the object's box in equal steps of at most a footprint; it ends where the transmittance
-/// is at most `settled`, which changes no channel by more than that. The depth of a ray that meets nothing is 0.
+/// is at most `settled`, which changes no channel by more than that. The depth of a ray that is less than half hidden
+/// is 0: that of what little it meets means nothing.
 #[inline]
 #[allow(clippy::too_many_arguments)]
 pub fn march(
@@ -46,5 +47,6 @@ pub fn march(
             index += 1;
         }
     }
-    ray.finish(background, 0.0)
+    let seen = ray.finish(background, 0.0);
+    if seen.opacity < 0.5 { Composite { depth: 0.0, ..seen } } else { seen }
 }

@@ -58,11 +58,11 @@ const _: () = assert!(size_of::<SweepBlock>() == 32);
 impl SweepBlock {
     /// The sweep of `view` through the object's box, over all rows. A footprint is that at the middle of the box.
     pub fn new(object: &ObjectBlock, camera: &CameraBlock, view: u32) -> SweepBlock {
+        let corners = object.corners();
         let (mut near, mut far) = (NO_SURFACE, 0.0);
         let mut corner = 0;
         while corner < 8 {
-            let pick = |axis: usize| if corner >> axis & 1 == 0 { object.low[axis] } else { object.high[axis] };
-            let depth = camera.project(glam::Vec3::new(pick(0), pick(1), pick(2))).depth;
+            let depth = camera.project(corners[corner]).depth;
             near = min(depth, near);
             far = max(depth, far);
             corner += 1;

@@ -1,6 +1,108 @@
-//! To come.
+//! `viewfuse evaluate`.
+
+use super::on_threads;
+use super::options::{PictureOptions, SourceOptions};
+use super::table::table;
+use anyhow::Context;
 use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
+use viewfuse::field::photo::PhotoField;
+use viewfuse::files::write_whole;
+use viewfuse::progress::Progress;
+use viewfuse::scene::Scene;
+use viewfuse::weighting::{SCHEME_NAMES, Weighting};
+
 #[derive(Args)]
-pub(crate) struct Arguments {}
-pub(crate) fn run(_: &Arguments) -> anyhow::Result<ExitCode> { Ok(ExitCode::SUCCESS) }
+#[command(after_help = "Examples:\n  \
+    viewfuse evaluate dino/ --targets 1,4,7,10,13,16 --size 160x120\n      each of six views from all others, every scheme\n  \
+    viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the other views from every third, two schemes")]
+pub(crate) struct Arguments {
+    /// One or more scenes
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
+    #[arg(long, value_name = "VIEWS")]
+    targets: Option<String>,
+    #[command(flatten)]
+    sources: SourceOptions,
+    /// A weighting scheme; may be given several times [default: every scheme that needs no file]
+    #[arg(long, value_name = "SCHEME")]
+    weights: Vec<String>,
+    #[command(flatten)]
+    picture: PictureOptions,
+    /// Write every single score to this CSV file
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let names: Vec<&str> = match arguments.weights.is_empty() {
+        true => SCHEME_NAMES.to_vec(),
+        false => arguments.weights.iter().map(String::as_str).collect(),
+    };
+    let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
+    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
+    let options = arguments.picture.to_render_options();
+    let mut all: Vec<(String, Score)> = Vec::new();
+    for path in &arguments.scenes {
+        let scene = Scene::open(path)?;
+        let progress = Progress::new("evaluating");
+        let scores = on_threads(arguments.picture.threads, || {
+            evaluate(&scene, &selection, &weightings, &Cpu, &PhotoField::default(), &options, &progress)
+        })?
+        .with_context(|| path.display().to_string())?;
+        drop(progress);
+        print_table(&path.display().to_string(), &means(&scores));
+        all.extend(scores.into_iter().map(|score| (path.display().to_string(), score)));
+    }
+    if arguments.scenes.len() > 1 {
+        let scores: Vec<Score> = all.iter().map(|(_, score)| score.clone()).collect();
+        print_table(&format!("all {} scenes", arguments.scenes.len()), &means(&scores));
+    }
+    if let Some(path) = &arguments.output {
+        write_whole(path, &csv_of(&all)?)?;
+        println!("{}", path.display());
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Means over the targets; the best value of each column is marked.
+fn print_table(title: &str, means: &[Mean]) {
+    let copy = means.iter().find(|mean| mean.scheme == NEAREST_COPY).map_or(f64::NAN, |mean| mean.psnr);
+    let best_psnr = means.iter().map(|mean| mean.psnr).fold(f64::NEG_INFINITY, f64::max);
+    let best_ssim = means.iter().filter_map(|mean| mean.ssim).fold(f64::NEG_INFINITY, f64::max);
+    let mut rows = table(["scheme", "PSNR dB", "over copy", "SSIM", "s / view"].map(str::to_owned));
+    let marked = |text: String, is_best: bool| if is_best { format!("* {text}") } else { text };
+    for mean in means {
+        let is_copy = mean.scheme == NEAREST_COPY;
+        rows.add_row([
+            mean.scheme.clone(),
+            marked(format!("{:.2}", mean.psnr), mean.psnr == best_psnr),
+            if is_copy { String::new() } else { format!("{:+.2}", mean.psnr - copy) },
+            mean.ssim.map_or(String::new(), |ssim| marked(format!("{ssim:.3}"), ssim == best_ssim)),
+            if is_copy { String::new() } else { format!("{:.2}", mean.seconds) },
+        ]);
+    }
+    println!("{title}: {} targets", means.first().map_or(0, |mean| mean.target_count));
+    println!("{rows}\n");
+}
+
+fn csv_of(scores: &[(String, Score)]) -> anyhow::Result<Vec<u8>> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(["scene", "scheme", "target", "sources", "psnr_db", "ssim", "seconds"])?;
+    for (scene, score) in scores {
+        writer.write_record([
+            scene,
+            &score.scheme,
+            &score.target,
+            &score.source_count.to_string(),
+            &format!("{:.6}", score.psnr),
+            &score.ssim.map_or(String::new(), |ssim| format!("{ssim:.6}")),
+            &format!("{:.6}", score.time.as_secs_f64()),
+        ])?;
+    }
+    Ok(writer.into_inner()?)
+}

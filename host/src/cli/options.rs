@@ -27,12 +27,7 @@ pub(crate) struct PictureOptions {
 
 impl PictureOptions {
     pub(crate) fn to_render_options(&self) -> RenderOptions {
-        RenderOptions {
-            size: self.size,
-            background: self.background,
-            leave_out: self.leave_out,
-            settled: self.settled,
-        }
+        RenderOptions { size: self.size, background: self.background, leave_out: self.leave_out, settled: self.settled }
     }
 }
 
@@ -49,12 +44,7 @@ pub(crate) struct SourceOptions {
 
 impl SourceOptions {
     pub(crate) fn to_selection(&self, targets: Option<&str>, orbit: Option<usize>) -> Selection {
-        Selection {
-            targets: targets.map(str::to_owned),
-            orbit,
-            sources: self.sources.clone(),
-            view_count: self.views,
-        }
+        Selection { targets: targets.map(str::to_owned), orbit, sources: self.sources.clone(), view_count: self.views }
     }
 }
 

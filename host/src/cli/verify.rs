@@ -1,6 +1,52 @@
-//! To come.
+//! `viewfuse verify`.
+
+use super::table::table;
 use clap::Args;
+use std::path::PathBuf;
 use std::process::ExitCode;
+use viewfuse::verify::{Measure, Report, verify};
+
 #[derive(Args)]
-pub(crate) struct Arguments {}
-pub(crate) fn run(_: &Arguments) -> anyhow::Result<ExitCode> { Ok(ExitCode::SUCCESS) }
+#[command(after_help = "Example:\n  viewfuse verify fixtures/weighting.json fixtures/metrics.safetensors\n\n\
+    Exit code 1 if a tolerance is exceeded.")]
+pub(crate) struct Arguments {
+    /// Files of reference values: weighting.json, metrics.safetensors, genvs_srn.safetensors (its attention weights)
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let mut all_pass = true;
+    for path in &arguments.files {
+        let report = verify(path)?;
+        print_report(&report);
+        all_pass &= report.passes();
+    }
+    Ok(if all_pass { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn print_report(report: &Report) {
+    let header = ["quantity", "numbers", "worst error", "", "tolerance", "", "at"];
+    let mut rows = table(header.map(str::to_owned));
+    for quantity in &report.quantities {
+        rows.add_row([
+            quantity.name.clone(),
+            quantity.count.to_string(),
+            format!("{:.2e}", quantity.worst),
+            match quantity.measure {
+                Measure::Absolute => "absolute".to_owned(),
+                Measure::Relative => "relative".to_owned(),
+            },
+            format!("{:.1e}", quantity.tolerance),
+            if quantity.passes() { "ok".to_owned() } else { "EXCEEDED".to_owned() },
+            quantity.place.clone(),
+        ]);
+    }
+    println!("{}", report.path.display());
+    println!("{rows}");
+    if !report.not_covered.is_empty() {
+        println!("not computed by this version: {}", report.not_covered.join(", "));
+    }
+    let failed = report.quantities.iter().filter(|quantity| !quantity.passes()).count();
+    println!("{} of {} quantities within tolerance\n", report.quantities.len() - failed, report.quantities.len());
+}

@@ -55,16 +55,7 @@ impl Device for Cpu {
         let width = scene.cameras[sweep.view as usize].width;
         for_each_pixel(sweep, width, costs, |pixel, plane, cost| {
             let pixel = sweep.first_row * width + pixel;
-            *cost = match_cost(
-                &scene.object,
-                sweep,
-                &scene.views,
-                &scene.texels,
-                entries,
-                pair_weights,
-                pixel,
-                plane,
-            );
+            *cost = match_cost(&scene.object, sweep, &scene.views, &scene.texels, entries, pair_weights, pixel, plane);
         });
         Ok(())
     }
@@ -166,12 +157,7 @@ fn of_view_mut<'a>(scene: &PhotoScene<Cpu>, view: u32, map: &'a mut [f32]) -> &'
 }
 
 /// Runs a kernel for every pixel and plane of a band, rows in parallel.
-fn for_each_pixel<T: Send>(
-    sweep: &SweepBlock,
-    width: u32,
-    values: &mut [T],
-    kernel: impl Fn(u32, u32, &mut T) + Sync,
-) {
+fn for_each_pixel<T: Send>(sweep: &SweepBlock, width: u32, values: &mut [T], kernel: impl Fn(u32, u32, &mut T) + Sync) {
     let plane_count = sweep.plane_count as usize;
     values.par_chunks_mut(plane_count * width as usize).enumerate().for_each(|(row, values)| {
         for (column, values) in values.chunks_exact_mut(plane_count).enumerate() {

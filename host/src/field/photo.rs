@@ -60,12 +60,7 @@ impl<D: Device> Field<D> for PhotoField {
         sources: &SourceImages,
         progress: &Progress,
     ) -> Result<Prepared<D>, FieldError<D::Error>> {
-        let mut cameras = Vec::with_capacity(sources.images.len());
-        let mut texels = Vec::new();
-        for image in &sources.images {
-            cameras.push(image.camera.block(texels.len() as u32));
-            texels.extend_from_slice(&image.texels);
-        }
+        let (cameras, texels) = joined(sources);
         let object = bounds::find(&cameras, &texels).ok_or(FieldError::NoObject)?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
         let failed = FieldError::Device;
@@ -145,10 +140,8 @@ impl<D: Device> Field<D> for PhotoField {
         let view_count = prepared.scene.object.view_count as usize;
         let weights = device.upload(&weights.values()[..view_count]).map_err(failed)?;
         let target = MarchTarget { camera: target.block(0), background: prepared.background, settled };
-        let mut pixels = Pixels {
-            colours: device.zeros(count).map_err(failed)?,
-            depths: device.zeros(count).map_err(failed)?,
-        };
+        let mut pixels =
+            Pixels { colours: device.zeros(count).map_err(failed)?, depths: device.zeros(count).map_err(failed)? };
         progress.expect(height.div_ceil(BAND_ROWS) as usize);
         for first_row in (0..height).step_by(BAND_ROWS as usize) {
             interrupt::check()?;
@@ -165,6 +158,23 @@ impl<D: Device> Field<D> for PhotoField {
             height,
         })
     }
+}
+
+/// The box around the object that the silhouettes of the sources show, or `None` if they show none.
+pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
+    let (cameras, texels) = joined(sources);
+    bounds::find(&cameras, &texels)
+}
+
+/// All sources' texels behind one another, and the cameras that know where theirs are.
+fn joined(sources: &SourceImages) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
+    let mut cameras = Vec::with_capacity(sources.images.len());
+    let mut texels = Vec::new();
+    for image in &sources.images {
+        cameras.push(image.camera.block(texels.len() as u32));
+        texels.extend_from_slice(&image.texels);
+    }
+    (cameras, texels)
 }
 
 /// A pixel's side at the middle of the object.

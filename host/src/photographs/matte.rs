@@ -152,17 +152,15 @@ pub(super) fn laid_over(photograph: &Photograph, background: [f32; 3]) -> Vec<[f
 /// Colour of a photograph's border (the median of each channel, unless given) and its noise around it.
 fn border(photograph: &Photograph, given: Option<[f32; 3]>) -> ([f32; 3], f32) {
     let (width, height) = photograph.pixels.dimensions();
-    let at_border = |x: u32, y: u32| {
-        x < BORDER || y < BORDER || x + BORDER >= width || y + BORDER >= height
-    };
+    let at_border = |x: u32, y: u32| x < BORDER || y < BORDER || x + BORDER >= width || y + BORDER >= height;
     let pixels: Vec<[f32; 3]> = photograph
         .pixels
         .enumerate_pixels()
         .filter(|(x, y, _)| at_border(*x, *y))
         .map(|(_, _, pixel)| colour_of(pixel))
         .collect();
-    let colour = given
-        .unwrap_or_else(|| [0, 1, 2].map(|channel| median(pixels.iter().map(|pixel| pixel[channel]).collect())));
+    let colour =
+        given.unwrap_or_else(|| [0, 1, 2].map(|channel| median(pixels.iter().map(|pixel| pixel[channel]).collect())));
     let mut distances: Vec<f32> = pixels.iter().map(|pixel| distance(*pixel, colour)).collect();
     distances.sort_by(f32::total_cmp);
     let noise = distances[((distances.len() as f64 * NOISE_SHARE) as usize).min(distances.len() - 1)];
@@ -203,7 +201,8 @@ fn silhouette(photograph: &Photograph, behind: [f32; 3], threshold: f32) -> Vec<
     // background's to that of the solid pixels nearby.
     let around = |at: usize, reach: i64| {
         let (x, y) = (at as i64 % width, at as i64 / width);
-        let (rows, columns) = ((y - reach).max(0)..=(y + reach).min(height - 1), (x - reach).max(0)..=(x + reach).min(width - 1));
+        let (rows, columns) =
+            ((y - reach).max(0)..=(y + reach).min(height - 1), (x - reach).max(0)..=(x + reach).min(width - 1));
         rows.flat_map(move |j| {
             columns.clone().map(move |i| ((j * width + i) as usize, ((i - x).pow(2) + (j - y).pow(2)) as f32))
         })

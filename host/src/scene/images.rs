@@ -43,7 +43,11 @@ pub(super) fn decode(path: &Path) -> Result<Photograph, SceneError> {
     let mut reader = open(path)?;
     reader.limits(limits);
     let decoded = reader.decode().map_err(|cause| SceneError::Image { path: path.to_path_buf(), cause })?;
-    Ok(Photograph { has_alpha: decoded.color().has_alpha(), pixels: decoded.into_rgba8() })
+    let has_channel = decoded.color().has_alpha();
+    let pixels = decoded.into_rgba8();
+    // SRN's photographs carry an alpha channel that is 255 everywhere: it says nothing.
+    let has_alpha = has_channel && pixels.pixels().any(|pixel| pixel[3] < u8::MAX);
+    Ok(Photograph { pixels, has_alpha })
 }
 
 /// A reader whose format is that of the content, whatever the file's extension says.
