@@ -1,0 +1,7 @@
+//! What the tests of viewfuse share: seeded inputs, a comparator that NaN can not slip through, and the same formulas
+//! evaluated in `f64`.
+#![forbid(unsafe_code)]
+
+pub mod compare;
+pub mod oracle;
+pub mod poses;
