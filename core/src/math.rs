@@ -31,7 +31,7 @@ pub fn abs(x: f32) -> f32 {
 #[inline]
 pub fn floor_to_i32(x: f32) -> i32 {
     let truncated = x as i32;
-    if (truncated as f32) > x { truncated - 1 } else { truncated }
+    if (truncated as f32) > x && truncated > i32::MIN { truncated - 1 } else { truncated }
 }
 
 /// Smaller of two numbers; if `a` is NaN the result is `b`.
@@ -105,7 +105,8 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     let x = if finite { x } else { 0.0 };
     let quadrant = floor_to_i32(x * (2.0 / PI) + 0.5);
     let k = quadrant as f32;
-    let r = clamp(((x - k * FIRST) - k * SECOND) - k * THIRD, -FRAC_PI_4, FRAC_PI_4);
+    // Rounding of the quadrant lets r exceed pi / 4 a little; the limit only matters for huge arguments.
+    let r = clamp(((x - k * FIRST) - k * SECOND) - k * THIRD, -0.8, 0.8);
     let z = r * r;
     let sin = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * r + r;
     let cos = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;

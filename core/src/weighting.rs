@@ -177,11 +177,18 @@ fn angles_between<const S: usize>(sources: &Sources<S>, target: &Pose, kind: Ang
 
 fn inverse_distance<const S: usize>(sources: &Sources<S>, target: &Pose, power: u32) -> Weights<S> {
     let (mut errors, largest) = distances(sources, target);
-    // Cubes overflow from 7e12 on: there the distances are measured in units of the largest one, which cancels, and
-    // the offset shrinks with them.
+    // Cubes overflow from 7e12 on: there the distances are measured in units of the nearest one, which cancels, and the
+    // offset shrinks with them. In units of the nearest nothing that matters can vanish, and what overflows to infinity
+    // has no weight.
     let (unit, offset) = if largest > 1.0e6 {
-        let inverse = 1.0 / largest;
-        (largest, ERROR_OFFSET * integer_power(inverse, power))
+        let mut nearest = largest;
+        let mut view = 0;
+        while view < sources.count() {
+            nearest = min(errors[view as usize], nearest);
+            view += 1;
+        }
+        let unit = max(nearest, 0.01);
+        (unit, ERROR_OFFSET * integer_power(1.0 / unit, power))
     } else {
         (1.0, ERROR_OFFSET)
     };

@@ -2,4 +2,7 @@
 //! and the same formulas evaluated in `f64`.
 #![forbid(unsafe_code)]
 
+pub mod compare;
+pub mod oracle;
+pub mod poses;
 pub mod scenes;
