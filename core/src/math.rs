@@ -8,7 +8,7 @@
 //! This is the only module that names `libm`, and it takes only the correctly rounded square root from it
 //! (plus `log10` in `f64` for the metrics, which never run on a device).
 
-use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
+use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LOG2_E, PI};
 
 /// Square root, correctly rounded. Negative input gives NaN.
 #[inline]
@@ -143,8 +143,29 @@ pub fn angle_from_components(y: f32, x: f32) -> f32 {
     if x < 0.0 { PI - acute } else { acute }
 }
 
-/// `ln 2`, for callers that turn half-lives into rates.
-pub const NATURAL_LOG_OF_TWO: f32 = LN_2;
+/// `a + b` as the rounded sum and the exact rest (Knuth). Overflow gives NaN in the rest.
+#[inline]
+pub fn two_sum(a: f32, b: f32) -> (f32, f32) {
+    let sum = a + b;
+    let added = sum - a;
+    (sum, (a - (sum - added)) + (b - added))
+}
+
+/// `a * b` as the rounded product and the exact rest (Dekker), for magnitudes of the factors below 1e15 and of the
+/// product above 1e-30; smaller rests are lost, larger factors give NaN.
+#[inline]
+pub fn two_product(a: f32, b: f32) -> (f32, f32) {
+    // 2^12 + 1 cuts 24 bits into two halves.
+    const SPLITTER: f32 = 4097.0;
+    let cut = |x: f32| {
+        let scaled = SPLITTER * x;
+        let high = scaled - (scaled - x);
+        (high, x - high)
+    };
+    let product = a * b;
+    let ((a_high, a_low), (b_high, b_low)) = (cut(a), cut(b));
+    (product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low)
+}
 
 /// Euclidean norm of three components without overflow or underflow: the components are divided by the largest
 /// magnitude first. Relative error below 3 ULP; all zero gives 0.

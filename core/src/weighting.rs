@@ -6,10 +6,11 @@
 //! underflow of every Gaussian, overflow of squares) these give the limit.
 //!
 //! Accuracy: against an `f64` evaluation on the same `f32` poses, the error of a weight is at most 12 ULP-equivalents
-//! (of `2^-24`) plus, for the Gaussian, `4 beta d^2` of them, because an exponent is only as good as its own rounding;
-//! `tests/numerics.rs` derives the bound and measures it.
+//! (of `2^-24`); `tests/numerics_weighting.rs` derives the bound and measures it. For the Gaussian that needs exponents
+//! with their rounding errors, because an error of an exponent is a relative error of the weight; beyond a distance or
+//! `beta` of 1e6, where squares approach overflow, plain ones are used and `4 beta d^2` such units are added.
 
-use crate::math::{abs, angle_from_components, max, min, norm3, sqrt};
+use crate::math::{abs, angle_from_components, exp, max, min, norm3, sqrt, two_product, two_sum};
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
@@ -201,23 +202,58 @@ fn inverse_distance<const S: usize>(sources: &Sources<S>, target: &Pose, power: 
 }
 
 fn gaussian<const S: usize>(sources: &Sources<S>, target: &Pose, beta: f32) -> Weights<S> {
-    let (distances, _) = distances(sources, target);
-    let mut nearest = f32::MAX;
-    let mut view = 0;
-    while view < sources.count() {
-        nearest = min(distances[view as usize], nearest);
+    let count = sources.count() as usize;
+    let (distances, largest) = distances(sources, target);
+    let mut nearest = 0;
+    let mut view = 1;
+    while view < count {
+        if distances[view] < distances[nearest] {
+            nearest = view;
+        }
         view += 1;
     }
-    let mut logits = [0.0; S];
+    let nearest_squared = squared_distance(sources.pose(nearest as u32), target);
+    let mut scores = [0.0; S];
     view = 0;
-    while view < sources.count() {
-        // Relative to the nearest source: d^2 - n^2 = (d - n)(d + n), so that the largest weight never underflows.
-        let d = distances[view as usize];
-        let excess = d - nearest;
-        logits[view as usize] = if excess > 0.0 && beta > 0.0 { -(beta * excess) * (d + nearest) } else { 0.0 };
+    while view < count {
+        // Relative to the nearest source, so that the largest weight never underflows.
+        let squared = squared_distance(sources.pose(view as u32), target);
+        // A relative error of an exponent is an absolute error of the logarithm of a weight: an exponent of 40 in f32
+        // alone would cost 5e-6. So it is kept with its rounding error, and the exponential corrected by that.
+        let (excess, rest) = two_sum(squared.0, -nearest_squared.0);
+        let rest = rest + (squared.1 - nearest_squared.1);
+        scores[view] = if largest > LARGEST_EXACT_DISTANCE || beta > LARGEST_EXACT_BETA {
+            // So far away the squares overflow; d^2 - n^2 = (d - n)(d + n).
+            let (far, near) = (distances[view], distances[nearest]);
+            if far > near && beta > 0.0 { exp(-(beta * (far - near)) * (far + near)) } else { 1.0 }
+        } else {
+            let (exponent, error) = two_product(beta, excess);
+            exp(-exponent) * (1.0 - (error + beta * rest))
+        };
         view += 1;
     }
-    Weights::from_logits(&logits, sources.count())
+    Weights::from_scores(&scores, sources.count())
+}
+
+/// Distance up to which the Gaussian's exponent is kept with its rounding error.
+const LARGEST_EXACT_DISTANCE: f32 = 1.0e6;
+/// The same for `beta`.
+const LARGEST_EXACT_BETA: f32 = 1.0e6;
+
+/// Squared distance of two cameras' centres, as the rounded value and the rest.
+fn squared_distance(a: &Pose, b: &Pose) -> (f32, f32) {
+    let (a, b) = (a.centre_world().to_array(), b.centre_world().to_array());
+    let (mut sum, mut rest) = (0.0, 0.0);
+    let mut axis = 0;
+    while axis < 3 {
+        let (difference, lost) = two_sum(a[axis], -b[axis]);
+        let (square, error) = two_product(difference, difference);
+        let (total, carry) = two_sum(sum, square);
+        sum = total;
+        rest += carry + (error + 2.0 * difference * lost);
+        axis += 1;
+    }
+    (sum, rest)
 }
 
 /// `x^power` for `power` in 1..=3.
