@@ -65,7 +65,10 @@ fn distances_of_very_different_sizes() {
     let mut random = Random::new(12);
     let scenes: Vec<_> = (0..300)
         .map(|i| {
-            let sources = (0..COUNTS[i % 7]).map(|_| { let s = random.log_range(1.0e-9, 1.0e20); random.pose(s) });
+            let sources = (0..COUNTS[i % 7]).map(|_| {
+                let s = random.log_range(1.0e-9, 1.0e20);
+                random.pose(s)
+            });
             (sources.collect::<Vec<_>>(), Pose::IDENTITY)
         })
         .collect();
@@ -85,7 +88,8 @@ fn rings_with_and_without_roll() {
         }
     }
     check_all("rings", &scenes);
-    let uniform = weights(Formula::RelativeFrobenius, &ring(8, 1.3, 0.4, 0.0), &looking_at_origin([1.0, 0.5, 0.5], 0.0));
+    let uniform =
+        weights(Formula::RelativeFrobenius, &ring(8, 1.3, 0.4, 0.0), &looking_at_origin([1.0, 0.5, 0.5], 0.0));
     assert!(uniform.iter().all(|w| (w - 0.125).abs() < 1.0e-6), "uniform on a look-at ring: {uniform:?}");
 }
 
@@ -180,7 +184,8 @@ fn a_rigid_motion_of_the_world_changes_nothing() {
             let steepness = 3.0 * 6.0e-7 / nearest.max(1.0e-2) + 40.0e-7;
             for view in 0..sources.len() {
                 let difference = f64::from((before[view] - after[view]).abs());
-                let same = difference <= f64::from(before[view]) * (2.0 * bounds[view] / 16_777_216.0 + 4.0 * steepness);
+                let same =
+                    difference <= f64::from(before[view]) * (2.0 * bounds[view] / 16_777_216.0 + 4.0 * steepness);
                 match formula {
                     Formula::L1 | Formula::RelativeFrobenius => changed_by_rotation += i32::from(!same),
                     Formula::Gaussian(_) => assert!(difference <= 2.0e-4, "{formula:?} {before:?} {after:?}"),
@@ -239,7 +244,10 @@ fn permuting_the_sources_permutes_the_weights() {
             let (a, b) = (weights(formula, &sources, &target), weights(formula, &rotated, &target));
             // Only the order of the sum differs: S - 1 additions and the division, twice.
             let bound = 2.0 * count as f32 / 16_777_216.0;
-            assert!((0..count).all(|view| (a[(view + shift) % count] - b[view]).abs() <= bound * b[view]), "{formula:?}");
+            assert!(
+                (0..count).all(|view| (a[(view + shift) % count] - b[view]).abs() <= bound * b[view]),
+                "{formula:?}"
+            );
         }
     }
 }

@@ -77,7 +77,8 @@ impl Comparator {
                 _ => difference / allowed,
             };
             if worst.is_none_or(|(largest, _)| share > largest) {
-                worst = Some((share, Worst { index, actual: a, expected: e, ulps: difference / unit_in_last_place(e) }));
+                worst =
+                    Some((share, Worst { index, actual: a, expected: e, ulps: difference / unit_in_last_place(e) }));
             }
         }
         let Some((_, worst)) = worst else { return Err(Mismatch::Empty) };

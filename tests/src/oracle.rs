@@ -76,11 +76,8 @@ impl WidePose {
             let sine_squared = self.rotation_difference_squared(other) / 8.0;
             return 2.0 * sine_squared.sqrt().atan2((1.0 - sine_squared).max(0.0).sqrt());
         }
-        let antisymmetric = [
-            dot(a[2], b[1]) - dot(a[1], b[2]),
-            dot(a[0], b[2]) - dot(a[2], b[0]),
-            dot(a[1], b[0]) - dot(a[0], b[1]),
-        ];
+        let antisymmetric =
+            [dot(a[2], b[1]) - dot(a[1], b[2]), dot(a[0], b[2]) - dot(a[2], b[0]), dot(a[1], b[0]) - dot(a[0], b[1])];
         norm(antisymmetric).atan2(twice_cosine)
     }
 
