@@ -1,7 +1,8 @@
 //! The formulas of weighting, evaluated in `f64` on the same `f32` poses, each with a bound on what `f32` may differ.
 //!
-//! Bounds count roundings to first order in units of `u = 2^-24`. An error `e` with a relative error of `k` units gives
-//! weights with at most `2 k + S + 2` units: the numerator and the sum inherit `k` each, the quotient of the smallest
+//! Bounds count roundings to first order in units of `u = 2^-24`. An error `e` with a relative error of `k` units
+//! (`k + 1` once the offset is added) gives weights with at most `2 (k + 1) + S + 2` units: the numerator and the sum
+//! inherit `k + 1` each, the quotient of the smallest
 //! and each error is rounded (1 in the numerator, 1 in the sum), the sum has `S - 1` additions, and the last division 1.
 
 use viewfuse_core::pose::Pose;
