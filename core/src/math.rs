@@ -3,7 +3,7 @@
 //! `libm` and GPU instructions disagree (a driver's `acos` may be off by 4096 ULP, its `sin` by 2^-11), so the
 //! functions that decide weights and colours are our own range-reduced polynomials in plain `f32` arithmetic: the
 //! same additions and multiplications in the same order everywhere. The polynomials are those of Cephes
-//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics.rs` against `f64`.
+//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics_math.rs` against `f64`.
 //!
 //! This is the only module that names `libm`, and it takes only the correctly rounded square root from it
 //! (plus `log10` in `f64` for the metrics, which never run on a device).
@@ -59,7 +59,7 @@ pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `e^x`: relative error below 2 ULP for `x` in `[-87.3, 88.7]`; 0 below (no subnormals: devices may flush them),
+/// `e^x`: error at most 1.1 ULP for `x` in `[-87.3, 88.7]`; 0 below (no subnormals: devices may flush them),
 /// saturated at `e^88.7` above. NaN gives 0.
 #[inline]
 pub fn exp(x: f32) -> f32 {
@@ -93,8 +93,8 @@ pub fn exact_power_of_two(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// Sine and cosine of an angle in radians: absolute error below 1.2e-7 for `|x| <= 8192`. Beyond that the argument
-/// itself is too coarse to mean much; the results stay in `[-1, 1]`. A non-finite angle gives `(0, 1)`.
+/// Sine and cosine of an angle in radians: absolute error below 9e-8 for `|x| <= 8192`. Beyond that the argument
+/// itself is too coarse to mean much; the results stay in `[-1, 1]` (to the same error). A non-finite angle gives `(0, 1)`.
 #[inline]
 pub fn sin_cos(x: f32) -> (f32, f32) {
     // pi / 2 in three parts (Cody and Waite); the products with the first two are exact for |k| < 2^13.
@@ -118,7 +118,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     }
 }
 
-/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`: relative error below 3 ULP.
+/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`: error at most 3 ULP.
 /// `(0, 0)` gives 0. This form is exact at 0 and pi, where `acos` of a dot product loses half of the digits.
 #[inline]
 pub fn angle_from_components(y: f32, x: f32) -> f32 {
@@ -168,7 +168,7 @@ pub fn two_product(a: f32, b: f32) -> (f32, f32) {
 }
 
 /// Euclidean norm of three components without overflow or underflow: the components are divided by the largest
-/// magnitude first. Relative error below 3 ULP; all zero gives 0.
+/// magnitude first. Error at most 2 ULP for magnitudes in `[1e-15, 1e15]`, 3 ULP elsewhere; all zero gives 0.
 #[inline]
 pub fn norm3(x: f32, y: f32, z: f32) -> f32 {
     let largest = max(max(abs(x), abs(y)), abs(z));

@@ -5,10 +5,24 @@
 //! proportional to `1 / (e + 1e-6)`, except for the Gaussian. Where the published code gives NaN (coinciding centres,
 //! underflow of every Gaussian, overflow of squares) these give the limit.
 //!
-//! Accuracy: against an `f64` evaluation on the same `f32` poses, the error of a weight is at most 12 ULP-equivalents
-//! (of `2^-24`); `tests/numerics_weighting.rs` derives the bound and measures it. For the Gaussian that needs exponents
-//! with their rounding errors, because an error of an exponent is a relative error of the weight; beyond a distance or
-//! `beta` of 1e6, where squares approach overflow, plain ones are used and `4 beta d^2` such units are added.
+//! Accuracy, relative to an `f64` evaluation on the same `f32` poses, in units of `2^-24`. An error `e` with `k`
+//! roundings gives a weight with at most `2 (k + 1) + S + 2`: `k + 1` in the numerator (the offset adds one), as many in
+//! the sum, two quotients, `S - 1` additions and the last division. Counted roundings `k`, and the largest error of a
+//! weight that was measured for up to 32 sources (random poses at scales from 1e-20 to 1e29, rings, near-coincident cameras):
+//!
+//! | scheme | `k` | measured |
+//! |---|---|---|
+//! | mean | 0 | 0.5 |
+//! | distance, power 1, 2, 3 | 5.5, 11, 16.5; 2 a power more where norms are scaled | 6.3, 8.9, 14.9 |
+//! | error | 21 (angle 16.5, its share 2.5, two additions) | 8.8 |
+//! | L1 | 12 | 6.6 |
+//! | Frobenius | 7.5; 9.5 where norms are scaled | 7.3 |
+//! | relative Frobenius | `12 + (18 abs(c_t) + abs(c_s)) / e`, as its translation may cancel | 8.0; 34 on a ring of radius 800 |
+//! | Gaussian | 8; beyond a distance or beta of 1e6 `11 beta (d^2 + n^2) + 4 beta abs(d^2 - n^2) + 4`, `n` the nearest distance | GAUSS |
+//!
+//! The Gaussian's exponent is kept with its rounding error, because an error of an exponent is a relative error of the
+//! weight; where squares approach overflow it is not. Weights below 4e-38 may be 0.
+//! `viewfuse-tests` derives these bounds in its oracle and asserts them for each weight.
 
 use crate::math::{abs, angle_from_components, exp, max, min, norm3, sqrt, two_product, two_sum};
 use crate::pose::Pose;

@@ -1,7 +1,8 @@
 //! The formulas of weighting, evaluated in `f64` on the same `f32` poses, each with a bound on what `f32` may differ.
 //!
-//! Bounds count roundings to first order in units of `u = 2^-24`. An error `e` with a relative error of `k` units gives
-//! weights with at most `2 k + S + 2` units: the numerator and the sum inherit `k` each, the quotient of the smallest
+//! Bounds count roundings to first order in units of `u = 2^-24`. An error `e` with a relative error of `k` units
+//! (`k + 1` once the offset is added) gives weights with at most `2 (k + 1) + S + 2` units: the numerator and the sum
+//! inherit `k + 1` each, the quotient of the smallest
 //! and each error is rounded (1 in the numerator, 1 in the sum), the sum has `S - 1` additions, and the last division 1.
 
 use viewfuse_core::pose::Pose;
@@ -225,17 +226,24 @@ fn relative_frobenius(source: &WidePose, target: &WidePose) -> (f64, f64) {
     (error, 12.0 + carried_units)
 }
 
-/// The logit of a source is `-beta (d^2 - n^2)` with the nearest distance `n`. Each square inherits 7 units of its
-/// distance (11 if scaled), the difference, sum and products are rounded 4 times, and `exp` adds its own 4 units.
+/// The logit of a source is `-beta (d^2 - n^2)` with the nearest distance `n`. Up to distances and a beta of 1e6 it is
+/// kept with its rounding error: `exp` has 4 units, the correction 3, and 1 is left for what is of second order. Beyond,
+/// each square inherits 7 units of its distance (11 if scaled), the difference, sum and products are rounded 4 times,
+/// and `exp` adds its own 4 units.
 fn gaussian(distances: &[f64], beta: f64) -> (Vec<f64>, Vec<f64>) {
     let nearest = distances.iter().copied().fold(f64::INFINITY, f64::min);
     let logits: Vec<f64> = distances.iter().map(|d| -beta * (d - nearest) * (d + nearest)).collect();
     let sum: f64 = logits.iter().map(|l| l.exp()).sum();
     let weights: Vec<f64> = logits.iter().map(|l| l.exp() / sum).collect();
+    let is_exact = beta <= 1.0e6 && distances.iter().all(|d| *d <= 1.0e6);
     let units: Vec<f64> = distances
         .iter()
         .zip(&logits)
-        .map(|(d, logit)| 11.0 * beta * (d * d + nearest * nearest) + 4.0 * logit.abs() + 4.0)
+        .map(
+            |(d, logit)| {
+                if is_exact { 8.0 } else { 11.0 * beta * (d * d + nearest * nearest) + 4.0 * logit.abs() + 4.0 }
+            },
+        )
         .collect();
     let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| if *w > 0.0 { w * u } else { 0.0 }).sum();
     let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 2.0).collect();
