@@ -122,25 +122,45 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
 /// `(0, 0)` gives 0. This form is exact at 0 and pi, where `acos` of a dot product loses half of the digits.
 #[inline]
 pub fn angle_from_components(y: f32, x: f32) -> f32 {
-    const TAN_PI_8: f32 = 0.414_213_57;
-    const TAN_3_PI_8: f32 = 2.414_213_7;
     let far = abs(x);
     // Three ranges of the acute angle, each brought within pi / 8 of 0 by one division: straight, turned back by
     // pi / 4, turned back by pi / 2.
-    let steep = y > far * TAN_3_PI_8;
-    let middle = y > far * TAN_PI_8;
-    let (numerator, denominator, offset) = if steep {
+    let (numerator, denominator, offset) = if y > far * TAN_3_PI_8 {
         (-far, y, FRAC_PI_2)
-    } else if middle {
+    } else if y > far * TAN_PI_8 {
         (y - far, y + far, FRAC_PI_4)
     } else {
         (y, far, 0.0)
     };
+    let acute = offset + small_arc_tangent(numerator, denominator);
+    if x < 0.0 { PI - acute } else { acute }
+}
+
+/// Angle of the point `(sqrt(x), sqrt(y))` from the positive x axis, in `[0, pi / 2]`, for `x` and `y` of at least 0:
+/// the same from squares, with one square root. `(0, 0)` gives 0.
+#[inline]
+pub fn angle_from_squares(y: f32, x: f32) -> f32 {
+    let mean = sqrt(y * x);
+    let (numerator, denominator, offset) = if y > x * (TAN_3_PI_8 * TAN_3_PI_8) {
+        (-mean, y, FRAC_PI_2)
+    } else if y > x * (TAN_PI_8 * TAN_PI_8) {
+        (y - x, y + x + 2.0 * mean, FRAC_PI_4)
+    } else {
+        (mean, x, 0.0)
+    };
+    offset + small_arc_tangent(numerator, denominator)
+}
+
+const TAN_PI_8: f32 = 0.414_213_57;
+const TAN_3_PI_8: f32 = 2.414_213_7;
+
+/// Arc tangent of a quotient of at most `tan(pi / 8)` in magnitude; 0 where the denominator is 0.
+#[inline]
+fn small_arc_tangent(numerator: f32, denominator: f32) -> f32 {
     let r = if denominator > 0.0 { numerator / denominator } else { 0.0 };
     let z = r * r;
     let p = ((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
-    let acute = offset + (p * z * r + r);
-    if x < 0.0 { PI - acute } else { acute }
+    p * z * r + r
 }
 
 /// `a + b` as the rounded sum and the exact rest (Knuth). Overflow gives NaN in the rest.

@@ -198,7 +198,7 @@ impl Formula {
         let sum: f64 = scores.iter().sum();
         let weights: Vec<f64> = scores.iter().map(|s| s / sum).collect();
         let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| w * (u + 1.0)).sum();
-        let bounds = units.iter().map(|u| u + 1.0 + mean_units + sources.len() as f64 + 2.0).collect();
+        let bounds = units.iter().map(|u| u + 1.0 + mean_units + sources.len() as f64 + 3.0).collect();
         (weights, bounds)
     }
 }
@@ -246,6 +246,6 @@ fn gaussian(distances: &[f64], beta: f64) -> (Vec<f64>, Vec<f64>) {
         )
         .collect();
     let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| if *w > 0.0 { w * u } else { 0.0 }).sum();
-    let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 2.0).collect();
+    let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 3.0).collect();
     (weights, bounds)
 }
