@@ -19,7 +19,7 @@ pub const MOST_PLANES: u32 = 128;
 /// Reach of the window over which costs are averaged, in pixels to each side.
 pub const WINDOW_REACH: u32 = 2;
 /// How far behind the entry into the hull planes are swept, in radii of the object: concavities are no deeper.
-pub const SWEPT_BEHIND_ENTRY: f32 = 0.6;
+pub const SWEPT_BEHIND_ENTRY: f32 = 0.4;
 /// Cost of lying behind the entry into the hull, per radius of the object: among equal matches the nearest.
 pub const DEPTH_COST: f32 = 0.02;
 /// Cost of differing from the neighbours' depths by one footprint...
