@@ -3,3 +3,6 @@
 #![forbid(unsafe_code)]
 
 pub mod scenes;
+
+pub mod bounded;
+pub mod photo_oracle;
