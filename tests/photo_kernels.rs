@@ -281,6 +281,17 @@ fn march_agrees() {
 }
 
 #[test]
+fn hull_entry_ends_at_any_focal_length() {
+    let mut world = World::new(1);
+    world.views.iter_mut().for_each(|view| view.intrinsics[0] = 1.0e9);
+    // Enough for a pixel to ask, too little for any point to belong to the hull.
+    world.texels.iter_mut().for_each(|texel| texel[3] = 0.15);
+    let World { object, views, texels, .. } = &world;
+    let pixel = views[0].width * views[0].height / 2;
+    assert_eq!(hull_entry(object, views, texels, 0, pixel), NO_SURFACE);
+}
+
+#[test]
 fn the_comparison_rejects_what_it_must() {
     let expected = [Some(Bounded::ONE), Some(Bounded::ZERO)];
     assert!(compare(&[1.0, 0.0], &expected, 1.0).is_ok());
