@@ -22,8 +22,11 @@ const SEEDS: std::ops::Range<u64> = 1..5;
 /// Runs a kernel on one world and the oracle on another.
 type Case = fn(&World, &World, &mut Results);
 
+/// An input by name, and how to put it off by 1 %.
+type Spoiler = (&'static str, fn(&mut World));
+
 /// Compares on several worlds, prints the figures, and makes sure that each spoilt input shows.
-fn check(kernel: &str, tolerance: f64, case: Case, spoilers: &[(&str, fn(&mut World))]) {
+fn check(kernel: &str, tolerance: f64, case: Case, spoilers: &[Spoiler]) {
     let run = |spoil: fn(&mut World)| {
         let mut results = Results::default();
         for seed in SEEDS {
@@ -116,8 +119,7 @@ fn match_cost_agrees() {
             }
         }
     };
-    let spoilers: [(&str, fn(&mut World)); 3] =
-        [("focal length", spoil_focal), ("texels", spoil_texels), ("weight", spoil_weight)];
+    let spoilers: [Spoiler; 3] = [("focal length", spoil_focal), ("texels", spoil_texels), ("weight", spoil_weight)];
     check("match_cost", 1.0e-4, case, &spoilers);
 }
 
@@ -240,7 +242,7 @@ fn sample_agrees() {
             (0..3).for_each(|c| results.push(found.colour[c], wanted.map(|sample| sample.1[c])));
         }
     };
-    let spoilers: [(&str, fn(&mut World)); 4] =
+    let spoilers: [Spoiler; 4] =
         [("focal length", spoil_focal), ("texels", spoil_texels), ("depths", spoil_depths), ("weight", spoil_weight)];
     check("sample", 1.0e-3, case, &spoilers);
 }
@@ -271,7 +273,7 @@ fn march_agrees() {
             }
         }
     };
-    let spoilers: [(&str, fn(&mut World)); 4] = [
+    let spoilers: [Spoiler; 4] = [
         ("target's focal length", |world| world.target.intrinsics[0] *= 1.01),
         ("texels", spoil_texels),
         ("depths", spoil_depths),

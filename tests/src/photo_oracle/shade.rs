@@ -67,8 +67,11 @@ pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, ju
     Some(Bounded { value, error: spread + 5.0 * ROUNDING * value })
 }
 
-/// What the views that contain a point say about it.
-fn containing<'a>(scene: &'a Scene, place: Vector) -> Option<Option<Vec<(usize, Seen, [Bounded; 4])>>> {
+/// Views by index, where they see a point, and what they show there.
+type Witnesses = Vec<(usize, Seen, [Bounded; 4])>;
+
+/// The views that contain a point; the inner `None` if one of them shows background there.
+fn containing(scene: &Scene, place: Vector) -> Option<Option<Witnesses>> {
     let mut undecided = false;
     let mut views = Vec::new();
     for (index, view) in scene.views.iter().enumerate() {
