@@ -6,3 +6,6 @@ pub mod compare;
 pub mod oracle;
 pub mod poses;
 pub mod scenes;
+
+pub mod bounded;
+pub mod photo_oracle;

@@ -3,6 +3,7 @@
 use super::{NO_SURFACE, ObjectBlock};
 use crate::camera::CameraBlock;
 use crate::lookup::{bilinear_channel_from, bilinear_from};
+use crate::math::max;
 use glam::Vec3;
 
 /// Least alpha at which a pixel can show the object: such a source pixel gets a depth.
@@ -13,6 +14,9 @@ pub const SWEPT_ALPHA: f32 = 0.3;
 pub const ENTRY_ALPHA: f32 = 0.6 * SWEPT_ALPHA;
 /// Step of the search for the entry, in footprints.
 pub const ENTRY_STEP: f32 = 2.0;
+/// Most steps of that search. Only a view of a sliver of the object, at an enormous focal length, asks for more: its steps are
+/// longer, and never so short that adding one changes nothing.
+pub const MOST_ENTRY_STEPS: f32 = 8192.0;
 
 /// Premultiplied colour and alpha that a view shows at an image coordinate.
 #[inline]
@@ -69,7 +73,8 @@ pub fn hull_entry(object: &ObjectBlock, views: &[CameraBlock], texels: &[[f32; 4
     let origin = camera.centre_world();
     let direction = camera.towards(column as f32 + 0.5, row as f32 + 0.5);
     let (enter, leave) = object.interval(origin, direction);
-    let step = ENTRY_STEP * 0.5 * (enter + leave) / camera.intrinsics[0];
+    let wanted = ENTRY_STEP * 0.5 * (enter + leave) / camera.intrinsics[0];
+    let step = max(wanted, (leave - enter) / MOST_ENTRY_STEPS);
     let mut depth = enter;
     while depth < leave {
         if hull_alpha(object, views, texels, origin + direction * depth, ENTRY_ALPHA) > 0.0 {

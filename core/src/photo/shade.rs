@@ -42,7 +42,8 @@ pub struct Sample {
 pub const EMPTY: Sample = Sample { occupancy: 0.0, colour: [0.0; 3] };
 
 /// Depth that a view's map has at an image coordinate: bilinear over those of the four depths around it that belong to
-/// the same surface as the one with the greatest share. [`NO_SURFACE`] where the view sees nothing.
+/// the same surface as the one with the greatest share, or as the nearest where that one sees nothing. [`NO_SURFACE`]
+/// where all four see nothing.
 #[inline]
 pub fn depth_at(view: &CameraBlock, depths: &[f32], x: f32, y: f32, jump: f32) -> f32 {
     let (left, right, share_x) = split(x, view.width);
@@ -56,7 +57,10 @@ pub fn depth_at(view: &CameraBlock, depths: &[f32], x: f32, y: f32, jump: f32) -
     let mut nearest = NO_SURFACE;
     let mut at = 0;
     while at < 4 {
-        nearest = min(around[at], nearest);
+        // Beyond the first and last centres a node is asked along whose share is 0: it is not around the coordinate.
+        if shares[at] > 0.0 {
+            nearest = min(around[at], nearest);
+        }
         if shares[at] > greatest {
             greatest = shares[at];
             surface = around[at];
