@@ -67,7 +67,7 @@ pub enum SelectionError {
         scene: String,
     },
     /// The cameras do not span an orbit.
-    #[error("{scene}: its cameras do not span an orbit ({error:?})")]
+    #[error("{scene}: its cameras span no circle: they stand at, or straight above, what they look at; give --targets")]
     NoOrbit {
         /// The scene's path.
         scene: String,

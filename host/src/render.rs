@@ -27,7 +27,7 @@ pub enum RenderError<E: std::error::Error> {
     #[error(transparent)]
     Photographs(#[from] PhotographsError),
     /// There are too few or too many sources.
-    #[error("unusable sources: {0:?}")]
+    #[error("{0}")]
     Sources(SourcesError),
     /// The size does not fit the scene.
     #[error(
@@ -47,7 +47,7 @@ pub enum RenderError<E: std::error::Error> {
         fitting_height: u32,
     },
     /// The size is not usable at all.
-    #[error("--size {width}x{height} is not usable: {error:?}")]
+    #[error("--size {width}x{height} is not usable: {error}")]
     Size {
         /// Asked for.
         width: u32,

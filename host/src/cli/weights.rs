@@ -38,8 +38,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     let job = arguments.sources.to_selection(Some(&arguments.target), None).resolve(&scene, 1)?;
     let poses: Vec<_> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();
-    let sources =
-        Sources::<MOST_SOURCES>::new(&poses).map_err(|error| anyhow::anyhow!("unusable sources: {error:?}"))?;
+    let sources = Sources::<MOST_SOURCES>::new(&poses)?;
     for target in &job.targets {
         let columns: Vec<(String, Vec<f32>)> = weightings
             .iter()
