@@ -31,7 +31,7 @@ pub enum SelectionError {
         item: String,
     },
     /// A source view has no photograph.
-    #[error("{scene}: view '{name}' has no photograph and can not be a source")]
+    #[error("{scene}: view '{name}' has no photograph and cannot be a source")]
     NoPhotograph {
         /// The scene's path.
         scene: String,

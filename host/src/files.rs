@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The operating system refused.
-    #[error("{}: can not be written: {source}", path.display())]
+    #[error("{}: cannot be written: {cause}", path.display())]
     Io {
         /// The file that was to appear.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The picture could not be encoded.
-    #[error("{}: can not be encoded: {source}", path.display())]
+    #[error("{}: cannot be encoded: {cause}", path.display())]
     Encode {
         /// The file that was to appear.
         path: PathBuf,
         /// What the encoder said.
-        source: image::ImageError,
+        cause: image::ImageError,
     },
 }
 
@@ -29,7 +29,7 @@ pub enum WriteError {
 /// # Errors
 /// [`WriteError::Io`]; nothing is left behind then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let failed = |source| WriteError::Io { path: path.to_path_buf(), source };
+    let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -60,6 +60,6 @@ pub fn write_png(path: &Path, picture: &image::DynamicImage) -> Result<(), Write
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture
         .write_to(&mut bytes, image::ImageFormat::Png)
-        .map_err(|source| WriteError::Encode { path: path.to_path_buf(), source })?;
+        .map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause })?;
     write_whole(path, bytes.get_ref())
 }

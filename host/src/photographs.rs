@@ -17,7 +17,7 @@ pub enum PhotographsError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The working size is unusable.
-    #[error("view '{view}' can not be resampled to {width}x{height}: {error}")]
+    #[error("view '{view}' cannot be resampled to {width}x{height}: {error}")]
     Size {
         /// The view.
         view: String,
