@@ -24,8 +24,8 @@ pub enum FieldError<E: std::error::Error> {
     /// The device failed.
     #[error("the device failed")]
     Device(#[source] E),
-    /// The person stopped the work.
-    #[error(transparent)]
+    /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
+    #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }
 
