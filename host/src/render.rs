@@ -56,6 +56,15 @@ pub enum RenderError<E: std::error::Error> {
         /// Why not.
         error: PinholeError,
     },
+    /// The silhouettes have no point of space in common.
+    #[error(
+        "{scene}: the silhouettes of the sources have no common object: no point lies inside all of them; check the \
+         poses with `viewfuse inspect` and the background with --background"
+    )]
+    NoObject {
+        /// The scene's path.
+        scene: String,
+    },
     /// The field failed.
     #[error(transparent)]
     Field(#[from] FieldError<E>),
@@ -192,7 +201,11 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let scale = working_scale(scene, options)?;
         let mut times = StageTimes::default();
         let images = timed(&mut times.photographs, || album.sources(sources, scale, options.background))?;
-        let prepared = timed(&mut times.prepare, || field.prepare(device, &images, progress))?;
+        let prepared =
+            timed(&mut times.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
+                FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
+                error => error.into(),
+            })?;
         Ok(Stage { scene, album, device, field, options, scale, sources: source_poses, images, prepared, times })
     }
 

@@ -3,7 +3,6 @@
 use super::on_threads;
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
-use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -52,8 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         let progress = Progress::new("evaluating");
         let scores = on_threads(arguments.picture.threads, || {
             evaluate(&scene, &selection, &weightings, &Cpu, &PhotoField::default(), &options, &progress)
-        })?
-        .with_context(|| path.display().to_string())?;
+        })??;
         drop(progress);
         print_table(&path.display().to_string(), &means(&scores));
         all.extend(scores.into_iter().map(|score| (path.display().to_string(), score)));
@@ -86,7 +84,8 @@ fn print_table(title: &str, means: &[Mean]) {
             if is_copy { String::new() } else { format!("{:.2}", mean.seconds) },
         ]);
     }
-    println!("{title}: {} targets", means.first().map_or(0, |mean| mean.target_count));
+    let count = means.first().map_or(0, |mean| mean.target_count);
+    println!("{title}: {}", if count == 1 { "1 target".to_owned() } else { format!("{count} targets") });
     println!("{rows}\n");
 }
 
