@@ -52,6 +52,38 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     Ok(())
 }
 
+/// Checks, before long work, that a file can appear at `path`: it is no folder, and the nearest folder above it that
+/// exists takes new files. Nothing is left behind.
+///
+/// # Errors
+/// [`WriteError::Io`].
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
+    if path.is_dir() {
+        return Err(failed(std::io::Error::other("it is a folder")));
+    }
+    let above = || path.ancestors().skip(1).map(|folder| if folder == "" { Path::new(".") } else { folder });
+    let Some(nearest) = above().find(|folder| folder.exists()) else { return Ok(()) };
+    if !nearest.is_dir() {
+        return Err(failed(std::io::Error::other(format!("{} is not a folder", nearest.display()))));
+    }
+    tempfile::tempfile_in(nearest).map_err(failed)?;
+    Ok(())
+}
+
+/// Removes a file; that it is not there is no error.
+///
+/// # Errors
+/// [`WriteError::Io`] if the system refuses.
+pub fn remove_if_there(path: &Path) -> Result<(), WriteError> {
+    match std::fs::remove_file(path) {
+        Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::Io { path: path.to_path_buf(), cause })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes a picture as PNG, whole or not at all.
 ///
 /// # Errors

@@ -9,7 +9,7 @@ use std::process::ExitCode;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
 use viewfuse::field::photo::PhotoField;
-use viewfuse::files::write_whole;
+use viewfuse::files::{check_writable, write_whole};
 use viewfuse::progress::Progress;
 use viewfuse::scene::Scene;
 use viewfuse::weighting::{SCHEME_NAMES, Weighting};
@@ -45,6 +45,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let options = arguments.picture.to_render_options();
+    arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let mut all: Vec<(String, Score)> = Vec::new();
     for path in &arguments.scenes {
         let scene = Scene::open(path)?;

@@ -4,7 +4,7 @@ use clap::Args;
 use image::DynamicImage;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse::files::write_png;
+use viewfuse::files::{check_writable, write_png};
 use viewfuse::inspect::{Inspection, camera_map, inspect};
 use viewfuse::photographs::BackgroundChoice;
 use viewfuse::scene::Scene;
@@ -27,6 +27,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
+    arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let inspection = inspect(&scene, arguments.background);
     if arguments.json {
         println!("{}", serde_json::to_string_pretty(&inspection)?);
