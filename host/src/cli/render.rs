@@ -1,7 +1,7 @@
 //! `viewfuse render`.
 
-use super::on_threads;
 use super::options::{PictureOptions, SourceOptions, parse_count};
+use super::{on_threads, say};
 use clap::Args;
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::path::{Path, PathBuf};
@@ -124,9 +124,9 @@ impl Run<'_> {
         };
         write_whole(&record_path, &serde_json::to_vec_pretty(&record)?)?;
         for frame in &record.frames {
-            println!("{}", summary(frame, &self.arguments.output));
+            say(format_args!("{}", summary(frame, &self.arguments.output)))?;
         }
-        println!(
+        say(format_args!(
             "{} from {} sources, {}, {} on {}: {:.2} s",
             if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) },
             record.sources.len(),
@@ -134,7 +134,7 @@ impl Run<'_> {
             record.field,
             record.device,
             record.times.total
-        );
+        ))?;
         Ok(())
     }
 
