@@ -167,7 +167,9 @@ fn depth_range(cameras: &[Camera], rig: &Rig, object: Option<&ObjectBlock>) -> [
             }
         }
     }
+    // Cameras that look away from everything have nothing before them: the range is empty then, not inside out.
     range[0] = range[0].max(0.01 * rig.distance);
+    range[1] = range[1].max(range[0]);
     range
 }
 
