@@ -2,4 +2,5 @@
 //! and the same formulas evaluated in `f64`.
 #![forbid(unsafe_code)]
 
+pub mod command;
 pub mod scenes;
