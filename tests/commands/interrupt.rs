@@ -25,7 +25,7 @@ fn wait_for(child: &mut Child, ready: impl Fn() -> bool) {
 #[track_caller]
 fn assert_stops_cleanly(folder: &Folder, signal: &str) {
     let output = folder.path().join("out");
-    let arguments = "render toy --orbit 2000 --size 384x384 -o out";
+    let arguments = "render toy --orbit 5000 --size 96x96 -o out";
     let mut run = command(super::BINARY, folder.path(), arguments);
     let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
     wait_for(&mut child, || output.join("orbit-001.png").exists());
@@ -46,7 +46,7 @@ fn assert_stops_cleanly(folder: &Folder, signal: &str) {
     assert_eq!(String::from_utf8_lossy(&result.stdout), "");
 
     let names = names_in(&output);
-    assert!(names.iter().any(|name| name == "orbit-001.png") && names.len() < 2000 * 3, "{names:?}");
+    assert!(names.iter().any(|name| name == "orbit-001.png") && names.len() < 5000 * 3, "{names:?}");
     for name in names {
         // No run record, no temporary file.
         assert!(name.starts_with("orbit-") && name.ends_with(".png"), "{name} is left");
