@@ -90,6 +90,10 @@ impl Pinhole {
     /// # Errors
     /// [`PinholeError::Size`] for an unusable size.
     pub fn resized(&self, width: u32, height: u32) -> Result<Pinhole, PinholeError> {
+        // A width of 0 would otherwise be found in the focal length that it scales.
+        if width == 0 || height == 0 {
+            return Err(PinholeError::Size);
+        }
         let x = width as f32 / self.width as f32;
         let y = height as f32 / self.height as f32;
         Pinhole::new(

@@ -4,19 +4,20 @@
 //! with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres the border
 //! node's value continues; a NaN coordinate is taken as 0. Slices shorter than the stated size are not allowed.
 
-use crate::math::{clamp, floor_to_i32};
+use crate::math::clamp;
 
 /// One axis of a look-up among `count` nodes: the two nodes around a coordinate and the share of the second.
-#[inline]
+#[inline(always)]
 pub fn split(coordinate: f32, count: u32) -> (usize, usize, f32) {
-    let last = (count - 1) as f32;
-    let position = clamp(coordinate - 0.5, 0.0, last);
-    let lower = floor_to_i32(position) as usize;
-    let upper = if lower + 1 < count as usize { lower + 1 } else { lower };
-    (lower, upper, position - lower as f32)
+    let last = count as i32 - 1;
+    let position = clamp(coordinate - 0.5, 0.0, last as f32);
+    // Not negative: truncation is the floor.
+    let lower = position as i32;
+    let upper = if lower < last { lower + 1 } else { last };
+    (lower as usize, upper as usize, position - lower as f32)
 }
 
-#[inline]
+#[inline(always)]
 fn mix<const C: usize>(a: &[f32; C], b: &[f32; C], share: f32) -> [f32; C] {
     let mut mixed = [0.0; C];
     let mut channel = 0;
@@ -35,7 +36,7 @@ pub fn bilinear<const C: usize>(grid: &[[f32; C]], width: u32, height: u32, x: f
 }
 
 /// As [`bilinear`], in a grid whose first node is `grid[first]`: one of several in a buffer.
-#[inline]
+#[inline(always)]
 pub fn bilinear_from<const C: usize>(
     grid: &[[f32; C]],
     first: usize,
@@ -52,6 +53,25 @@ pub fn bilinear_from<const C: usize>(
         &mix(&grid[bottom + left], &grid[bottom + right], share_x),
         share_y,
     )
+}
+
+/// One channel of [`bilinear_from`], for half the work.
+#[inline(always)]
+pub fn bilinear_channel_from<const C: usize>(
+    grid: &[[f32; C]],
+    first: usize,
+    width: u32,
+    height: u32,
+    x: f32,
+    y: f32,
+    channel: usize,
+) -> f32 {
+    let (left, right, share_x) = split(x, width);
+    let (top, bottom, share_y) = split(y, height);
+    let (top, bottom) = (first + top * width as usize, first + bottom * width as usize);
+    let upper = grid[top + left][channel] + (grid[top + right][channel] - grid[top + left][channel]) * share_x;
+    let lower = grid[bottom + left][channel] + (grid[bottom + right][channel] - grid[bottom + left][channel]) * share_x;
+    upper + (lower - upper) * share_y
 }
 
 /// Trilinear look-up in `grid[slice][row][column]`, `size` = `[columns, rows, slices]`, all at least 1. Columns are mixed

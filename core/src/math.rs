@@ -3,12 +3,12 @@
 //! `libm` and GPU instructions disagree (a driver's `acos` may be off by 4096 ULP, its `sin` by 2^-11), so the
 //! functions that decide weights and colours are our own range-reduced polynomials in plain `f32` arithmetic: the
 //! same additions and multiplications in the same order everywhere. The polynomials are those of Cephes
-//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics.rs` against `f64`.
+//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics_math.rs` against `f64`.
 //!
 //! This is the only module that names `libm`, and it takes only the correctly rounded square root from it
 //! (plus `log10` in `f64` for the metrics, which never run on a device).
 
-use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
+use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LOG2_E, PI};
 
 /// Square root, correctly rounded. Negative input gives NaN.
 #[inline]
@@ -31,7 +31,7 @@ pub fn abs(x: f32) -> f32 {
 #[inline]
 pub fn floor_to_i32(x: f32) -> i32 {
     let truncated = x as i32;
-    if (truncated as f32) > x { truncated - 1 } else { truncated }
+    if (truncated as f32) > x && truncated > i32::MIN { truncated - 1 } else { truncated }
 }
 
 /// Smaller of two numbers; if `a` is NaN the result is `b`.
@@ -59,7 +59,7 @@ pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `e^x`: relative error below 2 ULP for `x` in `[-87.3, 88.7]`; 0 below (no subnormals: devices may flush them),
+/// `e^x`: error at most 1.1 ULP for `x` in `[-87.3, 88.7]`; 0 below (no subnormals: devices may flush them),
 /// saturated at `e^88.7` above. NaN gives 0.
 #[inline]
 pub fn exp(x: f32) -> f32 {
@@ -93,8 +93,8 @@ pub fn exact_power_of_two(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// Sine and cosine of an angle in radians: absolute error below 1.2e-7 for `|x| <= 8192`. Beyond that the argument
-/// itself is too coarse to mean much; the results stay in `[-1, 1]`. A non-finite angle gives `(0, 1)`.
+/// Sine and cosine of an angle in radians: absolute error below 9e-8 for `|x| <= 8192`. Beyond that the argument
+/// itself is too coarse to mean much; the results stay in `[-1, 1]` (to the same error). A non-finite angle gives `(0, 1)`.
 #[inline]
 pub fn sin_cos(x: f32) -> (f32, f32) {
     // pi / 2 in three parts (Cody and Waite); the products with the first two are exact for |k| < 2^13.
@@ -105,7 +105,8 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     let x = if finite { x } else { 0.0 };
     let quadrant = floor_to_i32(x * (2.0 / PI) + 0.5);
     let k = quadrant as f32;
-    let r = clamp(((x - k * FIRST) - k * SECOND) - k * THIRD, -FRAC_PI_4, FRAC_PI_4);
+    // Rounding of the quadrant lets r exceed pi / 4 a little; the limit only matters for huge arguments.
+    let r = clamp(((x - k * FIRST) - k * SECOND) - k * THIRD, -0.8, 0.8);
     let z = r * r;
     let sin = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 1.666_665_5e-1) * z * r + r;
     let cos = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
@@ -117,36 +118,77 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     }
 }
 
-/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`: relative error below 3 ULP.
+/// Angle of the point `(x, y)` with `y >= 0` from the positive x axis, in `[0, pi]`: error at most 3 ULP.
 /// `(0, 0)` gives 0. This form is exact at 0 and pi, where `acos` of a dot product loses half of the digits.
 #[inline]
 pub fn angle_from_components(y: f32, x: f32) -> f32 {
-    const TAN_PI_8: f32 = 0.414_213_57;
-    const TAN_3_PI_8: f32 = 2.414_213_7;
     let far = abs(x);
     // Three ranges of the acute angle, each brought within pi / 8 of 0 by one division: straight, turned back by
     // pi / 4, turned back by pi / 2.
-    let steep = y > far * TAN_3_PI_8;
-    let middle = y > far * TAN_PI_8;
-    let (numerator, denominator, offset) = if steep {
+    let (numerator, denominator, offset) = if y > far * TAN_3_PI_8 {
         (-far, y, FRAC_PI_2)
-    } else if middle {
+    } else if y > far * TAN_PI_8 {
         (y - far, y + far, FRAC_PI_4)
     } else {
         (y, far, 0.0)
     };
-    let r = if denominator > 0.0 { numerator / denominator } else { 0.0 };
-    let z = r * r;
-    let p = ((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
-    let acute = offset + (p * z * r + r);
+    let acute = offset + small_arc_tangent(numerator, denominator);
     if x < 0.0 { PI - acute } else { acute }
 }
 
-/// `ln 2`, for callers that turn half-lives into rates.
-pub const NATURAL_LOG_OF_TWO: f32 = LN_2;
+/// Angle of the point `(sqrt(x), sqrt(y))` from the positive x axis, in `[0, pi / 2]`, for `x` and `y` of at least 0:
+/// the same from squares, with one square root. `(0, 0)` gives 0.
+#[inline]
+pub fn angle_from_squares(y: f32, x: f32) -> f32 {
+    let mean = sqrt(y * x);
+    let (numerator, denominator, offset) = if y > x * (TAN_3_PI_8 * TAN_3_PI_8) {
+        (-mean, y, FRAC_PI_2)
+    } else if y > x * (TAN_PI_8 * TAN_PI_8) {
+        (y - x, y + x + 2.0 * mean, FRAC_PI_4)
+    } else {
+        (mean, x, 0.0)
+    };
+    offset + small_arc_tangent(numerator, denominator)
+}
+
+const TAN_PI_8: f32 = 0.414_213_57;
+const TAN_3_PI_8: f32 = 2.414_213_7;
+
+/// Arc tangent of a quotient of at most `tan(pi / 8)` in magnitude; 0 where the denominator is 0.
+#[inline]
+fn small_arc_tangent(numerator: f32, denominator: f32) -> f32 {
+    let r = if denominator > 0.0 { numerator / denominator } else { 0.0 };
+    let z = r * r;
+    let p = ((8.053_744_5e-2 * z - 1.387_768_6e-1) * z + 1.997_771_1e-1) * z - 3.333_295e-1;
+    p * z * r + r
+}
+
+/// `a + b` as the rounded sum and the exact rest (Knuth). Overflow gives NaN in the rest.
+#[inline]
+pub fn two_sum(a: f32, b: f32) -> (f32, f32) {
+    let sum = a + b;
+    let added = sum - a;
+    (sum, (a - (sum - added)) + (b - added))
+}
+
+/// `a * b` as the rounded product and the exact rest (Dekker), for magnitudes of the factors below 1e15 and of the
+/// product above 1e-30; smaller rests are lost, larger factors give NaN.
+#[inline]
+pub fn two_product(a: f32, b: f32) -> (f32, f32) {
+    // 2^12 + 1 cuts 24 bits into two halves.
+    const SPLITTER: f32 = 4097.0;
+    let cut = |x: f32| {
+        let scaled = SPLITTER * x;
+        let high = scaled - (scaled - x);
+        (high, x - high)
+    };
+    let product = a * b;
+    let ((a_high, a_low), (b_high, b_low)) = (cut(a), cut(b));
+    (product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low)
+}
 
 /// Euclidean norm of three components without overflow or underflow: the components are divided by the largest
-/// magnitude first. Relative error below 3 ULP; all zero gives 0.
+/// magnitude first. Error at most 2 ULP for magnitudes in `[1e-15, 1e15]`, 3 ULP elsewhere; all zero gives 0.
 #[inline]
 pub fn norm3(x: f32, y: f32, z: f32) -> f32 {
     let largest = max(max(abs(x), abs(y)), abs(z));

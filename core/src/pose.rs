@@ -4,7 +4,7 @@
 //! right of the image, y down, z forward into the scene. Data in OpenGL axes (x right, y up, z backward; NeRF and
 //! Blender) comes in through its own constructor, so that a frame can not be confused silently.
 
-use crate::math::{abs, angle_from_components, max, norm3, sqrt};
+use crate::math::{abs, angle_from_components, angle_from_squares, max, norm3};
 use core::fmt;
 use glam::Vec3;
 
@@ -219,7 +219,7 @@ impl Pose {
     #[inline]
     pub fn axis_angle(&self, other: &Pose) -> f32 {
         let (difference, sum) = self.axis_chords_squared(other);
-        2.0 * angle_from_components(sqrt(difference), sqrt(sum))
+        2.0 * angle_from_squares(difference, sum)
     }
 
     /// `|a - b|^2` and `|a + b|^2` of the principal axes `a`, `b` of two cameras: `4 sin^2` and `4 cos^2` of half the
@@ -245,9 +245,8 @@ impl Pose {
                 + (a.down_world - b.down_world).length_squared()
                 + (a.forward_world - b.forward_world).length_squared();
             // |R_a - R_b|_F^2 = 8 sin^2(angle / 2)
-            let sine_of_half_squared = chord / 8.0;
-            let cosine_of_half_squared = max(1.0 - sine_of_half_squared, 0.0);
-            return 2.0 * angle_from_components(sqrt(sine_of_half_squared), sqrt(cosine_of_half_squared));
+            let sine_squared = chord / 8.0;
+            return 2.0 * angle_from_squares(sine_squared, max(1.0 - sine_squared, 0.0));
         }
         let antisymmetric = Vec3::new(
             a.forward_world.dot(b.down_world) - a.down_world.dot(b.forward_world),

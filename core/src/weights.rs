@@ -74,9 +74,7 @@ impl<const S: usize> Weights<S> {
         let mut smallest = f32::INFINITY;
         let mut view = 0;
         while view < count as usize {
-            if errors[view] >= 0.0 {
-                smallest = min(errors[view], smallest);
-            }
+            smallest = min(if errors[view] >= 0.0 { errors[view] } else { f32::INFINITY }, smallest);
             view += 1;
         }
         // The largest score is exactly 1, so the scores need no scaling before they are summed.
@@ -114,11 +112,15 @@ impl<const S: usize> Weights<S> {
 
     /// Finite non-negative values with their sum; if the sum is 0, every view counts the same.
     fn from_sum(mut values: [f32; S], sum: f32, count: u32) -> Weights<S> {
+        let count = (count as usize).min(S);
+        // One reciprocal for all: a rounding more, but a division takes as long as ten products.
+        let (factor, offset) = if sum > 0.0 { (1.0 / sum, 0.0) } else { (0.0, 1.0 / count as f32) };
         let mut view = 0;
-        while view < count as usize {
-            values[view] = if sum > 0.0 { values[view] / sum } else { 1.0 / count as f32 };
+        while view < count {
+            values[view] = values[view] * factor + offset;
             view += 1;
         }
+        let count = count as u32;
         Weights { values, count }
     }
 

@@ -29,7 +29,7 @@ fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let scene = toy();
     let folder = scene.path();
-    let printed = done(folder, "render toy --targets 20 --size 64x64 --seed 7 -o out/deeper");
+    let printed = done(folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 -o out/deeper");
     assert!(
         printed.contains("out/deeper/000020.png  PSNR ") && printed.contains("1 view from 23 sources"),
         "{printed}"
@@ -58,6 +58,7 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     assert_eq!((&frame["target"], record["frames"].as_array().map(Vec::len)), (&"000020".into(), Some(1)));
     let weights = numbers(&frame["weights"]);
     assert_eq!((weights.len(), texts(&frame["left_out"])), (23, Vec::new()));
+    assert_eq!(frame["weights"], frame["weights_before"]);
     assert!(weights.iter().all(|weight| *weight >= 0.0));
     assert_near(weights.iter().sum(), 1.0, 1.0e-5);
     assert!(frame["psnr"].as_f64().is_some_and(|psnr| psnr > 20.0 && printed.contains(&format!("PSNR {psnr:.2} dB"))));
@@ -161,7 +162,7 @@ fn weights_change_the_picture() {
     let scene = toy();
     let folder = scene.path();
     for (output, scheme) in [("a", "mean"), ("b", "error:alpha=1"), ("c", "cross-attention")] {
-        done(folder, &format!("render toy --targets 20 --size 32x32 --weights {scheme} -o {output}"));
+        done(folder, &format!("render toy --targets 20 --size 32x32 --leave-out 0 --weights {scheme} -o {output}"));
         assert_eq!(record(folder, output)["weighting"], scheme);
     }
     let mean = numbers(&record(folder, "a")["frames"][0]["weights"]);

@@ -3,4 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod command;
+pub mod compare;
+pub mod oracle;
+pub mod poses;
 pub mod scenes;

@@ -2,7 +2,7 @@
 
 use super::{NO_SURFACE, ObjectBlock};
 use crate::camera::CameraBlock;
-use crate::lookup::bilinear_from;
+use crate::lookup::{bilinear_channel_from, bilinear_from};
 use glam::Vec3;
 
 /// Least alpha at which a pixel can show the object: such a source pixel gets a depth.
@@ -18,6 +18,12 @@ pub const ENTRY_STEP: f32 = 2.0;
 #[inline]
 pub fn look_up(view: &CameraBlock, texels: &[[f32; 4]], x: f32, y: f32) -> [f32; 4] {
     bilinear_from(texels, view.first_texel as usize, view.width, view.height, x, y)
+}
+
+/// Only the alpha that a view shows at an image coordinate.
+#[inline]
+pub fn look_up_alpha(view: &CameraBlock, texels: &[[f32; 4]], x: f32, y: f32) -> f32 {
+    bilinear_channel_from(texels, view.first_texel as usize, view.width, view.height, x, y, 3)
 }
 
 /// How far the silhouettes allow a point to belong to the object: the least alpha over the views that contain it, in
@@ -37,7 +43,7 @@ pub fn hull_alpha(
         let seen = views[view].project(point_world);
         if seen.in_image {
             containing += 1;
-            let here = look_up(&views[view], texels, seen.x, seen.y)[3];
+            let here = look_up_alpha(&views[view], texels, seen.x, seen.y);
             if here < alpha {
                 alpha = here;
                 if alpha < least {

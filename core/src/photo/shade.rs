@@ -1,7 +1,7 @@
 //! A point in, occupancy and colour out.
 
 use super::hull::look_up;
-use super::{NO_SURFACE, ObjectBlock};
+use super::{NO_SURFACE, ObjectBlock, fade};
 use crate::camera::CameraBlock;
 use crate::fuse::VisibleFusion;
 use crate::lookup::split;
@@ -124,7 +124,7 @@ pub fn sample(
                     distance_sum += share * min(distance, TRUNCATION);
                     distance_share += share;
                 }
-                let visibility = exp(-(behind * behind) / (SEEN_BEHIND * SEEN_BEHIND));
+                let visibility = fade(behind / SEEN_BEHIND);
                 let hidden = HIDDEN_SHARE / (1.0 + behind * behind);
                 // Towards a silhouette's edge a view's colour is less its own.
                 let share = weight * alpha * alpha * (visibility + hidden);

@@ -3,10 +3,10 @@
 //! Costs are laid out `[row][column][plane]`, planes from near to far, for the band of rows being worked on. A cost is a
 //! mean absolute difference of colour in `[0, MOST_DIFFERENCE]`; a negative one says that the place is outside the hull.
 
-use super::hull::{SWEPT_ALPHA, look_up};
-use super::{NO_SURFACE, ObjectBlock};
+use super::hull::{SWEPT_ALPHA, look_up, look_up_alpha};
+use super::{NO_SURFACE, ObjectBlock, fade};
 use crate::camera::CameraBlock;
-use crate::math::{abs, clamp, exp, max, min};
+use crate::math::{abs, clamp, max, min};
 
 /// Largest difference that counts: beyond it, a pixel is simply another thing.
 pub const MOST_DIFFERENCE: f32 = 0.2;
@@ -129,16 +129,20 @@ pub fn match_cost(
         let seen = views[other as usize].project(point);
         if other != sweep.view && seen.in_image {
             containing += 1;
-            let colour = look_up(&views[other as usize], texels, seen.x, seen.y);
-            if colour[3] < SWEPT_ALPHA {
-                return OUTSIDE;
-            }
             let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
             let entry = entries[views[other as usize].texel_at(seen.x, seen.y)];
             let behind = max(seen.depth - entry, 0.0) * reach;
-            // Beyond 2.5 the visibility is below 0.002.
-            if weight > 0.0 && behind < 2.5 {
-                let share = weight * exp(-(behind * behind));
+            let share = weight * fade(behind);
+            if share <= 0.0 {
+                // Only the silhouette counts.
+                if look_up_alpha(&views[other as usize], texels, seen.x, seen.y) < SWEPT_ALPHA {
+                    return OUTSIDE;
+                }
+            } else {
+                let colour = look_up(&views[other as usize], texels, seen.x, seen.y);
+                if colour[3] < SWEPT_ALPHA {
+                    return OUTSIDE;
+                }
                 sum += share * min(mean_difference(&straight(&colour), &own), MOST_DIFFERENCE);
                 share_sum += share;
             }

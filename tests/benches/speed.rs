@@ -1,0 +1,122 @@
+//! How fast, and against what limit: `cargo bench -p viewfuse-tests`.
+//!
+//! - `weights`: error weighting of 32 sources for 251 targets on one core (SRN's test trajectory).
+//! - `sample`: the field at a point, on one core; the unit in which a render's time is counted. A sample asks `S` views;
+//!   each view costs a projection (21 operations and a reciprocal), a bilinear look-up of 4 channels (4 texels of 16
+//!   bytes, 30 operations) and, for a view with a weight, one of the depths (4 of 4 bytes, 25 operations) and its fusion
+//!   (25 operations): about 100 operations and 80 bytes a view. The maps of 15 views at 160x120 are 5.8 MB, so the
+//!   look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
+//! - `prepare`, `encode`, `render`: the stages of the sample scene at its own size, on all cores.
+
+use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use std::hint::black_box;
+use std::path::Path;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::few_shot::target_of;
+use viewfuse::field::photo::{PhotoField, find_object};
+use viewfuse::photographs::{Album, BackgroundChoice};
+use viewfuse::progress::Progress;
+use viewfuse::render::{RenderOptions, Stage};
+use viewfuse::scene::Scene;
+use viewfuse::weighting::Weighting;
+use viewfuse_core::Vec3;
+use viewfuse_core::photo::shade::sample;
+use viewfuse_core::pose::Pose;
+use viewfuse_core::random::uniform;
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
+
+/// Cameras spread over the upper part of a sphere, looking at the origin.
+fn spiral(first: u32, count: u32) -> Vec<Pose> {
+    (first..first + count)
+        .map(|index| {
+            let azimuth = index as f32 * 2.399_963;
+            let height = 0.1 + 0.8 * (index % 97) as f32 / 97.0;
+            let radius = (1.0 - height * height).sqrt();
+            let centre = Vec3::new(radius * azimuth.cos(), radius * azimuth.sin(), height) * 1.3;
+            Pose::look_at(centre, Vec3::ZERO, Vec3::Z).expect("a camera that looks at the origin")
+        })
+        .collect()
+}
+
+fn weights(criterion: &mut Criterion) {
+    let sources = Sources::<32>::new(&spiral(0, 32)).expect("32 sources");
+    let targets = spiral(100, 251);
+    let mut group = criterion.benchmark_group("weights");
+    group.throughput(Throughput::Elements(251));
+    for (name, scheme) in [
+        ("error alpha=1", Scheme::error(1.0, AngleKind::PrincipalAxis)),
+        ("error alpha=0.5", Scheme::error(0.5, AngleKind::PrincipalAxis)),
+        ("distance", Scheme::distance(1)),
+        ("gaussian", Scheme::gaussian(1.0)),
+    ] {
+        let scheme = scheme.expect("a scheme in range");
+        group.bench_function(format!("32 sources, 251 targets, {name}"), |bencher| {
+            bencher.iter(|| {
+                for target in &targets {
+                    black_box(weigh(scheme, black_box(&sources), black_box(target)));
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+fn stages(criterion: &mut Criterion) {
+    let scene = Scene::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/toy")).expect("the sample scene");
+    let sources: Vec<usize> = (0..20).collect();
+    let album = Album::open(&scene, 0..scene.views.len()).expect("its photographs");
+    let options = RenderOptions::default();
+    let weighting = Weighting::default_scheme();
+    let progress = Progress::hidden();
+    let field = PhotoField::default();
+    let stage = || Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &progress).expect("prepared");
+    let mut group = criterion.benchmark_group("sample scene 128x128, 20 sources");
+    group.sample_size(10);
+    group.bench_function("prepare", |bencher| bencher.iter(stage));
+    group.bench_function("encode", |bencher| {
+        bencher.iter_batched_ref(
+            stage,
+            |stage| black_box(stage.encode(&weighting, &progress).expect("encoded")),
+            BatchSize::PerIteration,
+        );
+    });
+    let mut stage = stage();
+    let depths = stage.encode(&weighting, &progress).expect("encoded");
+    let target = target_of(&scene, 20);
+    group.bench_function("render", |bencher| {
+        bencher.iter(|| black_box(stage.frame(&weighting, &depths, &target, &progress).expect("rendered")));
+    });
+    group.finish();
+
+    let object = find_object(&stage.images).expect("an object");
+    let mut texels = Vec::new();
+    let mut views = Vec::new();
+    for image in &stage.images.images {
+        views.push(image.camera.block(texels.len() as u32));
+        texels.extend_from_slice(&image.texels);
+    }
+    let footprints: Vec<f32> =
+        views.iter().map(|view| view.project(object.middle()).depth / view.intrinsics[0]).collect();
+    let poses: Vec<Pose> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+    let all = Sources::new(&poses).expect("20 sources");
+    let weights = weighting.weigh(&all, &target.camera.pose);
+    let weights = &weights.values()[..sources.len()];
+    let (low, high) = (Vec3::from_slice(&object.low[..3]), Vec3::from_slice(&object.high[..3]));
+    let points: Vec<Vec3> = (0..4096)
+        .map(|i| low + (high - low) * Vec3::new(uniform(7, i, 0), uniform(7, i, 1), uniform(7, i, 2)))
+        .collect();
+    let mut group = criterion.benchmark_group("sample, one core");
+    group.throughput(Throughput::Elements(points.len() as u64));
+    group.bench_function("random points of the object's box, 20 views", |bencher| {
+        bencher.iter(|| {
+            for point in &points {
+                black_box(sample(&object, &views, &footprints, &texels, &depths, weights, *point));
+            }
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, weights, stages);
+criterion_main!(benches);

@@ -1,0 +1,163 @@
+//! Cameras and poses: rays and projections are each other's inverse, what can not be seen is masked, what is not a
+//! camera is refused.
+
+use glam::Vec3;
+use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
+use viewfuse_core::pose::{LARGEST_COORDINATE, Pose, PoseError};
+use viewfuse_core::sources::{Sources, SourcesError};
+use viewfuse_tests::poses::Random;
+
+const UNIT: [[f32; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
+
+fn camera(pose: Pose) -> Camera {
+    let pinhole = Pinhole::new([131.25, 97.5], [70.3, 41.8], 160, 90).expect("a usable camera");
+    Camera { pose, pinhole }
+}
+
+#[test]
+fn projection_undoes_the_ray() {
+    let mut random = Random::new(41);
+    let mut worst = 0.0_f32;
+    for _ in 0..20_000 {
+        let camera = camera(random.pose(1.0));
+        let (x, y) = (random.range(0.1, 159.9) as f32, random.range(0.1, 89.9) as f32);
+        let ray = camera.ray(x, y);
+        assert!((ray.direction_world.length() - 1.0).abs() <= 3.0e-7);
+        let t = random.log_range(0.5, 100.0) as f32;
+        let seen = camera.project(ray.at(t));
+        assert!(seen.in_front && seen.in_image);
+        worst = worst.max((seen.x - x).abs()).max((seen.y - y).abs());
+        assert!(seen.depth <= t * 1.000_001 && seen.depth > 0.5 * t);
+    }
+    // The point is rounded at the size of the centre and seen from half a unit away at a focal length of 131 pixels.
+    println!("ray and back: {worst:e} pixels");
+    assert!(worst < 1.0e-3, "{worst}");
+}
+
+#[test]
+fn the_principal_point_looks_forward() {
+    let camera = camera(Pose::IDENTITY);
+    assert_eq!(camera.ray(70.3, 41.8).direction_world, Vec3::Z);
+    let right = camera.project(Vec3::new(1.0, 0.0, 1.0));
+    assert_eq!((right.x, right.y, right.depth, right.in_image), (70.3 + 131.25, 41.8, 1.0, false));
+    let down = camera.project(Vec3::new(0.0, 0.25, 1.0));
+    assert_eq!((down.x, down.y, down.in_image), (70.3, 41.8 + 0.25 * 97.5, true));
+}
+
+#[test]
+fn what_can_not_be_seen_is_masked() {
+    let camera = camera(Pose::IDENTITY);
+    for point in [Vec3::ZERO, Vec3::new(1.0, 2.0, 0.0), Vec3::new(0.1, 0.1, -1.0), Vec3::splat(f32::NAN)] {
+        let seen = camera.project(point);
+        assert!(!seen.in_front && !seen.in_image && seen.x == 0.0 && seen.y == 0.0, "{seen:?}");
+    }
+    assert_eq!(camera.project(Vec3::new(0.0, 0.0, -2.0)).depth, -2.0);
+    for (x, y) in [(-0.5, 40.0), (160.5, 40.0), (80.0, -0.5), (80.0, 90.5)] {
+        let seen = camera.project(camera.ray(x, y).at(2.0));
+        assert!(seen.in_front && !seen.in_image, "{x} {y}: {seen:?}");
+    }
+    let corner = camera.project(camera.ray(0.01, 89.99).at(2.0));
+    assert!(corner.in_image);
+}
+
+#[test]
+fn unusable_pinholes_are_refused() {
+    let new = |focal: [f32; 2], principal: [f32; 2], width, height| Pinhole::new(focal, principal, width, height);
+    for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(new([bad, 1.0], [0.0; 2], 4, 4), Err(PinholeError::Focal));
+        assert_eq!(new([1.0, bad], [0.0; 2], 4, 4), Err(PinholeError::Focal));
+    }
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert_eq!(new([1.0; 2], [bad, 0.0], 4, 4), Err(PinholeError::Principal));
+        assert_eq!(new([1.0; 2], [0.0, bad], 4, 4), Err(PinholeError::Principal));
+    }
+    for (width, height) in [(0, 4), (4, 0), ((1 << 20) + 1, 4), (4, u32::MAX)] {
+        assert_eq!(new([1.0; 2], [0.0; 2], width, height), Err(PinholeError::Size));
+    }
+    let pinhole = new([100.0, 50.0], [32.0, 20.0], 64, 40).expect("a usable camera");
+    assert_eq!(pinhole.resized(128, 20), new([200.0, 25.0], [64.0, 10.0], 128, 20));
+    assert_eq!(pinhole.resized(0, 20), Err(PinholeError::Size));
+}
+
+#[test]
+fn what_is_not_a_pose_is_refused() {
+    for row in 0..4 {
+        for column in 0..4 {
+            for bad in [f32::NAN, f32::INFINITY] {
+                let mut m = UNIT;
+                m[row][column] = bad;
+                let expected = PoseError::NotFinite { row: row as u32, column: column as u32 };
+                assert_eq!(Pose::from_opencv(&m), Err(expected));
+                assert_eq!(Pose::from_opengl(&m), Err(expected));
+            }
+        }
+    }
+    let changed = |row: usize, column: usize, value: f32| {
+        let mut m = UNIT;
+        m[row][column] = value;
+        Pose::from_opencv(&m)
+    };
+    assert_eq!(changed(0, 3, 1.1 * LARGEST_COORDINATE), Err(PoseError::TooFar));
+    assert!(changed(0, 3, LARGEST_COORDINATE).is_ok());
+    assert_eq!(changed(3, 3, 2.0), Err(PoseError::LastRow));
+    assert_eq!(changed(3, 0, 0.1), Err(PoseError::LastRow));
+    assert_eq!(changed(2, 2, -1.0), Err(PoseError::Mirrored));
+    for (row, column, value) in [(0, 0, 1.01), (0, 1, 0.01), (1, 2, -0.01), (0, 0, 0.0), (0, 0, 1.0e30)] {
+        let result = changed(row, column, value);
+        assert!(matches!(result, Err(PoseError::NotRigid { deviation }) if deviation > 1.0e-3), "{result:?}");
+    }
+    assert!(changed(0, 1, 0.0005).is_ok(), "four decimals pass");
+}
+
+#[test]
+fn opengl_and_opencv_differ_by_the_sign_of_two_axes() {
+    let mut random = Random::new(42);
+    for _ in 0..100 {
+        let pose = random.pose(2.0);
+        assert_eq!(Pose::from_opengl(&pose.to_opengl()), Ok(pose));
+        assert_eq!(Pose::from_opencv(&pose.to_opencv()), Ok(pose));
+        let (cv, gl) = (pose.to_opencv(), pose.to_opengl());
+        for row in 0..3 {
+            assert_eq!(
+                (gl[row][0], -gl[row][1], -gl[row][2], gl[row][3]),
+                (cv[row][0], cv[row][1], cv[row][2], cv[row][3])
+            );
+        }
+    }
+    let gl = Pose::from_opengl(&UNIT).expect("a pose");
+    assert_eq!((gl.forward_world(), gl.down_world(), gl.right_world()), (-Vec3::Z, -Vec3::Y, Vec3::X));
+}
+
+#[test]
+fn look_at_looks_at() {
+    let mut random = Random::new(43);
+    for _ in 0..2_000 {
+        let point = |random: &mut Random| Vec3::from_array(random.vector().map(|c| c as f32));
+        let (centre, target) = (point(&mut random), point(&mut random));
+        let pose = Pose::look_at(centre, target, Vec3::Z).expect("not degenerate");
+        let seen = pose.to_camera(target);
+        let distance = centre.distance(target);
+        assert!(
+            seen.x.abs() <= 2.0e-6 && seen.y.abs() <= 2.0e-6 && (seen.z - distance).abs() <= 2.0e-6 * (1.0 + distance)
+        );
+        assert!(pose.down_world().z <= 1.0e-6 && pose.right_world().z.abs() <= 1.0e-6, "up is up");
+    }
+    for (centre, target, up) in [
+        (Vec3::ONE, Vec3::ONE, Vec3::Z),
+        (Vec3::ZERO, Vec3::Z, Vec3::Z),
+        (Vec3::ZERO, Vec3::Z, -Vec3::Z),
+        (Vec3::ZERO, Vec3::X, Vec3::ZERO),
+        (Vec3::splat(f32::NAN), Vec3::X, Vec3::Z),
+        (Vec3::ZERO, Vec3::splat(f32::INFINITY), Vec3::Z),
+    ] {
+        assert!(Pose::look_at(centre, target, up).is_err(), "{centre} {target} {up}");
+    }
+}
+
+#[test]
+fn sources_are_counted() {
+    let pose = Pose::IDENTITY;
+    assert_eq!(Sources::<2>::new(&[]), Err(SourcesError::Empty));
+    assert_eq!(Sources::<2>::new(&[pose; 3]), Err(SourcesError::TooMany { count: 3, capacity: 2 }));
+    assert_eq!(Sources::<2>::new(&[pose; 2]).map(|sources| sources.count()), Ok(2));
+}

@@ -1,0 +1,173 @@
+//! Fusing views and compositing samples against `f64`.
+
+use viewfuse_core::composite::{Composite, Compositor};
+use viewfuse_core::fuse::{VisibleFusion, fuse_views, fuse_visible};
+use viewfuse_core::weights::Weights;
+use viewfuse_tests::compare::Comparator;
+use viewfuse_tests::poses::Random;
+
+const S: usize = 5;
+const C: usize = 4;
+
+#[test]
+fn fusion_is_the_weighted_sum() {
+    let mut random = Random::new(31);
+    for _ in 0..5_000 {
+        let scores: [f32; S] = std::array::from_fn(|_| random.unit() as f32);
+        let count = 1 + random.below(S);
+        let weights = Weights::from_scores(&scores, count as u32);
+        // Beyond the count lies NaN, which must not be touched.
+        let latents: [[f32; C]; S] = std::array::from_fn(|view| {
+            std::array::from_fn(|_| if view < count { random.normal() as f32 } else { f32::NAN })
+        });
+        let visibility: [f32; S] = std::array::from_fn(|_| (random.range(-0.3, 1.3).clamp(0.0, 1.0)) as f32);
+        let (mut sum, mut visible, mut seen, mut size) = ([0.0; C], [0.0; C], 0.0, 0.0_f64);
+        for view in 0..count {
+            let share = f64::from(weights.values()[view]);
+            seen += share * f64::from(visibility[view]);
+            for channel in 0..C {
+                let latent = f64::from(latents[view][channel]);
+                size = size.max(latent.abs());
+                sum[channel] += share * latent;
+                visible[channel] += share * f64::from(visibility[view]) * latent;
+            }
+        }
+        // A product, S additions of parts of a convex combination; the visible mean adds a product and a division.
+        let tolerance = Comparator { absolute: (S as f64 + 1.0) * size / 16_777_216.0, relative: 0.0 };
+        tolerance.compare_varying(&fuse_views(&weights, &latents), &sum).unwrap_or_else(|e| panic!("{e}"));
+        let fused = fuse_visible(&weights, &visibility, &latents, [9.0; C]);
+        if seen == 0.0 {
+            assert_eq!(fused, [9.0; C]);
+            continue;
+        }
+        let tolerance = Comparator { absolute: (2.0 * S as f64 + 4.0) * size / 16_777_216.0, relative: 0.0 };
+        tolerance.compare_varying(&fused, &visible.map(|v| v / seen)).unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+#[test]
+fn invisible_views_count_for_nothing() {
+    let weights = Weights::from_scores(&[0.25_f32, 0.5, 0.25], 3);
+    let latents = [[1.0, 2.0], [100.0, 100.0], [3.0, 6.0]];
+    assert_eq!(fuse_visible(&weights, &[1.0, 0.0, 1.0], &latents, [0.0; 2]), [2.0, 4.0]);
+    assert_eq!(fuse_visible(&weights, &[1.0; 3], &latents, [0.0; 2]), fuse_views(&weights, &latents));
+    assert_eq!(fuse_visible(&weights, &[0.0; 3], &latents, [7.0, 8.0]), [7.0, 8.0]);
+    assert_eq!(VisibleFusion::<2>::EMPTY.mean_or([7.0, 8.0]), [7.0, 8.0]);
+    // However little a view is seen, alone it decides.
+    assert_eq!(fuse_visible(&weights, &[1.0e-20, 0.0, 0.0], &[[4.0], [1.0], [1.0]], [0.0]), [4.0]);
+}
+
+/// One sample: channels, optical depth, distance.
+type Sample = ([f32; 3], f32, f32);
+
+fn composite(samples: &[Sample], background: [f32; 3]) -> (Composite<3>, Vec<f32>) {
+    let mut ray = Compositor::<3>::START;
+    let weights = samples.iter().map(|(channels, depth, at)| ray.add(channels, *depth, *at)).collect();
+    (ray.finish(&background, -1.0), weights)
+}
+
+/// Channels, opacity, depth in `f64`.
+fn oracle(samples: &[Sample], background: [f32; 3]) -> ([f64; 3], f64, f64) {
+    let (mut channels, mut depth, mut total) = ([0.0; 3], 0.0, 0.0_f64);
+    for (values, optical_depth, at) in samples {
+        let weight = (-total).exp() * -(-f64::from(*optical_depth)).exp_m1();
+        total += f64::from(*optical_depth);
+        depth += weight * f64::from(*at);
+        (0..3).for_each(|channel| channels[channel] += weight * f64::from(values[channel]));
+    }
+    (0..3).for_each(|channel| channels[channel] += (-total).exp() * f64::from(background[channel]));
+    let opacity = -(-total).exp_m1();
+    (channels, opacity, depth / opacity)
+}
+
+fn random_samples(random: &mut Random, count: usize, low: f64, high: f64) -> Vec<Sample> {
+    (0..count)
+        .map(|i| {
+            let channels = std::array::from_fn(|_| random.unit() as f32);
+            (channels, random.log_range(low, high) as f32, 1.0 + i as f32 / count as f32)
+        })
+        .collect()
+}
+
+#[test]
+fn compositing_agrees_with_f64() {
+    let mut random = Random::new(32);
+    for case in 0..3_000 {
+        let count = 1 + random.below(128);
+        let (low, high) = [(1.0e-6, 1.0e3), (1.0e-3, 1.0), (1.0e-6, 1.0e-2), (1.0, 1.0e3)][case % 4];
+        let samples = random_samples(&mut random, count, low, high);
+        let background: [f32; 3] = std::array::from_fn(|_| random.unit() as f32);
+        let (actual, weights) = composite(&samples, background);
+        let (channels, opacity, depth) = oracle(&samples, background);
+        // Each transmittance is off by the sum's roundings (N u o e^-o <= N u / e) and exp's 2 ULP.
+        let units = 0.4 * count as f64 + 4.0;
+        let tolerance = Comparator { absolute: 2.0 * (units + count as f64) / 16_777_216.0, relative: 0.0 };
+        tolerance.compare_varying(&actual.channels, &channels).unwrap_or_else(|e| panic!("{e}"));
+        tolerance.compare(&[actual.opacity], &[opacity]).unwrap_or_else(|e| panic!("{e}"));
+        assert!((0.0..=1.0).contains(&actual.opacity));
+        let depth_error = (f64::from(actual.depth) - depth).abs();
+        assert!(depth_error <= 4.0 * tolerance.absolute / opacity + 1.0e-6, "{depth_error} at opacity {opacity}");
+        // Weights are not negative and telescope to the opacity.
+        let sum: f64 = weights.iter().map(|w| f64::from(*w)).sum();
+        assert!((sum - f64::from(actual.opacity)).abs() <= count as f64 * 6.0e-8);
+        assert!(weights.iter().all(|w| *w >= 0.0), "{weights:?}");
+    }
+}
+
+#[test]
+fn two_thousand_thin_samples_are_not_lost() {
+    let samples = vec![([1.0, 0.5, 0.0], 1.0e-7, 2.0); 2000];
+    let (actual, _) = composite(&samples, [0.0; 3]);
+    let (channels, opacity, _) = oracle(&samples, [0.0; 3]);
+    // One by one each would round to 0 or 2^-24; kept as a sum they are right to half a step of the transmittance.
+    let tolerance = Comparator { absolute: 1.5e-7, relative: 0.0 };
+    tolerance.compare_varying(&actual.channels, &channels).unwrap_or_else(|e| panic!("{e}"));
+    tolerance.compare(&[actual.opacity], &[opacity]).unwrap_or_else(|e| panic!("{e}"));
+    assert!((actual.depth - 2.0).abs() < 2.0e-6, "{}", actual.depth);
+}
+
+#[test]
+fn empty_opaque_and_useless_samples() {
+    let (empty, _) = composite(&[], [0.1, 0.2, 0.3]);
+    assert_eq!(empty, Composite { channels: [0.1, 0.2, 0.3], depth: -1.0, opacity: 0.0 });
+    for nothing in [0.0, -1.0, f32::NAN, f32::NEG_INFINITY] {
+        let (same, weights) = composite(&[([9.0; 3], nothing, 5.0)], [0.1, 0.2, 0.3]);
+        assert_eq!((same, weights[0]), (empty, 0.0), "{nothing}");
+    }
+    for opaque in [f32::INFINITY, f32::MAX, 1.0e3] {
+        let samples = [([0.5, 0.6, 0.7], opaque, 3.0), ([9.0; 3], opaque, 5.0)];
+        let (actual, weights) = composite(&samples, [0.1; 3]);
+        assert_eq!(actual, Composite { channels: [0.5, 0.6, 0.7], depth: 3.0, opacity: 1.0 });
+        assert_eq!(weights, [1.0, 0.0]);
+    }
+}
+
+#[test]
+fn a_settled_ray_changes_by_less_than_its_threshold() {
+    let mut random = Random::new(33);
+    let mut reached = 0.0_f32;
+    for case in 0..3_000 {
+        let threshold = [0.5, 0.1, 1.0e-2, 1.0e-3][case % 4];
+        let samples = random_samples(&mut random, 64, 1.0e-3, 3.0);
+        let mut ray = Compositor::<3>::START;
+        let mut ended = None;
+        for (channels, optical_depth, at) in &samples {
+            if ended.is_none() && ray.is_settled(threshold) {
+                ended = Some(ray);
+            }
+            ray.add(channels, *optical_depth, *at);
+        }
+        let Some(ended) = ended else { continue };
+        // Whatever is behind: the rest of the samples, black or white.
+        let full = ray.finish(&[0.0, 1.0, 0.5], 0.0).channels;
+        for background in [[0.0; 3], [1.0; 3]] {
+            let short = ended.finish(&background, 0.0).channels;
+            for channel in 0..3 {
+                let change = (full[channel] - short[channel]).abs();
+                assert!(change <= threshold + 4.0e-6, "{change} > {threshold}");
+                reached = reached.max(change / threshold);
+            }
+        }
+    }
+    assert!(reached > 0.5, "the bound is not idle: {reached}");
+}

@@ -1,0 +1,161 @@
+//! The elementary functions against `f64`: dense sweeps, extremes, and the errors that their documentation states.
+
+use viewfuse_core::math;
+use viewfuse_tests::compare::unit_in_last_place;
+use viewfuse_tests::poses::Random;
+
+/// Every `stride`-th `f32` from `low` to `high`, both at least 0, and both ends.
+fn sweep(low: f32, high: f32, stride: usize) -> impl Iterator<Item = f32> {
+    (low.to_bits()..=high.to_bits()).step_by(stride).map(f32::from_bits).chain([high])
+}
+
+/// Largest of the second numbers; NaN wins.
+fn worst(cases: impl Iterator<Item = (f32, f64)>) -> (f32, f64) {
+    cases.fold((0.0, 0.0), |worst, case| if case.1 <= worst.1 { worst } else { case })
+}
+
+#[track_caller]
+fn assert_below(what: &str, (at, error): (f32, f64), bound: f64) {
+    println!("{what}: at most {error:.4e} (at {at:e}), stated {bound:.4e}");
+    assert!(error <= bound, "{what}: {error:e} at {at:e}, stated {bound:e}");
+}
+
+#[test]
+fn exp_is_within_its_error() {
+    let error = |x: f32| {
+        let expected = f64::from(x).exp();
+        (x, (f64::from(math::exp(x)) - expected).abs() / unit_in_last_place(expected))
+    };
+    let negative = sweep(0.0, 87.3, 97).map(|x| error(-x));
+    let positive = sweep(0.0, 88.7, 97).map(error);
+    assert_below("exp, ULP", worst(negative.chain(positive)), 1.1);
+}
+
+#[test]
+fn exp_at_its_ends() {
+    assert_eq!(math::exp(0.0), 1.0);
+    assert_eq!(math::exp(-0.0), 1.0);
+    assert_eq!(math::exp(f32::MIN_POSITIVE), 1.0);
+    assert!(math::exp(-87.3) >= f32::MIN_POSITIVE);
+    for low in [-87.31, -88.0, -1.0e10, f32::MIN, f32::NEG_INFINITY, f32::NAN] {
+        assert_eq!(math::exp(low), 0.0, "{low}");
+    }
+    for high in [88.71, 1.0e10, f32::MAX, f32::INFINITY] {
+        assert_eq!(math::exp(high), math::exp(88.7), "{high}");
+        assert!(math::exp(high).is_finite());
+    }
+}
+
+#[test]
+fn exp_never_decreases_by_more_than_its_error() {
+    let mut previous = 0.0_f32;
+    for i in 0..2_000_000 {
+        let value = math::exp(-80.0 + i as f32 * 7.9e-5);
+        assert!(value >= previous * (1.0 - 2.4e-7), "{i}");
+        previous = value;
+    }
+}
+
+#[test]
+fn sin_cos_is_within_its_absolute_error() {
+    let error = |x: f32| {
+        let (sin, cos) = math::sin_cos(x);
+        let (s, c) = f64::from(x).sin_cos();
+        (x, (f64::from(sin) - s).abs().max((f64::from(cos) - c).abs()))
+    };
+    let both = |range: f32, stride: usize| sweep(0.0, range, stride).flat_map(|x| [x, -x]).map(error);
+    assert_below("sin_cos up to 90 rad, absolute", worst(both(90.0, 97)), 9.0e-8);
+    assert_below("sin_cos up to 8192 rad, absolute", worst(both(8192.0, 101)), 9.0e-8);
+}
+
+#[test]
+fn sin_cos_stays_in_its_range_everywhere() {
+    for x in sweep(8192.0, f32::MAX, 1009).flat_map(|x| [x, -x]) {
+        let (sin, cos) = math::sin_cos(x);
+        assert!(sin.abs() <= 1.000_000_2 && cos.abs() <= 1.000_000_2, "{x}: {sin} {cos}");
+    }
+    for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert_eq!(math::sin_cos(x), (0.0, 1.0));
+    }
+    assert_eq!(math::sin_cos(0.0), (0.0, 1.0));
+    assert_eq!(math::sin_cos(1.0e-30).0, 1.0e-30);
+}
+
+#[test]
+fn angles_are_relatively_accurate() {
+    let error = |y: f32, x: f32| {
+        let expected = f64::from(y).atan2(f64::from(x));
+        (y / x, (f64::from(math::angle_from_components(y, x)) - expected).abs() / unit_in_last_place(expected))
+    };
+    let ratios = sweep(1.0e-30, 1.0e30, 53).flat_map(|y| [error(y, 1.0), error(y, -1.0)]);
+    assert_below("angle_from_components of (y, +-1), ULP", worst(ratios), 3.0);
+    let mut random = Random::new(1);
+    let pairs = (0..2_000_000).map(|_| {
+        let y = random.log_range(1.0e-6, 1.0e6) as f32;
+        let x = random.log_range(1.0e-6, 1.0e6) as f32;
+        error(y, if random.unit() < 0.5 { -x } else { x })
+    });
+    assert_below("angle_from_components of random components, ULP", worst(pairs), 3.0);
+}
+
+#[test]
+fn angles_at_their_ends() {
+    use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+    assert_eq!(math::angle_from_components(0.0, 0.0), 0.0);
+    assert_eq!(math::angle_from_components(0.0, 2.0), 0.0);
+    assert_eq!(math::angle_from_components(0.0, -2.0), PI);
+    assert_eq!(math::angle_from_components(3.0, 0.0), FRAC_PI_2);
+    assert_eq!(math::angle_from_components(3.0, 3.0), FRAC_PI_4);
+    assert_eq!(math::angle_from_components(f32::MAX, f32::MIN_POSITIVE), FRAC_PI_2);
+    for i in 0..=1000 {
+        let (sin, cos) = math::sin_cos(PI * i as f32 / 1000.0);
+        let angle = math::angle_from_components(sin.max(0.0), cos);
+        assert!((0.0..=PI).contains(&angle));
+    }
+}
+
+#[test]
+fn norms_neither_overflow_nor_vanish() {
+    let mut random = Random::new(2);
+    let mut error = |low: f64, high: f64| {
+        let [x, y, z] = [0; 3].map(|_| (random.log_range(low, high) * (random.unit() - 0.5).signum()) as f32);
+        let wide = [x, y, z].map(f64::from);
+        let expected = wide.iter().map(|c| c * c).sum::<f64>().sqrt();
+        (x, (f64::from(math::norm3(x, y, z)) - expected).abs() / unit_in_last_place(expected))
+    };
+    let middle = worst((0..1_000_000).map(|_| error(1.0e-6, 1.0e6)));
+    assert_below("norm3, ULP", middle, 2.0);
+    let thresholds = worst((0..300_000).map(|_| error(1.0e-16, 1.0e-14)).collect::<Vec<_>>().into_iter());
+    assert_below("norm3 around 1e-15, ULP", thresholds, 3.0);
+    let small = worst((0..300_000).map(|_| error(1.0e-34, 1.0e-15)).collect::<Vec<_>>().into_iter());
+    assert_below("norm3 of small components, ULP", small, 3.0);
+    let large = worst((0..300_000).map(|_| error(1.0e14, 1.0e37)).collect::<Vec<_>>().into_iter());
+    assert_below("norm3 of large components, ULP", large, 3.0);
+    assert_eq!(math::norm3(0.0, 0.0, 0.0), 0.0);
+    assert_eq!(math::norm3(-3.0, 0.0, 4.0), 5.0);
+    assert_eq!(math::norm3(3.0e30, 4.0e30, 0.0), 5.0e30);
+}
+
+#[test]
+fn small_functions() {
+    for (x, floor) in [(0.0, 0), (0.9, 0), (-0.1, -1), (-1.0, -1), (3.0, 3), (-3.5, -4), (f32::NAN, 0)] {
+        assert_eq!(math::floor_to_i32(x), floor, "{x}");
+    }
+    assert_eq!(math::floor_to_i32(1.0e20), i32::MAX);
+    assert_eq!(math::floor_to_i32(-1.0e20), i32::MIN);
+    assert_eq!(math::floor_to_i32(f32::NEG_INFINITY), i32::MIN);
+    assert_eq!(math::min(f32::NAN, 1.0), 1.0);
+    assert_eq!(math::max(f32::NAN, 1.0), 1.0);
+    assert_eq!(math::clamp(f32::NAN, 2.0, 3.0), 2.0);
+    assert_eq!(math::clamp(f32::INFINITY, 2.0, 3.0), 3.0);
+    for k in -126..=127 {
+        assert_eq!(f64::from(math::exact_power_of_two(k)), f64::from(k).exp2());
+    }
+    assert_eq!(math::smoothstep(1.0, 3.0, 0.5), 0.0);
+    assert_eq!(math::smoothstep(1.0, 3.0, 2.0), 0.5);
+    assert_eq!(math::smoothstep(1.0, 3.0, 9.0), 1.0);
+    for x in sweep(1.0e-30, 1.0e30, 1_000_003) {
+        assert_eq!(f64::from(math::sqrt(x)), f64::from(f64::from(x).sqrt() as f32));
+    }
+    assert!(math::sqrt(-1.0).is_nan());
+}

@@ -1,0 +1,211 @@
+//! Random numbers, depth samples and look-ups: known answers, distributions, `f64` oracles, and what degenerate input
+//! gives.
+
+use viewfuse_core::depths::{PROBABILITY_FLOOR, inverse_cdf, stratified_depth};
+use viewfuse_core::lookup::{bilinear, trilinear};
+use viewfuse_core::random::{threefry_2x32, uniform};
+use viewfuse_tests::compare::Comparator;
+use viewfuse_tests::poses::Random;
+
+#[test]
+fn threefry_known_answers() {
+    // Random123's kat_vectors, threefry2x32 with 20 rounds.
+    assert_eq!(threefry_2x32([0; 2], [0; 2]), [0x6b20_0159, 0x99ba_4efe]);
+    assert_eq!(threefry_2x32([u32::MAX; 2], [u32::MAX; 2]), [0x1cb9_96fc, 0xbb00_2be7]);
+    let key = [0x1319_8a2e, 0x0370_7344];
+    assert_eq!(threefry_2x32(key, [0x243f_6a88, 0x85a3_08d3]), [0xc492_3a9c, 0x483d_f7a0]);
+}
+
+#[test]
+fn uniform_is_uniform() {
+    const COUNT: u32 = 1 << 20;
+    for seed in [0, 1, u64::MAX, 1 << 40] {
+        let (mut sum, mut squares, mut cells, mut lag) = (0.0, 0.0, [0_u32; 256], 0.0);
+        let mut previous = 0.5;
+        for i in 0..COUNT {
+            let u = uniform(seed, i / 64, i % 64);
+            assert!((0.0..1.0).contains(&u) && (u * 16_777_216.0).fract() == 0.0);
+            let u = f64::from(u);
+            sum += u;
+            squares += u * u;
+            lag += (u - 0.5) * (previous - 0.5);
+            previous = u;
+            cells[(u * 256.0) as usize] += 1;
+        }
+        let count = f64::from(COUNT);
+        let (mean, expected) = (sum / count, count / 256.0);
+        let variance = squares / count - mean * mean;
+        let chi_square: f64 = cells.iter().map(|c| (f64::from(*c) - expected).powi(2) / expected).sum();
+        // Four to five standard deviations each: 0.289 / sqrt N, 0.0745 / sqrt N, 255 +- sqrt(2 * 255), 0.0833 / sqrt N.
+        assert!((mean - 0.5).abs() < 5.0 * 0.289 / count.sqrt(), "mean {mean}");
+        assert!((variance - 1.0 / 12.0).abs() < 5.0 * 0.0745 / count.sqrt(), "variance {variance}");
+        assert!((155.0..360.0).contains(&chi_square), "chi-square {chi_square}");
+        assert!((lag / count).abs() < 5.0 * 0.0833 / count.sqrt(), "neighbours {lag}");
+    }
+    assert_ne!(uniform(1, 2, 3), uniform(1 << 32, 2, 3), "both halves of the seed count");
+}
+
+#[test]
+fn stratified_depths_stay_in_their_parts() {
+    let mut random = Random::new(21);
+    for _ in 0..20_000 {
+        let near = random.range(0.0, 3.0) as f32;
+        let far = near + random.log_range(1.0e-6, 1.0e3) as f32;
+        let count = 1 + random.below(256) as u32;
+        let part = random.below(count as usize) as u32;
+        let jitter = random.unit() as f32;
+        let depth = stratified_depth(near, far, part, count, jitter);
+        assert!((near..=far).contains(&depth));
+        let (n, f) = (f64::from(near), f64::from(far));
+        let expected = n + (f - n) * (f64::from(part) + f64::from(jitter)) / f64::from(count);
+        // Difference, sum, quotient and product are rounded once each in units of the interval, the result in its own.
+        assert!((f64::from(depth) - expected).abs() <= (4.0 * (f - n) + f) / 16_777_216.0);
+        assert!(stratified_depth(near, far, part, count, 1.0) >= depth);
+    }
+    assert_eq!(stratified_depth(1.0, 3.0, 0, 0, 0.5), 2.0);
+    assert_eq!(stratified_depth(1.0, 3.0, 9, 4, 0.5), 3.0);
+    assert_eq!(stratified_depth(1.0, 3.0, 0, 4, f32::NAN), 1.0);
+}
+
+/// The inverse of the cumulative distribution in `f64`.
+fn inverse_cdf_oracle(near: f64, far: f64, weights: &[f32], u: f64) -> f64 {
+    let masses: Vec<f64> = weights.iter().map(|w| f64::from(w.max(0.0)) + f64::from(PROBABILITY_FLOOR)).collect();
+    let mut remaining = u.clamp(0.0, 1.0) * masses.iter().sum::<f64>();
+    let width = (far - near) / masses.len() as f64;
+    for (part, mass) in masses.iter().enumerate() {
+        if remaining < *mass {
+            return near + width * (part as f64 + remaining / mass);
+        }
+        remaining -= mass;
+    }
+    far
+}
+
+#[test]
+fn importance_samples_follow_the_distribution() {
+    let mut random = Random::new(22);
+    for case in 0..300 {
+        let weights: [f32; 64] = std::array::from_fn(|_| match case % 3 {
+            0 => random.unit() as f32,
+            1 => random.log_range(1.0e-9, 1.0) as f32,
+            _ => (random.unit() < 0.1) as u8 as f32,
+        });
+        let total: f64 = weights.iter().map(|w| f64::from(*w) + 1.0e-5).sum();
+        let mut previous = 0.0;
+        for i in 0..=400 {
+            let u = i as f32 / 400.0;
+            let depth = inverse_cdf(0.8, 1.8, &weights, u);
+            assert!((0.8..=1.8).contains(&depth) && depth >= previous, "{u}: {depth} after {previous}");
+            previous = depth;
+            // Sums are off by up to 2 N u of the total: the answer must lie where u could be by that much.
+            let slack = 130.0 / 16_777_216.0 * total.max(1.0) / total;
+            let low = inverse_cdf_oracle(0.8, 1.8, &weights, f64::from(u) - slack) - 5.0e-7;
+            let high = inverse_cdf_oracle(0.8, 1.8, &weights, f64::from(u) + slack) + 5.0e-7;
+            assert!((low..=high).contains(&f64::from(depth)), "{u}: {depth} not in {low}..{high}");
+        }
+    }
+}
+
+#[test]
+fn samples_hit_parts_as_often_as_their_weights_say() {
+    let weights = [0.1_f32, 0.0, 0.4, 0.2, 0.0, 0.0, 0.25, 0.05];
+    let mut hits = [0.0_f64; 8];
+    for i in 0..200_000 {
+        let depth = inverse_cdf(2.0, 6.0, &weights, uniform(5, i, 0));
+        hits[(((depth - 2.0) * 2.0) as usize).min(7)] += 1.0;
+    }
+    for part in 0..8 {
+        let p = f64::from(weights[part]);
+        let deviation = (200_000.0 * p * (1.0 - p)).sqrt();
+        assert!((hits[part] - 200_000.0 * p).abs() <= 5.0 * deviation + 10.0, "{part}: {hits:?}");
+    }
+}
+
+#[test]
+fn degenerate_distributions() {
+    for nothing in [[0.0_f32; 16], [f32::NAN; 16], [-1.0; 16]] {
+        for i in 0..=16 {
+            let u = i as f32 / 16.0;
+            assert!((inverse_cdf(1.0, 3.0, &nothing, u) - (1.0 + 2.0 * u)).abs() <= 1.0e-6, "uniform at {u}");
+        }
+    }
+    let one_hot: [f32; 16] = std::array::from_fn(|part| (part == 5) as u8 as f32);
+    for i in 1..100 {
+        let depth = inverse_cdf(0.0, 16.0, &one_hot, i as f32 / 100.0);
+        assert!((4.99..=6.01).contains(&depth), "{depth}");
+    }
+    for weights in [one_hot, [0.3; 16], [1.0e-9; 16]] {
+        assert_eq!(inverse_cdf(0.1, 0.7, &weights, 0.0), 0.1);
+        assert_eq!(inverse_cdf(0.1, 0.7, &weights, -1.0), 0.1);
+        assert_eq!(inverse_cdf(0.1, 0.7, &weights, f32::NAN), 0.1);
+        assert_eq!(inverse_cdf(0.1, 0.7, &weights, 1.0), 0.7);
+        assert_eq!(inverse_cdf(0.1, 0.7, &weights, 9.0), 0.7);
+    }
+    assert_eq!(inverse_cdf(1.0, 3.0, &[0.7], 0.5), 2.0);
+}
+
+const SIZE: [usize; 3] = [7, 5, 4];
+
+fn grid(random: &mut Random) -> Vec<[f32; 2]> {
+    (0..SIZE.iter().product::<usize>()).map(|_| [random.normal() as f32, random.normal() as f32]).collect()
+}
+
+/// Nodes and shares of one axis in `f64`.
+fn split(coordinate: f32, count: usize) -> [(usize, f64); 2] {
+    let position = (f64::from(coordinate) - 0.5).clamp(0.0, count as f64 - 1.0);
+    let lower = position.floor();
+    let share = position - lower;
+    [(lower as usize, 1.0 - share), ((lower as usize + 1).min(count - 1), share)]
+}
+
+#[test]
+fn lookups_agree_with_f64() {
+    let mut random = Random::new(23);
+    let tolerance = Comparator { absolute: 3.0e-6, relative: 0.0 };
+    let grid = grid(&mut random);
+    for _ in 0..20_000 {
+        let [x, y, z] = SIZE.map(|count| random.range(-1.0, count as f64 + 1.0) as f32);
+        let (mut flat, mut deep) = ([0.0; 2], [0.0; 2]);
+        for (row, row_share) in split(y, SIZE[1]) {
+            for (column, column_share) in split(x, SIZE[0]) {
+                for channel in 0..2 {
+                    flat[channel] += row_share * column_share * f64::from(grid[row * SIZE[0] + column][channel]);
+                    for (slice, share) in split(z, SIZE[2]) {
+                        let node = grid[(slice * SIZE[1] + row) * SIZE[0] + column][channel];
+                        deep[channel] += share * row_share * column_share * f64::from(node);
+                    }
+                }
+            }
+        }
+        let size = SIZE.map(|count| count as u32);
+        tolerance.compare_varying(&bilinear(&grid, size[0], size[1], x, y), &flat).unwrap_or_else(|e| panic!("{e}"));
+        tolerance.compare_varying(&trilinear(&grid, size, x, y, z), &deep).unwrap_or_else(|e| panic!("{e}"));
+    }
+}
+
+#[test]
+fn lookups_at_nodes_borders_and_nan() {
+    let grid = grid(&mut Random::new(24));
+    let size = SIZE.map(|count| count as u32);
+    let node = |x: usize, y: usize, z: usize| grid[(z * SIZE[1] + y) * SIZE[0] + x];
+    for z in 0..SIZE[2] {
+        for y in 0..SIZE[1] {
+            for x in 0..SIZE[0] {
+                let at = [x, y, z].map(|i| i as f32 + 0.5);
+                assert_eq!(trilinear(&grid, size, at[0], at[1], at[2]), node(x, y, z));
+                assert_eq!(bilinear(&grid, size[0], size[1], at[0], at[1]), node(x, y, 0));
+            }
+        }
+    }
+    for far in [7.0, 6.5, 1.0e9, f32::INFINITY] {
+        assert_eq!(bilinear(&grid, size[0], size[1], far, 2.5), node(6, 2, 0));
+    }
+    for low in [0.5, 0.0, -3.0, -1.0e30, f32::NEG_INFINITY, f32::NAN] {
+        assert_eq!(bilinear(&grid, size[0], size[1], low, 2.5), node(0, 2, 0));
+        assert_eq!(trilinear(&grid, size, low, low, low), node(0, 0, 0));
+    }
+    for coordinate in [-1.0, 0.5, 0.7, 9.0, f32::NAN] {
+        assert_eq!(bilinear(&grid, 1, 1, coordinate, coordinate), node(0, 0, 0));
+        assert_eq!(trilinear(&grid, [1, 1, 1], coordinate, coordinate, coordinate), node(0, 0, 0));
+    }
+}

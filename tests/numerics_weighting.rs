@@ -1,0 +1,274 @@
+//! Every formula weighting against `f64` on the same poses, with the derived bound, and what must not change it.
+
+use viewfuse_core::pose::Pose;
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weighting::{AngleKind, Scheme, SchemeError, weigh};
+use viewfuse_tests::compare::relative_units;
+use viewfuse_tests::oracle::{FORMULAS, Formula, Matrix, WidePose, minus, norm, normalised};
+use viewfuse_tests::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
+
+/// Weights below this may be cut off: `exp` knows no subnormals.
+const NEGLIGIBLE: f64 = 4.0e-38;
+const COUNTS: [usize; 7] = [1, 2, 3, 5, 8, 16, 32];
+
+fn weights(formula: Formula, sources: &[Pose], target: &Pose) -> Vec<f32> {
+    let sources = Sources::<32>::new(sources).expect("between 1 and 32 sources");
+    let weights = weigh(formula.scheme(), &sources, target);
+    weights.values()[..weights.count() as usize].to_vec()
+}
+
+/// Largest error in units of `2^-24`, after asserting the simplex and the bound of each weight.
+#[track_caller]
+fn check(formula: Formula, sources: &[Pose], target: &Pose) -> f64 {
+    let actual = weights(formula, sources, target);
+    let (expected, bounds) = formula.evaluate(sources, target);
+    let sum: f64 = actual.iter().map(|w| f64::from(*w)).sum();
+    assert!((sum - 1.0).abs() <= sources.len() as f64 / 16_777_216.0, "{formula:?}: sum {sum}");
+    let mut worst = 0.0_f64;
+    for view in 0..sources.len() {
+        let (a, e, bound) = (actual[view], expected[view], bounds[view]);
+        assert!(a.is_finite() && a >= 0.0, "{formula:?}[{view}] = {a}");
+        if (f64::from(a) - e).abs() <= NEGLIGIBLE {
+            continue;
+        }
+        let units = relative_units(a, e);
+        assert!(units <= bound, "{formula:?}[{view}] = {a:e}, not {e:e}: {units:.1} units, bound {bound:.1}");
+        worst = worst.max(units);
+    }
+    worst
+}
+
+/// Checks every formula on many scenes and prints the worst error of each.
+#[track_caller]
+fn check_all(what: &str, scenes: &[(Vec<Pose>, Pose)]) {
+    for formula in FORMULAS {
+        let worst = scenes.iter().map(|(sources, target)| check(formula, sources, target)).fold(0.0, f64::max);
+        println!("{what}: {formula:?}: {worst:.1} units of 2^-24");
+    }
+}
+
+#[test]
+fn random_poses_of_all_sizes() {
+    let mut random = Random::new(11);
+    for scale in [1.0e-20, 1.0e-7, 1.0e-3, 0.1, 1.0, 3.0, 100.0, 1.0e7, 1.0e12, 1.0e18, 1.0e20, 1.0e29] {
+        let scenes: Vec<_> = COUNTS
+            .iter()
+            .flat_map(|count| [*count; 40])
+            .map(|count| ((0..count).map(|_| random.pose(scale)).collect(), random.pose(scale)))
+            .collect();
+        check_all(&format!("random, scale {scale:e}"), &scenes);
+    }
+}
+
+#[test]
+fn distances_of_very_different_sizes() {
+    let mut random = Random::new(12);
+    let scenes: Vec<_> = (0..300)
+        .map(|i| {
+            let sources = (0..COUNTS[i % 7]).map(|_| {
+                let s = random.log_range(1.0e-9, 1.0e20);
+                random.pose(s)
+            });
+            (sources.collect::<Vec<_>>(), Pose::IDENTITY)
+        })
+        .collect();
+    check_all("mixed scales", &scenes);
+}
+
+#[test]
+fn rings_with_and_without_roll() {
+    let mut scenes = Vec::new();
+    for roll in [0.0, 0.3, 3.0] {
+        for count in COUNTS {
+            let sources = ring(count, 1.2, 0.5, roll);
+            scenes.push((sources.clone(), looking_at_origin([0.4, -1.0, 0.7], 0.0)));
+            scenes.push((sources.clone(), looking_at_origin([0.4, -1.0, 0.7], 2.0)));
+            scenes.push((sources.clone(), sources[count / 2]));
+            scenes.push((ring(count, 800.0, 30.0, roll), looking_at_origin([500.0, 600.0, 30.0], 0.0)));
+        }
+    }
+    check_all("rings", &scenes);
+    let uniform =
+        weights(Formula::RelativeFrobenius, &ring(8, 1.3, 0.4, 0.0), &looking_at_origin([1.0, 0.5, 0.5], 0.0));
+    assert!(uniform.iter().all(|w| (w - 0.125).abs() < 1.0e-6), "uniform on a look-at ring: {uniform:?}");
+}
+
+#[test]
+fn cameras_that_nearly_coincide() {
+    let mut random = Random::new(13);
+    let mut scenes = Vec::new();
+    for i in 0..600 {
+        let rotation = random.rotation();
+        let centre = random.vector();
+        let sources = (0..COUNTS[i % 7]).map(|_| {
+            let angle = random.log_range(1.0e-7, 1.0e-2);
+            let distance = random.log_range(1.0e-7, 1.0e-2);
+            let turned = multiply(&rotation_about(random.vector(), angle), &rotation);
+            let step = normalised(random.vector());
+            pose_of(&turned, [0, 1, 2].map(|axis| centre[axis] + distance * step[axis]))
+        });
+        scenes.push((sources.collect::<Vec<_>>(), pose_of(&rotation, centre)));
+    }
+    check_all("near-coincident", &scenes);
+}
+
+#[test]
+fn coinciding_cameras_share_the_weight() {
+    let pose = looking_at_origin([1.0, 0.2, 0.3], 0.5);
+    let other = looking_at_origin([-1.0, 0.4, 0.3], 0.0);
+    for formula in FORMULAS {
+        assert_eq!(weights(formula, &[pose; 3], &pose), vec![1.0 / 3.0; 3], "{formula:?}");
+        check(formula, &[pose, other, pose], &pose);
+        check(formula, &[pose, other], &other);
+        assert_eq!(weights(formula, &[other], &pose), [1.0], "{formula:?}");
+    }
+}
+
+#[test]
+fn angles_near_zero_a_right_angle_and_pi() {
+    use std::f64::consts::{FRAC_PI_2, PI};
+    let mut random = Random::new(14);
+    let (mut axis_near, mut axis_far, mut rotation_near, mut rotation_far) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+    for i in 0..60_000 {
+        let base = random.rotation();
+        let offset = random.log_range(1.0e-7, 1.0);
+        let angle = [offset, FRAC_PI_2 + 1.0e-3 * offset, FRAC_PI_2 - offset, PI - offset, PI][i % 5];
+        let turned = multiply(&rotation_about(random.vector(), angle), &base);
+        let (a, b) = (pose_of(&base, [0.0; 3]), pose_of(&turned, [0.0; 3]));
+        let (wide_a, wide_b) = (WidePose::new(&a), WidePose::new(&b));
+        let axis = (a.axis_angle(&b), wide_a.axis_angle(&wide_b));
+        let rotation = (a.rotation_angle(&b), wide_a.rotation_angle(&wide_b));
+        axis_near = axis_near.max(relative_units(axis.0, axis.1));
+        axis_far = axis_far.max((f64::from(axis.0) - axis.1).abs());
+        // Where the two forms meet they differ by what the rotations are off; either is right there.
+        if (rotation.1 - FRAC_PI_2).abs() > 1.0e-5 {
+            rotation_near = rotation_near.max(relative_units(rotation.0, rotation.1));
+        }
+        rotation_far = rotation_far.max((f64::from(rotation.0) - angle).abs());
+        assert_eq!(a.axis_angle(&a), 0.0);
+        assert_eq!(a.rotation_angle(&a), 0.0);
+        assert!((0.0..=std::f32::consts::PI).contains(&rotation.0) && (0.0..=std::f32::consts::PI).contains(&axis.0));
+    }
+    println!("axis angle: {axis_near:.1} units relative, {axis_far:.2e} rad");
+    println!("rotation angle: {rotation_near:.1} units relative, {rotation_far:.2e} rad from the intended angle");
+    assert!(axis_near <= 14.0 && axis_far <= 7.0e-7);
+    assert!(rotation_near <= 16.5 && rotation_far <= 1.0e-6);
+}
+
+#[test]
+fn opposite_axes_are_pi_apart() {
+    let a = Pose::IDENTITY;
+    let b = pose_of(&[[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]], [0.0; 3]);
+    let rolled = pose_of(&[[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]);
+    assert_eq!(a.axis_angle(&b), std::f32::consts::PI);
+    assert_eq!(a.rotation_angle(&b), std::f32::consts::PI);
+    assert_eq!(a.axis_angle(&rolled), 0.0);
+    assert_eq!(a.rotation_angle(&rolled), std::f32::consts::PI);
+}
+
+#[test]
+fn a_rigid_motion_of_the_world_changes_nothing() {
+    let mut random = Random::new(15);
+    let mut changed_by_rotation = 0;
+    for i in 0..400 {
+        let sources: Vec<Pose> = (0..COUNTS[i % 7]).map(|_| random.pose(1.0)).collect();
+        let target = random.pose(1.0);
+        let motion = (random.rotation(), random.vector());
+        let moved: Vec<Pose> = sources.iter().map(|pose| moved(pose, &motion, 1.0)).collect();
+        let moved_target = self::moved(&target, &motion, 1.0);
+        for formula in FORMULAS {
+            let (before, after) = (weights(formula, &sources, &target), weights(formula, &moved, &moved_target));
+            let bounds = formula.evaluate(&sources, &target).1;
+            // Rounding the moved poses moves centres by 2e-7 and axes by 1e-7 or so; all distances here exceed 0.01.
+            let nearest = sources.iter().map(|s| f64::from(s.distance(&target))).fold(1.0, f64::min);
+            let steepness = 3.0 * 6.0e-7 / nearest.max(1.0e-2) + 40.0e-7;
+            for view in 0..sources.len() {
+                let difference = f64::from((before[view] - after[view]).abs());
+                let same =
+                    difference <= f64::from(before[view]) * (2.0 * bounds[view] / 16_777_216.0 + 4.0 * steepness);
+                match formula {
+                    Formula::L1 | Formula::RelativeFrobenius => changed_by_rotation += i32::from(!same),
+                    Formula::Gaussian(_) => assert!(difference <= 2.0e-4, "{formula:?} {before:?} {after:?}"),
+                    _ => assert!(same, "{formula:?} {before:?} {after:?}"),
+                }
+            }
+        }
+    }
+    assert!(changed_by_rotation > 400, "L1 and the relative pose depend on the world's axes and origin");
+}
+
+#[test]
+fn error_weighting_ignores_the_unit_of_length() {
+    let mut random = Random::new(16);
+    for i in 0..200 {
+        let sources: Vec<Pose> = (0..COUNTS[i % 7]).map(|_| random.pose(1.0)).collect();
+        let target = random.pose(1.0);
+        for factor in [1.0 / 1_048_576.0, 0.125, 4096.0, (60.0_f64).exp2()] {
+            let still = ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [0.0; 3]);
+            let scaled: Vec<Pose> = sources.iter().map(|pose| moved(pose, &still, factor)).collect();
+            let scaled_target = moved(&target, &still, factor);
+            for alpha in [0.0, 0.5, 1.0] {
+                let formula = Formula::Error(alpha, AngleKind::PrincipalAxis);
+                let (a, b) = (weights(formula, &sources, &target), weights(formula, &scaled, &scaled_target));
+                // Powers of two are exact until the norm starts to scale its components.
+                let same = a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 30.0 * a / 16_777_216.0);
+                assert!(same && (factor > 1.0e15 || a == b), "{factor}: {a:?} {b:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn parameters_out_of_range_are_refused() {
+    for alpha in [-0.1, 1.1, f32::NAN, f32::INFINITY] {
+        assert_eq!(Scheme::error(alpha, AngleKind::FullRotation), Err(SchemeError::Alpha));
+    }
+    for beta in [-1.0, f32::NAN, f32::INFINITY] {
+        assert_eq!(Scheme::gaussian(beta), Err(SchemeError::Beta));
+    }
+    for power in [0, 4] {
+        assert_eq!(Scheme::distance(power), Err(SchemeError::Power));
+    }
+}
+
+#[test]
+fn permuting_the_sources_permutes_the_weights() {
+    let mut random = Random::new(17);
+    for i in 0..200 {
+        let count = COUNTS[i % 7];
+        let sources: Vec<Pose> = (0..count).map(|_| random.pose(1.5)).collect();
+        let target = random.pose(1.5);
+        let shift = random.below(count);
+        let rotated: Vec<Pose> = (0..count).map(|view| sources[(view + shift) % count]).collect();
+        for formula in FORMULAS.into_iter().filter(|f| *f != Formula::Mean) {
+            let (a, b) = (weights(formula, &sources, &target), weights(formula, &rotated, &target));
+            // Only the order of the sum differs: S - 1 additions and the division, twice.
+            let bound = 2.0 * count as f32 / 16_777_216.0;
+            assert!(
+                (0..count).all(|view| (a[(view + shift) % count] - b[view]).abs() <= bound * b[view]),
+                "{formula:?}"
+            );
+        }
+    }
+}
+
+fn multiply(a: &Matrix, b: &Matrix) -> Matrix {
+    let mut product = [[0.0; 3]; 3];
+    for row in 0..3 {
+        for column in 0..3 {
+            product[row][column] = (0..3).map(|k| a[row][k] * b[k][column]).sum();
+        }
+    }
+    product
+}
+
+/// The pose after scaling the world and then a rigid motion of it.
+fn moved(pose: &Pose, (rotation, translation): &(Matrix, [f64; 3]), scale: f64) -> Pose {
+    let wide = WidePose::new(pose);
+    let columns = [0, 1, 2].map(|row: usize| [wide.axes[0][row], wide.axes[1][row], wide.axes[2][row]]);
+    let turned = |v: [f64; 3]| [0, 1, 2].map(|row: usize| (0..3).map(|k| rotation[row][k] * v[k]).sum::<f64>());
+    let centre = turned(wide.centre.map(|c| c * scale));
+    let result = pose_of(&multiply(rotation, &columns), [0, 1, 2].map(|axis: usize| centre[axis] + translation[axis]));
+    debug_assert!(norm(minus(WidePose::new(&result).axes[2], turned(wide.axes[2]))) < 1.0e-6);
+    result
+}
