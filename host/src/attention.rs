@@ -82,6 +82,7 @@ pub enum AttentionError {
 
 /// Attention weighting with its parameters.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is one a run, and a weighting keeps it in a box")]
 pub enum AttentionModel {
     /// The paper's cross attention on Fourier features of the centre and the view direction.
     Fourier(FourierEmbedding),
