@@ -6,6 +6,7 @@
 
 use crate::math::abs;
 use crate::pose::Pose;
+use core::fmt;
 use glam::Vec3;
 
 /// Why numbers are not a pinhole camera.
@@ -18,6 +19,18 @@ pub enum PinholeError {
     /// Width or height is zero or above 2^20.
     Size,
 }
+
+impl fmt::Display for PinholeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            PinholeError::Focal => "a focal length is not a positive, finite number",
+            PinholeError::Principal => "the principal point is not finite",
+            PinholeError::Size => "width and height must be from 1 to 1048576 pixels",
+        })
+    }
+}
+
+impl core::error::Error for PinholeError {}
 
 /// Intrinsics of a camera without distortion, checked when built.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,6 +5,7 @@
 //! Blender) comes in through its own constructor, so that a frame can not be confused silently.
 
 use crate::math::{abs, angle_from_components, angle_from_squares, max, norm3};
+use core::fmt;
 use glam::Vec3;
 
 /// Largest allowed entry of `R^T R - I` and of the last row's difference from `(0, 0, 0, 1)`.
@@ -38,6 +39,27 @@ pub enum PoseError {
     /// The determinant is -1: an axis is mirrored.
     Mirrored,
 }
+
+impl fmt::Display for PoseError {
+    /// In words; rows and columns count from 1 here, as people do.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PoseError::NotFinite { row, column } => {
+                write!(f, "the entry in row {}, column {} is not finite as a 32-bit number", row + 1, column + 1)
+            }
+            PoseError::TooFar => {
+                write!(f, "the camera's centre is further than {LARGEST_COORDINATE:e} from the origin")
+            }
+            PoseError::LastRow => f.write_str("the last row is not 0 0 0 1"),
+            PoseError::NotRigid { deviation } => {
+                write!(f, "the 3x3 block is scaled or skewed: R^T R differs from the identity by {deviation:.4}")
+            }
+            PoseError::Mirrored => f.write_str("the determinant of the 3x3 block is -1: an axis is mirrored"),
+        }
+    }
+}
+
+impl core::error::Error for PoseError {}
 
 /// A rigid camera-to-world transform, checked when built.
 ///

@@ -1,6 +1,7 @@
 //! The poses of the source views.
 
 use crate::pose::Pose;
+use core::fmt;
 
 /// Why poses can not be sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,6 +16,19 @@ pub enum SourcesError {
         capacity: u32,
     },
 }
+
+impl fmt::Display for SourcesError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SourcesError::Empty => f.write_str("there is no source view"),
+            SourcesError::TooMany { count, capacity } => {
+                write!(f, "there are {count} source views; at most {capacity} fit")
+            }
+        }
+    }
+}
+
+impl core::error::Error for SourcesError {}
 
 /// Between one and `S` source poses, in the order of the views.
 #[derive(Clone, Copy, Debug, PartialEq)]

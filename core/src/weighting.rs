@@ -29,6 +29,7 @@ use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
 use core::f32::consts::FRAC_1_PI;
+use core::fmt;
 
 /// Added to every error before the reciprocal, as in the published code.
 pub const ERROR_OFFSET: f32 = 1.0e-6;
@@ -53,6 +54,18 @@ pub enum SchemeError {
     /// The power must be 1, 2 or 3.
     Power,
 }
+
+impl fmt::Display for SchemeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            SchemeError::Alpha => "alpha must be between 0 and 1",
+            SchemeError::Beta => "beta must be finite and at least 0",
+            SchemeError::Power => "the power must be 1, 2 or 3",
+        })
+    }
+}
+
+impl core::error::Error for SchemeError {}
 
 /// A weighting scheme given by a formula. Built by checked constructors where it has parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]

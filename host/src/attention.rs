@@ -24,20 +24,20 @@ use viewfuse_core::sources::Sources;
 #[derive(Debug, thiserror::Error)]
 pub enum AttentionError {
     /// The file could not be read.
-    #[error("{}: can not be read: {source}", path.display())]
+    #[error("{}: cannot be read: {cause}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The file is not in the safetensors format.
-    #[error("{}: not a safetensors file: {source}", path.display())]
+    #[error("{}: not a safetensors file: {cause}", path.display())]
     Format {
         /// The file.
         path: PathBuf,
         /// What the reader said.
-        source: safetensors::SafeTensorError,
+        cause: safetensors::SafeTensorError,
     },
     /// No known variant has these tensors.
     #[error("{}: holds no attention weighting: none of the tensors paper.0.weight, paper_flat.0.weight, \
@@ -82,6 +82,7 @@ pub enum AttentionError {
 
 /// Attention weighting with its parameters.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "there is one a run, and a weighting keeps it in a box")]
 pub enum AttentionModel {
     /// The paper's cross attention on Fourier features of the centre and the view direction.
     Fourier(FourierEmbedding),
@@ -102,9 +103,9 @@ impl AttentionModel {
     /// # Errors
     /// [`AttentionError`], always with the file and the tensor.
     pub fn open(path: &Path) -> Result<AttentionModel, AttentionError> {
-        let bytes = std::fs::read(path).map_err(|source| AttentionError::Io { path: path.to_path_buf(), source })?;
+        let bytes = std::fs::read(path).map_err(|cause| AttentionError::Io { path: path.to_path_buf(), cause })?;
         let file = SafeTensors::deserialize(&bytes)
-            .map_err(|source| AttentionError::Format { path: path.to_path_buf(), source })?;
+            .map_err(|cause| AttentionError::Format { path: path.to_path_buf(), cause })?;
         let has = |name: &str| file.tensor(name).is_ok();
         let mut read = |name: &str, shape: &[usize]| read_tensor(path, &file, name, shape);
         if has("paper.0.weight") {

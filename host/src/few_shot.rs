@@ -25,13 +25,19 @@ pub enum SelectionError {
         last: String,
     },
     /// A step is not a positive whole number.
-    #[error("'{item}': the step behind '/' must be a whole number of at least 1")]
+    #[error("view list '{item}': the step behind '/' must be a whole number of at least 1")]
     BadStep {
         /// The item of the list.
         item: String,
     },
+    /// A range ends before it starts, or has no start or end.
+    #[error("view list '{item}': a range is FIRST..LAST, both ends included and FIRST not after LAST")]
+    BadRange {
+        /// The item of the list.
+        item: String,
+    },
     /// A source view has no photograph.
-    #[error("{scene}: view '{name}' has no photograph and can not be a source")]
+    #[error("{scene}: view '{name}' has no photograph and cannot be a source")]
     NoPhotograph {
         /// The scene's path.
         scene: String,
@@ -39,13 +45,15 @@ pub enum SelectionError {
         name: String,
     },
     /// A view is a target and a source at once.
-    #[error("view '{name}' is a target and a source at once; take it out of --sources or --targets")]
+    #[error("{scene}: view '{name}' is a target and a source at once; take it out of --sources or of the targets")]
     TargetIsSource {
+        /// The scene's path.
+        scene: String,
         /// The view.
         name: String,
     },
     /// There are not enough sources.
-    #[error("{scene}: {count} source view(s) left after the targets are taken out; at least {least} are needed")]
+    #[error("{scene}: too few source views: {count}, at least {least} are needed (a target is never a source)")]
     TooFewSources {
         /// The scene's path.
         scene: String,
@@ -55,8 +63,10 @@ pub enum SelectionError {
         least: usize,
     },
     /// There are more sources than the program holds.
-    #[error("{count} source views; at most {MOST_SOURCES} fit: choose with --sources or --views")]
+    #[error("{scene}: {count} source views; at most {MOST_SOURCES} fit: choose with --sources or --views")]
     TooManySources {
+        /// The scene's path.
+        scene: String,
         /// How many there are.
         count: usize,
     },
@@ -67,7 +77,7 @@ pub enum SelectionError {
         scene: String,
     },
     /// The cameras do not span an orbit.
-    #[error("{scene}: its cameras do not span an orbit ({error:?})")]
+    #[error("{scene}: its cameras span no circle: they stand at, or straight above, what they look at; give --targets")]
     NoOrbit {
         /// The scene's path.
         scene: String,
@@ -146,7 +156,8 @@ impl Selection {
             Some(list) => {
                 let sources = view_list(scene, list)?;
                 if let Some(&view) = sources.iter().find(|view| targets.contains(view)) {
-                    return Err(SelectionError::TargetIsSource { name: scene.views[view].name.clone() });
+                    let name = scene.views[view].name.clone();
+                    return Err(SelectionError::TargetIsSource { scene: scene_name(), name });
                 }
                 if let Some(&view) = sources.iter().find(|&&view| scene.views[view].image.is_none()) {
                     let name = scene.views[view].name.clone();
@@ -169,7 +180,7 @@ impl Selection {
             });
         }
         if sources.len() > MOST_SOURCES {
-            return Err(SelectionError::TooManySources { count: sources.len() });
+            return Err(SelectionError::TooManySources { scene: scene_name(), count: sources.len() });
         }
         Ok(sources)
     }
@@ -185,7 +196,7 @@ use crate::scene::View;
 /// The views that a list names, in the order of the scene, each once.
 ///
 /// # Errors
-/// [`SelectionError::NoSuchView`] or [`SelectionError::BadStep`].
+/// [`SelectionError::NoSuchView`], [`SelectionError::BadStep`] or [`SelectionError::BadRange`].
 pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError> {
     let find = |name: &str| {
         scene.view_named(name).ok_or_else(|| SelectionError::NoSuchView {
@@ -215,7 +226,15 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
         if range == "all" {
             chosen.extend((0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).step_by(step));
         } else if let Some((first, last)) = range.split_once("..") {
-            chosen.extend((find(first)?..=find(last)?).step_by(step));
+            let bad_range = || SelectionError::BadRange { item: item.to_owned() };
+            if first.is_empty() || last.is_empty() {
+                return Err(bad_range());
+            }
+            let (first, last) = (find(first)?, find(last)?);
+            if first > last {
+                return Err(bad_range());
+            }
+            chosen.extend((first..=last).step_by(step));
         } else {
             chosen.push(find(range)?);
         }

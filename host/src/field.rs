@@ -16,16 +16,13 @@ use viewfuse_core::camera::Camera;
 #[derive(Debug, thiserror::Error)]
 pub enum FieldError<E: std::error::Error> {
     /// The silhouettes have no point of space in common.
-    #[error(
-        "the silhouettes of the sources have no common object: no point lies inside all of them; \
-             check the poses with `viewfuse inspect` and the background with --background"
-    )]
+    #[error("no point lies inside all silhouettes of the sources")]
     NoObject,
     /// The device failed.
     #[error("the device failed")]
     Device(#[source] E),
-    /// The person stopped the work.
-    #[error(transparent)]
+    /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
+    #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }
 

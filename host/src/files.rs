@@ -7,20 +7,20 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// The operating system refused.
-    #[error("{}: can not be written: {source}", path.display())]
+    #[error("{}: cannot be written: {cause}", path.display())]
     Io {
         /// The file that was to appear.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The picture could not be encoded.
-    #[error("{}: can not be encoded: {source}", path.display())]
+    #[error("{}: cannot be encoded: {cause}", path.display())]
     Encode {
         /// The file that was to appear.
         path: PathBuf,
         /// What the encoder said.
-        source: image::ImageError,
+        cause: image::ImageError,
     },
 }
 
@@ -29,7 +29,7 @@ pub enum WriteError {
 /// # Errors
 /// [`WriteError::Io`]; nothing is left behind then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let failed = |source| WriteError::Io { path: path.to_path_buf(), source };
+    let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -52,6 +52,38 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     Ok(())
 }
 
+/// Checks, before long work, that a file can appear at `path`: it is no folder, and the nearest folder above it that
+/// exists takes new files. Nothing is left behind.
+///
+/// # Errors
+/// [`WriteError::Io`].
+pub fn check_writable(path: &Path) -> Result<(), WriteError> {
+    let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
+    if path.is_dir() {
+        return Err(failed(std::io::Error::other("it is a folder")));
+    }
+    let above = || path.ancestors().skip(1).map(|folder| if folder == "" { Path::new(".") } else { folder });
+    let Some(nearest) = above().find(|folder| folder.exists()) else { return Ok(()) };
+    if !nearest.is_dir() {
+        return Err(failed(std::io::Error::other(format!("{} is not a folder", nearest.display()))));
+    }
+    tempfile::tempfile_in(nearest).map_err(failed)?;
+    Ok(())
+}
+
+/// Removes a file; that it is not there is no error.
+///
+/// # Errors
+/// [`WriteError::Io`] if the system refuses.
+pub fn remove_if_there(path: &Path) -> Result<(), WriteError> {
+    match std::fs::remove_file(path) {
+        Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::Io { path: path.to_path_buf(), cause })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes a picture as PNG, whole or not at all.
 ///
 /// # Errors
@@ -60,6 +92,6 @@ pub fn write_png(path: &Path, picture: &image::DynamicImage) -> Result<(), Write
     let mut bytes = std::io::Cursor::new(Vec::new());
     picture
         .write_to(&mut bytes, image::ImageFormat::Png)
-        .map_err(|source| WriteError::Encode { path: path.to_path_buf(), source })?;
+        .map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause })?;
     write_whole(path, bytes.get_ref())
 }

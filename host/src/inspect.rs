@@ -142,7 +142,7 @@ fn object_of(scene: &Scene, background: BackgroundChoice) -> Result<ObjectBlock,
     let views: Vec<usize> =
         (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).take(MOST_SOURCES).collect();
     if views.len() < 2 {
-        return Err("fewer than two photographs: the object can not be found".to_owned());
+        return Err("fewer than two photographs: the object cannot be found".to_owned());
     }
     let pinhole = scene.views[views[0]].camera.pinhole;
     let scale = (LOOK_SIDE / pinhole.width().max(pinhole.height()) as f32).min(1.0);
@@ -167,7 +167,9 @@ fn depth_range(cameras: &[Camera], rig: &Rig, object: Option<&ObjectBlock>) -> [
             }
         }
     }
+    // Cameras that look away from everything have nothing before them: the range is empty then, not inside out.
     range[0] = range[0].max(0.01 * rig.distance);
+    range[1] = range[1].max(range[0]);
     range
 }
 

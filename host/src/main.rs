@@ -4,14 +4,18 @@
 mod cli;
 
 use std::process::ExitCode;
+use viewfuse::interrupt::Interrupted;
 
 fn main() -> ExitCode {
     match cli::run() {
         Ok(code) => code,
         Err(error) => {
+            if let Some(interrupted) = error.chain().find_map(|cause| cause.downcast_ref::<Interrupted>()) {
+                eprintln!("viewfuse: {interrupted}");
+                return ExitCode::from(130);
+            }
             eprintln!("viewfuse: {error:#}");
-            let interrupted = error.chain().any(|cause| cause.is::<viewfuse::interrupt::Interrupted>());
-            ExitCode::from(if interrupted { 130 } else { 1 })
+            ExitCode::from(1)
         }
     }
 }

@@ -17,7 +17,7 @@ pub enum PhotographsError {
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The working size is unusable.
-    #[error("view '{view}' can not be resampled to {width}x{height}: {error:?}")]
+    #[error("view '{view}' cannot be resampled to {width}x{height}: {error}")]
     Size {
         /// The view.
         view: String,
@@ -30,12 +30,12 @@ pub enum PhotographsError {
     },
     /// The background covers the whole photograph, or nothing of it.
     #[error(
-        "view '{view}' shows no object before the background ({colour}); give the background with --background, \
-             or photographs with an alpha channel"
+        "{path}: shows no object before the background ({colour}); give the background with --background, or \
+         photographs with an alpha channel"
     )]
     NoSilhouette {
-        /// The view.
-        view: String,
+        /// The photograph.
+        path: String,
         /// The background colour that was assumed.
         colour: String,
     },
@@ -109,7 +109,7 @@ impl<'a> Album<'a> {
             .par_iter()
             .zip(&photographs)
             .map(|(&view, photograph)| {
-                let View { name, camera, .. } = &self.scene.views[view];
+                let View { name, camera, image } = &self.scene.views[view];
                 let (width, height) = scaled_size(camera, scale);
                 let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
                     view: name.clone(),
@@ -120,7 +120,8 @@ impl<'a> Album<'a> {
                 let premultiplied = matte::premultiplied(photograph, &backdrop);
                 let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
                 if opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha) {
-                    return Err(PhotographsError::NoSilhouette { view: name.clone(), colour: backdrop.to_string() });
+                    let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
+                    return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
                 }
                 let (own_width, own_height) = photograph.pixels.dimensions();
                 let texels = resample::area_average(&premultiplied, [own_width, own_height], [width, height]);

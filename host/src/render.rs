@@ -27,7 +27,7 @@ pub enum RenderError<E: std::error::Error> {
     #[error(transparent)]
     Photographs(#[from] PhotographsError),
     /// There are too few or too many sources.
-    #[error("unusable sources: {0:?}")]
+    #[error("{0}")]
     Sources(SourcesError),
     /// The size does not fit the scene.
     #[error(
@@ -47,7 +47,7 @@ pub enum RenderError<E: std::error::Error> {
         fitting_height: u32,
     },
     /// The size is not usable at all.
-    #[error("--size {width}x{height} is not usable: {error:?}")]
+    #[error("--size {width}x{height} is not usable: {error}")]
     Size {
         /// Asked for.
         width: u32,
@@ -55,6 +55,15 @@ pub enum RenderError<E: std::error::Error> {
         height: u32,
         /// Why not.
         error: PinholeError,
+    },
+    /// The silhouettes have no point of space in common.
+    #[error(
+        "{scene}: the silhouettes of the sources have no common object: no point lies inside all of them; check the \
+         poses with `viewfuse inspect` and the background with --background"
+    )]
+    NoObject {
+        /// The scene's path.
+        scene: String,
     },
     /// The field failed.
     #[error(transparent)]
@@ -193,7 +202,11 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let scale = working_scale(scene, options)?;
         let mut times = StageTimes::default();
         let images = timed(&mut times.photographs, || album.sources(sources, scale, options.background))?;
-        let prepared = timed(&mut times.prepare, || field.prepare(device, &images, progress))?;
+        let prepared =
+            timed(&mut times.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
+                FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
+                error => error.into(),
+            })?;
         Ok(Stage { scene, album, device, field, options, scale, sources: source_poses, images, prepared, times })
     }
 

@@ -14,12 +14,12 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The file could not be read.
-    #[error("{}: can not be read: {source}", path.display())]
+    #[error("{}: cannot be read: {cause}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The file is neither JSON nor safetensors.
     #[error("{}: neither JSON ({json}) nor safetensors ({safetensors})", path.display())]
@@ -137,10 +137,10 @@ impl Report {
 /// Compares this build with a file.
 ///
 /// # Errors
-/// [`VerifyError`] if the file can not be compared at all. A tolerance that is exceeded is no error but part of the
+/// [`VerifyError`] if the file cannot be compared at all. A tolerance that is exceeded is no error but part of the
 /// report.
 pub fn verify(path: &Path) -> Result<Report, VerifyError> {
-    let bytes = std::fs::read(path).map_err(|source| VerifyError::Io { path: path.to_path_buf(), source })?;
+    let bytes = std::fs::read(path).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;
     let report = match SafeTensors::deserialize(&bytes) {
         Ok(tensors) => {
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };

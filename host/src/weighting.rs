@@ -63,6 +63,9 @@ pub enum WeightingError {
         /// What was given.
         value: String,
     },
+    /// Learned attention without its parameters.
+    #[error("weighting scheme 'attention' needs a file of parameters: attention:FILE")]
+    NoFile,
     /// The attention parameters could not be read.
     #[error(transparent)]
     Attention(#[from] AttentionError),
@@ -112,6 +115,9 @@ impl FromStr for Weighting {
     fn from_str(text: &str) -> Result<Weighting, WeightingError> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         if name == "attention" {
+            if rest.is_empty() {
+                return Err(WeightingError::NoFile);
+            }
             let model = AttentionModel::open(&PathBuf::from(rest))?;
             return Ok(Weighting { name: text.to_owned(), kind: Kind::Attention(Box::new(model)) });
         }

@@ -14,7 +14,7 @@ use std::path::Path;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::few_shot::target_of;
 use viewfuse::field::photo::{PhotoField, find_object};
-use viewfuse::photographs::{Album, BackgroundChoice};
+use viewfuse::photographs::Album;
 use viewfuse::progress::Progress;
 use viewfuse::render::{RenderOptions, Stage};
 use viewfuse::scene::Scene;

@@ -2,6 +2,7 @@
 //! and the same formulas evaluated in `f64`.
 #![forbid(unsafe_code)]
 
+pub mod command;
 pub mod compare;
 pub mod oracle;
 pub mod poses;

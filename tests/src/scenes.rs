@@ -117,3 +117,14 @@ pub fn middlebury() -> Folder {
     folder.write("toy_par.txt", format!("2\n{}\n{}\n", line("toy0001.png"), line("toy0002.png")));
     folder
 }
+
+/// The first bytes of a PNG whose header promises 100000 x 100000 pixels of 8-bit RGB.
+pub fn huge_png() -> Vec<u8> {
+    let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
+    let side = 100_000_u32.to_be_bytes();
+    bytes.extend(side.into_iter().chain(side).chain([8, 2, 0, 0, 0]));
+    // Checksums take a table: they are given.
+    bytes.extend(0x2730_9c9f_u32.to_be_bytes());
+    bytes.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e");
+    bytes
+}

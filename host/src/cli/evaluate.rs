@@ -1,16 +1,15 @@
 //! `viewfuse evaluate`.
 
-use super::on_threads;
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
-use anyhow::Context;
+use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
 use viewfuse::field::photo::PhotoField;
-use viewfuse::files::write_whole;
+use viewfuse::files::{check_writable, write_whole};
 use viewfuse::progress::Progress;
 use viewfuse::scene::Scene;
 use viewfuse::weighting::{SCHEME_NAMES, Weighting};
@@ -46,31 +45,31 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let options = arguments.picture.to_render_options();
+    arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let mut all: Vec<(String, Score)> = Vec::new();
     for path in &arguments.scenes {
         let scene = Scene::open(path)?;
         let progress = Progress::new("evaluating");
         let scores = on_threads(arguments.picture.threads, || {
             evaluate(&scene, &selection, &weightings, &Cpu, &PhotoField::default(), &options, &progress)
-        })?
-        .with_context(|| path.display().to_string())?;
+        })??;
         drop(progress);
-        print_table(&path.display().to_string(), &means(&scores));
+        print_table(&path.display().to_string(), &means(&scores))?;
         all.extend(scores.into_iter().map(|score| (path.display().to_string(), score)));
     }
     if arguments.scenes.len() > 1 {
         let scores: Vec<Score> = all.iter().map(|(_, score)| score.clone()).collect();
-        print_table(&format!("all {} scenes", arguments.scenes.len()), &means(&scores));
+        print_table(&format!("all {} scenes", arguments.scenes.len()), &means(&scores))?;
     }
     if let Some(path) = &arguments.output {
         write_whole(path, &csv_of(&all)?)?;
-        println!("{}", path.display());
+        say(format_args!("{}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
 }
 
 /// Means over the targets; the best value of each column is marked.
-fn print_table(title: &str, means: &[Mean]) {
+fn print_table(title: &str, means: &[Mean]) -> std::io::Result<()> {
     let copy = means.iter().find(|mean| mean.scheme == NEAREST_COPY).map_or(f64::NAN, |mean| mean.psnr);
     let best_psnr = means.iter().map(|mean| mean.psnr).fold(f64::NEG_INFINITY, f64::max);
     let best_ssim = means.iter().filter_map(|mean| mean.ssim).fold(f64::NEG_INFINITY, f64::max);
@@ -86,8 +85,9 @@ fn print_table(title: &str, means: &[Mean]) {
             if is_copy { String::new() } else { format!("{:.2}", mean.seconds) },
         ]);
     }
-    println!("{title}: {} targets", means.first().map_or(0, |mean| mean.target_count));
-    println!("{rows}\n");
+    let count = means.first().map_or(0, |mean| mean.target_count);
+    say(format_args!("{title}: {}", if count == 1 { "1 target".to_owned() } else { format!("{count} targets") }))?;
+    say(format_args!("{rows}\n"))
 }
 
 fn csv_of(scores: &[(String, Score)]) -> anyhow::Result<Vec<u8>> {

@@ -1,8 +1,7 @@
 //! `viewfuse render`.
 
-use super::on_threads;
 use super::options::{PictureOptions, SourceOptions, parse_count};
-use anyhow::Context;
+use super::{on_threads, say};
 use clap::Args;
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::path::{Path, PathBuf};
@@ -13,7 +12,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::few_shot::FewShot;
 use viewfuse::field::Field;
 use viewfuse::field::photo::PhotoField;
-use viewfuse::files::{write_png, write_whole};
+use viewfuse::files::{check_writable, remove_if_there, write_png, write_whole};
 use viewfuse::photographs::{SourceImages, to_rgb8};
 use viewfuse::progress::Progress;
 use viewfuse::record::{FrameRecord, RunRecord, background_record, depth_step, source_names, times_record};
@@ -62,6 +61,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.orbit);
     let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&field))?;
     let options = arguments.picture.to_render_options();
+    check_writable(&arguments.output.join("run.json"))?;
     let run = Run { arguments, scene: &scene, job: &job, weighting: &weighting, options: &options, start, open_time };
     on_threads(arguments.picture.threads, || run.render(&device, &field))??;
     Ok(ExitCode::SUCCESS)
@@ -80,6 +80,8 @@ struct Run<'a> {
 impl Run<'_> {
     fn render<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<()> {
         let names = source_names(self.scene, self.job);
+        // An old record beside new pictures would lie: it goes before the first of them appears.
+        let record_path = self.arguments.output.join("run.json");
         let progress = Progress::new("rendering");
         let mut frames = Vec::new();
         let mut frame_time = Duration::ZERO;
@@ -96,15 +98,15 @@ impl Run<'_> {
                 frame_time += frame.time;
                 size = [frame.picture.width(), frame.picture.height()];
                 background = sources.background;
-                self.write(sources, &names, &frame).context("writing the results")?;
+                if frames.is_empty() {
+                    remove_if_there(&record_path)?;
+                }
+                self.write(sources, &names, &frame)?;
                 frames.push(FrameRecord::of(&frame, &names));
                 Ok(())
             },
         )?;
         drop(progress);
-        for frame in &frames {
-            println!("{}", summary(frame, &self.arguments.output));
-        }
         let record = RunRecord {
             viewfuse: env!("CARGO_PKG_VERSION"),
             scene: self.arguments.scene.display().to_string(),
@@ -120,8 +122,11 @@ impl Run<'_> {
             times: times_record(self.open_time, stages, frame_time, self.start.elapsed()),
             frames,
         };
-        write_whole(&self.arguments.output.join("run.json"), &serde_json::to_vec_pretty(&record)?)?;
-        println!(
+        write_whole(&record_path, &serde_json::to_vec_pretty(&record)?)?;
+        for frame in &record.frames {
+            say(format_args!("{}", summary(frame, &self.arguments.output)))?;
+        }
+        say(format_args!(
             "{} from {} sources, {}, {} on {}: {:.2} s",
             if record.frames.len() == 1 { "1 view".to_owned() } else { format!("{} views", record.frames.len()) },
             record.sources.len(),
@@ -129,7 +134,7 @@ impl Run<'_> {
             record.field,
             record.device,
             record.times.total
-        );
+        ))?;
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! `viewfuse verify`.
 
+use super::say;
 use super::table::table;
 use clap::Args;
 use std::path::PathBuf;
@@ -19,13 +20,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut all_pass = true;
     for path in &arguments.files {
         let report = verify(path)?;
-        print_report(&report);
+        print_report(&report)?;
         all_pass &= report.passes();
     }
     Ok(if all_pass { ExitCode::SUCCESS } else { ExitCode::from(1) })
 }
 
-fn print_report(report: &Report) {
+fn print_report(report: &Report) -> std::io::Result<()> {
     let header = ["quantity", "numbers", "worst error", "", "tolerance", "", "at"];
     let mut rows = table(header.map(str::to_owned));
     for quantity in &report.quantities {
@@ -42,11 +43,15 @@ fn print_report(report: &Report) {
             quantity.place.clone(),
         ]);
     }
-    println!("{}", report.path.display());
-    println!("{rows}");
+    say(format_args!("{}", report.path.display()))?;
+    say(format_args!("{rows}"))?;
     if !report.not_covered.is_empty() {
-        println!("not computed by this version: {}", report.not_covered.join(", "));
+        say(format_args!("not computed by this version: {}", report.not_covered.join(", ")))?;
     }
     let failed = report.quantities.iter().filter(|quantity| !quantity.passes()).count();
-    println!("{} of {} quantities within tolerance\n", report.quantities.len() - failed, report.quantities.len());
+    say(format_args!(
+        "{} of {} quantities within tolerance\n",
+        report.quantities.len() - failed,
+        report.quantities.len()
+    ))
 }

@@ -1,6 +1,7 @@
 //! `viewfuse weights`.
 
 use super::options::SourceOptions;
+use super::say;
 use super::table::table;
 use clap::Args;
 use serde_json::json;
@@ -38,8 +39,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     let job = arguments.sources.to_selection(Some(&arguments.target), None).resolve(&scene, 1)?;
     let poses: Vec<_> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();
-    let sources =
-        Sources::<MOST_SOURCES>::new(&poses).map_err(|error| anyhow::anyhow!("unusable sources: {error:?}"))?;
+    let sources = Sources::<MOST_SOURCES>::new(&poses)?;
     for target in &job.targets {
         let columns: Vec<(String, Vec<f32>)> = weightings
             .iter()
@@ -49,9 +49,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             })
             .collect();
         if arguments.json {
-            println!("{}", serde_json::to_string_pretty(&as_json(&scene, &job, target, &columns))?);
+            say(format_args!("{}", serde_json::to_string_pretty(&as_json(&scene, &job, target, &columns))?))?;
         } else {
-            print_table(&scene, &job, target, &columns);
+            print_table(&scene, &job, target, &columns)?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -64,7 +64,7 @@ fn as_json(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Ve
     json!({ "scene": scene.path, "target": target.name, "sources": sources, "weights": weights })
 }
 
-fn print_table(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Vec<f32>)]) {
+fn print_table(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Vec<f32>)]) -> std::io::Result<()> {
     let lead = ["source".to_owned(), "distance".to_owned(), "angle".to_owned()];
     // Parameters go below the name, so that the table stays narrow.
     let names = columns.iter().map(|(name, _)| name.replace(':', "\n").replace('-', "-\n"));
@@ -76,6 +76,6 @@ fn print_table(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String
         let lead = [source.name.clone(), format!("{distance:.3}"), format!("{angle:.1}\u{b0}")];
         rows.add_row(lead.into_iter().chain(columns.iter().map(|(_, values)| format!("{:.4}", values[row]))));
     }
-    println!("{}: target {}, {} sources", scene.path.display(), target.name, job.sources.len());
-    println!("{rows}");
+    say(format_args!("{}: target {}, {} sources", scene.path.display(), target.name, job.sources.len()))?;
+    say(format_args!("{rows}"))
 }

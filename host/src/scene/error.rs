@@ -115,7 +115,7 @@ pub enum SceneError {
         found: usize,
     },
     /// The matrix is not a camera pose.
-    #[error("{path}{place}: not a camera pose: {}", describe(.reason))]
+    #[error("{path}{place}: not a camera pose: {reason}")]
     Pose {
         /// The file.
         path: PathBuf,
@@ -229,19 +229,4 @@ pub enum SceneError {
         /// How many views there are.
         view_count: usize,
     },
-}
-
-/// Core's reason in words; rows and columns count from 1 here, as people do.
-fn describe(reason: &PoseError) -> String {
-    match reason {
-        PoseError::NotFinite { row, column } => {
-            format!("the entry in row {}, column {} is not finite as a 32-bit number", row + 1, column + 1)
-        }
-        PoseError::TooFar => "the camera's centre is further than 1e30 from the origin".to_string(),
-        PoseError::LastRow => "the last row is not 0 0 0 1".to_string(),
-        PoseError::NotRigid { deviation } => {
-            format!("the 3x3 block is scaled or skewed: R^T R differs from the identity by {deviation}")
-        }
-        PoseError::Mirrored => "the determinant of the 3x3 block is -1: an axis is mirrored".to_string(),
-    }
 }

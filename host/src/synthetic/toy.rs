@@ -46,10 +46,10 @@ const TEST_PLACES: [[f32; 2]; 4] = [[0.7, 0.5], [2.15, 0.4], [4.1, 0.7], [5.55, 
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ToyError {
     /// The intrinsics are unusable.
-    #[error("the sample's intrinsics are unusable: {0:?}")]
+    #[error("the sample's intrinsics are unusable: {0}")]
     Pinhole(PinholeError),
     /// A camera is unusable.
-    #[error("a camera of the sample is unusable: {0:?}")]
+    #[error("a camera of the sample is unusable: {0}")]
     Pose(PoseError),
 }
 

@@ -30,13 +30,13 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
             .chunks_exact(16)
             .map(|m| {
                 let rows = [0, 4, 8, 12].map(|at| [m[at], m[at + 1], m[at + 2], m[at + 3]]);
-                Pose::from_opengl(&rows).map_err(|error| content(name, format!("not a pose: {error:?}")))
+                Pose::from_opengl(&rows).map_err(|error| content(name, format!("not a camera pose: {error}")))
             })
             .collect()
     };
     let source_poses = poses("attention_src")?;
     let sources =
-        Sources::<MOST_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", format!("{error:?}")))?;
+        Sources::<MOST_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", error.to_string()))?;
     let targets = poses("attention_tgt")?;
     let mut covered = vec!["attention_src".to_owned(), "attention_tgt".to_owned()];
     for (variant, model) in variants() {

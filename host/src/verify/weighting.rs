@@ -49,7 +49,7 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
             .map_err(|message| content(&format!("case '{}', src", case.name), message))?;
         let target = pose(&case.tgt).map_err(|message| content(&format!("case '{}', tgt", case.name), message))?;
         let sources = Sources::<MOST_SOURCES>::new(&poses)
-            .map_err(|error| content(&format!("case '{}', src", case.name), format!("{error:?}")))?;
+            .map_err(|error| content(&format!("case '{}', src", case.name), error.to_string()))?;
         for (method, official) in &case.official {
             let Some(weighting) = scheme_of(method) else {
                 if !not_covered.contains(method) {
@@ -114,7 +114,7 @@ fn pose(matrix: &[f32]) -> Result<Pose, String> {
     for (row, values) in rows.iter_mut().zip(matrix.chunks_exact(4)) {
         row.copy_from_slice(values);
     }
-    Pose::from_opengl(&rows).map_err(|error| format!("not a pose: {error:?}"))
+    Pose::from_opengl(&rows).map_err(|error| format!("not a camera pose: {error}"))
 }
 
 /// A list of numbers, or `None` for anything else (the official code failed, or gave NaN).

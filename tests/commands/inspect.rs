@@ -1,0 +1,83 @@
+//! `viewfuse inspect`: a good scene raises no warning, a bad one its own.
+
+use super::{done, numbers, texts};
+use serde_json::Value;
+use viewfuse_tests::command::{change_poses, names_in, toy};
+use viewfuse_tests::scenes::Folder;
+
+fn inspection(folder: &Folder) -> Value {
+    serde_json::from_str(&done(folder.path(), "inspect toy --json")).expect("JSON")
+}
+
+/// Exactly one of the warnings holds this text; `others` says how many more there may be.
+#[track_caller]
+fn assert_warns(folder: &Folder, text: &str, others: usize) {
+    let inspection = inspection(folder);
+    let warnings = texts(&inspection["warnings"]);
+    assert_eq!(warnings.iter().filter(|warning| warning.contains(text)).count(), 1, "{warnings:#?}");
+    assert!(warnings.len() <= 1 + others, "{warnings:#?}");
+    assert!(inspection["near"].as_f64() <= inspection["far"].as_f64(), "{inspection}");
+    let printed = done(folder.path(), "inspect toy");
+    assert!(printed.lines().any(|line| line.starts_with("warning    ") && line.contains(text)), "{printed}");
+}
+
+#[test]
+fn a_good_scene() {
+    let scene = toy();
+    let inspection = inspection(&scene);
+    assert_eq!(texts(&inspection["warnings"]), Vec::<&str>::new());
+    assert_eq!((&inspection["layout"], &inspection["photograph_count"]), (&"srn".into(), &24.into()));
+    assert_eq!((numbers(&inspection["size"]), numbers(&inspection["focal"])), (vec![128.0; 2], vec![131.25; 2]));
+    assert!(numbers(&inspection["focus"]).iter().all(|x| x.abs() < 1.0e-4));
+    assert!(numbers(&inspection["distances"]).iter().all(|distance| (distance - 1.3).abs() < 1.0e-4));
+    let (near, far) = (inspection["near"].as_f64().expect("near"), inspection["far"].as_f64().expect("far"));
+    assert!(0.5 < near && near < 1.3 && 1.3 < far && far < 2.0);
+    let corners = inspection["object"].as_array().expect("an object");
+    assert!(numbers(&corners[0]).iter().all(|x| *x < 0.0) && numbers(&corners[1]).iter().all(|x| *x > 0.0));
+    assert!(done(scene.path(), "inspect toy").contains("warnings   none"));
+}
+
+#[test]
+fn draws_the_cameras() {
+    let scene = toy();
+    let printed = done(scene.path(), "inspect toy -o maps/cameras.png");
+    assert!(printed.contains("maps/cameras.png"), "{printed}");
+    assert_eq!(names_in(&scene.path().join("maps")), ["cameras.png"]);
+    let map = image::open(scene.path().join("maps/cameras.png")).expect("a picture").to_rgb8();
+    assert!(map.width() > 300 && map.pixels().any(|pixel| *pixel != *map.get_pixel(0, 0)));
+    // With --json, standard output is JSON and nothing else.
+    let json = done(scene.path(), "inspect toy --json -o maps/cameras.png");
+    assert!(serde_json::from_str::<Value>(&json).is_ok(), "{json}");
+}
+
+#[test]
+fn flipped_axes() {
+    let scene = toy();
+    change_poses(&scene, |_, matrix| [1, 2, 5, 6, 9, 10].iter().for_each(|&at| matrix[at] = -matrix[at]));
+    assert_warns(&scene, "24 of 24 cameras look away from the point", 1);
+}
+
+#[test]
+fn cameras_without_a_common_point() {
+    let scene = toy();
+    change_poses(&scene, |view, matrix| {
+        matrix[3] += 1.3 * ((7 * view % 5) as f64 - 2.0);
+        matrix[7] += 1.1 * ((3 * view % 5) as f64 - 2.0);
+        matrix[11] += 0.9 * ((11 * view % 7) as f64 - 3.0);
+    });
+    assert_warns(&scene, "the cameras do not look at a common point", 1);
+}
+
+#[test]
+fn a_scene_in_other_units() {
+    let scene = toy();
+    change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e6));
+    assert_warns(&scene, "the cameras are 1.300e6 units from what they look at", 0);
+}
+
+#[test]
+fn two_views_from_one_place() {
+    let scene = toy();
+    std::fs::copy(scene.path().join("toy/pose/000003.txt"), scene.path().join("toy/pose/000007.txt")).expect("a copy");
+    assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
+}

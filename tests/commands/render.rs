@@ -1,0 +1,172 @@
+//! `viewfuse render`.
+
+use super::{assert_near, done, numbers, texts};
+use image::{ColorType, DynamicImage};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use viewfuse_tests::command::{names_in, toy};
+
+fn record(folder: &Path, output: &str) -> Value {
+    let text = fs::read_to_string(folder.join(output).join("run.json")).expect("a run record");
+    serde_json::from_str(&text).expect("JSON")
+}
+
+fn picture(folder: &Path, file: &str) -> DynamicImage {
+    image::open(folder.join(file)).expect("a picture")
+}
+
+/// Bytes of every picture in a folder, with their names.
+fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    names_in(folder)
+        .into_iter()
+        .filter(|name| name.ends_with(".png"))
+        .map(|name| (name.clone(), fs::read(folder.join(&name)).expect("a picture")))
+        .collect()
+}
+
+#[test]
+fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
+    let scene = toy();
+    let folder = scene.path();
+    let printed = done(folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 -o out/deeper");
+    assert!(
+        printed.contains("out/deeper/000020.png  PSNR ") && printed.contains("1 view from 23 sources"),
+        "{printed}"
+    );
+    let output = folder.join("out/deeper");
+    assert_eq!(names_in(&output), ["000020.png", "000020_depth.png", "000020_sheet.png", "run.json"]);
+
+    let prediction = picture(&output, "000020.png");
+    assert_eq!((prediction.width(), prediction.height(), prediction.color()), (64, 64, ColorType::Rgb8));
+    let depth = picture(&output, "000020_depth.png");
+    assert_eq!((depth.width(), depth.height(), depth.color()), (64, 64, ColorType::L16));
+    let sheet = picture(&output, "000020_sheet.png");
+    assert!(sheet.width() > 64 && sheet.height() > 64);
+
+    let record = record(folder, "out/deeper");
+    assert_eq!((&record["seed"], &record["scene"], &record["size"]), (&7.into(), &"toy".into(), &[64, 64][..].into()));
+    assert!(record["device"].as_str().is_some_and(|device| device.starts_with("cpu")), "{record}");
+    assert_eq!(record["weighting"], "error:alpha=1");
+    let expected: Vec<String> = (0..24).filter(|view| *view != 20).map(|view| format!("{view:06}")).collect();
+    assert_eq!(texts(&record["sources"]), expected);
+    let time = |name: &str| record["times"][name].as_f64().expect("a time in seconds");
+    let stages: f64 = ["open", "photographs", "prepare", "encode", "frames"].map(time).iter().sum();
+    assert!(stages > 0.0 && stages <= time("total"), "{}", record["times"]);
+
+    let frame = &record["frames"][0];
+    assert_eq!((&frame["target"], record["frames"].as_array().map(Vec::len)), (&"000020".into(), Some(1)));
+    let weights = numbers(&frame["weights"]);
+    assert_eq!((weights.len(), texts(&frame["left_out"])), (23, Vec::new()));
+    assert_eq!(frame["weights"], frame["weights_before"]);
+    assert!(weights.iter().all(|weight| *weight >= 0.0));
+    assert_near(weights.iter().sum(), 1.0, 1.0e-5);
+    assert!(frame["psnr"].as_f64().is_some_and(|psnr| psnr > 20.0 && printed.contains(&format!("PSNR {psnr:.2} dB"))));
+    assert!(frame["ssim"].as_f64().is_some_and(|ssim| ssim > 0.8 && ssim <= 1.0));
+
+    // The depth map in world units: the lorry is within 0.55 of the origin, the camera 1.3 from it.
+    let step = frame["depth_step"].as_f64().expect("the unit of the depth map");
+    let depths: Vec<f64> = depth.to_luma16().pixels().map(|pixel| step * f64::from(pixel[0])).collect();
+    assert!(depths.iter().filter(|z| **z > 0.0).count() > 300);
+    assert!(depths.iter().all(|z| *z == 0.0 || (0.7..1.9).contains(z)));
+}
+
+#[test]
+fn leaves_out_what_counts_little() {
+    let scene = toy();
+    done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 -o out");
+    let record = record(scene.path(), "out");
+    let frame = &record["frames"][0];
+    let (used, before) = (numbers(&frame["weights"]), numbers(&frame["weights_before"]));
+    let (sources, left_out) = (texts(&record["sources"]), texts(&frame["left_out"]));
+    assert!(!left_out.is_empty() && left_out.len() < 23);
+    let omitted: f64 = (0..23).filter(|&view| left_out.contains(&sources[view])).map(|view| before[view]).sum();
+    assert!(omitted <= 0.2 + 1.0e-6);
+    assert_near(frame["left_out_weight"].as_f64().expect("a number"), omitted, 1.0e-6);
+    assert_near(used.iter().sum(), 1.0, 1.0e-5);
+    let most_left_out = (0..23).filter(|&v| left_out.contains(&sources[v])).map(|v| before[v]).fold(0.0, f64::max);
+    for view in 0..23 {
+        assert_eq!(used[view] == 0.0, left_out.contains(&sources[view]), "view {view}");
+        assert!(used[view] == 0.0 || before[view] >= most_left_out, "view {view} counts less and was kept");
+    }
+}
+
+#[test]
+fn orbits() {
+    let scene = toy();
+    done(scene.path(), "render toy --orbit 3 --size 32x32 -o out");
+    let expected: Vec<String> = (0..3)
+        .flat_map(|frame| ["", "_depth", "_sheet"].map(|part| format!("orbit-{frame:03}{part}.png")))
+        .chain(["run.json".to_owned()])
+        .collect();
+    assert_eq!(names_in(&scene.path().join("out")), expected);
+    let record = record(scene.path(), "out");
+    let centres: Vec<[f64; 3]> = (0..3)
+        .map(|frame| [0, 1, 2].map(|row| numbers(&record["frames"][frame]["world_from_camera"][row])[3]))
+        .collect();
+    for frame in 0..3 {
+        assert_eq!(record["frames"][frame]["psnr"], Value::Null);
+        assert_near(centres[frame].iter().map(|x| x * x).sum::<f64>().sqrt(), 1.3, 1.0e-3);
+        // Three places on a circle are as far from each other.
+        let gap = |other: usize| (0..3).map(|k| (centres[frame][k] - centres[other][k]).powi(2)).sum::<f64>().sqrt();
+        assert_near(gap((frame + 1) % 3), gap((frame + 2) % 3), 1.0e-3);
+    }
+}
+
+#[test]
+fn the_same_run_makes_the_same_pictures() {
+    let scene = toy();
+    let folder = scene.path();
+    let arguments = "render toy --targets 20,22 --size 48x48";
+    done(folder, &format!("{arguments} -o first"));
+    done(folder, &format!("{arguments} -o second"));
+    done(folder, &format!("{arguments} --threads 1 -o third"));
+    let first = pictures(&folder.join("first"));
+    assert_eq!(first.len(), 6);
+    assert!(first == pictures(&folder.join("second")), "two runs differ");
+    assert!(first == pictures(&folder.join("third")), "one thread gives other pictures");
+    assert!(first[0].1 != first[3].1, "two targets look the same");
+}
+
+#[test]
+fn chooses_sources() {
+    let scene = toy();
+    let sources = |choice: &str| {
+        done(scene.path(), &format!("render toy --targets 20 --size 16x16 {choice} -o out"));
+        let record = record(scene.path(), "out");
+        let names: Vec<usize> = texts(&record["sources"]).iter().map(|n| n.parse().expect("a number")).collect();
+        assert_eq!(numbers(&record["frames"][0]["weights"]).len(), names.len());
+        names
+    };
+    assert_eq!(sources("--sources all/3"), [0, 3, 6, 9, 12, 15, 18, 21]);
+    assert_eq!(sources("--sources 3..6,9,12..18/3"), [3, 4, 5, 6, 9, 12, 15, 18]);
+    assert_eq!(sources("--sources 000001,5,5"), [1, 5]);
+    let spread = sources("--views 5");
+    assert!(spread.len() == 5 && spread.windows(2).all(|pair| pair[0] < pair[1]) && !spread.contains(&20));
+    assert_eq!(sources("--sources 3..6 --views 2").len(), 2);
+}
+
+#[test]
+fn a_second_run_replaces_the_first() {
+    let scene = toy();
+    let folder = scene.path();
+    done(folder, "render toy --targets 20 --size 64x64 -o out");
+    done(folder, "render toy --targets 20 --size 32x32 --weights mean -o out");
+    assert_eq!(names_in(&folder.join("out")), ["000020.png", "000020_depth.png", "000020_sheet.png", "run.json"]);
+    assert_eq!(picture(folder, "out/000020.png").width(), 32);
+    assert_eq!(record(folder, "out")["weighting"], "mean");
+}
+
+#[test]
+fn weights_change_the_picture() {
+    let scene = toy();
+    let folder = scene.path();
+    for (output, scheme) in [("a", "mean"), ("b", "error:alpha=1"), ("c", "cross-attention")] {
+        done(folder, &format!("render toy --targets 20 --size 32x32 --leave-out 0 --weights {scheme} -o {output}"));
+        assert_eq!(record(folder, output)["weighting"], scheme);
+    }
+    let mean = numbers(&record(folder, "a")["frames"][0]["weights"]);
+    mean.iter().for_each(|weight| assert_near(*weight, 1.0 / 23.0, 1.0e-7));
+    let prediction = |output: &str| picture(folder, &format!("{output}/000020.png")).to_rgb8();
+    assert!(prediction("a") != prediction("b") && prediction("b") != prediction("c"));
+}

@@ -1,0 +1,103 @@
+//! `viewfuse verify` on reference values computed here in `f64`, right and wrong.
+
+use super::{BINARY, done};
+use serde_json::{Value, json};
+use viewfuse_tests::command::{run, safetensors};
+use viewfuse_tests::scenes::Folder;
+
+/// Weights of two sources with these errors: proportional to `1 / (e + 1e-6)`.
+fn weights(errors: [f64; 2]) -> [f64; 2] {
+    let shares = errors.map(|error| 1.0 / (error + 1.0e-6));
+    shares.map(|share| share / (shares[0] + shares[1]))
+}
+
+/// The target stands at the origin. One source is 1 away and turned by a right angle about y, the other is 3 away and
+/// rolled by 30 degrees: the full angle counts the roll, the angle between the axes would not.
+fn weighting() -> Value {
+    let (sine, cosine) = (0.5, 3.0_f64.sqrt() / 2.0);
+    let turned = json!([0, 0, 1, 1, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1]);
+    let rolled = json!([cosine, -sine, 0, 0, sine, cosine, 0, 3, 0, 0, 1, 0, 0, 0, 0, 1]);
+    let target = json!([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+    let official = json!({
+        "distance": { "f64": weights([1.0, 3.0]) },
+        "distance_cubed": { "f64": weights([1.0, 27.0]) },
+        "error_weighing_alpha=1": { "f64": weights([1.0 / 2.0, 1.0 / 6.0]) },
+        "error_weighing_alpha=0.5": { "f64": weights([1.0 / 4.0 + 1.0 / 6.0, 1.0 / 12.0 + 1.0 / 2.0]) },
+        "a_method_of_the_future": { "f64": [0.5, 0.5] },
+    });
+    json!({ "cases": [{ "name": "by hand", "src": [turned, rolled], "tgt": target, "official": official }] })
+}
+
+/// The reference is refused: exit code 1, and the quantity's row says so. Nothing is written.
+#[track_caller]
+fn assert_exceeded(folder: &Folder, file: &str, quantity: &str) {
+    let outcome = run(BINARY, folder.path(), &format!("verify {file}"));
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(1), ""), "{}", outcome.stdout);
+    let exceeded: Vec<&str> = outcome.stdout.lines().filter(|line| line.contains("EXCEEDED")).collect();
+    assert!(exceeded.len() == 1 && exceeded[0].trim().starts_with(quantity), "{}", outcome.stdout);
+}
+
+#[test]
+fn right_weights_pass() {
+    let folder = Folder::new();
+    folder.write("weighting.json", weighting().to_string());
+    let printed = done(folder.path(), "verify weighting.json");
+    assert!(printed.contains("8 of 8 quantities within tolerance"), "{printed}");
+    assert!(printed.contains("not computed by this version: a_method_of_the_future"), "{printed}");
+    assert!(!printed.contains("EXCEEDED"), "{printed}");
+}
+
+#[test]
+fn wrong_weights_do_not() {
+    let folder = Folder::new();
+    for method in ["distance", "distance_cubed", "error_weighing_alpha=1", "error_weighing_alpha=0.5"] {
+        let mut reference = weighting();
+        let number = &mut reference["cases"][0]["official"][method]["f64"][1];
+        *number = json!(number.as_f64().expect("a weight") + 1.0e-3);
+        folder.write("weighting.json", reference.to_string());
+        assert_exceeded(&folder, "weighting.json", method);
+    }
+}
+
+/// JSON has no NaN: the official code's is `null`, which is no number to agree with.
+#[test]
+fn a_weight_that_is_no_number_does_not_pass() {
+    let folder = Folder::new();
+    for bad in [json!(null), json!("NaN")] {
+        let mut reference = weighting();
+        reference["cases"][0]["official"]["distance"]["f64"][0] = bad;
+        folder.write("weighting.json", reference.to_string());
+        let outcome = run(BINARY, folder.path(), "verify weighting.json");
+        assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(1), ""));
+        assert!(outcome.stderr.contains("weighting.json: case 'by hand', distance: no list of weights"), "{outcome:?}");
+    }
+}
+
+/// Three pairs of pictures of 2 x 1 pixels: 10 apart everywhere, equal, and black against white.
+fn metrics(psnr: [f64; 3]) -> Vec<u8> {
+    let shape: &[usize] = &[3, 1, 2, 3];
+    let prediction = [[110_u8; 6], [7; 6], [0; 6]].concat();
+    let truth = [[100_u8; 6], [7; 6], [255; 6]].concat();
+    let psnr: Vec<u8> = psnr.iter().flat_map(|value| value.to_le_bytes()).collect();
+    safetensors(&[("pred", "U8", shape, prediction), ("truth", "U8", shape, truth), ("psnr", "F64", &[3], psnr)])
+}
+
+#[test]
+fn metrics_right_and_wrong() {
+    let folder = Folder::new();
+    let right = [10.0 * (255.0_f64 * 255.0 / 100.0).log10(), f64::INFINITY, 0.0];
+    folder.write("metrics.safetensors", metrics(right));
+    let printed = done(folder.path(), "verify metrics.safetensors");
+    assert!(printed.contains("1 of 1 quantities within tolerance"), "{printed}");
+    for (pair, wrong) in [(0, right[0] + 1.0e-3), (1, 100.0), (2, 1.0e-3), (0, f64::NAN), (1, f64::NAN)] {
+        let mut psnr = right;
+        psnr[pair] = wrong;
+        folder.write("metrics.safetensors", metrics(psnr));
+        assert_exceeded(&folder, "metrics.safetensors", "PSNR");
+    }
+    // One bad file among good ones fails the run, and the good one is still reported.
+    folder.write("weighting.json", weighting().to_string());
+    let outcome = run(BINARY, folder.path(), "verify metrics.safetensors weighting.json");
+    assert_eq!(outcome.code, Some(1));
+    assert!(outcome.stdout.contains("0 of 1 quantities") && outcome.stdout.contains("8 of 8 quantities"));
+}

@@ -1,0 +1,142 @@
+//! Running the command `viewfuse` as a person does: in a folder, looking at what it prints, returns and leaves behind.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use crate::scenes::Folder;
+
+/// What a command printed and returned.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outcome {
+    /// The exit code; `None` if a signal ended it.
+    pub code: Option<i32>,
+    /// Standard output.
+    pub stdout: String,
+    /// Standard error.
+    pub stderr: String,
+}
+
+/// The command, ready to be started in a folder with arguments that are separated by blanks.
+pub fn command(binary: &str, folder: &Path, arguments: &str) -> Command {
+    let mut command = Command::new(binary);
+    command.current_dir(folder).args(arguments.split_whitespace()).stdin(Stdio::null());
+    command
+}
+
+/// Runs the command to its end.
+pub fn run(binary: &str, folder: &Path, arguments: &str) -> Outcome {
+    let output = command(binary, folder, arguments).output().expect("the command starts");
+    let text = |bytes| String::from_utf8(bytes).expect("the command prints UTF-8");
+    Outcome { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+/// Runs the command, which must succeed and say nothing on standard error (no progress bar either: it is no terminal).
+/// Returns what it printed.
+#[track_caller]
+pub fn done(binary: &str, folder: &Path, arguments: &str) -> String {
+    let outcome = run(binary, folder, arguments);
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""), "viewfuse {arguments}\n{}", outcome.stdout);
+    outcome.stdout
+}
+
+/// The job must fail: exit code 1, one line on standard error with every part, nothing on standard output, and the
+/// folder as it was.
+#[track_caller]
+pub fn assert_refused(binary: &str, folder: &Path, arguments: &str, parts: &[&str]) {
+    let before = files_below(folder);
+    let Outcome { code, stdout, stderr } = run(binary, folder, arguments);
+    assert_eq!(code, Some(1), "viewfuse {arguments}\n{stderr}");
+    let message = stderr.strip_prefix("viewfuse: ").and_then(|rest| rest.strip_suffix('\n')).unwrap_or_default();
+    assert!(!message.is_empty() && !message.contains('\n') && message.len() < 500, "viewfuse {arguments}\n{stderr}");
+    for part in parts {
+        assert!(message.contains(part), "viewfuse {arguments}\n{message:?} does not hold {part:?}");
+    }
+    let pieces: Vec<&str> = message.split(": ").collect();
+    assert!(pieces.windows(2).all(|pair| pair[0] != pair[1]), "said twice: {message:?}");
+    assert_eq!(stdout, "", "viewfuse {arguments}");
+    assert_eq!(files_below(folder), before, "viewfuse {arguments} left something behind");
+}
+
+/// The arguments must be refused: exit code 2, every part in the first line of standard error, and the folder as it was.
+#[track_caller]
+pub fn assert_wrong_arguments(binary: &str, folder: &Path, arguments: &str, parts: &[&str]) {
+    let before = files_below(folder);
+    let Outcome { code, stdout, stderr } = run(binary, folder, arguments);
+    assert_eq!((code, stdout.as_str()), (Some(2), ""), "viewfuse {arguments}\n{stderr}");
+    let line = stderr.lines().next().unwrap_or_default();
+    for part in parts {
+        assert!(line.contains(part), "viewfuse {arguments}\n{line:?} does not hold {part:?}");
+    }
+    assert_eq!(files_below(folder), before, "viewfuse {arguments} left something behind");
+}
+
+/// Every file and folder below a folder, hidden ones too, with its length; sorted.
+pub fn files_below(folder: &Path) -> Vec<(PathBuf, u64)> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let is_folder = path.is_dir();
+        found.push((path.clone(), if is_folder { 0 } else { fs::metadata(&path).expect("a file").len() }));
+        if is_folder {
+            found.extend(files_below(&path));
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Names of the files in a folder, hidden ones too, sorted.
+pub fn names_in(folder: &Path) -> Vec<String> {
+    let name = |entry: fs::DirEntry| entry.file_name().to_string_lossy().into_owned();
+    let mut names: Vec<String> =
+        fs::read_dir(folder).expect("a folder").map(|entry| name(entry.expect("an entry"))).collect();
+    names.sort();
+    names
+}
+
+/// A folder that holds a copy of the sample scene as `toy`.
+pub fn toy() -> Folder {
+    let folder = Folder::new();
+    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/toy");
+    for (path, _) in files_below(&sample).into_iter().filter(|(path, _)| path.is_file()) {
+        let name = path.strip_prefix(&sample).expect("a file of the sample");
+        fs::copy(&path, folder.file(&Path::new("toy").join(name).to_string_lossy())).expect("a copy");
+    }
+    folder
+}
+
+/// Rewrites every pose of the sample scene: `change` gets the view's number and the row-major camera-to-world matrix.
+pub fn change_poses(folder: &Folder, change: impl Fn(usize, &mut [f64; 16])) {
+    for name in names_in(&folder.path().join("toy/pose")) {
+        let file = format!("toy/pose/{name}");
+        let text = fs::read_to_string(folder.path().join(&file)).expect("a pose");
+        let numbers: Vec<f64> = text.split_whitespace().map(|word| word.parse().expect("a number")).collect();
+        let mut matrix: [f64; 16] = numbers.try_into().expect("16 numbers");
+        change(name.trim_end_matches(".txt").parse().expect("a number"), &mut matrix);
+        folder.write(&file, crate::scenes::words(&matrix));
+    }
+}
+
+/// Bytes of `f32` numbers as safetensors stores them.
+pub fn f32_bytes(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
+    values.into_iter().flat_map(f32::to_le_bytes).collect()
+}
+
+/// A safetensors file of tensors given by name, type as the format writes it (`F32`), shape and bytes.
+pub fn safetensors(tensors: &[(&str, &str, &[usize], Vec<u8>)]) -> Vec<u8> {
+    let mut header = serde_json::Map::new();
+    let mut data: Vec<u8> = Vec::new();
+    for (name, dtype, shape, bytes) in tensors {
+        let offsets = [data.len(), data.len() + bytes.len()];
+        header.insert((*name).to_owned(), serde_json::json!({"dtype": dtype, "shape": shape, "data_offsets": offsets}));
+        data.extend(bytes);
+    }
+    let mut header = serde_json::Value::Object(header).to_string().into_bytes();
+    // The data starts at a multiple of 8.
+    header.resize(header.len().next_multiple_of(8), b' ');
+    let mut file = (header.len() as u64).to_le_bytes().to_vec();
+    file.extend(header);
+    file.extend(data);
+    file
+}
