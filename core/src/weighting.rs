@@ -93,6 +93,9 @@ impl Scheme {
     /// cameras that look at its centre.
     pub const RELATIVE_FROBENIUS: Scheme = Scheme(Formula::RelativeFrobenius);
 
+    /// Error weighting with `alpha = 1` and the angle between principal axes: the best of the paper's formulas.
+    pub const ERROR: Scheme = Scheme(Formula::Error { alpha: 1.0, angle: AngleKind::PrincipalAxis });
+
     /// Weights proportional to `exp(-beta d^2)` with `d` the distance of the centres in world units.
     ///
     /// # Errors

@@ -10,7 +10,7 @@
 //! | `query_layer.weight`, `key_layer.weight` | published learned cross attention |
 //! | `multihead_attention.*`, `weight_calculation_layer.*` | published relative-pose self attention |
 
-use crate::weighting::{MOST_SOURCES, SourceWeights};
+use crate::sources::{SourcePoses, SourceWeights};
 use safetensors::{Dtype, SafeTensors};
 use std::path::{Path, PathBuf};
 use viewfuse_core::attention::{
@@ -18,7 +18,6 @@ use viewfuse_core::attention::{
     PoseSelfAttention, cross_attention, learned_cross_attention, pose_self_attention,
 };
 use viewfuse_core::pose::Pose;
-use viewfuse_core::sources::Sources;
 
 /// Why attention parameters could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -178,7 +177,7 @@ impl AttentionModel {
     }
 
     /// The weights of the sources for a target, in the order of the sources.
-    pub fn weigh(&self, sources: &Sources<MOST_SOURCES>, target: &Pose) -> SourceWeights {
+    pub fn weigh(&self, sources: &SourcePoses, target: &Pose) -> SourceWeights {
         match self {
             AttentionModel::Fourier(embedding) => cross_attention(embedding, sources, target),
             AttentionModel::Flat(embedding) => cross_attention(embedding, sources, target),

@@ -5,7 +5,7 @@
 
 use crate::rig::Rig;
 use crate::scene::Scene;
-use crate::weighting::MOST_SOURCES;
+use crate::sources::MOST_SOURCES;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::PoseError;
 

@@ -9,7 +9,7 @@ use crate::device::Device;
 use crate::interrupt::Interrupted;
 use crate::photographs::SourceImages;
 use crate::progress::Progress;
-use crate::weighting::SourceWeights;
+use crate::sources::SourceWeights;
 use viewfuse_core::camera::Camera;
 
 /// Why a field could not make a picture.

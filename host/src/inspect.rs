@@ -5,7 +5,7 @@ use crate::field::photo::find_object;
 use crate::photographs::{Album, BackgroundChoice};
 use crate::rig::Rig;
 use crate::scene::{Layout, Scene};
-use crate::weighting::MOST_SOURCES;
+use crate::sources::MOST_SOURCES;
 use image::RgbImage;
 use serde::Serialize;
 use viewfuse_core::Vec3;

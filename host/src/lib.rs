@@ -7,6 +7,7 @@
 //! scene                         a folder of posed photographs: Scene, View, Photograph
 //! synthetic                     scenes made by ourselves
 //! rig                           the cameras as a whole: focus, up, orbits
+//! sources                       how many sources there can be
 //! formula, attention, weighting pose -> weight, by name: Weighting
 //! few_shot                      which views are sources, which cameras are targets: FewShot
 //! photographs                   sources at working size without their background: SourceImages
@@ -37,6 +38,12 @@ pub mod render;
 pub mod rig;
 pub mod scene;
 pub mod sheet;
+pub mod sources;
 pub mod synthetic;
 pub mod verify;
 pub mod weighting;
+
+/// The README's code is compiled with the documentation's tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+struct Readme;

@@ -6,12 +6,13 @@ use crate::field::{Field, FieldError, Rendered};
 use crate::photographs::{Album, BackgroundChoice, PhotographsError, SourceImages, to_rgb8};
 use crate::progress::Progress;
 use crate::scene::{Scene, SceneError};
-use crate::weighting::{MOST_SOURCES, SourceWeights, Weighting};
+use crate::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
+use crate::weighting::Weighting;
 use image::RgbImage;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::metrics::{psnr, ssim};
-use viewfuse_core::sources::{Sources, SourcesError};
+use viewfuse_core::sources::SourcesError;
 use viewfuse_core::weights::{Omission, Weights};
 
 /// Longest side of a picture whose size nobody asked for.
@@ -175,7 +176,7 @@ pub struct Stage<'a, D: Device, F: Field<D>> {
     field: &'a F,
     options: &'a RenderOptions,
     scale: f32,
-    sources: Sources<MOST_SOURCES>,
+    sources: SourcePoses,
     /// The sources at working size.
     pub images: SourceImages,
     prepared: F::Prepared,
@@ -198,10 +199,11 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         progress: &Progress,
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
-        let source_poses = Sources::new(&poses).map_err(RenderError::Sources)?;
+        let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let scale = working_scale(scene, options)?;
         let mut times = StageTimes::default();
-        let images = timed(&mut times.photographs, || album.sources(sources, scale, options.background))?;
+        // Enlarging the sources would add pixels but no detail.
+        let images = timed(&mut times.photographs, || album.sources(sources, scale.min(1.0), options.background))?;
         let prepared =
             timed(&mut times.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
                 FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
@@ -288,13 +290,13 @@ fn same_size(a: &Camera, b: &Camera) -> bool {
 }
 
 /// The weights of all sources for each source as a target; a source's weight for itself is 0.
-fn relevance_among(sources: &Sources<MOST_SOURCES>, weighting: &Weighting, leave_out: f32) -> Vec<SourceWeights> {
+fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32) -> Vec<SourceWeights> {
     let count = sources.count();
     (0..count)
         .map(|view| {
             // The scheme sees only the others: its own pose would take nearly all the weight.
             let others: Vec<_> = (0..count).filter(|other| *other != view).map(|other| *sources.pose(other)).collect();
-            let Ok(others) = Sources::<MOST_SOURCES>::new(&others) else {
+            let Ok(others) = SourcePoses::new(&others) else {
                 return Weights::mean(count);
             };
             let weights = weighting.weigh(&others, sources.pose(view)).without_least(leave_out).weights;

@@ -1,20 +1,13 @@
 //! Weighting schemes by name: what a person types, and the weights it gives.
 
 use crate::attention::{AttentionError, AttentionModel};
+use crate::sources::{SourcePoses, SourceWeights};
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 use viewfuse_core::attention::published_cross_attention;
 use viewfuse_core::pose::Pose;
-use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
-use viewfuse_core::weights::Weights;
-
-/// Most source views of one run: the capacity of every fixed-size array of views on the host.
-pub const MOST_SOURCES: usize = 256;
-
-/// The weights of a run's sources.
-pub type SourceWeights = Weights<MOST_SOURCES>;
 
 /// Every scheme that needs no file, with its default parameters: the rows of tables over all schemes.
 pub const SCHEME_NAMES: [&str; 11] = [
@@ -88,12 +81,11 @@ enum Kind {
 impl Weighting {
     /// The scheme used where a person names none: error weighting with `alpha = 1`, the best of the paper's formulas.
     pub fn default_scheme() -> Weighting {
-        let scheme = Scheme::error(1.0, AngleKind::PrincipalAxis).unwrap_or(Scheme::MEAN);
-        Weighting { name: "error:alpha=1".to_owned(), kind: Kind::Formula(scheme) }
+        Weighting { name: "error:alpha=1".to_owned(), kind: Kind::Formula(Scheme::ERROR) }
     }
 
     /// The weights of the sources for a target, in the order of the sources.
-    pub fn weigh(&self, sources: &Sources<MOST_SOURCES>, target: &Pose) -> SourceWeights {
+    pub fn weigh(&self, sources: &SourcePoses, target: &Pose) -> SourceWeights {
         match &self.kind {
             Kind::Formula(scheme) => weigh(*scheme, sources, target),
             Kind::CrossAttention => published_cross_attention(sources, target),

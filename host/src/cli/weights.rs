@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse::few_shot::{FewShot, Target};
 use viewfuse::scene::Scene;
-use viewfuse::weighting::{MOST_SOURCES, SCHEME_NAMES, Weighting};
+use viewfuse::sources::MOST_SOURCES;
+use viewfuse::weighting::{SCHEME_NAMES, Weighting};
 use viewfuse_core::sources::Sources;
 
 #[derive(Args)]

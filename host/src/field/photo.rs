@@ -7,7 +7,7 @@ use crate::device::{Device, MarchTarget, PhotoScene, Pixels};
 use crate::interrupt;
 use crate::photographs::SourceImages;
 use crate::progress::Progress;
-use crate::weighting::SourceWeights;
+use crate::sources::SourceWeights;
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::photo::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};

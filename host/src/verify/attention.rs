@@ -4,7 +4,7 @@
 use super::{Measure, Quantity, Report, VerifyError};
 use crate::attention::AttentionModel;
 use crate::formula;
-use crate::weighting::{MOST_SOURCES, SourceWeights};
+use crate::sources::{MOST_SOURCES, SourceWeights};
 use safetensors::{Dtype, SafeTensors};
 use std::convert::Infallible;
 use std::path::Path;

@@ -1,7 +1,8 @@
 //! `weighting.json`: weights of the published formulas.
 
 use super::{Measure, Quantity, Report, VerifyError};
-use crate::weighting::{MOST_SOURCES, Weighting};
+use crate::sources::MOST_SOURCES;
+use crate::weighting::Weighting;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

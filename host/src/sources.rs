@@ -1,0 +1,13 @@
+//! How many source views a run can have, and what is kept of each.
+
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weights::Weights;
+
+/// Most source views of one run: the capacity of every fixed-size array of views on the host.
+pub const MOST_SOURCES: usize = 256;
+
+/// The poses of a run's sources.
+pub type SourcePoses = Sources<MOST_SOURCES>;
+
+/// The weights of a run's sources.
+pub type SourceWeights = Weights<MOST_SOURCES>;

@@ -1,0 +1,94 @@
+//! The README's commands are run as they stand there, and its claims about itself hold.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn readme() -> String {
+    std::fs::read_to_string(repository().join("README.md")).expect("the README")
+}
+
+/// The lines of all `sh` blocks.
+fn commands() -> Vec<String> {
+    let mut inside = false;
+    let mut commands = Vec::new();
+    for line in readme().lines() {
+        match line {
+            "```sh" => inside = true,
+            "```" => inside = false,
+            _ if inside => commands.push(line.to_owned()),
+            _ => {}
+        }
+    }
+    commands
+}
+
+#[test]
+fn every_command_runs() {
+    const PREFIX: &str = "cargo run --release -- ";
+    let folder = tempfile::tempdir().expect("a folder");
+    let ours: Vec<String> = commands().iter().filter_map(|line| Some(line.strip_prefix(PREFIX)?.to_owned())).collect();
+    assert!(ours.len() >= 5, "{ours:?}");
+    for command in ours {
+        let out = folder.path().join("out").display().to_string();
+        let arguments: Vec<String> =
+            command
+                .split_whitespace()
+                .map(|word| {
+                    if word == "out" || word.starts_with("out/") { word.replacen("out", &out, 1) } else { word.into() }
+                })
+                .collect();
+        let output = Command::new(env!("CARGO_BIN_EXE_viewfuse"))
+            .args(&arguments)
+            .current_dir(repository())
+            .output()
+            .expect("the command starts");
+        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    for file in ["000021.png", "000021_depth.png", "000021_sheet.png", "run.json", "cameras.png", "scores.csv"] {
+        assert!(folder.path().join("out").join(file).exists(), "{file}");
+    }
+}
+
+#[test]
+fn the_test_command_is_the_one_that_ci_runs() {
+    let test = commands().into_iter().find(|line| line.starts_with("cargo test")).expect("a test command");
+    let ci = std::fs::read_to_string(repository().join(".ci/run")).expect("the CI script");
+    assert!(ci.lines().any(|line| line.starts_with(&test)), "{test}");
+}
+
+#[test]
+fn what_it_links_to_is_there() {
+    let text = readme();
+    let links: Vec<&str> = text.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
+    assert!(!links.is_empty());
+    for link in links {
+        assert!(repository().join(link).exists(), "{link}");
+    }
+}
+
+#[test]
+fn core_depends_on_mathematics_only() {
+    let tree = |extra: &[&str]| {
+        let output = Command::new(env!("CARGO"))
+            .args(["tree", "--offline", "--locked", "-p", "viewfuse-core", "-e", "normal", "--prefix", "none"])
+            .args(extra)
+            .current_dir(repository())
+            .output()
+            .expect("cargo");
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let packages = tree(&[]);
+    let names: Vec<&str> = packages.lines().filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(names.contains(&"glam") && names.contains(&"libm"), "{names:?}");
+    assert!(names.iter().all(|name| ["viewfuse-core", "glam", "libm", "bytemuck"].contains(name)), "{names:?}");
+    let features = tree(&["-f", "{p} {f}"]);
+    let has_std = features.lines().any(|line| {
+        line.rsplit(' ').next().is_some_and(|features| features.split(',').any(|feature| feature == "std"))
+    });
+    assert!(!has_std, "{features}");
+}
