@@ -10,7 +10,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
 
 /// Every scheme that needs no file, with its default parameters: the rows of tables over all schemes.
-pub const SCHEME_NAMES: [&str; 11] = [
+pub const SCHEME_NAMES: [&str; 12] = [
     "mean",
     "l1",
     "frobenius",
@@ -21,6 +21,7 @@ pub const SCHEME_NAMES: [&str; 11] = [
     "distance:power=3",
     "error:alpha=1",
     "error:alpha=0.5",
+    "error:alpha=1,angle=full",
     "cross-attention",
 ];
 
