@@ -24,7 +24,7 @@ use viewfuse::weighting::Weighting;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
-    viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7, each from all the others, with the error\n  \
+    viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with the error\n  \
     viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n\n\
     Writes NAME.png, NAME_depth.png (16 bit; scale in run.json), NAME_sheet.png for each target, and run.json.")]
 pub(crate) struct Arguments {

@@ -68,7 +68,7 @@ fn as_json(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Ve
 fn print_table(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Vec<f32>)]) -> std::io::Result<()> {
     let lead = ["source".to_owned(), "distance".to_owned(), "angle".to_owned()];
     // Parameters go below the name, so that the table stays narrow.
-    let names = columns.iter().map(|(name, _)| name.replace(':', "\n").replace('-', "-\n"));
+    let names = columns.iter().map(|(name, _)| name.replace(':', "\n").replace(',', ",\n").replace('-', "-\n"));
     let mut rows = table(lead.into_iter().chain(names));
     for (row, &view) in job.sources.iter().enumerate() {
         let (source, pose) = (&scene.views[view], target.camera.pose);
