@@ -8,7 +8,6 @@ use crate::progress::Progress;
 use crate::render::{RenderError, RenderOptions, Stage, Truth};
 use crate::scene::Scene;
 use crate::weighting::Weighting;
-use image::RgbImage;
 use std::time::{Duration, Instant};
 
 /// Name of the row that copies the nearest source instead of rendering.
@@ -72,7 +71,8 @@ pub fn evaluate<D: Device, F: Field<D>>(
         let mut stage = Stage::prepare(scene, &album, sources, device, field, options, progress)?;
         for &target in targets {
             let nearest = nearest_source(scene, sources, target);
-            let (prediction, truth) = stage.photograph_and_truth(nearest, target)?;
+            let size = stage.picture_size(target)?;
+            let (prediction, truth) = (stage.truth_at(nearest, size)?, stage.truth_at(target, size)?);
             scores.push(score(
                 NEAREST_COPY,
                 scene,
@@ -180,16 +180,4 @@ pub fn means(scores: &[Score]) -> Vec<Mean> {
             }
         })
         .collect()
-}
-
-impl<D: Device, F: Field<D>> Stage<'_, D, F> {
-    /// A source's photograph and the target's, both at the target's working size over the run's background.
-    fn photograph_and_truth(
-        &self,
-        source: usize,
-        target: usize,
-    ) -> Result<(RgbImage, RgbImage), RenderError<D::Error>> {
-        let size = self.picture_size(target)?;
-        Ok((self.truth_at(source, size)?, self.truth_at(target, size)?))
-    }
 }
