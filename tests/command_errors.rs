@@ -190,7 +190,7 @@ fn wrong_arguments() {
     assert_wrong(&format!("{RENDER} --leave-out 1"), &["--leave-out", "less than 1"]);
     assert_wrong(&format!("{RENDER} --leave-out nan"), &["--leave-out"]);
     assert_wrong(&format!("{RENDER} --orbit 0"), &["--orbit", "from 1 to 10000"]);
-    assert_wrong(&format!("{RENDER} --threads 0"), &["--threads", "from 1 to 10000"]);
+    assert_wrong(&format!("{RENDER} --threads 0"), &["--threads", "1..=256"]);
     assert_wrong(&format!("{RENDER} --seed -1"), &["-1"]);
     assert_wrong("verify", &["required"]);
 }
@@ -234,4 +234,11 @@ fn references_that_are_none() {
     let [pred, truth] = ["pred", "truth"].map(|name| (name, "F32", [1].as_slice(), f32_bytes([1.0])));
     folder.write("metrics.safetensors", safetensors(&[pred, truth]));
     refused("metrics.safetensors", &["metrics.safetensors: tensor 'pred'", "U8 [pair, row, column, 3]"]);
+}
+
+#[test]
+fn an_evaluation_of_nothing() {
+    assert_refused("evaluate toy --targets ,", &["toy", "no targets"]);
+    // Every scene is opened before the first is computed.
+    assert_refused("evaluate toy nowhere", &["nowhere"]);
 }

@@ -123,7 +123,7 @@ fn nothing_is_left_out_for_free() {
         assert_eq!((omission.weights, omission.omitted_count, omission.omitted_weight), (weights, 0, 0.0));
     }
     let omission = weights.without_least(1.0e9);
-    assert_eq!(omission.weights.values(), &[0.0, 1.0, 0.0], "of equal weights the later goes first; one stays");
+    assert_eq!(omission.weights.values(), &[0.0, 0.5, 0.5], "the greatest stay, all of them");
 }
 
 #[test]
@@ -148,4 +148,19 @@ fn degenerate_scores() {
         assert_eq!(Weights::from_errors(&[number], 1).values(), &[1.0]);
         assert_eq!(Weights::from_logits(&[number], 1).values(), &[1.0]);
     }
+}
+
+#[test]
+fn equal_weights_go_or_stay_together() {
+    for count in 1..=32 {
+        assert_eq!(Weights::<32>::mean(count).without_least(0.9).omitted_count, 0, "{count} equal views");
+    }
+    let mut scores = [0.0; S];
+    scores[..6].copy_from_slice(&[8.0, 1.0, 4.0, 1.0, 0.0, 2.0]);
+    let weights = Weights::from_scores(&scores, 6);
+    let none = weights.without_least(1.9 / 16.0);
+    assert_eq!((none.omitted_count, none.weights), (0, weights));
+    let two = weights.without_least(2.0 / 16.0);
+    assert_eq!((two.omitted_count, two.weights.get(1), two.weights.get(3)), (2, 0.0, 0.0));
+    assert!(two.weights.get(5) > 0.0 && (two.omitted_weight - 0.125).abs() < 1.0e-6);
 }

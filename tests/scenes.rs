@@ -141,10 +141,14 @@ fn a_view_is_found_by_name_or_by_its_number() {
         (scene.view_named("1"), scene.view_named("target_1"), scene.view_named("02")),
         (Some(2), Some(2), Some(0))
     );
-    // An exact name wins; a number that two names end in finds neither.
+    // An exact name wins; of a photograph and a target pose of one number the photograph is meant.
     folder.write("target_pose/2.txt", scenes::words(&scenes::WORLD_FROM_CAMERA));
     let scene = open(&folder);
-    assert_eq!((scene.view_named("2"), scene.view_named("02")), (Some(0), None));
+    assert_eq!((scene.view_named("2"), scene.view_named("02")), (Some(0), Some(0)));
+    // A number that two photographs end in finds neither.
+    folder.image("rgb/car2.png", 16, 12).write("pose/car2.txt", scenes::words(&scenes::WORLD_FROM_CAMERA));
+    let scene = open(&folder);
+    assert_eq!((scene.view_named("2"), scene.view_named("02"), scene.view_named("car2")), (Some(0), None, Some(2)));
 }
 
 #[test]

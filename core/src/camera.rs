@@ -12,9 +12,9 @@ use glam::Vec3;
 /// Why numbers are not a pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PinholeError {
-    /// A focal length is not a finite positive number.
+    /// A focal length is not a number from [`SHORTEST_FOCAL`] to [`LONGEST_FOCAL`].
     Focal,
-    /// A coordinate of the principal point is not finite.
+    /// A coordinate of the principal point is not finite, or larger than [`LONGEST_FOCAL`].
     Principal,
     /// Width or height is zero or above 2^20.
     Size,
@@ -23,14 +23,19 @@ pub enum PinholeError {
 impl fmt::Display for PinholeError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            PinholeError::Focal => "a focal length is not a positive, finite number",
-            PinholeError::Principal => "the principal point is not finite",
+            PinholeError::Focal => "a focal length is not a number from 0.001 to 1e9 pixels",
+            PinholeError::Principal => "the principal point is not finite, or further off than 1e9 pixels",
             PinholeError::Size => "width and height must be from 1 to 1048576 pixels",
         })
     }
 }
 
 impl core::error::Error for PinholeError {}
+
+/// Least focal length of a pinhole camera, in pixels.
+pub const SHORTEST_FOCAL: f32 = 1.0e-3;
+/// Greatest focal length, and greatest distance of the principal point from the image's corner, in pixels.
+pub const LONGEST_FOCAL: f32 = 1.0e9;
 
 /// Intrinsics of a camera without distortion, checked when built.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,11 +52,12 @@ impl Pinhole {
     /// # Errors
     /// [`PinholeError`] names the first quantity that is not usable.
     pub fn new(focal: [f32; 2], principal: [f32; 2], width: u32, height: u32) -> Result<Pinhole, PinholeError> {
-        let usable = |f: f32| f > 0.0 && f <= f32::MAX;
+        // Wide enough for any lens on any image, narrow enough that no quotient of coordinates overflows.
+        let usable = |f: f32| (SHORTEST_FOCAL..=LONGEST_FOCAL).contains(&f);
         if !(usable(focal[0]) && usable(focal[1])) {
             return Err(PinholeError::Focal);
         }
-        if !(abs(principal[0]) <= f32::MAX && abs(principal[1]) <= f32::MAX) {
+        if !(abs(principal[0]) <= LONGEST_FOCAL && abs(principal[1]) <= LONGEST_FOCAL) {
             return Err(PinholeError::Principal);
         }
         if width == 0 || height == 0 || width > 1 << 20 || height > 1 << 20 {

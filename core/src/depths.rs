@@ -3,7 +3,7 @@
 //! Depths are distances along the ray in world units. NeRF's two kinds: stratified (one jittered sample in each of `N`
 //! equal parts of the interval) and importance samples by inverting the distribution that a first pass found.
 
-use crate::math::{clamp, max};
+use crate::math::clamp;
 
 /// The sample in part `part` of `count` equal parts of `[near, far]`, at the fraction `jitter` in `[0, 1]` of its part
 /// (0.5: the middle). The result never leaves `[near, far]`; `count` 0 is taken as 1.
@@ -18,7 +18,7 @@ pub const PROBABILITY_FLOOR: f32 = 1.0e-5;
 
 /// The depth at which the distribution given by `weights` over `N` equal parts of `[near, far]` reaches `u`.
 ///
-/// Within a part the distribution is uniform. Negative and NaN weights count as 0. `u` is limited to `[0, 1]`. The
+/// Within a part the distribution is uniform. Negative and NaN weights count as 0, those above 1e30 as that. `u` is limited to `[0, 1]`. The
 /// cumulative sum is compared with `u` times its own total, so that it can not end below 1 and the result never leaves
 /// `[near, far]` (in the published code a sum that rounds below 1 puts samples beyond the end). Increasing in `u`.
 #[inline]
@@ -27,18 +27,24 @@ pub fn inverse_cdf<const N: usize>(near: f32, far: f32, weights: &[f32; N], u: f
     let mut total = 0.0;
     let mut part = 0;
     while part < N {
-        total += max(weights[part], 0.0) + PROBABILITY_FLOOR;
+        total += mass_of(weights[part]);
         part += 1;
     }
     let wanted = clamp(u, 0.0, 1.0) * total;
     let mut below = 0.0;
     part = 0;
-    let mut mass = max(weights[0], 0.0) + PROBABILITY_FLOOR;
+    let mut mass = mass_of(weights[0]);
     while part + 1 < N && below + mass <= wanted {
         below += mass;
         part += 1;
-        mass = max(weights[part], 0.0) + PROBABILITY_FLOOR;
+        mass = mass_of(weights[part]);
     }
     let inside = clamp((wanted - below) / mass, 0.0, 1.0);
     stratified_depth(near, far, part as u32, N as u32, inside)
+}
+
+/// Probability of a part before normalising; bounded, so that sums stay finite.
+#[inline]
+fn mass_of(weight: f32) -> f32 {
+    clamp(weight, 0.0, 1.0e30) + PROBABILITY_FLOOR
 }

@@ -1,10 +1,11 @@
 //! The mathematics of viewfuse, at fixed sizes.
 //!
-//! Everything here is `no_std`, free of allocation and of `unsafe`, and uses only `f32` and `u32`, so that one body
-//! serves as the definition on a workstation, as the source of a GPU kernel and as firmware. The modules stand in the
-//! order of the data:
+//! Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32` and 32-bit integers (only the
+//! metrics, which never run on a device, in `f64`), so that one body serves as the definition on a workstation, as the
+//! source of a GPU kernel and as firmware. The modules stand in the order of the data:
 //!
 //! ```text
+//! math              one result on every target                    sqrt, exp, sin_cos, angles, norms
 //! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
 //! sources           the poses of the source views                 Sources<S>
 //! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
@@ -13,8 +14,8 @@
 //! random, depths    where along a ray to look                     uniform, stratified_depth, inverse_cdf
 //! lookup            what a view shows there                       bilinear, trilinear
 //! fuse              the views' latents become one                 fuse_views, fuse_visible
-//! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! composite         samples along a ray become a pixel            Compositor<C>
+//! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
 //! ```
 //!

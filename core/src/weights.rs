@@ -42,8 +42,8 @@ impl<const S: usize> Weights<S> {
         Weights::from_scores(&[1.0; S], count)
     }
 
-    /// Proportional to non-negative scores. A score that is NaN, negative or infinite counts as 0 (an infinite one as
-    /// the largest finite number); if none is positive, every view counts the same. `count` is limited to `[1, S]`.
+    /// Proportional to non-negative scores. A score that is NaN or negative counts as 0, an infinite one as the largest
+    /// finite number; if none is positive, every view counts the same. `count` is limited to `[1, S]`.
     pub fn from_scores(scores: &[f32; S], count: u32) -> Weights<S> {
         const { assert!(S > 0) };
         let count = count.clamp(1, S as u32);
@@ -70,6 +70,7 @@ impl<const S: usize> Weights<S> {
     /// Evaluated as `smallest / error`, which neither overflows nor divides by zero: if some errors are exactly 0,
     /// those views share all the weight (the limit). An error that is NaN, negative or infinite counts as infinite.
     pub fn from_errors(errors: &[f32; S], count: u32) -> Weights<S> {
+        const { assert!(S > 0) };
         let count = count.clamp(1, S as u32);
         let mut smallest = f32::INFINITY;
         let mut view = 0;
@@ -93,6 +94,7 @@ impl<const S: usize> Weights<S> {
     /// Softmax of logits, the largest subtracted first. A NaN logit counts as minus infinity; several that are plus
     /// infinity share all the weight.
     pub fn from_logits(logits: &[f32; S], count: u32) -> Weights<S> {
+        const { assert!(S > 0) };
         let count = count.clamp(1, S as u32);
         let mut largest = f32::NEG_INFINITY;
         let mut view = 0;
@@ -144,35 +146,43 @@ impl<const S: usize> Weights<S> {
 
     /// Leaves out views of least weight whose weights together stay at or below `total`, and renormalises the rest.
     ///
-    /// Views go in order of increasing weight, of equal weights the later one first. The view of largest weight
-    /// always stays. `total` is meant to lie in `[0, 1)`; at 0 or NaN only views of weight 0 are left out, which
-    /// changes nothing.
+    /// Views go in order of increasing weight; views of equal weight go together or stay together, so that no choice
+    /// among equals is arbitrary (the mean leaves out nothing). The views of largest weight always stay. `total` is
+    /// meant to lie in `[0, 1)`; at 0 or NaN nothing is left out.
     pub fn without_least(&self, total: f32) -> Omission<S> {
+        let count = (self.count as usize).min(S);
         let mut kept = self.values;
-        let mut kept_count = 0;
-        let mut view = 0;
-        while view < self.count as usize {
-            kept_count += (kept[view] > 0.0) as u32;
-            view += 1;
-        }
         let mut omitted_weight = 0.0;
         let mut omitted_count = 0;
-        while kept_count > 1 {
-            let mut least = S;
-            view = 0;
-            while view < self.count as usize {
-                if kept[view] > 0.0 && (least == S || kept[view] <= kept[least]) {
-                    least = view;
+        loop {
+            // The least weight that is kept, how many views have it, and whether any has more.
+            let (mut least, mut equal_count, mut any_above) = (f32::INFINITY, 0, false);
+            let mut view = 0;
+            while view < count {
+                let weight = kept[view];
+                if weight > 0.0 {
+                    any_above |= weight > least || (weight < least && equal_count > 0);
+                    if weight < least {
+                        least = weight;
+                        equal_count = 0;
+                    }
+                    equal_count += (weight == least) as u32;
                 }
                 view += 1;
             }
-            if !(omitted_weight + kept[least] <= total) {
+            let with_these = omitted_weight + least * equal_count as f32;
+            if !any_above || !(with_these <= total) {
                 break;
             }
-            omitted_weight += kept[least];
-            kept[least] = 0.0;
-            kept_count -= 1;
-            omitted_count += 1;
+            view = 0;
+            while view < count {
+                if kept[view] == least {
+                    kept[view] = 0.0;
+                }
+                view += 1;
+            }
+            omitted_weight = with_these;
+            omitted_count += equal_count;
         }
         let weights = if omitted_count == 0 { *self } else { Weights::from_scores(&kept, self.count) };
         Omission { weights, omitted_weight, omitted_count }

@@ -66,9 +66,9 @@ fn say(text: impl Display) -> io::Result<()> {
 }
 
 /// Runs a piece of work on this many threads instead of all cores.
-fn on_threads<T: Send>(threads: Option<usize>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
+fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
     match threads {
         None => Ok(work()),
-        Some(count) => Ok(rayon::ThreadPoolBuilder::new().num_threads(count).build()?.install(work)),
+        Some(count) => Ok(rayon::ThreadPoolBuilder::new().num_threads(count.into()).build()?.install(work)),
     }
 }

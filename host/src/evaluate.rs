@@ -65,7 +65,7 @@ pub fn evaluate<D: Device, F: Field<D>>(
 ) -> Result<Vec<Score>, EvaluateError<D::Error>> {
     let groups = source_groups(scene, selection, field.least_sources())?;
     let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
-    let album = Album::open(scene, used).map_err(RenderError::from)?;
+    let album = Album::open(scene, used, progress).map_err(RenderError::from)?;
     let mut scores = Vec::new();
     for (sources, targets) in &groups {
         let mut stage = Stage::prepare(scene, &album, sources, device, field, options, progress)?;
@@ -129,8 +129,11 @@ fn source_groups<E: std::error::Error>(
         }
         return Ok(vec![(sources, targets)]);
     }
-    asked
-        .unwrap_or_else(|| photographed().collect())
+    let targets = asked.unwrap_or_else(|| photographed().collect());
+    if targets.is_empty() {
+        return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
+    }
+    targets
         .into_iter()
         .map(|target| Ok((selection.sources_without(scene, &[target], least_sources)?, vec![target])))
         .collect()

@@ -4,7 +4,7 @@
 //! included), `all`, and `/STEP` behind either to take every `STEP`-th.
 
 use crate::rig::Rig;
-use crate::scene::Scene;
+use crate::scene::{Scene, View};
 use crate::sources::MOST_SOURCES;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::PoseError;
@@ -191,7 +191,6 @@ pub fn target_of(scene: &Scene, view: usize) -> Target {
     let View { name, camera, image } = &scene.views[view];
     Target { name: name.clone(), camera: *camera, truth: image.is_some().then_some(view) }
 }
-use crate::scene::View;
 
 /// The views that a list names, in the order of the scene, each once.
 ///

@@ -2,7 +2,9 @@
 
 use crate::canvas::{BLUE, Canvas, GREY, INK, LINE_HEIGHT, RED};
 use crate::field::photo::find_object;
+use crate::interrupt::{self, Interrupted};
 use crate::photographs::{Album, BackgroundChoice};
+use crate::progress::Progress;
 use crate::rig::Rig;
 use crate::scene::{Layout, Scene};
 use crate::sources::MOST_SOURCES;
@@ -13,7 +15,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_core::photo::ObjectBlock;
 
 /// Longest side at which photographs are looked at: enough to find the object.
-const LOOK_SIDE: f32 = 128.0;
+const LOOK_SIDE: u32 = 128;
 /// A rig whose axes miss their common point by more than this share of the distance has no common subject.
 const MOST_AXIS_MISS: f32 = 0.25;
 /// Distances within which the parameters of published schemes (Gaussian, attention) mean something.
@@ -55,22 +57,26 @@ pub struct Inspection {
 }
 
 /// Looks at a scene. Photographs are read at a small size to find the object; if that fails, the reason is a warning.
-pub fn inspect(scene: &Scene, background: BackgroundChoice) -> Inspection {
+///
+/// # Errors
+/// [`Interrupted`] if the work is stopped.
+pub fn inspect(scene: &Scene, background: BackgroundChoice, progress: &Progress) -> Result<Inspection, Interrupted> {
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
     let rig = Rig::of(&cameras);
     let mut warnings = rig_warnings(scene, &rig);
-    let object = match object_of(scene, background) {
+    let object = match object_of(scene, background, progress, &mut warnings) {
         Ok(object) => Some(object),
         Err(reason) => {
             warnings.push(reason);
             None
         }
     };
+    interrupt::check()?;
     let [near, far] = depth_range(&cameras, &rig, object.as_ref());
     let distance = |camera: &Camera| camera.pose.centre_world().distance(rig.focus);
     let pinhole = cameras[0].pinhole;
     let photograph_count = scene.views.iter().filter(|view| view.image.is_some()).count();
-    Inspection {
+    Ok(Inspection {
         path: scene.path.display().to_string(),
         layout: match scene.layout {
             Layout::Srn => "srn",
@@ -93,7 +99,7 @@ pub fn inspect(scene: &Scene, background: BackgroundChoice) -> Inspection {
         near,
         far,
         warnings,
-    }
+    })
 }
 
 /// What looks wrong with the cameras.
@@ -138,16 +144,20 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
 }
 
 /// The object that the silhouettes show, or why there is none.
-fn object_of(scene: &Scene, background: BackgroundChoice) -> Result<ObjectBlock, String> {
+fn object_of(
+    scene: &Scene,
+    background: BackgroundChoice,
+    progress: &Progress,
+    warnings: &mut Vec<String>,
+) -> Result<ObjectBlock, String> {
     let views: Vec<usize> =
         (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).take(MOST_SOURCES).collect();
     if views.len() < 2 {
         return Err("fewer than two photographs: the object cannot be found".to_owned());
     }
-    let pinhole = scene.views[views[0]].camera.pinhole;
-    let scale = (LOOK_SIDE / pinhole.width().max(pinhole.height()) as f32).min(1.0);
-    let album = Album::open(scene, views.iter().copied()).map_err(|error| error.to_string())?;
-    let images = album.sources(&views, scale, background).map_err(|error| error.to_string())?;
+    let album = Album::open(scene, views.iter().copied(), progress).map_err(|error| error.to_string())?;
+    let images = album.sources(&views, LOOK_SIDE, background).map_err(|error| error.to_string())?;
+    warnings.extend(images.warning.clone());
     find_object(&images).ok_or_else(|| {
         "the silhouettes have no common object: wrong poses, or a background that is not of one colour".to_owned()
     })

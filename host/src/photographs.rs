@@ -5,9 +5,12 @@ mod resample;
 
 pub use matte::BackgroundChoice;
 
-use crate::scene::{Photograph, Scene, SceneError};
+use crate::interrupt::{self, Interrupted};
+use crate::progress::Progress;
+use crate::scene::{Photograph, Scene, SceneError, View};
 use image::RgbImage;
 use rayon::prelude::*;
+use std::borrow::Cow;
 use viewfuse_core::camera::{Camera, PinholeError};
 
 /// Why photographs could not be prepared.
@@ -39,6 +42,9 @@ pub enum PhotographsError {
         /// The background colour that was assumed.
         colour: String,
     },
+    /// The person stopped the work.
+    #[error("interrupted")]
+    Interrupted(#[from] Interrupted),
 }
 
 /// One source at working size.
@@ -57,78 +63,112 @@ pub struct SourceImages {
     pub images: Vec<SourceImage>,
     /// What is behind the object, red green blue in `[0, 1]`.
     pub background: [f32; 3],
+    /// What is doubtful about the background, if anything.
+    pub warning: Option<String>,
 }
 
-/// Decoded photographs of a scene, each read once.
+/// Most bytes of decoded photographs that are kept. Where a run needs more, each is decoded again whenever it is needed.
+const MOST_KEPT_BYTES: u64 = 512 << 20;
+
+/// Photographs of a scene, decoded once where memory allows.
 pub struct Album<'a> {
     scene: &'a Scene,
-    photographs: Vec<Option<Photograph>>,
+    kept: Vec<Option<Photograph>>,
 }
 
 impl<'a> Album<'a> {
     /// Reads the photographs of these views, all cores at once.
     ///
     /// # Errors
-    /// [`SceneError`] of the first view that can not be read.
-    pub fn open(scene: &'a Scene, views: impl IntoIterator<Item = usize>) -> Result<Album<'a>, SceneError> {
+    /// [`PhotographsError`] of the first view that cannot be read, or if the work is stopped.
+    pub fn open(
+        scene: &'a Scene,
+        views: impl IntoIterator<Item = usize>,
+        progress: &Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
         let mut wanted: Vec<usize> = views.into_iter().collect();
         wanted.sort_unstable();
         wanted.dedup();
-        let read: Vec<(usize, Photograph)> = wanted
-            .into_par_iter()
-            .map(|view| scene.photograph(view).map(|photograph| (view, photograph)))
-            .collect::<Result<_, _>>()?;
-        let mut photographs = vec![None; scene.views.len()];
-        for (view, photograph) in read {
-            photographs[view] = Some(photograph);
+        let mut kept = vec![None; scene.views.len()];
+        let bytes = |view: &usize| {
+            let pinhole = &scene.views[*view].camera.pinhole;
+            4 * u64::from(pinhole.width()) * u64::from(pinhole.height())
+        };
+        if wanted.iter().map(bytes).sum::<u64>() <= MOST_KEPT_BYTES {
+            progress.expect(wanted.len());
+            let read = |view: usize| {
+                interrupt::check()?;
+                let photograph = scene.photograph(view)?;
+                progress.step();
+                Ok((view, photograph))
+            };
+            let photographs: Vec<_> = wanted.into_par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
+            for (view, photograph) in photographs {
+                kept[view] = Some(photograph);
+            }
         }
-        Ok(Album { scene, photographs })
+        Ok(Album { scene, kept })
     }
 
-    /// Photograph of a view that was opened.
-    fn photograph(&self, view: usize) -> Result<std::borrow::Cow<'_, Photograph>, SceneError> {
-        match &self.photographs[view] {
-            Some(photograph) => Ok(std::borrow::Cow::Borrowed(photograph)),
-            None => Ok(std::borrow::Cow::Owned(self.scene.photograph(view)?)),
+    fn photograph(&self, view: usize) -> Result<Cow<'_, Photograph>, SceneError> {
+        match self.kept.get(view) {
+            Some(Some(photograph)) => Ok(Cow::Borrowed(photograph)),
+            _ => Ok(Cow::Owned(self.scene.photograph(view)?)),
         }
     }
 
-    /// The sources at `scale` times their own size, the background taken out as `choice` says.
+    /// The sources, reduced to at most `longest_side` pixels on a side, the background taken out as `choice` says.
     ///
     /// # Errors
     /// [`PhotographsError`].
     pub fn sources(
         &self,
         views: &[usize],
-        scale: f32,
+        longest_side: u32,
         choice: BackgroundChoice,
     ) -> Result<SourceImages, PhotographsError> {
-        let photographs: Vec<_> = views.iter().map(|&view| self.photograph(view)).collect::<Result<_, _>>()?;
-        let backdrop = matte::Backdrop::of(photographs.iter().map(AsRef::as_ref), choice);
+        // Twice over the photographs, so that never more of them than there are threads must be in memory.
+        let look = |&view: &usize| {
+            interrupt::check()?;
+            Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
+        };
+        let borders: Vec<_> = views.par_iter().map(look).collect::<Result<_, PhotographsError>>()?;
+        let backdrop = matte::Backdrop::of(borders.into_iter().flatten(), choice);
         let images = views
             .par_iter()
-            .zip(&photographs)
-            .map(|(&view, photograph)| {
-                let View { name, camera, image } = &self.scene.views[view];
-                let (width, height) = scaled_size(camera, scale);
-                let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
-                    view: name.clone(),
-                    width,
-                    height,
-                    error,
-                })?;
-                let premultiplied = matte::premultiplied(photograph, &backdrop);
-                let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
-                if opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha) {
-                    let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
-                    return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
-                }
-                let (own_width, own_height) = photograph.pixels.dimensions();
-                let texels = resample::area_average(&premultiplied, [own_width, own_height], [width, height]);
-                Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
+            .map(|&view| {
+                interrupt::check()?;
+                self.cut_out(view, longest_side, &backdrop)
             })
             .collect::<Result<_, PhotographsError>>()?;
-        Ok(SourceImages { images, background: backdrop.colour() })
+        Ok(SourceImages { images, background: backdrop.colour(), warning: backdrop.warning() })
+    }
+
+    fn cut_out(
+        &self,
+        view: usize,
+        longest_side: u32,
+        backdrop: &matte::Backdrop,
+    ) -> Result<SourceImage, PhotographsError> {
+        let View { name, camera, image } = &self.scene.views[view];
+        let photograph = self.photograph(view)?;
+        // Enlarging a source would add pixels but no detail.
+        let (width, height) = reduced_size(camera, longest_side);
+        let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
+            view: name.clone(),
+            width,
+            height,
+            error,
+        })?;
+        let premultiplied = matte::premultiplied(&photograph, backdrop);
+        let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
+        if opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha) {
+            let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
+            return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
+        }
+        let (own_width, own_height) = photograph.pixels.dimensions();
+        let texels = resample::area_average(&premultiplied, [own_width, own_height], [width, height]);
+        Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
 
     /// The truth at a view, resampled to a size and laid over a background, rounded to 8 bits.
@@ -143,12 +183,21 @@ impl<'a> Album<'a> {
     }
 }
 
-use crate::scene::View;
+/// Longest side of a camera's image in pixels.
+pub fn longest_side(camera: &Camera) -> u32 {
+    camera.pinhole.width().max(camera.pinhole.height())
+}
 
-/// Size of a view's image at a scale: at least one pixel on a side.
-pub fn scaled_size(camera: &Camera, scale: f32) -> (u32, u32) {
-    let scaled = |side: u32| ((side as f32 * scale).round() as u32).max(1);
+/// Size of a camera's image with its longest side scaled to `side`; at least one pixel on a side.
+pub fn scaled_size(camera: &Camera, side: u32) -> (u32, u32) {
+    let scale = f64::from(side) / f64::from(longest_side(camera));
+    let scaled = |own: u32| ((f64::from(own) * scale).round() as u32).max(1);
     (scaled(camera.pinhole.width()), scaled(camera.pinhole.height()))
+}
+
+/// As [`scaled_size`], but never larger than the image is.
+pub fn reduced_size(camera: &Camera, side: u32) -> (u32, u32) {
+    scaled_size(camera, side.min(longest_side(camera)))
 }
 
 /// Values in `[0, 1]` rounded to the nearest of 256 levels; the fourth channel is dropped. NaN becomes 0.

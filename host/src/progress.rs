@@ -1,11 +1,14 @@
 //! Progress of long work: a bar on a terminal, nothing elsewhere.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use std::sync::Mutex;
 use std::time::Duration;
 
 /// A count of pieces of work done and left. Hidden when standard error is not a terminal.
 pub struct Progress {
     bar: ProgressBar,
+    /// Warnings that were shown; `None` where nothing is shown at all.
+    told: Option<Mutex<Vec<String>>>,
 }
 
 impl Progress {
@@ -16,17 +19,26 @@ impl Progress {
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(label.to_owned());
         bar.enable_steady_tick(Duration::from_millis(200));
-        Progress { bar }
+        Progress { bar, told: Some(Mutex::default()) }
     }
 
     /// No display at all.
     pub fn hidden() -> Progress {
-        Progress { bar: ProgressBar::hidden() }
+        Progress { bar: ProgressBar::hidden(), told: None }
     }
 
     /// More pieces will come.
     pub fn expect(&self, pieces: usize) {
         self.bar.inc_length(pieces as u64);
+    }
+
+    /// Shows a warning on standard error, once however often it is given.
+    pub fn warn(&self, warning: &str) {
+        let Some(Ok(mut told)) = self.told.as_ref().map(Mutex::lock) else { return };
+        if !told.iter().any(|earlier| earlier == warning) {
+            self.bar.suspend(|| eprintln!("viewfuse: warning: {warning}"));
+            told.push(warning.to_owned());
+        }
     }
 
     /// A piece is done.

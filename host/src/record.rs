@@ -29,6 +29,8 @@ pub struct RunRecord {
     pub leave_out: f32,
     /// Transmittance at which rays may end: no channel changes by more than this times its range.
     pub settled: f32,
+    /// What was doubtful about the photographs.
+    pub warnings: Vec<String>,
     /// Names of the source views.
     pub sources: Vec<String>,
     /// Times of what all frames share.

@@ -3,9 +3,11 @@
 use crate::device::Device;
 use crate::few_shot::{FewShot, Target};
 use crate::field::{Field, FieldError, Rendered};
-use crate::photographs::{Album, BackgroundChoice, PhotographsError, SourceImages, to_rgb8};
+use crate::photographs::{
+    Album, BackgroundChoice, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8,
+};
 use crate::progress::Progress;
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Scene, SceneError, View};
 use crate::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
 use crate::weighting::Weighting;
 use image::RgbImage;
@@ -152,22 +154,25 @@ impl Truth {
     }
 }
 
-/// The ratio of the working size to the size of the scene's first view, checked.
+/// The longest side of the pictures of a run: what was asked for, or that of the largest photograph, at most
+/// [`LONGEST_DEFAULT_SIDE`].
 ///
 /// # Errors
 /// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
-pub fn working_scale<E: std::error::Error>(scene: &Scene, options: &RenderOptions) -> Result<f32, RenderError<E>> {
-    let Some(view) = scene.views.first() else { return Ok(1.0) };
-    let (view_width, view_height) = (view.camera.pinhole.width(), view.camera.pinhole.height());
+pub fn working_side<E: std::error::Error>(scene: &Scene, options: &RenderOptions) -> Result<u32, RenderError<E>> {
     let Some([width, height]) = options.size else {
-        return Ok((LONGEST_DEFAULT_SIDE as f32 / view_width.max(view_height) as f32).min(1.0));
+        let largest = scene.views.iter().map(|view| longest_side(&view.camera)).max();
+        return Ok(largest.unwrap_or(LONGEST_DEFAULT_SIDE).min(LONGEST_DEFAULT_SIDE));
     };
-    view.camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
-    let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
-    if fitting_height.abs_diff(height) > 1 {
-        return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
+    if let Some(View { camera, .. }) = scene.views.first() {
+        let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
+        camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
+        if fitting_height.abs_diff(height) > 1 {
+            return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
+        }
     }
-    Ok(width as f32 / view_width as f32)
+    Ok(width.max(height))
 }
 
 /// A set of sources on a device: everything that no weighting and no target changes.
@@ -177,7 +182,7 @@ pub struct Stage<'a, D: Device, F: Field<D>> {
     device: &'a D,
     field: &'a F,
     options: &'a RenderOptions,
-    scale: f32,
+    side: u32,
     sources: SourcePoses,
     /// The sources at working size.
     pub images: SourceImages,
@@ -202,16 +207,18 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
-        let scale = working_scale(scene, options)?;
+        let side = working_side(scene, options)?;
         let mut times = StageTimes::default();
-        // Enlarging the sources would add pixels but no detail.
-        let images = timed(&mut times.photographs, || album.sources(sources, scale.min(1.0), options.background))?;
+        let images = timed(&mut times.photographs, || album.sources(sources, side, options.background))?;
+        if let Some(warning) = &images.warning {
+            progress.warn(&format!("{}: {warning}", scene.path.display()));
+        }
         let prepared =
             timed(&mut times.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
                 FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
                 error => error.into(),
             })?;
-        Ok(Stage { scene, album, device, field, options, scale, sources: source_poses, images, prepared, times })
+        Ok(Stage { scene, album, device, field, options, side, sources: source_poses, images, prepared, times })
     }
 
     /// Encodes the sources under a weighting: each source as a target of the others.
@@ -279,7 +286,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError<D::Error>> {
         let (width, height) = match (self.options.size, self.scene.views.first()) {
             (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
-            _ => crate::photographs::scaled_size(camera, self.scale),
+            (Some(_), _) => scaled_size(camera, self.side),
+            (None, _) => reduced_size(camera, self.side),
         };
         let pinhole =
             camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
@@ -330,7 +338,8 @@ pub fn render<D: Device, F: Field<D>, X: From<RenderError<D::Error>>>(
     mut deliver: impl FnMut(&SourceImages, Frame) -> Result<(), X>,
 ) -> Result<StageTimes, X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
-    let album = Album::open(scene, job.sources.iter().copied().chain(truths)).map_err(RenderError::from)?;
+    let shown = job.sources.iter().copied().chain(truths);
+    let album = Album::open(scene, shown, progress).map_err(RenderError::from)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, device, field, options, progress)?;
     let latents = stage.encode(weighting, progress)?;
     for target in &job.targets {

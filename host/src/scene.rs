@@ -125,16 +125,23 @@ impl Scene {
     /// whole number, the one view whose name ends in that number, leading zeros aside.
     ///
     /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. It never is a position in
-    /// [`Scene::views`]: some data sets count from 1 and some from 0. `None` if no view fits or, by number, several do.
+    /// [`Scene::views`]: some data sets count from 1 and some from 0. Of a photograph and a target pose of the same
+    /// number the photograph is meant. `None` if no view fits or, by number, several do.
     pub fn view_named(&self, text: &str) -> Option<usize> {
         if let Some(view) = self.views.iter().position(|view| view.name == text) {
             return Some(view);
         }
         let wanted = trailing_number(text).filter(|_| text.bytes().all(|byte| byte.is_ascii_digit()))?;
-        let fits = |view: &View| trailing_number(&view.name) == Some(wanted);
-        let mut found = self.views.iter().enumerate().filter(|(_, view)| fits(view)).map(|(index, _)| index);
-        let first = found.next()?;
-        if found.next().is_none() { Some(first) } else { None }
+        let fitting = |has_image: bool| {
+            let fits =
+                move |view: &View| view.image.is_some() == has_image && trailing_number(&view.name) == Some(wanted);
+            let mut found = self.views.iter().enumerate().filter(move |(_, view)| fits(view)).map(|(index, _)| index);
+            (found.next(), found.next())
+        };
+        match (fitting(true), fitting(false)) {
+            ((Some(view), None), _) | ((None, _), (Some(view), None)) => Some(view),
+            _ => None,
+        }
     }
 }
 

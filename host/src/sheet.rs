@@ -44,8 +44,8 @@ impl Sheet {
     /// Draws the page.
     pub fn draw(mut self) -> RgbImage {
         self.sources.sort_by(|a, b| b.weight.total_cmp(&a.weight));
-        let hidden = self.sources.len().saturating_sub(SOURCES_SHOWN);
-        self.sources.truncate(SOURCES_SHOWN);
+        let hidden = self.sources.split_off(self.sources.len().min(SOURCES_SHOWN));
+        let hidden_left_out = hidden.iter().filter(|source| source.weight == 0.0).count();
         let thumbnails: Vec<RgbImage> = self.sources.iter().map(|source| thumbnail(&source.picture)).collect();
         let cell_width = thumbnails.iter().map(RgbImage::width).max().unwrap_or(THUMBNAIL_HEIGHT) + GAP;
         let cell_height = THUMBNAIL_HEIGHT + BAR + 2 * LINE_HEIGHT + GAP;
@@ -85,11 +85,17 @@ impl Sheet {
             let weight = if source.weight > 0.0 { format!("{:.4}", source.weight) } else { "left out".to_owned() };
             let text_top = below + BAR as i32 + 2;
             canvas.text(x, text_top, &weight, if source.weight > 0.0 { INK } else { GREY });
-            canvas.text(x, text_top + LINE_HEIGHT as i32, &source.name, GREY);
+            let name = end_of(&source.name, ((cell_width - GAP) / CHARACTER_WIDTH) as usize);
+            canvas.text(x, text_top + LINE_HEIGHT as i32, &name, GREY);
         }
-        if hidden > 0 {
+        if !hidden.is_empty() {
             let y = results_top - LINE_HEIGHT - GAP;
-            canvas.text(MARGIN as i32, y as i32, &format!("and {hidden} more sources of smaller weight"), GREY);
+            canvas.text(
+                MARGIN as i32,
+                y as i32,
+                &format!("and {} more of smaller weight, {hidden_left_out} of them left out", hidden.len()),
+                GREY,
+            );
         }
         for (index, (label, picture)) in results.iter().enumerate() {
             let x = (MARGIN + index as u32 * result_cell) as i32;
@@ -100,6 +106,16 @@ impl Sheet {
         }
         canvas.into_image()
     }
+}
+
+/// A name that fits into so many characters: the end of a long one, where names of one series differ.
+fn end_of(name: &str, most: usize) -> String {
+    let length = name.chars().count();
+    if length <= most {
+        return name.to_owned();
+    }
+    let kept: String = name.chars().skip(length + 2 - most.max(2)).collect();
+    format!("..{kept}")
 }
 
 fn thumbnail(picture: &RgbImage) -> RgbImage {

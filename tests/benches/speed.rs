@@ -7,6 +7,8 @@
 //!   (25 operations): about 100 operations and 80 bytes a view. The maps of 15 views at 160x120 are 5.8 MB, so the
 //!   look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
 //! - `prepare`, `encode`, `render`: the stages of the sample scene at its own size, on all cores.
+//! - with `VIEWFUSE_BENCH_SCENE=FOLDER`: the first view of that scene from all others at 160 pixels across, from the
+//!   photographs in memory to the picture, on all cores.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -65,7 +67,7 @@ fn weights(criterion: &mut Criterion) {
 fn stages(criterion: &mut Criterion) {
     let scene = Scene::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/toy")).expect("the sample scene");
     let sources: Vec<usize> = (0..20).collect();
-    let album = Album::open(&scene, 0..scene.views.len()).expect("its photographs");
+    let album = Album::open(&scene, 0..scene.views.len(), &Progress::hidden()).expect("its photographs");
     let options = RenderOptions::default();
     let weighting = Weighting::default_scheme();
     let progress = Progress::hidden();
@@ -118,5 +120,29 @@ fn stages(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, weights, stages);
+/// The whole way for a scene of one's own.
+fn own_scene(criterion: &mut Criterion) {
+    let Some(path) = std::env::var_os("VIEWFUSE_BENCH_SCENE") else { return };
+    let scene = Scene::open(Path::new(&path)).expect("the scene of VIEWFUSE_BENCH_SCENE");
+    let sources: Vec<usize> = (1..scene.views.len()).collect();
+    let progress = Progress::hidden();
+    let album = Album::open(&scene, 0..scene.views.len(), &progress).expect("its photographs");
+    let pinhole = scene.views[0].camera.pinhole;
+    let size = [160, (160.0 * pinhole.height() as f32 / pinhole.width() as f32).round() as u32];
+    let options = RenderOptions { size: Some(size), ..RenderOptions::default() };
+    let (weighting, field, target) = (Weighting::default_scheme(), PhotoField::default(), target_of(&scene, 0));
+    let mut group = criterion.benchmark_group(format!("own scene, {} sources", sources.len()));
+    group.sample_size(10);
+    group.bench_function(format!("photographs to picture, {}x{}", size[0], size[1]), |bencher| {
+        bencher.iter(|| {
+            let mut stage =
+                Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &progress).expect("prepared");
+            let latents = stage.encode(&weighting, &progress).expect("encoded");
+            black_box(stage.frame(&weighting, &latents, &target, &progress).expect("rendered"))
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, weights, stages, own_scene);
 criterion_main!(benches);

@@ -2,7 +2,7 @@
 
 use super::{done, numbers, texts};
 use serde_json::Value;
-use viewfuse_tests::command::{change_poses, names_in, toy};
+use viewfuse_tests::command::{change_poses, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
 
 fn inspection(folder: &Folder) -> Value {
@@ -80,4 +80,23 @@ fn two_views_from_one_place() {
     let scene = toy();
     std::fs::copy(scene.path().join("toy/pose/000003.txt"), scene.path().join("toy/pose/000007.txt")).expect("a copy");
     assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
+}
+
+#[test]
+fn a_background_of_many_colours() {
+    let scene = toy();
+    for name in names_in(&scene.file("toy/rgb")) {
+        let path = scene.file(&format!("toy/rgb/{name}"));
+        let object = image::open(&path).expect("a photograph").to_rgba8();
+        let cluttered = image::RgbImage::from_fn(object.width(), object.height(), |x, y| {
+            let pixel = object.get_pixel(x, y);
+            let behind = [(x * 37 % 256) as u8, (y * 53 % 256) as u8, ((x + y) * 29 % 256) as u8];
+            if pixel[3] > 127 { image::Rgb([pixel[0], pixel[1], pixel[2]]) } else { image::Rgb(behind) }
+        });
+        cluttered.save(&path).expect("a photograph");
+    }
+    assert_warns(&scene, "not of one colour", 1);
+    let outcome = run(env!("CARGO_BIN_EXE_viewfuse"), scene.path(), "render toy --targets 20 --size 32x32 -o out");
+    let warnings = outcome.stderr.lines().filter(|line| line.contains("not of one colour")).count();
+    assert_eq!(warnings, 1, "{}", outcome.stderr);
 }

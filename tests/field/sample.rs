@@ -91,7 +91,7 @@ fn frame(leave_out: f32) -> (Frame, image::RgbImage) {
     let scene = Scene::open(sample_folder()).expect("the sample");
     let sources: Vec<usize> = (0..20).step_by(3).collect();
     let options = RenderOptions { size: Some([48, 48]), leave_out, ..RenderOptions::default() };
-    let album = Album::open(&scene, 0..24).expect("photographs");
+    let album = Album::open(&scene, 0..24, &Progress::hidden()).expect("photographs");
     let (field, quiet) = (PhotoField::default(), Progress::hidden());
     let mut stage = Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &quiet).expect("a stage");
     let weighting = scheme("error:alpha=1");
@@ -127,9 +127,9 @@ fn a_photograph_of_nothing_is_named() {
     let folder = flattened_sample();
     RgbaImage::from_pixel(128, 128, Rgba([255; 4])).save(folder.file("rgb/000007.png")).expect("a photograph");
     let scene = Scene::open(folder.path()).expect("a scene");
-    let album = Album::open(&scene, 0..20).expect("photographs");
+    let album = Album::open(&scene, 0..20, &Progress::hidden()).expect("photographs");
     let sources: Vec<usize> = (0..20).collect();
-    match album.sources(&sources, 1.0, BackgroundChoice::Auto) {
+    match album.sources(&sources, 128, BackgroundChoice::Auto) {
         Err(PhotographsError::NoSilhouette { path, colour }) => {
             assert!(path.ends_with("000007.png"), "{path}");
             assert!(colour.contains("255,255,255"), "{colour}");

@@ -218,7 +218,7 @@ fn min_u32(a: u32, b: u32) -> u32 {
     if a < b { a } else { b }
 }
 
-/// Reach of [`NEIGHBOURS`] in pixels.
+/// Reach in pixels of the neighbours whose depths a pixel's should resemble.
 pub const NEIGHBOUR_REACH: u32 = 2;
 /// Where the neighbours are whose depths a pixel's should resemble: columns and rows.
 const NEIGHBOURS: [[i32; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-2, -2], [2, -2], [-2, 2], [2, 2]];

@@ -47,11 +47,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options();
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let mut all: Vec<(String, Score)> = Vec::new();
-    for path in &arguments.scenes {
-        let scene = Scene::open(path)?;
+    // All are opened before the first is computed: a wrong path shows at once.
+    let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    for (path, scene) in arguments.scenes.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
         let scores = on_threads(arguments.picture.threads, || {
-            evaluate(&scene, &selection, &weightings, &Cpu, &PhotoField::default(), &options, &progress)
+            evaluate(scene, &selection, &weightings, &Cpu, &PhotoField::default(), &options, &progress)
         })??;
         drop(progress);
         print_table(&path.display().to_string(), &means(&scores))?;

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use viewfuse::files::{check_writable, write_png};
 use viewfuse::inspect::{Inspection, camera_map, inspect};
 use viewfuse::photographs::BackgroundChoice;
+use viewfuse::progress::Progress;
 use viewfuse::scene::Scene;
 
 #[derive(Args)]
@@ -29,7 +30,9 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
-    let inspection = inspect(&scene, arguments.background);
+    let progress = Progress::new("reading");
+    let inspection = inspect(&scene, arguments.background, &progress)?;
+    drop(progress);
     if arguments.json {
         say(format_args!("{}", serde_json::to_string_pretty(&inspection)?))?;
     } else {

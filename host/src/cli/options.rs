@@ -21,8 +21,8 @@ pub(crate) struct PictureOptions {
     #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SETTLED, value_parser = parse_share)]
     settled: f32,
     /// Work on this many threads [default: all cores]
-    #[arg(long, value_name = "N", value_parser = parse_count)]
-    pub(crate) threads: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) threads: Option<u16>,
 }
 
 impl PictureOptions {

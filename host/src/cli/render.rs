@@ -85,7 +85,7 @@ impl Run<'_> {
         let progress = Progress::new("rendering");
         let mut frames = Vec::new();
         let mut frame_time = Duration::ZERO;
-        let (mut size, mut background) = ([0, 0], [0.0; 3]);
+        let (mut size, mut background, mut warning) = ([0, 0], [0.0; 3], None);
         let stages = render(
             self.scene,
             self.job,
@@ -98,6 +98,7 @@ impl Run<'_> {
                 frame_time += frame.time;
                 size = [frame.picture.width(), frame.picture.height()];
                 background = sources.background;
+                warning.clone_from(&sources.warning);
                 if frames.is_empty() {
                     remove_if_there(&record_path)?;
                 }
@@ -118,6 +119,7 @@ impl Run<'_> {
             background: background_record(self.options, background),
             leave_out: self.options.leave_out,
             settled: self.options.settled,
+            warnings: warning.into_iter().collect(),
             sources: names,
             times: times_record(self.open_time, stages, frame_time, self.start.elapsed()),
             frames,
@@ -190,6 +192,7 @@ fn summary(frame: &FrameRecord, folder: &Path) -> String {
     };
     let left_out = match frame.left_out.len() {
         0 => String::new(),
+        1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
         count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
     };
     format!("{}{score}{left_out}", folder.join(format!("{}.png", frame.target)).display())

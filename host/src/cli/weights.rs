@@ -41,6 +41,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let job = arguments.sources.to_selection(Some(&arguments.target), None).resolve(&scene, 1)?;
     let poses: Vec<_> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();
     let sources = Sources::<MOST_SOURCES>::new(&poses)?;
+    let mut documents = Vec::new();
     for target in &job.targets {
         let columns: Vec<(String, Vec<f32>)> = weightings
             .iter()
@@ -50,10 +51,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             })
             .collect();
         if arguments.json {
-            say(format_args!("{}", serde_json::to_string_pretty(&as_json(&scene, &job, target, &columns))?))?;
+            documents.push(as_json(&scene, &job, target, &columns));
         } else {
             print_table(&scene, &job, target, &columns)?;
         }
+    }
+    if arguments.json {
+        // One target is the rule; several become a list.
+        let document = if documents.len() == 1 { documents.remove(0) } else { documents.into() };
+        say(format_args!("{}", serde_json::to_string_pretty(&document)?))?;
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -65,6 +65,23 @@ impl fmt::Display for BackgroundChoice {
     }
 }
 
+/// The border of a photograph: its colour and how far its pixels stray from that.
+pub(super) struct Border {
+    colour: [f32; 3],
+    noise: f32,
+}
+
+impl Border {
+    /// `None` for a photograph whose alpha channel says what is background.
+    pub(super) fn of(photograph: &Photograph, choice: BackgroundChoice) -> Option<Border> {
+        let given = match choice {
+            BackgroundChoice::Colour(colour) => Some(colour),
+            BackgroundChoice::Auto => None,
+        };
+        (!photograph.has_alpha).then(|| border(photograph, given))
+    }
+}
+
 /// What is behind the object in all photographs of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Backdrop {
@@ -73,29 +90,36 @@ pub(super) struct Backdrop {
     threshold: f32,
     /// Whether each photograph's own border colour is its background.
     from_border: bool,
+    /// How far the typical border strays from one colour.
+    noise: f32,
 }
 
 impl Backdrop {
     /// Looks at the borders of all photographs together: the colour is the median over them, the threshold follows the
     /// noise of the typical one.
-    pub(super) fn of<'a>(photographs: impl Iterator<Item = &'a Photograph>, choice: BackgroundChoice) -> Backdrop {
-        let opaque: Vec<&Photograph> = photographs.filter(|photograph| !photograph.has_alpha).collect();
-        let given = match choice {
-            BackgroundChoice::Colour(colour) => Some(colour),
-            BackgroundChoice::Auto => None,
+    pub(super) fn of(borders: impl Iterator<Item = Border>, choice: BackgroundChoice) -> Backdrop {
+        let borders: Vec<Border> = borders.collect();
+        let median_colour =
+            || [0, 1, 2].map(|channel| median(borders.iter().map(|border| border.colour[channel]).collect()));
+        let (colour, from_border) = match choice {
+            BackgroundChoice::Colour(colour) => (colour, false),
+            BackgroundChoice::Auto if borders.is_empty() => ([1.0; 3], false),
+            BackgroundChoice::Auto => (median_colour(), true),
         };
-        let borders: Vec<([f32; 3], f32)> = opaque.iter().map(|photograph| border(photograph, given)).collect();
-        if borders.is_empty() {
-            return Backdrop { colour: given.unwrap_or([1.0; 3]), threshold: THRESHOLD.0, from_border: false };
-        }
-        let noise = median(borders.iter().map(|(_, noise)| *noise).collect());
-        Backdrop {
-            colour: given.unwrap_or_else(|| {
-                [0, 1, 2].map(|channel| median(borders.iter().map(|(colour, _)| colour[channel]).collect()))
-            }),
-            threshold: (NOISE_FACTOR * noise).clamp(THRESHOLD.0, THRESHOLD.1),
-            from_border: given.is_none(),
-        }
+        let noise = median(borders.iter().map(|border| border.noise).collect());
+        Backdrop { colour, threshold: (NOISE_FACTOR * noise).clamp(THRESHOLD.0, THRESHOLD.1), from_border, noise }
+    }
+
+    /// What is doubtful about it: borders that stray further than any threshold allows for.
+    pub(super) fn warning(&self) -> Option<String> {
+        (NOISE_FACTOR * self.noise > THRESHOLD.1).then(|| {
+            format!(
+                "the photographs' borders are not of one colour (they stray by {:.0} of 255 from {self}): the object \
+                 cannot be told from such a background; photograph before a plain one, or cut the object out (PNG with \
+                 alpha)",
+                self.noise * 255.0
+            )
+        })
     }
 
     /// Red, green, blue in `[0, 1]`.
@@ -124,7 +148,7 @@ pub(super) fn premultiplied(photograph: &Photograph, backdrop: &Backdrop) -> Vec
             })
             .collect();
     }
-    let behind = if backdrop.from_border { border(photograph, None).0 } else { backdrop.colour };
+    let behind = if backdrop.from_border { border(photograph, None).colour } else { backdrop.colour };
     let alphas = silhouette(photograph, behind, backdrop.threshold);
     photograph
         .pixels
@@ -150,7 +174,7 @@ pub(super) fn laid_over(photograph: &Photograph, background: [f32; 3]) -> Vec<[f
 }
 
 /// Colour of a photograph's border (the median of each channel, unless given) and its noise around it.
-fn border(photograph: &Photograph, given: Option<[f32; 3]>) -> ([f32; 3], f32) {
+fn border(photograph: &Photograph, given: Option<[f32; 3]>) -> Border {
     let (width, height) = photograph.pixels.dimensions();
     let at_border = |x: u32, y: u32| x < BORDER || y < BORDER || x + BORDER >= width || y + BORDER >= height;
     let pixels: Vec<[f32; 3]> = photograph
@@ -164,7 +188,7 @@ fn border(photograph: &Photograph, given: Option<[f32; 3]>) -> ([f32; 3], f32) {
     let mut distances: Vec<f32> = pixels.iter().map(|pixel| distance(*pixel, colour)).collect();
     distances.sort_by(f32::total_cmp);
     let noise = distances[((distances.len() as f64 * NOISE_SHARE) as usize).min(distances.len() - 1)];
-    (colour, noise)
+    Border { colour, noise }
 }
 
 /// Alpha of every pixel: 0 for background, 1 inside the object, fractions on its edge.

@@ -8,11 +8,12 @@ use crate::sources::{MOST_SOURCES, SourceWeights};
 use safetensors::{Dtype, SafeTensors};
 use std::convert::Infallible;
 use std::path::Path;
-use viewfuse_core::attention::published_cross_attention;
+use viewfuse_core::attention::{EMBEDDING, PoseEmbedding, published_cross_attention};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 
 const TOLERANCE: f64 = 1.0e-5;
+const EMBEDDING_TENSOR: &str = "attention_embedding.paper_fourier";
 
 /// Compares what is there; returns the names of the tensors that were used.
 pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -> Result<Vec<String>, VerifyError> {
@@ -39,6 +40,18 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
         Sources::<MOST_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", error.to_string()))?;
     let targets = poses("attention_tgt")?;
     let mut covered = vec!["attention_src".to_owned(), "attention_tgt".to_owned()];
+    if let Some(reference) = floats(file, EMBEDDING_TENSOR).filter(|values| values.len() == EMBEDDING * targets.len()) {
+        let Ok(model) = AttentionModel::fourier(&mut prefixed(""));
+        if let AttentionModel::Fourier(embedding) = model {
+            let mut quantity = Quantity::new("attention: embedding of paper_fourier", Measure::Absolute, TOLERANCE);
+            for (index, (target, expected)) in targets.iter().zip(reference.chunks_exact(EMBEDDING)).enumerate() {
+                let ours = embedding.embed(target).map(f64::from);
+                quantity.compare_all(ours, expected.iter().copied().map(f64::from), &format!("target {index}"));
+            }
+            report.quantities.push(quantity);
+            covered.push(EMBEDDING_TENSOR.to_owned());
+        }
+    }
     for (variant, model) in variants() {
         let name = format!("attention_weights.{variant}");
         if file.tensor(&name).is_err() {
@@ -70,11 +83,13 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
     Ok(covered)
 }
 
+/// Parameters by formula, their names behind a prefix.
+fn prefixed(prefix: &'static str) -> impl FnMut(&str, &[usize]) -> Result<Vec<f32>, Infallible> {
+    move |name, shape| Ok(formula::tensor(&format!("{prefix}{name}"), shape))
+}
+
 /// Names of the variants in the file, with their parameters; the published cross attention has none.
 fn variants() -> [(&'static str, Option<AttentionModel>); 5] {
-    fn prefixed(prefix: &'static str) -> impl FnMut(&str, &[usize]) -> Result<Vec<f32>, Infallible> {
-        move |name, shape| Ok(formula::tensor(&format!("{prefix}{name}"), shape))
-    }
     let Ok(fourier) = AttentionModel::fourier(&mut prefixed(""));
     let Ok(flat) = AttentionModel::flat(&mut prefixed(""));
     let Ok(learned) = AttentionModel::learned_cross(&mut prefixed("learned_cross_attention."));
