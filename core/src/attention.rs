@@ -108,6 +108,7 @@ pub trait PoseEmbedding {
 /// The paper's embedding: Fourier features of the centre and the view direction through three linear layers with ReLU
 /// between them (none after the last).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct FourierEmbedding {
     /// Features to hidden.
     pub first: Linear<POSE_FEATURES, HIDDEN>,
@@ -125,6 +126,7 @@ impl PoseEmbedding for FourierEmbedding {
 
 /// The paper's second embedding: the 16 entries of the pose, row by row, through two linear layers with ReLU between.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct FlatEmbedding {
     /// Pose entries to hidden.
     pub first: Linear<16, HIDDEN>,
@@ -165,6 +167,7 @@ pub fn published_cross_attention<const S: usize>(sources: &Sources<S>, target: &
 
 /// Parameters of the published learned cross attention.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct LearnedCrossAttention {
     /// Applied to the target's features (no bias).
     pub query: Linear<POSE_FEATURES, POSE_FEATURES>,
@@ -185,6 +188,7 @@ pub fn learned_cross_attention<const S: usize>(
 /// Parameters of the published relative-pose self attention (PyTorch's `MultiheadAttention` with [`HEADS`] heads and a
 /// linear map to one logit).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
 pub struct PoseSelfAttention {
     /// Rows 0..42 of `in_proj`.
     pub query: Linear<POSE_FEATURES, POSE_FEATURES>,
