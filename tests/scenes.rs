@@ -189,3 +189,17 @@ fn pixels_that_are_not_there() {
     folder.image("rgb/2.png", 12, 16);
     assert!(matches!(scene.photograph(0), Err(SceneError::SizeMismatch { width: 12, height: 16, .. })));
 }
+
+#[test]
+fn views_numbered_alike_in_two_folders_are_told_apart() {
+    let mut transforms = scenes::transforms();
+    let frame = |path: &str| serde_json::json!({ "file_path": path, "transform_matrix": scenes::opengl_matrix() });
+    transforms["frames"] = serde_json::json!([frame("left/0001.png"), frame("right/0001.png"), frame("left/0002.png")]);
+    let folder = scenes::transforms_folder(&transforms);
+    for name in ["left/0001.png", "right/0001.png", "left/0002.png"] {
+        folder.image(name, 16, 12);
+    }
+    let scene = open(&folder);
+    let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(names, ["left_0001", "right_0001", "0002"]);
+}

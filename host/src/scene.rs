@@ -4,7 +4,7 @@
 //! counts, finite and rigid poses, sizes. The pixels of a view are read when they are first needed
 //! ([`Scene::photograph`]), so that a command that needs only poses touches no image.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -81,11 +81,12 @@ impl Scene {
     pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
         let path = path.as_ref();
         let (layout, file) = recognise(path)?;
-        let views = match layout {
+        let mut views = match layout {
             Layout::Srn => srn::read(&file),
             Layout::Transforms => transforms::read(&file),
             Layout::Middlebury => middlebury::read(&file),
         }?;
+        distinguish(&mut views);
         let mut names = HashSet::new();
         for view in &views {
             if !names.insert(view.name.as_str()) {
@@ -141,6 +142,22 @@ impl Scene {
         match (fitting(true), fitting(false)) {
             ((Some(view), None), _) | ((None, _), (Some(view), None)) => Some(view),
             _ => None,
+        }
+    }
+}
+
+/// Views of several cameras are often numbered alike in a folder each: those get the folder's name in front of theirs.
+fn distinguish(views: &mut [View]) {
+    let folder_of = |view: &View| view.image.as_deref().and_then(Path::parent).map(Path::to_path_buf);
+    let mut folders: HashMap<String, Vec<PathBuf>> = HashMap::new();
+    for view in views.iter() {
+        folders.entry(view.name.clone()).or_default().extend(folder_of(view));
+    }
+    for view in views.iter_mut() {
+        let all = &folders[&view.name];
+        let differ = all.iter().collect::<HashSet<_>>().len() == all.len();
+        if let Some(folder) = folder_of(view).as_deref().and_then(Path::file_name).filter(|_| all.len() > 1 && differ) {
+            view.name = format!("{}_{}", folder.to_string_lossy(), view.name);
         }
     }
 }
