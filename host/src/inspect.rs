@@ -6,7 +6,7 @@ use crate::interrupt::{self, Interrupted};
 use crate::photographs::{Album, BackgroundChoice};
 use crate::progress::Progress;
 use crate::rig::Rig;
-use crate::scene::{Layout, Scene};
+use crate::scene::{Layout, Scene, View};
 use crate::sources::MOST_SOURCES;
 use image::RgbImage;
 use serde::Serialize;
@@ -127,11 +127,15 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
             rig.distance, USUAL_DISTANCES.0, USUAL_DISTANCES.1
         ));
     }
-    for (index, view) in scene.views.iter().enumerate() {
-        let same = scene.views[..index].iter().find(|other| other.camera.pose == view.camera.pose);
-        if let Some(other) = same {
-            warnings.push(format!("views '{}' and '{}' have the same pose", other.name, view.name));
-        }
+    let twin = |(index, view): (usize, &View)| {
+        let other = scene.views[..index].iter().find(|other| other.camera.pose == view.camera.pose)?;
+        Some((other.name.clone(), view.name.clone()))
+    };
+    let twins: Vec<(String, String)> = scene.views.iter().enumerate().filter_map(twin).collect();
+    if let Some((first, second)) = twins.first() {
+        let more =
+            if twins.len() > 1 { format!(", and so have {} more views", twins.len() - 1) } else { String::new() };
+        warnings.push(format!("views '{first}' and '{second}' have the same pose{more}"));
     }
     let first = &scene.views[0].camera.pinhole;
     if let Some(view) = scene.views.iter().find(|view| {

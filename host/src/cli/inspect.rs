@@ -48,22 +48,26 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 fn print_text(inspection: &Inspection) -> std::io::Result<()> {
-    let point = |p: [f32; 3]| format!("({:.4}, {:.4}, {:.4})", p[0], p[1], p[2]);
     let i = inspection;
+    // Four decimals of the scene's own unit: of one that is measured in thousandths, all would be zeros.
+    let usual = (0.1..1.0e4).contains(&i.distances[1]);
+    let number = |x: f32| if usual { format!("{x:.4}") } else { format!("{x:.4e}") };
+    let point = |p: [f32; 3]| format!("({}, {}, {})", number(p[0]), number(p[1]), number(p[2]));
     say(format_args!("scene      {} ({})", i.path, i.layout))?;
     say(format_args!("views      {} photographs, {} target poses without one", i.photograph_count, i.target_count))?;
     say(format_args!(
         "image      {}x{}, focal {:.2} {:.2}, principal point {:.2} {:.2}",
         i.size[0], i.size[1], i.focal[0], i.focal[1], i.principal[0], i.principal[1]
     ))?;
-    say(format_args!("focus      {}, missed by the axes by {:.4} (root mean square)", point(i.focus), i.axis_miss))?;
-    say(format_args!("distance   {:.4} to {:.4}", i.distances[0], i.distances[1]))?;
+    let miss = number(i.axis_miss);
+    say(format_args!("focus      {}, missed by the axes by {miss} (root mean square)", point(i.focus)))?;
+    say(format_args!("distance   {} to {}", number(i.distances[0]), number(i.distances[1])))?;
     say(format_args!("up         {}", point(i.up)))?;
     match i.object {
         Some([low, high]) => say(format_args!("object     {} to {}", point(low), point(high)))?,
         None => say(format_args!("object     not found"))?,
     }
-    say(format_args!("depth      near {:.4}, far {:.4}", i.near, i.far))?;
+    say(format_args!("depth      near {}, far {}", number(i.near), number(i.far)))?;
     if i.warnings.is_empty() {
         say("warnings   none")?;
     }
