@@ -36,7 +36,7 @@ const THUMBNAIL_HEIGHT: u32 = 96;
 const SOURCES_PER_ROW: usize = 6;
 const BAR: u32 = 4;
 /// Shown sources; further ones have small weights and are only counted.
-const SOURCES_SHOWN: usize = 18;
+const SOURCES_SHOWN: usize = 24;
 /// An absolute error of a quarter of the range is shown in the strongest colour.
 const STRONGEST_ERROR: f32 = 0.25;
 
