@@ -7,7 +7,7 @@
 //!   (25 operations): about 100 operations and 80 bytes a view. The maps of 15 views at 160x120 are 5.8 MB, so the
 //!   look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
 //! - `prepare`, `encode`, `render`: the stages of the sample scene at its own size, on all cores.
-//! - with `VIEWFUSE_BENCH_SCENE=FOLDER`: the first view of that scene from all others at 160 pixels across, from the
+//! - with `VIEWFUSE_BENCH_SCENE=FOLDER` (a full path): the first view of that scene from all others at 160 pixels across, from the
 //!   photographs in memory to the picture, on all cores.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
