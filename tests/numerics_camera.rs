@@ -1,4 +1,4 @@
-//! Cameras and poses: rays and projections are each other's inverse, what can not be seen is masked, what is not a
+//! Cameras and poses: rays and projections are each other's inverse, what cannot be seen is masked, what is not a
 //! camera is refused.
 
 use glam::Vec3;

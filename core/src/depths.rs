@@ -19,7 +19,7 @@ pub const PROBABILITY_FLOOR: f32 = 1.0e-5;
 /// The depth at which the distribution given by `weights` over `N` equal parts of `[near, far]` reaches `u`.
 ///
 /// Within a part the distribution is uniform. Negative and NaN weights count as 0, those above 1e30 as that. `u` is limited to `[0, 1]`. The
-/// cumulative sum is compared with `u` times its own total, so that it can not end below 1 and the result never leaves
+/// cumulative sum is compared with `u` times its own total, so that it cannot end below 1 and the result never leaves
 /// `[near, far]` (in the published code a sum that rounds below 1 puts samples beyond the end). Increasing in `u`.
 #[inline]
 pub fn inverse_cdf<const N: usize>(near: f32, far: f32, weights: &[f32; N], u: f32) -> f32 {

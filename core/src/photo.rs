@@ -32,7 +32,7 @@ use glam::Vec3;
 pub const NO_SURFACE: f32 = 1.0e30;
 
 /// Visibility of what lies behind a surface: 1 at the surface, falling like a bell with the distance behind it in units
-/// of the bell's width, 0 from two widths on. `(1 - b^2 / 4)^4` follows `exp(-b^2)` to 0.07 and costs a quarter of it.
+/// of the bell's width, 0 from two widths on. `(1 - b^2 / 4)^4` follows `exp(-b^2)` to 0.075 and costs a quarter of it.
 #[inline]
 pub fn fade(behind: f32) -> f32 {
     let rest = crate::math::max(1.0 - 0.25 * behind * behind, 0.0);

@@ -3,7 +3,7 @@
 use crate::pose::Pose;
 use core::fmt;
 
-/// Why poses can not be sources.
+/// Why poses cannot be sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SourcesError {
     /// There is no source at all.

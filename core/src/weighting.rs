@@ -44,7 +44,7 @@ pub enum AngleKind {
     FullRotation = 1,
 }
 
-/// Why a number can not be a parameter of a scheme.
+/// Why a number cannot be a parameter of a scheme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SchemeError {
     /// `alpha` must lie in `[0, 1]`.

@@ -1,6 +1,6 @@
 //! How much each source view counts: a point of the probability simplex.
 //!
-//! [`Weights`] can not hold anything but finite, non-negative numbers that sum to 1. Whatever goes in, also NaN,
+//! [`Weights`] cannot hold anything but finite, non-negative numbers that sum to 1. Whatever goes in, also NaN,
 //! infinities or all zeros, comes out as such numbers, by rules that every constructor states.
 
 use crate::math::{exp, max, min};

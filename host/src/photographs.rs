@@ -133,12 +133,13 @@ impl<'a> Album<'a> {
             Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
         };
         let borders: Vec<_> = views.par_iter().map(look).collect::<Result<_, PhotographsError>>()?;
-        let backdrop = matte::Backdrop::of(borders.into_iter().flatten(), choice);
+        let backdrop = matte::Backdrop::of(borders.iter().flatten(), choice);
         let images = views
             .par_iter()
-            .map(|&view| {
+            .zip(&borders)
+            .map(|(&view, border)| {
                 interrupt::check()?;
-                self.cut_out(view, longest_side, &backdrop)
+                self.cut_out(view, longest_side, border.as_ref(), &backdrop)
             })
             .collect::<Result<_, PhotographsError>>()?;
         Ok(SourceImages { images, background: backdrop.colour(), warning: backdrop.warning() })
@@ -148,6 +149,7 @@ impl<'a> Album<'a> {
         &self,
         view: usize,
         longest_side: u32,
+        border: Option<&matte::Border>,
         backdrop: &matte::Backdrop,
     ) -> Result<SourceImage, PhotographsError> {
         let View { name, camera, image } = &self.scene.views[view];
@@ -160,7 +162,7 @@ impl<'a> Album<'a> {
             height,
             error,
         })?;
-        let premultiplied = matte::premultiplied(&photograph, backdrop);
+        let premultiplied = matte::premultiplied(&photograph, border, backdrop);
         let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
         if opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha) {
             let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
@@ -174,7 +176,7 @@ impl<'a> Album<'a> {
     /// The truth at a view, resampled to a size and laid over a background, rounded to 8 bits.
     ///
     /// # Errors
-    /// [`SceneError`] if it can not be read.
+    /// [`SceneError`] if it cannot be read.
     pub fn truth(&self, view: usize, size: [u32; 2], background: [f32; 3]) -> Result<RgbImage, SceneError> {
         let photograph = self.photograph(view)?;
         let own_size = photograph.pixels.dimensions();

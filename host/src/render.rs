@@ -269,7 +269,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     /// A view's photograph at a size, over the run's background.
     ///
     /// # Errors
-    /// [`RenderError::Scene`] if it can not be read.
+    /// [`RenderError::Scene`] if it cannot be read.
     pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError<D::Error>> {
         Ok(self.album.truth(view, size, self.images.background)?)
     }

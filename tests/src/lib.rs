@@ -1,4 +1,4 @@
-//! What the tests of viewfuse share: scenes built on disk, seeded inputs, comparators that NaN can not slip through,
+//! What the tests of viewfuse share: scenes built on disk, seeded inputs, comparators that NaN cannot slip through,
 //! and the same formulas evaluated in `f64`.
 #![forbid(unsafe_code)]
 

@@ -78,7 +78,7 @@ impl Border {
             BackgroundChoice::Colour(colour) => Some(colour),
             BackgroundChoice::Auto => None,
         };
-        (!photograph.has_alpha).then(|| border(photograph, given))
+        (!photograph.has_alpha).then(|| look_at_border(photograph, given))
     }
 }
 
@@ -97,8 +97,8 @@ pub(super) struct Backdrop {
 impl Backdrop {
     /// Looks at the borders of all photographs together: the colour is the median over them, the threshold follows the
     /// noise of the typical one.
-    pub(super) fn of(borders: impl Iterator<Item = Border>, choice: BackgroundChoice) -> Backdrop {
-        let borders: Vec<Border> = borders.collect();
+    pub(super) fn of<'a>(borders: impl Iterator<Item = &'a Border>, choice: BackgroundChoice) -> Backdrop {
+        let borders: Vec<&Border> = borders.collect();
         let median_colour =
             || [0, 1, 2].map(|channel| median(borders.iter().map(|border| border.colour[channel]).collect()));
         let (colour, from_border) = match choice {
@@ -135,9 +135,10 @@ impl fmt::Display for Backdrop {
     }
 }
 
-/// The photograph as premultiplied RGBA with the background's share taken out.
-pub(super) fn premultiplied(photograph: &Photograph, backdrop: &Backdrop) -> Vec<[f32; 4]> {
-    if photograph.has_alpha {
+/// The photograph as premultiplied RGBA with the background's share taken out; `border` is its own, `None` where its
+/// alpha channel says what is background.
+pub(super) fn premultiplied(photograph: &Photograph, border: Option<&Border>, backdrop: &Backdrop) -> Vec<[f32; 4]> {
+    let Some(border) = border else {
         return photograph
             .pixels
             .pixels()
@@ -147,8 +148,8 @@ pub(super) fn premultiplied(photograph: &Photograph, backdrop: &Backdrop) -> Vec
                 [r, g, b, alpha]
             })
             .collect();
-    }
-    let behind = if backdrop.from_border { border(photograph, None).colour } else { backdrop.colour };
+    };
+    let behind = if backdrop.from_border { border.colour } else { backdrop.colour };
     let alphas = silhouette(photograph, behind, backdrop.threshold);
     photograph
         .pixels
@@ -174,7 +175,7 @@ pub(super) fn laid_over(photograph: &Photograph, background: [f32; 3]) -> Vec<[f
 }
 
 /// Colour of a photograph's border (the median of each channel, unless given) and its noise around it.
-fn border(photograph: &Photograph, given: Option<[f32; 3]>) -> Border {
+fn look_at_border(photograph: &Photograph, given: Option<[f32; 3]>) -> Border {
     let (width, height) = photograph.pixels.dimensions();
     let at_border = |x: u32, y: u32| x < BORDER || y < BORDER || x + BORDER >= width || y + BORDER >= height;
     let pixels: Vec<[f32; 3]> = photograph

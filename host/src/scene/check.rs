@@ -72,7 +72,7 @@ impl Intrinsics {
     /// axis.
     ///
     /// # Errors
-    /// [`SceneError::SizeMismatch`] if the photograph can not be the whole image at another scale.
+    /// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale.
     pub(super) fn pinhole_of(
         &self,
         path: &Path,

@@ -46,7 +46,7 @@ pub enum WriteError {
     },
     /// The layout has one set of intrinsics for all views, with one focal length for both axes.
     #[error(
-        "{path}: view {view} has intrinsics that this layout can not hold beside the first view's",
+        "{path}: view {view} has intrinsics that this layout cannot hold beside the first view's",
         path = .path.display()
     )]
     Intrinsics {
@@ -56,7 +56,7 @@ pub enum WriteError {
         view: usize,
     },
     /// The file system refused.
-    #[error("{path}: can not be written", path = .path.display())]
+    #[error("{path}: cannot be written", path = .path.display())]
     Io {
         /// What was being written.
         path: PathBuf,
@@ -64,7 +64,7 @@ pub enum WriteError {
         source: io::Error,
     },
     /// The picture could not be stored.
-    #[error("{path}: can not be stored as a PNG", path = .path.display())]
+    #[error("{path}: cannot be stored as a PNG", path = .path.display())]
     Png {
         /// What was being written.
         path: PathBuf,

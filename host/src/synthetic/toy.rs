@@ -42,7 +42,7 @@ const ZONE: [f32; 2] = [0.173_648_18, 0.866_025_4];
 /// degrees from its nearest training view, where training views are 25 degrees apart.
 const TEST_PLACES: [[f32; 2]; 4] = [[0.7, 0.5], [2.15, 0.4], [4.1, 0.7], [5.55, 0.6]];
 
-/// Why the sample scene can not be described; with the constants of this file it always can.
+/// Why the sample scene cannot be described; with the constants of this file it always can.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ToyError {
     /// The intrinsics are unusable.

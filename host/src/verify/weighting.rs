@@ -13,9 +13,6 @@ use viewfuse_core::sources::Sources;
 /// Relative difference from the official `f64` weights that passes: our own error is some 1e-6 (see
 /// `viewfuse_core::weighting`), and the official formula's on `f32` poses of nearly equal cameras is as large.
 const TOLERANCE: f64 = 1.0e-5;
-/// Distance from the simplex that passes: rounding of a sum of as many terms as there can be.
-const SIMPLEX_TOLERANCE: f64 = MOST_SOURCES as f64 / 16_777_216.0;
-
 #[derive(Deserialize)]
 struct File {
     cases: Vec<Case>,
@@ -38,6 +35,9 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
         message,
     };
     let file = File::deserialize(json).map_err(|error| content("top level", error.to_string()))?;
+    // Distance from the simplex that passes: the rounding of a sum of as many terms as the file has sources.
+    let most_sources = file.cases.iter().chain(&file.extreme).map(|case| case.src.len()).max().unwrap_or(1);
+    let simplex_tolerance = most_sources as f64 / 16_777_216.0;
     let mut agreement: BTreeMap<String, Quantity> = BTreeMap::new();
     let mut simplex: BTreeMap<String, Quantity> = BTreeMap::new();
     let mut not_covered: Vec<String> = Vec::new();
@@ -61,7 +61,7 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
             let weights = weighting.weigh(&sources, &target);
             let ours = || weights.values()[..poses.len()].iter().map(|&weight| f64::from(weight));
             let on_simplex = simplex.entry(method.clone()).or_insert_with(|| {
-                Quantity::new(format!("{method}: on the simplex"), Measure::Absolute, SIMPLEX_TOLERANCE)
+                Quantity::new(format!("{method}: on the simplex"), Measure::Absolute, simplex_tolerance)
             });
             let negative: f64 = ours().map(|weight| (-weight).max(0.0)).sum();
             on_simplex.compare(ours().sum::<f64>(), 1.0, || case.name.clone());
