@@ -178,8 +178,10 @@ fn lookups_agree_with_f64() {
             }
         }
         let size = SIZE.map(|count| count as u32);
-        tolerance.compare_varying(&bilinear(&grid, size[0], size[1], x, y), &flat).unwrap_or_else(|e| panic!("{e}"));
-        tolerance.compare_varying(&trilinear(&grid, size, x, y, z), &deep).unwrap_or_else(|e| panic!("{e}"));
+        tolerance
+            .compare_varying(&bilinear(&grid[..], size[0], size[1], x, y), &flat)
+            .unwrap_or_else(|e| panic!("{e}"));
+        tolerance.compare_varying(&trilinear(&grid[..], size, x, y, z), &deep).unwrap_or_else(|e| panic!("{e}"));
     }
 }
 
@@ -192,20 +194,20 @@ fn lookups_at_nodes_borders_and_nan() {
         for y in 0..SIZE[1] {
             for x in 0..SIZE[0] {
                 let at = [x, y, z].map(|i| i as f32 + 0.5);
-                assert_eq!(trilinear(&grid, size, at[0], at[1], at[2]), node(x, y, z));
-                assert_eq!(bilinear(&grid, size[0], size[1], at[0], at[1]), node(x, y, 0));
+                assert_eq!(trilinear(&grid[..], size, at[0], at[1], at[2]), node(x, y, z));
+                assert_eq!(bilinear(&grid[..], size[0], size[1], at[0], at[1]), node(x, y, 0));
             }
         }
     }
     for far in [7.0, 6.5, 1.0e9, f32::INFINITY] {
-        assert_eq!(bilinear(&grid, size[0], size[1], far, 2.5), node(6, 2, 0));
+        assert_eq!(bilinear(&grid[..], size[0], size[1], far, 2.5), node(6, 2, 0));
     }
     for low in [0.5, 0.0, -3.0, -1.0e30, f32::NEG_INFINITY, f32::NAN] {
-        assert_eq!(bilinear(&grid, size[0], size[1], low, 2.5), node(0, 2, 0));
-        assert_eq!(trilinear(&grid, size, low, low, low), node(0, 0, 0));
+        assert_eq!(bilinear(&grid[..], size[0], size[1], low, 2.5), node(0, 2, 0));
+        assert_eq!(trilinear(&grid[..], size, low, low, low), node(0, 0, 0));
     }
     for coordinate in [-1.0, 0.5, 0.7, 9.0, f32::NAN] {
-        assert_eq!(bilinear(&grid, 1, 1, coordinate, coordinate), node(0, 0, 0));
-        assert_eq!(trilinear(&grid, [1, 1, 1], coordinate, coordinate, coordinate), node(0, 0, 0));
+        assert_eq!(bilinear(&grid[..], 1, 1, coordinate, coordinate), node(0, 0, 0));
+        assert_eq!(trilinear(&grid[..], [1, 1, 1], coordinate, coordinate, coordinate), node(0, 0, 0));
     }
 }

@@ -10,7 +10,7 @@ mod world;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::NO_SURFACE;
 use viewfuse_core::photo::hull::{hull_alpha, hull_entry};
-use viewfuse_core::photo::march::march;
+use viewfuse_core::photo::march::{MarchBlock, march};
 use viewfuse_core::photo::shade::{JUMP, depth_at, sample};
 use viewfuse_core::photo::sweep::{match_cost, mean_column, pick_depth, sum_row};
 use viewfuse_tests::bounded::{Bounded, Disagreement, compare};
@@ -81,7 +81,7 @@ fn hull_alpha_agrees() {
     let case: Case = |actual, expected, results| {
         for point in expected.points(2000) {
             for least in [0.02, 0.3] {
-                let found = hull_alpha(&actual.object, &actual.views, &actual.texels, point, least);
+                let found = hull_alpha(&actual.object, &actual.views, &actual.texels[..], point, least);
                 results.push(found, oracle::hull_alpha(&expected.scene(), oracle::point(point.into()), least));
             }
         }
@@ -95,7 +95,7 @@ fn hull_entry_agrees() {
     let case: Case = |actual, expected, results| {
         for (view, camera) in (0..).zip(&expected.views) {
             for pixel in 0..camera.width * camera.height {
-                let found = hull_entry(&actual.object, &actual.views, &actual.texels, view, pixel);
+                let found = hull_entry(&actual.object, &actual.views, &actual.texels[..], view, pixel);
                 results.push(found, oracle::hull_entry(&expected.scene(), view, pixel));
             }
         }
@@ -112,7 +112,7 @@ fn match_cost_agrees() {
         for pixel in sweep.first_row * width..(sweep.first_row + sweep.row_count) * width {
             for plane in 0..sweep.plane_count {
                 let World { object, views, texels, entries, pair_weights, .. } = actual;
-                let found = match_cost(object, &sweep, views, texels, entries, pair_weights, pixel, plane);
+                let found = match_cost(object, &sweep, views, &texels[..], &entries[..], pair_weights, pixel, plane);
                 let World { entries, pair_weights, .. } = expected;
                 let scene = expected.scene();
                 results.push(found, oracle::match_cost(&scene, &sweep, entries, pair_weights, pixel, plane));
@@ -160,7 +160,7 @@ fn sum_row_agrees() {
         let (_, _, costs) = band_costs(expected, 1.0);
         for pixel in 0..sweep.row_count * width {
             for plane in 0..sweep.plane_count {
-                let found = sum_row(&sweep, width, &given, pixel, plane);
+                let found = sum_row(&sweep, &given, pixel, plane);
                 let wanted = oracle::sum_row(&sweep, width, &costs, pixel, plane);
                 (0..2).for_each(|part| results.push(found[part], wanted[part]));
             }
@@ -177,10 +177,9 @@ fn mean_column_agrees() {
         let (_, _, costs) = band_costs(expected, 1.0);
         let elements =
             || (0..sweep.row_count * width).flat_map(|pixel| (0..sweep.plane_count).map(move |p| (pixel, p)));
-        let rows: Vec<[f32; 2]> =
-            elements().map(|(pixel, plane)| sum_row(&sweep, width, &given, pixel, plane)).collect();
+        let rows: Vec<[f32; 2]> = elements().map(|(pixel, plane)| sum_row(&sweep, &given, pixel, plane)).collect();
         for (pixel, plane) in elements() {
-            let found = mean_column(&sweep, width, &given, &rows, pixel, plane);
+            let found = mean_column(&sweep, &given, &rows, pixel, plane);
             results.push(found, oracle::mean_column(&sweep, width, &costs, pixel, plane));
         }
     };
@@ -199,7 +198,7 @@ fn pick_depth_agrees() {
         for guess in [&expected.depths[first..], &none[..]] {
             for pixel in 0..sweep.row_count * width {
                 let (found_entries, entries) = (&actual.entries[first..], &expected.entries[first..]);
-                let found = pick_depth(&actual.object, &sweep, width, &given, found_entries, guess, pixel);
+                let found = pick_depth(&actual.object, &sweep, &given, found_entries, guess, pixel);
                 let wanted = oracle::pick_depth(&expected.object, &sweep, width, &means, entries, guess, pixel);
                 results.push(found, wanted);
             }
@@ -218,7 +217,7 @@ fn depth_at_agrees() {
             for _ in 0..1000 {
                 let x = numbers.between(0.0, camera.width as f32);
                 let y = numbers.between(0.0, camera.height as f32);
-                let found = depth_at(camera, &actual.depths, x, y, jump);
+                let found = depth_at(camera, &actual.depths[..], x, y, jump);
                 let at = [x, y, jump].map(Bounded::from);
                 results.push(found, oracle::depth_at(camera, &expected.depths, at[0], at[1], at[2]));
             }
@@ -234,7 +233,7 @@ fn sample_agrees() {
     let case: Case = |actual, expected, results| {
         for point in expected.points(4000) {
             let World { object, views, footprints, texels, depths, weights, .. } = actual;
-            let found = sample(object, views, footprints, texels, depths, weights, point);
+            let found = sample(object, views, footprints, &texels[..], &depths[..], weights, point);
             let World { footprints, depths, weights, .. } = expected;
             let place = oracle::point(point.into());
             let wanted = oracle::sample(&expected.scene(), footprints, depths, weights, place);
@@ -250,7 +249,8 @@ fn sample_agrees() {
 fn march_one(world: &World, target: &CameraBlock, at: [f32; 2], settled: f32) -> [f32; 5] {
     let World { object, views, footprints, texels, depths, weights, .. } = world;
     let background = [1.0, 0.5, 0.25];
-    let seen = march(object, views, footprints, texels, depths, weights, target, at, &background, settled);
+    let block = MarchBlock { target: *target, background, settled };
+    let seen = march(object, views, footprints, &texels[..], &depths[..], weights, &block, at);
     [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity, seen.depth]
 }
 
@@ -290,7 +290,7 @@ fn hull_entry_ends_at_any_focal_length() {
     world.texels.iter_mut().for_each(|texel| texel[3] = 0.15);
     let World { object, views, texels, .. } = &world;
     let pixel = views[0].width * views[0].height / 2;
-    assert_eq!(hull_entry(object, views, texels, 0, pixel), NO_SURFACE);
+    assert_eq!(hull_entry(object, views, &texels[..], 0, pixel), NO_SURFACE);
 }
 
 #[test]

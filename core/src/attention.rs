@@ -9,6 +9,7 @@
 //! inputs in order.
 
 use crate::math::{max, sin_cos, sqrt};
+use crate::pages::{Fetch, StartingAt};
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
@@ -69,6 +70,17 @@ impl<const I: usize, const O: usize> Linear<I, O> {
     /// All parameters zero.
     pub const ZERO: Linear<I, O> = Linear { weight: [[0.0; I]; O], bias: [0.0; O] };
 
+    fn flat(&self) -> impl Iterator<Item = f32> {
+        self.weight.as_flattened().iter().chain(&self.bias).copied()
+    }
+
+    /// Takes the parameters from the front of a list and returns the rest of it.
+    fn take_flat<'a>(&mut self, parameters: &'a [f32]) -> &'a [f32] {
+        let own = self.weight.as_flattened_mut().iter_mut().chain(&mut self.bias);
+        own.zip(parameters).for_each(|(own, parameter)| *own = *parameter);
+        parameters.get(I * O + O..).unwrap_or_default()
+    }
+
     /// `bias + weight x`, each sum from the bias through the inputs in order.
     pub fn apply(&self, x: &[f32; I]) -> [f32; O] {
         let mut y = self.bias;
@@ -118,6 +130,25 @@ pub struct FourierEmbedding {
     pub third: Linear<HIDDEN, EMBEDDING>,
 }
 
+impl FourierEmbedding {
+    /// How many parameters there are.
+    pub const PARAMETERS: usize = size_of::<FourierEmbedding>() / size_of::<f32>();
+
+    /// From its parameters in order: of each layer the weights, then the biases. Missing ones are 0.
+    pub fn from_flat(parameters: &[f32]) -> FourierEmbedding {
+        let mut embedding = FourierEmbedding { first: Linear::ZERO, second: Linear::ZERO, third: Linear::ZERO };
+        let rest = embedding.first.take_flat(parameters);
+        let rest = embedding.second.take_flat(rest);
+        embedding.third.take_flat(rest);
+        embedding
+    }
+
+    /// Its parameters in the order of [`FourierEmbedding::from_flat`].
+    pub fn flat(&self) -> impl Iterator<Item = f32> {
+        self.first.flat().chain(self.second.flat()).chain(self.third.flat())
+    }
+}
+
 impl PoseEmbedding for FourierEmbedding {
     fn embed(&self, pose: &Pose) -> [f32; EMBEDDING] {
         self.third.apply(&self.second.apply_relu(&self.first.apply_relu(&features_of(pose))))
@@ -154,8 +185,40 @@ pub fn cross_attention<const S: usize>(
     target: &Pose,
 ) -> Weights<S> {
     let query = embedding.embed(target);
-    let scale = 1.0 / sqrt(EMBEDDING as f32);
-    softmax_over(sources, |source| dot(&query, &embedding.embed(source)) * scale)
+    softmax_over(sources, |source| scaled_dot(&query, &embedding.embed(source)))
+}
+
+/// The same from embeddings that were computed before: of one pose as `queries[0..EMBEDDING]`, of `count` sources as
+/// `keys[source][EMBEDDING]`, flat. `count` is limited to `[1, S]`.
+pub fn attend<const S: usize>(
+    queries: &(impl Fetch<f32> + ?Sized),
+    keys: &(impl Fetch<f32> + ?Sized),
+    count: u32,
+) -> Weights<S> {
+    const { assert!(S > 0) };
+    let count = count.clamp(1, S as u32);
+    let mut logits = [0.0; S];
+    let mut view = 0;
+    while view < count as usize {
+        logits[view] = scaled_dot(queries, &StartingAt { all: keys, first: view * EMBEDDING });
+        view += 1;
+    }
+    Weights::from_logits(&logits, count)
+}
+
+/// `q . k / sqrt(A)` of two embeddings; the sum runs in order.
+#[inline]
+fn scaled_dot(query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized)) -> f32 {
+    // 1 / sqrt(128) = sqrt(2) / 16
+    const SCALE: f32 = core::f32::consts::SQRT_2 / 16.0;
+    const { assert!(EMBEDDING == 128) };
+    let mut sum = 0.0;
+    let mut feature = 0;
+    while feature < EMBEDDING {
+        sum += query.fetch(feature) * key.fetch(feature);
+        feature += 1;
+    }
+    sum * SCALE
 }
 
 /// The published cross attention without parameters: softmax of the dot products of the pose features themselves. Raw

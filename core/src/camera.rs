@@ -5,7 +5,8 @@
 //! `[0, width] x [0, height]`.
 
 use crate::math::abs;
-use crate::pose::Pose;
+use crate::pose::{Pose, PoseBlock};
+use bytemuck::{Pod, Zeroable};
 use core::fmt;
 use glam::Vec3;
 
@@ -169,13 +170,9 @@ impl Camera {
     /// The camera as plain data for kernels. `first_texel` is where its image starts in a buffer of several images.
     #[inline]
     pub fn block(&self, first_texel: u32) -> CameraBlock {
-        let (right, down, forward) = (self.pose.right_world(), self.pose.down_world(), self.pose.forward_world());
-        let centre = self.pose.centre_world();
         let Pinhole { focal, principal, width, height } = self.pinhole;
         CameraBlock {
-            right: [right.x, right.y, right.z, centre.x],
-            down: [down.x, down.y, down.z, centre.y],
-            forward: [forward.x, forward.y, forward.z, centre.z],
+            pose: self.pose.block(),
             intrinsics: [focal[0], focal[1], principal[0], principal[1]],
             width,
             height,
@@ -186,15 +183,11 @@ impl Camera {
 }
 
 /// A camera as plain data: what a kernel reads from a buffer. Made from a checked [`Camera`] by [`Camera::block`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CameraBlock {
-    /// The camera's x axis in world coordinates; behind it the centre's x.
-    pub right: [f32; 4],
-    /// The camera's y axis in world coordinates; behind it the centre's y.
-    pub down: [f32; 4],
-    /// The principal axis in world coordinates; behind it the centre's z.
-    pub forward: [f32; 4],
+    /// Where the camera stands and how it is turned.
+    pub pose: PoseBlock,
     /// Focal lengths x, y and principal point x, y, in pixels.
     pub intrinsics: [f32; 4],
     /// Width of the image in pixels, at least 1.
@@ -213,7 +206,7 @@ impl CameraBlock {
     /// The camera's centre in world coordinates.
     #[inline]
     pub fn centre_world(&self) -> Vec3 {
-        Vec3::new(self.right[3], self.down[3], self.forward[3])
+        self.pose.centre_world()
     }
 
     /// The world direction from the centre through the image coordinate `(x, y)`, of length such that its component
@@ -222,7 +215,7 @@ impl CameraBlock {
     pub fn towards(&self, x: f32, y: f32) -> Vec3 {
         let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;
         let (across, below) = ((x - principal_x) / focal_x, (y - principal_y) / focal_y);
-        axis(&self.right) * across + axis(&self.down) * below + axis(&self.forward)
+        self.pose.rotate_to_world(across, below, 1.0)
     }
 
     /// Where a world point appears. Points at or behind the camera's plane are masked (`in_front` is false, the
@@ -230,15 +223,15 @@ impl CameraBlock {
     #[inline]
     pub fn project(&self, point_world: Vec3) -> Projection {
         let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;
-        let offset = point_world - self.centre_world();
-        let depth = axis(&self.forward).dot(offset);
+        let place = self.pose.rotate_to_camera(point_world - self.centre_world());
+        let depth = place.z;
         // The smallest depth whose reciprocal and products stay finite for any point that is worth looking at.
         if !(depth > 1.0e-20) {
             return Projection { x: 0.0, y: 0.0, depth, in_front: false, in_image: false };
         }
         let inverse_depth = 1.0 / depth;
-        let x = focal_x * (axis(&self.right).dot(offset) * inverse_depth) + principal_x;
-        let y = focal_y * (axis(&self.down).dot(offset) * inverse_depth) + principal_y;
+        let x = focal_x * (place.x * inverse_depth) + principal_x;
+        let y = focal_y * (place.y * inverse_depth) + principal_y;
         let in_image = x >= 0.0 && y >= 0.0 && x <= self.width as f32 && y <= self.height as f32;
         Projection { x, y, depth, in_front: true, in_image }
     }
@@ -250,9 +243,4 @@ impl CameraBlock {
         let row = (y as u32).min(self.height - 1);
         (self.first_texel + row * self.width + column) as usize
     }
-}
-
-#[inline]
-fn axis(row: &[f32; 4]) -> Vec3 {
-    Vec3::new(row[0], row[1], row[2])
 }

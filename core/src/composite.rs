@@ -7,6 +7,8 @@
 //! GeNVS it does).
 
 use crate::math::{exp, max};
+use crate::pages::Fetch;
+use bytemuck::{Pod, Zeroable};
 
 /// A ray on its way from the camera: accumulates `C` channels and the depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,4 +101,34 @@ impl<const C: usize> Compositor<C> {
         let depth = if opacity > 0.0 { self.weighted_depth / opacity } else { empty_depth };
         Composite { channels, depth, opacity }
     }
+}
+
+/// A dispatch of [`composite_samples`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct CompositeBlock {
+    /// What is behind everything, red green blue.
+    pub background: [f32; 3],
+    /// Depth of a ray that hits nothing.
+    pub empty_depth: f32,
+    /// Samples on each ray.
+    pub sample_count: u32,
+}
+
+/// The pixel of a ray from its samples, front to back: `samples[i]` is red, green, blue and optical depth, `depths[i]`
+/// the distance along the ray.
+#[inline]
+pub fn composite_samples(
+    samples: &(impl Fetch<[f32; 4]> + ?Sized),
+    depths: &(impl Fetch<f32> + ?Sized),
+    block: &CompositeBlock,
+) -> Composite<3> {
+    let mut ray = Compositor::<3>::START;
+    let mut index = 0;
+    while index < block.sample_count as usize {
+        let [red, green, blue, optical_depth] = samples.fetch(index);
+        ray.add(&[red, green, blue], optical_depth, depths.fetch(index));
+        index += 1;
+    }
+    ray.finish(&block.background, block.empty_depth)
 }

@@ -2,7 +2,9 @@
 //!
 //! Sums run in view order. Source: PixelNeRF's and GeNVS's combine step, with the mean replaced by [`Weights`].
 
+use crate::pages::Fetch;
 use crate::weights::Weights;
+use bytemuck::{Pod, Zeroable};
 
 /// Weighted sum of the latents of all views: `latents[view][channel]` to `[channel]`. A view that sees nothing is
 /// expected to hold zeros, which shrinks the result (the published behaviour).
@@ -12,6 +14,33 @@ pub fn fuse_views<const S: usize, const C: usize>(weights: &Weights<S>, latents:
     let mut view = 0;
     while view < weights.count() {
         add_scaled(&mut sum, &latents[view as usize], weights.get(view));
+        view += 1;
+    }
+    sum
+}
+
+/// A dispatch of [`fuse_element`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct FuseBlock {
+    /// How many views there are.
+    pub view_count: u32,
+    /// From an element to the next view's.
+    pub stride: u32,
+}
+
+/// One channel of [`fuse_views`] from flat buffers: the weighted sum of the elements `latents[view * stride]` over
+/// the views.
+#[inline]
+pub fn fuse_element(
+    weights: &(impl Fetch<f32> + ?Sized),
+    latents: &(impl Fetch<f32> + ?Sized),
+    block: &FuseBlock,
+) -> f32 {
+    let mut sum = 0.0;
+    let mut view = 0;
+    while view < block.view_count as usize {
+        sum += weights.fetch(view) * latents.fetch(view * block.stride as usize);
         view += 1;
     }
     sum

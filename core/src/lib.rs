@@ -6,6 +6,7 @@
 //!
 //! ```text
 //! math              one result on every target                    sqrt, exp, sin_cos, angles, norms
+//! pages             reading elements wherever they lie             Fetch, Pages
 //! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
 //! sources           the poses of the source views                 Sources<S>
 //! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
@@ -32,6 +33,7 @@ pub mod fuse;
 pub mod lookup;
 pub mod math;
 pub mod metrics;
+pub mod pages;
 pub mod photo;
 pub mod pose;
 pub mod random;

@@ -2,9 +2,10 @@
 //!
 //! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are continuous
 //! with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres the border
-//! node's value continues; a NaN coordinate is taken as 0. Slices shorter than the stated size are not allowed.
+//! node's value continues; a NaN coordinate is taken as 0. Grids shorter than the stated size are not allowed.
 
 use crate::math::clamp;
+use crate::pages::Fetch;
 
 /// One axis of a look-up among `count` nodes: the two nodes around a coordinate and the share of the second.
 #[inline(always)]
@@ -31,14 +32,20 @@ fn mix<const C: usize>(a: &[f32; C], b: &[f32; C], share: f32) -> [f32; C] {
 /// Bilinear look-up in `grid[row][column]` of `height` rows and `width` columns, both at least 1. Columns are mixed
 /// first, then rows.
 #[inline]
-pub fn bilinear<const C: usize>(grid: &[[f32; C]], width: u32, height: u32, x: f32, y: f32) -> [f32; C] {
+pub fn bilinear<const C: usize>(
+    grid: &(impl Fetch<[f32; C]> + ?Sized),
+    width: u32,
+    height: u32,
+    x: f32,
+    y: f32,
+) -> [f32; C] {
     bilinear_from(grid, 0, width, height, x, y)
 }
 
 /// As [`bilinear`], in a grid whose first node is `grid[first]`: one of several in a buffer.
 #[inline(always)]
 pub fn bilinear_from<const C: usize>(
-    grid: &[[f32; C]],
+    grid: &(impl Fetch<[f32; C]> + ?Sized),
     first: usize,
     width: u32,
     height: u32,
@@ -49,8 +56,8 @@ pub fn bilinear_from<const C: usize>(
     let (top, bottom, share_y) = split(y, height);
     let (top, bottom) = (first + top * width as usize, first + bottom * width as usize);
     mix(
-        &mix(&grid[top + left], &grid[top + right], share_x),
-        &mix(&grid[bottom + left], &grid[bottom + right], share_x),
+        &mix(&grid.fetch(top + left), &grid.fetch(top + right), share_x),
+        &mix(&grid.fetch(bottom + left), &grid.fetch(bottom + right), share_x),
         share_y,
     )
 }
@@ -58,7 +65,7 @@ pub fn bilinear_from<const C: usize>(
 /// One channel of [`bilinear_from`], for half the work.
 #[inline(always)]
 pub fn bilinear_channel_from<const C: usize>(
-    grid: &[[f32; C]],
+    grid: &(impl Fetch<[f32; C]> + ?Sized),
     first: usize,
     width: u32,
     height: u32,
@@ -69,15 +76,23 @@ pub fn bilinear_channel_from<const C: usize>(
     let (left, right, share_x) = split(x, width);
     let (top, bottom, share_y) = split(y, height);
     let (top, bottom) = (first + top * width as usize, first + bottom * width as usize);
-    let upper = grid[top + left][channel] + (grid[top + right][channel] - grid[top + left][channel]) * share_x;
-    let lower = grid[bottom + left][channel] + (grid[bottom + right][channel] - grid[bottom + left][channel]) * share_x;
+    let upper = grid.fetch(top + left)[channel]
+        + (grid.fetch(top + right)[channel] - grid.fetch(top + left)[channel]) * share_x;
+    let lower = grid.fetch(bottom + left)[channel]
+        + (grid.fetch(bottom + right)[channel] - grid.fetch(bottom + left)[channel]) * share_x;
     upper + (lower - upper) * share_y
 }
 
 /// Trilinear look-up in `grid[slice][row][column]`, `size` = `[columns, rows, slices]`, all at least 1. Columns are mixed
 /// first, then rows, then slices.
 #[inline]
-pub fn trilinear<const C: usize>(grid: &[[f32; C]], size: [u32; 3], x: f32, y: f32, z: f32) -> [f32; C] {
+pub fn trilinear<const C: usize>(
+    grid: &(impl Fetch<[f32; C]> + ?Sized),
+    size: [u32; 3],
+    x: f32,
+    y: f32,
+    z: f32,
+) -> [f32; C] {
     let (front, back, share_z) = split(z, size[2]);
     let slice = (size[0] * size[1]) as usize;
     mix(

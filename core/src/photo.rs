@@ -26,6 +26,7 @@ pub mod march;
 pub mod shade;
 pub mod sweep;
 
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// The depth of a pixel that sees nothing: beyond everything, but finite.
@@ -41,7 +42,7 @@ pub fn fade(behind: f32) -> f32 {
 }
 
 /// The object and its views as a whole, as plain data.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct ObjectBlock {
     /// Least corner of a box around the object, world coordinates; the fourth number is unused.

@@ -5,6 +5,7 @@
 //! Blender) comes in through its own constructor, so that a frame cannot be confused silently.
 
 use crate::math::{abs, angle_from_components, angle_from_squares, max, norm3};
+use bytemuck::{Pod, Zeroable};
 use core::fmt;
 use glam::Vec3;
 
@@ -72,6 +73,60 @@ pub struct Pose {
     centre_world: Vec3,
 }
 
+/// A pose as plain data: what a kernel reads from a buffer. Made from a checked [`Pose`] by [`Pose::block`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PoseBlock {
+    /// The camera's x axis in world coordinates; behind it the centre's x.
+    pub right: [f32; 4],
+    /// The camera's y axis in world coordinates; behind it the centre's y.
+    pub down: [f32; 4],
+    /// The principal axis in world coordinates; behind it the centre's z.
+    pub forward: [f32; 4],
+}
+
+const _: () = assert!(size_of::<PoseBlock>() == 48);
+
+impl PoseBlock {
+    /// The pose that the block was made from.
+    #[inline]
+    pub fn pose(&self) -> Pose {
+        Pose {
+            right_world: axis(&self.right),
+            down_world: axis(&self.down),
+            forward_world: axis(&self.forward),
+            centre_world: self.centre_world(),
+        }
+    }
+
+    /// The camera's centre in world coordinates.
+    #[inline]
+    pub fn centre_world(&self) -> Vec3 {
+        Vec3::new(self.right[3], self.down[3], self.forward[3])
+    }
+
+    /// A vector in camera axes, in world axes.
+    #[inline]
+    pub fn rotate_to_world(&self, x: f32, y: f32, z: f32) -> Vec3 {
+        axis(&self.right) * x + axis(&self.down) * y + axis(&self.forward) * z
+    }
+
+    /// Components of a world vector along the camera's axes.
+    #[inline]
+    pub fn rotate_to_camera(&self, vector_world: Vec3) -> Vec3 {
+        Vec3::new(
+            axis(&self.right).dot(vector_world),
+            axis(&self.down).dot(vector_world),
+            axis(&self.forward).dot(vector_world),
+        )
+    }
+}
+
+#[inline]
+fn axis(row: &[f32; 4]) -> Vec3 {
+    Vec3::new(row[0], row[1], row[2])
+}
+
 impl Pose {
     /// At the world's origin, looking along world z, with world y down.
     pub const IDENTITY: Pose =
@@ -132,6 +187,17 @@ impl Pose {
             row += 1;
         }
         Pose::from_opencv(&m)
+    }
+
+    /// The pose as plain data for kernels.
+    #[inline]
+    pub fn block(&self) -> PoseBlock {
+        let Pose { right_world: right, down_world: down, forward_world: forward, centre_world: centre } = *self;
+        PoseBlock {
+            right: [right.x, right.y, right.z, centre.x],
+            down: [down.x, down.y, down.z, centre.y],
+            forward: [forward.x, forward.y, forward.z, centre.z],
+        }
     }
 
     /// A camera at `centre_world` that looks at `point_world`, with the image's up direction as near to `up_world` as

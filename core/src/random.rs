@@ -29,6 +29,12 @@ pub fn threefry_2x32(key: [u32; 2], counter: [u32; 2]) -> [u32; 2] {
 /// A number in `[0, 1)`, a multiple of `2^-24`, for a seed, a pixel (flat row-major index) and a sample.
 #[inline]
 pub fn uniform(seed: u64, pixel: u32, sample: u32) -> f32 {
-    let words = threefry_2x32([seed as u32, (seed >> 32) as u32], [pixel, sample]);
+    uniform_from([seed as u32, (seed >> 32) as u32], pixel, sample)
+}
+
+/// As [`uniform`], from the seed's low and high word: not every GPU has 64-bit integers.
+#[inline]
+pub fn uniform_from(seed: [u32; 2], pixel: u32, sample: u32) -> f32 {
+    let words = threefry_2x32(seed, [pixel, sample]);
     (words[0] >> 8) as f32 * (1.0 / 16_777_216.0)
 }

@@ -59,6 +59,13 @@ impl<const S: usize> Sources<S> {
         Ok(sources)
     }
 
+    /// The first `count` poses of an array; `count` is limited to `[1, S]`.
+    #[inline]
+    pub fn from_array(poses: [Pose; S], count: u32) -> Sources<S> {
+        const { assert!(S > 0) };
+        Sources { poses, count: count.clamp(1, S as u32) }
+    }
+
     /// How many sources there are: at least 1, at most `S`.
     #[inline]
     pub fn count(&self) -> u32 {

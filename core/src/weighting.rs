@@ -24,10 +24,11 @@
 //! weight; where squares approach overflow it is not. Weights below 4e-38 may be 0.
 //! `viewfuse-tests` derives these bounds in its oracle and asserts them for each weight.
 
-use crate::math::{abs, angle_from_squares, exp, max, min, norm3, sqrt, two_product, two_sum};
+use crate::math::{abs, angle_from_squares, clamp, exp, max, min, norm3, sqrt, two_product, two_sum};
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
+use bytemuck::{Pod, Zeroable};
 use core::f32::consts::FRAC_1_PI;
 use core::fmt;
 
@@ -118,6 +119,70 @@ impl Scheme {
     /// [`SchemeError::Power`] for any other power.
     pub fn distance(power: u32) -> Result<Scheme, SchemeError> {
         if (1..=3).contains(&power) { Ok(Scheme(Formula::Distance { power })) } else { Err(SchemeError::Power) }
+    }
+}
+
+/// A scheme as plain data: what a kernel reads from a buffer. Made from a [`Scheme`] by [`Scheme::block`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SchemeBlock {
+    /// Which formula, in the order of [`weigh`]'s cases; unknown ones are the mean.
+    pub formula: u32,
+    /// The power, or 1 for the angle of the full rotation.
+    pub choice: u32,
+    /// `alpha` or `beta`.
+    pub parameter: f32,
+    /// Zero.
+    pub padding: u32,
+}
+
+const _: () = assert!(size_of::<SchemeBlock>() == 16);
+
+/// How many sources the kernels that weigh on a device can hold: rows of weights there have this length.
+pub const MOST_WEIGHED: usize = 32;
+
+/// A dispatch of [`weigh`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct WeighBlock {
+    /// The scheme.
+    pub scheme: SchemeBlock,
+    /// How many sources there are.
+    pub source_count: u32,
+}
+
+impl Scheme {
+    /// The scheme as plain data for kernels.
+    pub fn block(&self) -> SchemeBlock {
+        let (formula, choice, parameter) = match self.0 {
+            Formula::Mean => (0, 0, 0.0),
+            Formula::Gaussian { beta } => (1, 0, beta),
+            Formula::Distance { power } => (2, power, 0.0),
+            Formula::Error { alpha, angle } => (3, angle as u32, alpha),
+            Formula::L1 => (4, 0, 0.0),
+            Formula::Frobenius => (5, 0, 0.0),
+            Formula::RelativeFrobenius => (6, 0, 0.0),
+        };
+        SchemeBlock { formula, choice, parameter, padding: 0 }
+    }
+}
+
+impl SchemeBlock {
+    /// The scheme that the block was made from. Parameters that no scheme has are brought into their range.
+    #[inline]
+    pub fn scheme(&self) -> Scheme {
+        Scheme(match self.formula {
+            1 => Formula::Gaussian { beta: clamp(self.parameter, 0.0, f32::MAX) },
+            2 => Formula::Distance { power: self.choice.clamp(1, 3) },
+            3 => Formula::Error {
+                alpha: clamp(self.parameter, 0.0, 1.0),
+                angle: if self.choice == 0 { AngleKind::PrincipalAxis } else { AngleKind::FullRotation },
+            },
+            4 => Formula::L1,
+            5 => Formula::Frobenius,
+            6 => Formula::RelativeFrobenius,
+            _ => Formula::Mean,
+        })
     }
 }
 

@@ -6,14 +6,20 @@
 
 pub mod cpu;
 
+use bytemuck::Pod;
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::composite::CompositeBlock;
+use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::photo::ObjectBlock;
+use viewfuse_core::photo::march::MarchBlock;
 use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_core::pose::PoseBlock;
+use viewfuse_core::weighting::WeighBlock;
 
 /// What a buffer can hold: plain data.
-pub trait Element: Copy + Default + Send + Sync + 'static {}
-impl<T: Copy + Default + Send + Sync + 'static> Element for T {}
+pub trait Element: Pod + Default + Send + Sync {}
+impl<T: Pod + Default + Send + Sync> Element for T {}
 
 /// Views and object of the weight-free field in a device's memory; see [`viewfuse_core::photo`].
 pub struct PhotoScene<D: Device + ?Sized> {
@@ -35,17 +41,6 @@ pub struct Pixels<D: Device + ?Sized> {
     pub colours: D::Buffer<[f32; 4]>,
     /// `[row][column]`: depth along the principal axis; 0 where nothing is met.
     pub depths: D::Buffer<f32>,
-}
-
-/// Everything about a target that [`Device::march`] needs besides the scene.
-#[derive(Clone, Copy, Debug)]
-pub struct MarchTarget {
-    /// The target camera.
-    pub camera: CameraBlock,
-    /// What is behind everything, red green blue in `[0, 1]`.
-    pub background: [f32; 3],
-    /// Transmittance at which a ray may end.
-    pub settled: f32,
 }
 
 /// Something that runs kernels.
@@ -70,11 +65,76 @@ pub trait Device {
     /// If the device has no room.
     fn zeros<T: Element>(&self, count: usize) -> Result<Self::Buffer<T>, Self::Error>;
 
+    /// Most elements of a buffer that is bound as a whole: what grows with the work is cut so that it fits.
+    fn most_elements<T: Element>(&self) -> usize;
+
     /// The values of a buffer.
     ///
     /// # Errors
     /// If the device is lost.
     fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, Self::Error>;
+
+    /// Kernel `weigh` for every target: `weights[target][MOST_WEIGHED]`, zeros beyond the sources.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn weigh(
+        &self,
+        block: &WeighBlock,
+        sources: &Self::Buffer<PoseBlock>,
+        targets: &Self::Buffer<PoseBlock>,
+        weights: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `embed_pose` for every pose: `embedded[pose][EMBEDDING]`. `embedding` holds the parameters of a
+    /// [`viewfuse_core::attention::FourierEmbedding`], flat.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn embed_pose(
+        &self,
+        embedding: &Self::Buffer<f32>,
+        poses: &Self::Buffer<PoseBlock>,
+        embedded: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `attend` for every target: `weights[target][MOST_WEIGHED]` from `queries[target][EMBEDDING]` and
+    /// `keys[source][EMBEDDING]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn attend(
+        &self,
+        source_count: u32,
+        queries: &Self::Buffer<f32>,
+        keys: &Self::Buffer<f32>,
+        weights: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `fuse_views` for every element: `fused[element]` from `weights[view]` and `latents[view][element]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn fuse_views(
+        &self,
+        block: &FuseBlock,
+        weights: &Self::Buffer<f32>,
+        latents: &Self::Buffer<f32>,
+        fused: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `composite` for every ray, from `samples[ray][sample]` (red, green, blue, optical depth) and
+    /// `sample_depths[ray][sample]`.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn composite(
+        &self,
+        block: &CompositeBlock,
+        samples: &Self::Buffer<[f32; 4]>,
+        sample_depths: &Self::Buffer<f32>,
+        pixels: &mut Pixels<Self>,
+    ) -> Result<(), Self::Error>;
 
     /// Kernel `hull_entry` for every pixel of one view: writes the view's part of `entries[view][row][column]`.
     ///
@@ -107,7 +167,6 @@ pub trait Device {
     fn sum_row(
         &self,
         sweep: &SweepBlock,
-        width: u32,
         costs: &Self::Buffer<f32>,
         row_sums: &mut Self::Buffer<[f32; 2]>,
     ) -> Result<(), Self::Error>;
@@ -119,7 +178,6 @@ pub trait Device {
     fn mean_column(
         &self,
         sweep: &SweepBlock,
-        width: u32,
         costs: &Self::Buffer<f32>,
         row_sums: &Self::Buffer<[f32; 2]>,
         means: &mut Self::Buffer<f32>,
@@ -152,7 +210,7 @@ pub trait Device {
         scene: &PhotoScene<Self>,
         depths: &Self::Buffer<f32>,
         weights: &Self::Buffer<f32>,
-        target: &MarchTarget,
+        target: &MarchBlock,
         first_row: u32,
         row_count: u32,
         pixels: &mut Pixels<Self>,

@@ -51,11 +51,11 @@ pub struct Scene<'a> {
 }
 
 fn centre(camera: &CameraBlock) -> Vector {
-    point([camera.right[3], camera.down[3], camera.forward[3]])
+    point([camera.pose.right[3], camera.pose.down[3], camera.pose.forward[3]])
 }
 
 fn axes(camera: &CameraBlock) -> [Vector; 3] {
-    [camera.right, camera.down, camera.forward].map(|axis| point([axis[0], axis[1], axis[2]]))
+    [camera.pose.right, camera.pose.down, camera.pose.forward].map(|axis| point([axis[0], axis[1], axis[2]]))
 }
 
 /// World direction through an image coordinate, 1 along the principal axis.

@@ -4,6 +4,7 @@ use super::{NO_SURFACE, ObjectBlock};
 use crate::camera::CameraBlock;
 use crate::lookup::{bilinear_channel_from, bilinear_from};
 use crate::math::max;
+use crate::pages::Fetch;
 use glam::Vec3;
 
 /// Least alpha at which a pixel can show the object: such a source pixel gets a depth.
@@ -20,13 +21,13 @@ pub const MOST_ENTRY_STEPS: f32 = 8192.0;
 
 /// Premultiplied colour and alpha that a view shows at an image coordinate.
 #[inline]
-pub fn look_up(view: &CameraBlock, texels: &[[f32; 4]], x: f32, y: f32) -> [f32; 4] {
+pub fn look_up(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized), x: f32, y: f32) -> [f32; 4] {
     bilinear_from(texels, view.first_texel as usize, view.width, view.height, x, y)
 }
 
 /// Only the alpha that a view shows at an image coordinate.
 #[inline]
-pub fn look_up_alpha(view: &CameraBlock, texels: &[[f32; 4]], x: f32, y: f32) -> f32 {
+pub fn look_up_alpha(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized), x: f32, y: f32) -> f32 {
     bilinear_channel_from(texels, view.first_texel as usize, view.width, view.height, x, y, 3)
 }
 
@@ -36,7 +37,7 @@ pub fn look_up_alpha(view: &CameraBlock, texels: &[[f32; 4]], x: f32, y: f32) ->
 pub fn hull_alpha(
     object: &ObjectBlock,
     views: &[CameraBlock],
-    texels: &[[f32; 4]],
+    texels: &(impl Fetch<[f32; 4]> + ?Sized),
     point_world: Vec3,
     least: f32,
 ) -> f32 {
@@ -63,9 +64,15 @@ pub fn hull_alpha(
 /// Depth at which the ray of a source pixel enters the hull; [`NO_SURFACE`] where it misses it or the pixel shows
 /// background. `pixel` is the flat index in the view's image.
 #[inline]
-pub fn hull_entry(object: &ObjectBlock, views: &[CameraBlock], texels: &[[f32; 4]], view: u32, pixel: u32) -> f32 {
+pub fn hull_entry(
+    object: &ObjectBlock,
+    views: &[CameraBlock],
+    texels: &(impl Fetch<[f32; 4]> + ?Sized),
+    view: u32,
+    pixel: u32,
+) -> f32 {
     let camera = &views[view as usize];
-    if texels[(camera.first_texel + pixel) as usize][3] < LEAST_ALPHA {
+    if texels.fetch((camera.first_texel + pixel) as usize)[3] < LEAST_ALPHA {
         return NO_SURFACE;
     }
     let column = pixel % camera.width;

@@ -5,16 +5,32 @@ use super::shade::sample;
 use crate::camera::CameraBlock;
 use crate::composite::{Composite, Compositor};
 use crate::math::{clamp, floor_to_i32};
+use crate::pages::Fetch;
+use bytemuck::{Pod, Zeroable};
 
 /// Length of a step, in footprints of the target.
 pub const STEP: f32 = 1.0;
 /// Most steps of a ray.
 pub const MOST_STEPS: u32 = 1024;
 
+/// A target to march to, as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct MarchBlock {
+    /// The target camera.
+    pub target: CameraBlock,
+    /// What is behind everything, red green blue in `[0, 1]`.
+    pub background: [f32; 3],
+    /// Transmittance at which a ray may end.
+    pub settled: f32,
+}
+
+const _: () = assert!(size_of::<MarchBlock>() == 96);
+
 /// Colour, depth along the principal axis and opacity of the target's ray through the image coordinate `(x, y)`.
 ///
 /// The ray is marched through the object's box in equal steps of at most a footprint; it ends where the transmittance
-/// is at most `settled`, which changes no channel by more than that. The depth of a ray that is less than half hidden
+/// is at most `block.settled`, which changes no channel by more than that. The depth of a ray that is less than half hidden
 /// is 0: that of what little it meets means nothing.
 #[inline]
 #[allow(clippy::too_many_arguments)]
@@ -22,14 +38,13 @@ pub fn march(
     object: &ObjectBlock,
     views: &[CameraBlock],
     footprints: &[f32],
-    texels: &[[f32; 4]],
-    depths: &[f32],
+    texels: &(impl Fetch<[f32; 4]> + ?Sized),
+    depths: &(impl Fetch<f32> + ?Sized),
     weights: &[f32],
-    target: &CameraBlock,
+    block: &MarchBlock,
     at: [f32; 2],
-    background: &[f32; 3],
-    settled: f32,
 ) -> Composite<3> {
+    let target = &block.target;
     let mut ray = Compositor::<3>::START;
     let origin = target.centre_world();
     let direction = target.towards(at[0], at[1]);
@@ -40,13 +55,13 @@ pub fn march(
         let step_count = floor_to_i32(wanted) as u32 + 1;
         let step = (leave - enter) / step_count as f32;
         let mut index = 0;
-        while index < step_count && !ray.is_settled(settled) {
+        while index < step_count && !ray.is_settled(block.settled) {
             let depth = enter + (index as f32 + 0.5) * step;
             let here = sample(object, views, footprints, texels, depths, weights, origin + direction * depth);
             ray.add_solid(&here.colour, here.occupancy, depth);
             index += 1;
         }
     }
-    let seen = ray.finish(background, 0.0);
+    let seen = ray.finish(&block.background, 0.0);
     if seen.opacity < 0.5 { Composite { depth: 0.0, ..seen } } else { seen }
 }

@@ -6,6 +6,7 @@ use crate::camera::CameraBlock;
 use crate::fuse::VisibleFusion;
 use crate::lookup::split;
 use crate::math::{abs, exp, max, min};
+use crate::pages::Fetch;
 use glam::Vec3;
 
 /// Below this hull alpha a point is empty and no more views are asked.
@@ -45,12 +46,17 @@ pub const EMPTY: Sample = Sample { occupancy: 0.0, colour: [0.0; 3] };
 /// the same surface as the one with the greatest share, or as the nearest where that one sees nothing. [`NO_SURFACE`]
 /// where all four see nothing.
 #[inline]
-pub fn depth_at(view: &CameraBlock, depths: &[f32], x: f32, y: f32, jump: f32) -> f32 {
+pub fn depth_at(view: &CameraBlock, depths: &(impl Fetch<f32> + ?Sized), x: f32, y: f32, jump: f32) -> f32 {
     let (left, right, share_x) = split(x, view.width);
     let (top, bottom, share_y) = split(y, view.height);
     let first = view.first_texel as usize;
     let (top, bottom) = (first + top * view.width as usize, first + bottom * view.width as usize);
-    let around = [depths[top + left], depths[top + right], depths[bottom + left], depths[bottom + right]];
+    let around = [
+        depths.fetch(top + left),
+        depths.fetch(top + right),
+        depths.fetch(bottom + left),
+        depths.fetch(bottom + right),
+    ];
     let shares =
         [(1.0 - share_x) * (1.0 - share_y), share_x * (1.0 - share_y), (1.0 - share_x) * share_y, share_x * share_y];
     let (mut surface, mut greatest) = (NO_SURFACE, -1.0);
@@ -95,8 +101,8 @@ pub fn sample(
     object: &ObjectBlock,
     views: &[CameraBlock],
     footprints: &[f32],
-    texels: &[[f32; 4]],
-    depths: &[f32],
+    texels: &(impl Fetch<[f32; 4]> + ?Sized),
+    depths: &(impl Fetch<f32> + ?Sized),
     weights: &[f32],
     point_world: Vec3,
 ) -> Sample {

@@ -7,6 +7,8 @@ use super::hull::{SWEPT_ALPHA, look_up, look_up_alpha};
 use super::{NO_SURFACE, ObjectBlock, fade};
 use crate::camera::CameraBlock;
 use crate::math::{abs, clamp, max, min};
+use crate::pages::Fetch;
+use bytemuck::{Pod, Zeroable};
 
 /// Largest difference that counts: beyond it, a pixel is simply another thing.
 pub const MOST_DIFFERENCE: f32 = 0.2;
@@ -32,7 +34,7 @@ pub const SEEN_BEHIND_ENTRY: f32 = 0.3;
 pub const OUTSIDE: f32 = -1.0;
 
 /// One source's sweep, as plain data.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SweepBlock {
     /// The source view.
@@ -49,8 +51,8 @@ pub struct SweepBlock {
     pub plane_step: f32,
     /// A footprint of the source, world units.
     pub footprint: f32,
-    /// Zero.
-    pub padding: u32,
+    /// Columns of the source.
+    pub width: u32,
 }
 
 const _: () = assert!(size_of::<SweepBlock>() == 32);
@@ -81,7 +83,7 @@ impl SweepBlock {
             near,
             plane_step: (far - near) / plane_count as f32,
             footprint,
-            padding: 0,
+            width: camera.width,
         }
     }
 
@@ -104,8 +106,8 @@ pub fn match_cost(
     object: &ObjectBlock,
     sweep: &SweepBlock,
     views: &[CameraBlock],
-    texels: &[[f32; 4]],
-    entries: &[f32],
+    texels: &(impl Fetch<[f32; 4]> + ?Sized),
+    entries: &(impl Fetch<f32> + ?Sized),
     pair_weights: &[f32],
     pixel: u32,
     plane: u32,
@@ -114,11 +116,11 @@ pub fn match_cost(
     let texel = (camera.first_texel + pixel) as usize;
     let depth = sweep.depth(plane);
     // Half a plane in front of the entry still touches the hull.
-    let behind_entry = depth - entries[texel];
+    let behind_entry = depth - entries.fetch(texel);
     if behind_entry < -0.5 * sweep.plane_step || behind_entry > SWEPT_BEHIND_ENTRY * object.radius {
         return OUTSIDE;
     }
-    let own = straight(&texels[texel]);
+    let own = straight(&texels.fetch(texel));
     let (column, row) = (pixel % camera.width, pixel / camera.width);
     let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
     let reach = 1.0 / (SEEN_BEHIND_ENTRY * object.radius);
@@ -130,7 +132,7 @@ pub fn match_cost(
         if other != sweep.view && seen.in_image {
             containing += 1;
             let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
-            let entry = entries[views[other as usize].texel_at(seen.x, seen.y)];
+            let entry = entries.fetch(views[other as usize].texel_at(seen.x, seen.y));
             let behind = max(seen.depth - entry, 0.0) * reach;
             let share = weight * fade(behind);
             if share <= 0.0 {
@@ -167,7 +169,8 @@ fn mean_difference(a: &[f32; 3], b: &[f32; 3]) -> f32 {
 /// Sum and count of the costs inside the hull over the window's columns, at a pixel of the band (`pixel` counts from
 /// the band's first) and a plane.
 #[inline]
-pub fn sum_row(sweep: &SweepBlock, width: u32, costs: &[f32], pixel: u32, plane: u32) -> [f32; 2] {
+pub fn sum_row(sweep: &SweepBlock, costs: &[f32], pixel: u32, plane: u32) -> [f32; 2] {
+    let width = sweep.width;
     let column = pixel % width;
     let first = pixel - min_u32(column, WINDOW_REACH);
     let last = pixel + min_u32(width - 1 - column, WINDOW_REACH);
@@ -187,17 +190,11 @@ pub fn sum_row(sweep: &SweepBlock, width: u32, costs: &[f32], pixel: u32, plane:
 /// Mean cost over the window from its rows' sums, at a pixel of the band and a plane; [`OUTSIDE`] where the pixel's own
 /// cost is.
 #[inline]
-pub fn mean_column(
-    sweep: &SweepBlock,
-    width: u32,
-    costs: &[f32],
-    row_sums: &[[f32; 2]],
-    pixel: u32,
-    plane: u32,
-) -> f32 {
+pub fn mean_column(sweep: &SweepBlock, costs: &[f32], row_sums: &[[f32; 2]], pixel: u32, plane: u32) -> f32 {
     if costs[(pixel * sweep.plane_count + plane) as usize] < 0.0 {
         return OUTSIDE;
     }
+    let width = sweep.width;
     let row = pixel / width;
     let first = row - min_u32(row, WINDOW_REACH);
     let last = row + min_u32(sweep.row_count - 1 - row, WINDOW_REACH);
@@ -232,16 +229,16 @@ const NEIGHBOURS: [[i32; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-2, -2], [
 pub fn pick_depth(
     object: &ObjectBlock,
     sweep: &SweepBlock,
-    width: u32,
     means: &[f32],
-    entries: &[f32],
-    guess: &[f32],
+    entries: &(impl Fetch<f32> + ?Sized),
+    guess: &(impl Fetch<f32> + ?Sized),
     pixel: u32,
 ) -> f32 {
-    let entry = entries[pixel as usize];
+    let entry = entries.fetch(pixel as usize);
     if entry >= NO_SURFACE {
         return NO_SURFACE;
     }
+    let width = sweep.width;
     let (column, row) = ((pixel % width) as i32, (pixel / width) as i32);
     let mut around = [0.0; 8];
     let mut around_count = 0;
@@ -249,7 +246,7 @@ pub fn pick_depth(
     while neighbour < 8 {
         let (x, y) = (column + NEIGHBOURS[neighbour][0], row + NEIGHBOURS[neighbour][1]);
         if x >= 0 && y >= 0 && x < width as i32 && y < sweep.row_count as i32 {
-            let depth = guess[(y as u32 * width + x as u32) as usize];
+            let depth = guess.fetch((y as u32 * width + x as u32) as usize);
             if depth < NO_SURFACE {
                 around[around_count] = depth;
                 around_count += 1;

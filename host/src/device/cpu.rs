@@ -1,12 +1,18 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
 
-use super::{Device, Element, MarchTarget, PhotoScene, Pixels};
+use super::{Device, Element, PhotoScene, Pixels};
 use rayon::prelude::*;
 use std::convert::Infallible;
 use std::ops::Range;
+use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding, attend};
+use viewfuse_core::composite::{CompositeBlock, composite_samples};
+use viewfuse_core::fuse::{FuseBlock, fuse_element};
 use viewfuse_core::photo::hull::hull_entry;
-use viewfuse_core::photo::march::march;
+use viewfuse_core::photo::march::{MarchBlock, march};
 use viewfuse_core::photo::sweep::{SweepBlock, match_cost, mean_column, pick_depth, sum_row};
+use viewfuse_core::pose::{Pose, PoseBlock};
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock, weigh};
 
 /// All cores of this machine. Buffers are vectors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,8 +34,85 @@ impl Device for Cpu {
         Ok(vec![T::default(); count])
     }
 
+    fn most_elements<T: Element>(&self) -> usize {
+        usize::MAX
+    }
+
     fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, Infallible> {
         Ok(buffer.clone())
+    }
+
+    fn weigh(
+        &self,
+        block: &WeighBlock,
+        sources: &Vec<PoseBlock>,
+        targets: &Vec<PoseBlock>,
+        weights: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let mut poses = [Pose::IDENTITY; MOST_WEIGHED];
+        poses.iter_mut().zip(sources).for_each(|(pose, source)| *pose = source.pose());
+        let sources = Sources::from_array(poses, block.source_count);
+        weights.par_chunks_mut(MOST_WEIGHED).zip(targets).for_each(|(row, target)| {
+            row.copy_from_slice(weigh(block.scheme.scheme(), &sources, &target.pose()).values());
+        });
+        Ok(())
+    }
+
+    fn embed_pose(
+        &self,
+        embedding: &Vec<f32>,
+        poses: &Vec<PoseBlock>,
+        embedded: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let embedding = FourierEmbedding::from_flat(embedding);
+        embedded.par_chunks_mut(EMBEDDING).zip(poses).for_each(|(row, pose)| {
+            row.copy_from_slice(&embedding.embed(&pose.pose()));
+        });
+        Ok(())
+    }
+
+    fn attend(
+        &self,
+        source_count: u32,
+        queries: &Vec<f32>,
+        keys: &Vec<f32>,
+        weights: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        weights.par_chunks_mut(MOST_WEIGHED).zip(queries.par_chunks(EMBEDDING)).for_each(|(row, query)| {
+            row.copy_from_slice(attend::<MOST_WEIGHED>(query, &keys[..], source_count).values());
+        });
+        Ok(())
+    }
+
+    fn fuse_views(
+        &self,
+        block: &FuseBlock,
+        weights: &Vec<f32>,
+        latents: &Vec<f32>,
+        fused: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        fused.par_iter_mut().enumerate().for_each(|(element, fused)| {
+            *fused = fuse_element(&weights[..], &latents[element..], block);
+        });
+        Ok(())
+    }
+
+    fn composite(
+        &self,
+        block: &CompositeBlock,
+        samples: &Vec<[f32; 4]>,
+        sample_depths: &Vec<f32>,
+        pixels: &mut Pixels<Self>,
+    ) -> Result<(), Infallible> {
+        let count = block.sample_count as usize;
+        let rays = samples.par_chunks(count).zip(sample_depths.par_chunks(count));
+        let pixels = pixels.colours.par_iter_mut().zip(&mut pixels.depths);
+        pixels.zip(rays).for_each(|((colour, depth), (samples, depths))| {
+            let seen = composite_samples(samples, depths, block);
+            *colour = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
+            *depth = seen.depth;
+        });
+        Ok(())
     }
 
     fn hull_entry(&self, scene: &PhotoScene<Self>, view: u32, entries: &mut Vec<f32>) -> Result<(), Infallible> {
@@ -38,7 +121,7 @@ impl Device for Cpu {
         rows.enumerate().for_each(|(row, entries)| {
             for (column, entry) in entries.iter_mut().enumerate() {
                 let pixel = (row * width + column) as u32;
-                *entry = hull_entry(&scene.object, &scene.views, &scene.texels, view, pixel);
+                *entry = hull_entry(&scene.object, &scene.views, &scene.texels[..], view, pixel);
             }
         });
         Ok(())
@@ -52,23 +135,26 @@ impl Device for Cpu {
         pair_weights: &Vec<f32>,
         costs: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        let width = scene.cameras[sweep.view as usize].width;
-        for_each_pixel(sweep, width, costs, |pixel, plane, cost| {
+        let width = sweep.width;
+        for_each_pixel(sweep, costs, |pixel, plane, cost| {
             let pixel = sweep.first_row * width + pixel;
-            *cost = match_cost(&scene.object, sweep, &scene.views, &scene.texels, entries, pair_weights, pixel, plane);
+            *cost = match_cost(
+                &scene.object,
+                sweep,
+                &scene.views,
+                &scene.texels[..],
+                &entries[..],
+                pair_weights,
+                pixel,
+                plane,
+            );
         });
         Ok(())
     }
 
-    fn sum_row(
-        &self,
-        sweep: &SweepBlock,
-        width: u32,
-        costs: &Vec<f32>,
-        row_sums: &mut Vec<[f32; 2]>,
-    ) -> Result<(), Infallible> {
-        for_each_pixel(sweep, width, row_sums, |pixel, plane, sums| {
-            *sums = sum_row(sweep, width, costs, pixel, plane);
+    fn sum_row(&self, sweep: &SweepBlock, costs: &Vec<f32>, row_sums: &mut Vec<[f32; 2]>) -> Result<(), Infallible> {
+        for_each_pixel(sweep, row_sums, |pixel, plane, sums| {
+            *sums = sum_row(sweep, costs, pixel, plane);
         });
         Ok(())
     }
@@ -76,13 +162,12 @@ impl Device for Cpu {
     fn mean_column(
         &self,
         sweep: &SweepBlock,
-        width: u32,
         costs: &Vec<f32>,
         row_sums: &Vec<[f32; 2]>,
         means: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        for_each_pixel(sweep, width, means, |pixel, plane, mean| {
-            *mean = mean_column(sweep, width, costs, row_sums, pixel, plane);
+        for_each_pixel(sweep, means, |pixel, plane, mean| {
+            *mean = mean_column(sweep, costs, row_sums, pixel, plane);
         });
         Ok(())
     }
@@ -106,7 +191,7 @@ impl Device for Cpu {
         picked[written].par_chunks_mut(width as usize).enumerate().for_each(|(row, depths)| {
             for (column, depth) in depths.iter_mut().enumerate() {
                 let pixel = (rows.start + row as u32) * width + column as u32;
-                *depth = pick_depth(&scene.object, sweep, width, means, entries, guess, pixel);
+                *depth = pick_depth(&scene.object, sweep, means, entries, guess, pixel);
             }
         });
         Ok(())
@@ -117,12 +202,12 @@ impl Device for Cpu {
         scene: &PhotoScene<Self>,
         depths: &Vec<f32>,
         weights: &Vec<f32>,
-        target: &MarchTarget,
+        target: &MarchBlock,
         first_row: u32,
         row_count: u32,
         pixels: &mut Pixels<Self>,
     ) -> Result<(), Infallible> {
-        let width = target.camera.width as usize;
+        let width = target.target.width as usize;
         let band = first_row as usize * width..(first_row + row_count) as usize * width;
         let colour_rows = pixels.colours[band.clone()].par_chunks_mut(width);
         let depth_rows = pixels.depths[band].par_chunks_mut(width);
@@ -133,13 +218,11 @@ impl Device for Cpu {
                     &scene.object,
                     &scene.views,
                     &scene.footprints,
-                    &scene.texels,
-                    depths,
+                    &scene.texels[..],
+                    &depths[..],
                     weights,
-                    &target.camera,
+                    target,
                     at,
-                    &target.background,
-                    target.settled,
                 );
                 *colour = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
                 *depth = seen.depth;
@@ -157,8 +240,8 @@ fn of_view_mut<'a>(scene: &PhotoScene<Cpu>, view: u32, map: &'a mut [f32]) -> &'
 }
 
 /// Runs a kernel for every pixel and plane of a band, rows in parallel.
-fn for_each_pixel<T: Send>(sweep: &SweepBlock, width: u32, values: &mut [T], kernel: impl Fn(u32, u32, &mut T) + Sync) {
-    let plane_count = sweep.plane_count as usize;
+fn for_each_pixel<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn(u32, u32, &mut T) + Sync) {
+    let (plane_count, width) = (sweep.plane_count as usize, sweep.width);
     values.par_chunks_mut(plane_count * width as usize).enumerate().for_each(|(row, values)| {
         for (column, values) in values.chunks_exact_mut(plane_count).enumerate() {
             let pixel = row as u32 * width + column as u32;

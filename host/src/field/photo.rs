@@ -3,13 +3,14 @@
 mod bounds;
 
 use super::{Field, FieldError, Rendered};
-use crate::device::{Device, MarchTarget, PhotoScene, Pixels};
+use crate::device::{Device, PhotoScene, Pixels};
 use crate::interrupt;
 use crate::photographs::SourceImages;
 use crate::progress::Progress;
 use crate::sources::SourceWeights;
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::photo::march::MarchBlock;
 use viewfuse_core::photo::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
 use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
 
@@ -101,7 +102,7 @@ impl<D: Device> Field<D> for PhotoField {
         for view in 0..view_count {
             let camera = &scene.cameras[view as usize];
             let whole = SweepBlock::new(&scene.object, camera, view);
-            for (sweep, kept_rows) in bands(whole, camera.width, self.most_band_values) {
+            for (sweep, kept_rows) in bands(whole, self.most_band_values) {
                 interrupt::check()?;
                 let count = (sweep.row_count * camera.width * sweep.plane_count) as usize;
                 let mut costs = device.zeros(count).map_err(failed)?;
@@ -109,8 +110,8 @@ impl<D: Device> Field<D> for PhotoField {
                 let mut means = device.zeros(count).map_err(failed)?;
                 let entries = &prepared.entries;
                 device.match_cost(scene, &sweep, entries, &pair_weights, &mut costs).map_err(failed)?;
-                device.sum_row(&sweep, camera.width, &costs, &mut row_sums).map_err(failed)?;
-                device.mean_column(&sweep, camera.width, &costs, &row_sums, &mut means).map_err(failed)?;
+                device.sum_row(&sweep, &costs, &mut row_sums).map_err(failed)?;
+                device.mean_column(&sweep, &costs, &row_sums, &mut means).map_err(failed)?;
                 let all_rows = 0..sweep.row_count;
                 device
                     .pick_depth(scene, &sweep, &means, entries, &nothing, all_rows, &mut first_guess)
@@ -139,7 +140,7 @@ impl<D: Device> Field<D> for PhotoField {
         let count = (width * height) as usize;
         let view_count = prepared.scene.object.view_count as usize;
         let weights = device.upload(&weights.values()[..view_count]).map_err(failed)?;
-        let target = MarchTarget { camera: target.block(0), background: prepared.background, settled };
+        let target = MarchBlock { target: target.block(0), background: prepared.background, settled };
         let mut pixels =
             Pixels { colours: device.zeros(count).map_err(failed)?, depths: device.zeros(count).map_err(failed)? };
         progress.expect(height.div_ceil(BAND_ROWS) as usize);
@@ -186,8 +187,8 @@ fn footprint(object: &ObjectBlock, camera: &CameraBlock) -> f32 {
 
 /// Cuts a sweep over all rows into bands of bounded memory. With each band come the rows, counted from its first, whose
 /// depths are final; the others are its halo.
-fn bands(whole: SweepBlock, width: u32, most_values: usize) -> Vec<(SweepBlock, Range<u32>)> {
-    let row_values = width as usize * whole.plane_count as usize;
+fn bands(whole: SweepBlock, most_values: usize) -> Vec<(SweepBlock, Range<u32>)> {
+    let row_values = whole.width as usize * whole.plane_count as usize;
     let affordable = u32::try_from(most_values / row_values).unwrap_or(u32::MAX);
     if affordable >= whole.row_count {
         return vec![(whole, 0..whole.row_count)];

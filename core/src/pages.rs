@@ -1,0 +1,112 @@
+//! Reading and writing numbered elements, wherever they lie.
+//!
+//! Kernels read through [`Fetch`], so that one body serves a slice in memory and a buffer that is longer than a device
+//! can bind at once and therefore lies in up to four [`Pages`] of equal length, a power of two.
+
+/// Numbered elements that can be read.
+pub trait Fetch<T> {
+    /// The element at `index`, which exists.
+    fn fetch(&self, index: usize) -> T;
+}
+
+impl<T: Copy> Fetch<T> for [T] {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> T {
+        self[index]
+    }
+}
+
+impl<T: Copy, const N: usize> Fetch<T> for [T; N] {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> T {
+        self[index]
+    }
+}
+
+/// How many pages a buffer can have.
+pub const MOST_PAGES: usize = 4;
+
+/// A buffer in pages of `2^shift` elements; with `shift` 0 everything is on the first page. Pages that are not needed may
+/// be anything, also the first one again.
+#[derive(Clone, Copy)]
+pub struct Pages<'a, T> {
+    /// Page 0.
+    pub a: &'a [T],
+    /// Page 1.
+    pub b: &'a [T],
+    /// Page 2.
+    pub c: &'a [T],
+    /// Page 3.
+    pub d: &'a [T],
+    /// Binary logarithm of a page's length, or 0.
+    pub shift: u32,
+}
+
+impl<T: Copy> Fetch<T> for Pages<'_, T> {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> T {
+        if self.shift == 0 {
+            return self.a[index];
+        }
+        let (page, at) = place(index, self.shift);
+        match page {
+            0 => self.a[at],
+            1 => self.b[at],
+            2 => self.c[at],
+            _ => self.d[at],
+        }
+    }
+}
+
+/// As [`Pages`], to be written.
+pub struct PagesMut<'a, T> {
+    /// Page 0.
+    pub a: &'a mut [T],
+    /// Page 1.
+    pub b: &'a mut [T],
+    /// Page 2.
+    pub c: &'a mut [T],
+    /// Page 3.
+    pub d: &'a mut [T],
+    /// Binary logarithm of a page's length, or 0.
+    pub shift: u32,
+}
+
+impl<T: Copy> PagesMut<'_, T> {
+    /// Writes the element at `index`, which exists.
+    #[inline(always)]
+    pub fn store(&mut self, index: usize, value: T) {
+        if self.shift == 0 {
+            self.a[index] = value;
+            return;
+        }
+        let (page, at) = place(index, self.shift);
+        match page {
+            0 => self.a[at] = value,
+            1 => self.b[at] = value,
+            2 => self.c[at] = value,
+            _ => self.d[at] = value,
+        }
+    }
+}
+
+#[inline(always)]
+fn place(index: usize, shift: u32) -> (usize, usize) {
+    (index >> shift, index & ((1 << shift) - 1))
+}
+
+/// Elements counted from `first` on.
+#[derive(Clone, Copy)]
+pub struct StartingAt<'a, F: ?Sized> {
+    /// All elements.
+    pub all: &'a F,
+    /// The index of the one that is number 0.
+    pub first: usize,
+}
+
+impl<T, F: Fetch<T> + ?Sized> Fetch<T> for StartingAt<'_, F> {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> T {
+        self.all.fetch(self.first + index)
+    }
+}

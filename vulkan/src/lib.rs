@@ -1,0 +1,3 @@
+//! The kernels of viewfuse on any Vulkan device.
+
+pub mod kernel;
