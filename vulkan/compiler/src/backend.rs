@@ -181,7 +181,9 @@ fn official() -> Result<Backend, BackendError> {
         let mut cargo = Command::new("cargo");
         cargo.arg(format!("+{NIGHTLY}")).args(["build", "--release"]).current_dir(&folder);
         // Those of the cargo that runs this program would undo the choice of the toolchain.
-        for variable in ["CARGO", "RUSTC", "RUSTUP_TOOLCHAIN", "RUSTFLAGS", "CARGO_TARGET_DIR", "CARGO_ENCODED_RUSTFLAGS"] {
+        for variable in
+            ["CARGO", "RUSTC", "RUSTUP_TOOLCHAIN", "RUSTFLAGS", "CARGO_TARGET_DIR", "CARGO_ENCODED_RUSTFLAGS"]
+        {
             cargo.env_remove(variable);
         }
         output_of(&mut cargo)?;

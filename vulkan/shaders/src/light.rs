@@ -8,7 +8,7 @@ use viewfuse_core::fuse::{FuseBlock, fuse_element};
 use viewfuse_core::pages::StartingAt;
 
 /// The weighted sum over the views of channel number `first + id.x`.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "fuse_views"))]
 pub fn fuse_views(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<FuseBlock>,
@@ -24,7 +24,7 @@ pub fn fuse_views(
 }
 
 /// The pixel of ray number `first + id.x` from its samples.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "composite"))]
 pub fn composite(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<CompositeBlock>,

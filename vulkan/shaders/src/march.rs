@@ -9,7 +9,7 @@ use viewfuse_core::photo::ObjectBlock;
 use viewfuse_core::photo::march::MarchBlock;
 
 /// The ray of pixel number `first + id.x` of the target through the solid.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "march"))]
 #[allow(clippy::too_many_arguments)]
 pub fn march(
     #[spirv(global_invocation_id)] id: UVec3,
@@ -46,9 +46,9 @@ pub fn march(
     let texels = Pages { a: texels_a, b: texels_b, c: texels_c, d: texels_d, shift: page_shift };
     let depths = Pages { a: depths_a, b: depths_b, c: depths_c, d: depths_d, shift: page_shift };
     let mut colours = PagesMut { a: colours_a, b: colours_b, c: colours_c, d: colours_d, shift: page_shift };
-    let mut pixel_depths = PagesMut { a: pixel_depths_a, b: pixel_depths_b, c: pixel_depths_c, d: pixel_depths_d, shift: page_shift };
-    let seen =
-        viewfuse_core::photo::march::march(object, views, footprints, &texels, &depths, weights, block, at);
+    let mut pixel_depths =
+        PagesMut { a: pixel_depths_a, b: pixel_depths_b, c: pixel_depths_c, d: pixel_depths_d, shift: page_shift };
+    let seen = viewfuse_core::photo::march::march(object, views, footprints, &texels, &depths, weights, block, at);
     colours.store(pixel as usize, [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity]);
     pixel_depths.store(pixel as usize, seen.depth);
 }

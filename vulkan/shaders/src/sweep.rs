@@ -9,7 +9,7 @@ use viewfuse_core::photo::sweep::SweepBlock;
 use viewfuse_core::photo::{ObjectBlock, hull, sweep};
 
 /// Where the ray of pixel number `first + id.x` of a view, the parameter, enters the hull.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "hull_entry"))]
 pub fn hull_entry(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<u32>,
@@ -37,7 +37,7 @@ pub fn hull_entry(
 }
 
 /// How badly other views match at plane and pixel number `first + id.x` of the band.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "match_cost"))]
 #[allow(clippy::too_many_arguments)]
 pub fn match_cost(
     #[spirv(global_invocation_id)] id: UVec3,
@@ -65,12 +65,11 @@ pub fn match_cost(
     let plane = element % sweep.plane_count;
     let texels = Pages { a: texels_a, b: texels_b, c: texels_c, d: texels_d, shift: page_shift };
     let entries = Pages { a: entries_a, b: entries_b, c: entries_c, d: entries_d, shift: page_shift };
-    costs[element as usize] =
-        sweep::match_cost(object, sweep, views, &texels, &entries, pair_weights, pixel, plane);
+    costs[element as usize] = sweep::match_cost(object, sweep, views, &texels, &entries, pair_weights, pixel, plane);
 }
 
 /// Costs summed over a window's columns at plane and pixel number `first + id.x` of the band.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "sum_row"))]
 pub fn sum_row(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<SweepBlock>,
@@ -82,12 +81,11 @@ pub fn sum_row(
     }
     let sweep = &push.parameters;
     let element = push.piece.first + id.x;
-    row_sums[element as usize] =
-        sweep::sum_row(sweep, costs, element / sweep.plane_count, element % sweep.plane_count);
+    row_sums[element as usize] = sweep::sum_row(sweep, costs, element / sweep.plane_count, element % sweep.plane_count);
 }
 
 /// Costs averaged over a window at plane and pixel number `first + id.x` of the band.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "mean_column"))]
 pub fn mean_column(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<SweepBlock>,
@@ -107,7 +105,7 @@ pub fn mean_column(
 /// The depth of least cost of pixel number `first + id.x` of the band.
 ///
 /// `entries`, `guess` and `picked` are maps of all views, of which the band is a part.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "pick_depth"))]
 #[allow(clippy::too_many_arguments)]
 pub fn pick_depth(
     #[spirv(global_invocation_id)] id: UVec3,

@@ -10,7 +10,7 @@ use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock};
 
 /// Weights of the sources for target number `first + id.x`, by formula.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "weigh"))]
 pub fn weigh(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<WeighBlock>,
@@ -34,7 +34,7 @@ pub fn weigh(
 }
 
 /// The embedding of pose number `first + id.x`.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "embed_pose"))]
 pub fn embed_pose(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] piece: &Piece,
@@ -50,7 +50,7 @@ pub fn embed_pose(
 }
 
 /// Weights of the sources for target number `first + id.x`, by attention; the parameter is how many sources there are.
-#[spirv(compute(threads(64)))]
+#[spirv(compute(threads(64), entry_point_name = "attend"))]
 pub fn attend(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<u32>,
