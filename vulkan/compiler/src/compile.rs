@@ -1,0 +1,81 @@
+//! Sources become a module.
+//!
+//! rust-gpu's optimiser (SPIRV-Tools) is left out: it may rewrite float arithmetic that is not marked against
+//! contraction, such as `(a - b) + b` to `a`, and the marks come after it. rust-gpu's own passes (inlining, memory to
+//! registers, dead code) stay.
+
+use crate::backend::{Backend, Toolchain};
+use crate::refine::{RefineError, refine};
+use spirv_builder::{SpirvBuilder, SpirvBuilderError};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What the module runs on: Vulkan 1.1 and later.
+pub const TARGET: &str = "spirv-unknown-vulkan1.1";
+
+/// Why there is no module.
+#[derive(Debug, thiserror::Error)]
+pub enum CompileError {
+    /// The compiler failed; what it found wrong is already on the standard error output.
+    #[error("the kernels do not compile: {0}")]
+    Compiler(#[from] SpirvBuilderError),
+    /// The module could not be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The module is none.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
+    /// The validator has objections.
+    #[error("spirv-val, for {environment}: {said}")]
+    Invalid {
+        /// The version of Vulkan.
+        environment: String,
+        /// What it said.
+        said: String,
+    },
+}
+
+/// The module as bytes, of the sources in the repository `root`, built in `target`.
+///
+/// # Errors
+/// [`CompileError`].
+pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Vec<u8>, CompileError> {
+    let mut builder = SpirvBuilder::new(root.join("vulkan").join("shaders"), TARGET);
+    builder.rustc_codegen_spirv_location = Some(backend.code_generator.clone());
+    builder.target_dir_path = Some(target.to_path_buf());
+    builder.extra_args = vec!["--no-spirv-opt".to_owned()];
+    // We are no build script, nobody reads instructions to cargo.
+    builder.build_script.defaults = false;
+    if let Toolchain::Rustup(name) = &backend.toolchain {
+        builder.toolchain_overwrite = Some(name.clone());
+    }
+    let compiled = builder.build()?;
+    let path = compiled.module.unwrap_single();
+    let bytes = std::fs::read(path).map_err(|source| CompileError::Read { path: path.to_path_buf(), source })?;
+    Ok(refine(&bytes)?)
+}
+
+/// Validates a module by `spirv-val`, for the versions of Vulkan that it is meant for. Returns whether there is such
+/// a program.
+///
+/// # Errors
+/// [`CompileError::Invalid`], or [`CompileError::Read`] for a file that could not be written.
+pub fn validate(module: &[u8], target: &Path) -> Result<bool, CompileError> {
+    let path = target.join("refined.spv");
+    std::fs::write(&path, module).map_err(|source| CompileError::Read { path: path.clone(), source })?;
+    for environment in ["vulkan1.1", "vulkan1.2", "vulkan1.3"] {
+        let Ok(output) = Command::new("spirv-val").args(["--target-env", environment]).arg(&path).output() else {
+            return Ok(false);
+        };
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout);
+            return Err(CompileError::Invalid { environment: environment.to_owned(), said });
+        }
+    }
+    Ok(true)
+}

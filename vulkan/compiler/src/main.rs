@@ -1,0 +1,111 @@
+//! `cargo shaders`: makes `kernels.spv` and `kernels.toml`, or checks that they are what the sources give.
+
+use std::env;
+use std::error::Error;
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use viewfuse_shader_compiler::backend::{Backend, HOME_VARIABLE, Toolchain};
+use viewfuse_shader_compiler::compile::{compile, validate};
+use viewfuse_shader_compiler::stamp::{Inputs, MODULE, STAMP, Stamp, sha256};
+
+const USAGE: &str = "usage: cargo shaders [--check]
+Makes vulkan/src/kernels.spv and kernels.toml from the sources.
+  --check    writes nothing; compiles and compares, exit code 1 if anything differs";
+
+/// Environment variables by which somebody could change what is compiled.
+const FORBIDDEN: [&str; 3] = ["RUSTGPU_CODEGEN_ARGS", "RUSTGPU_RUSTFLAGS", "RUSTGPU_CARGOFLAGS"];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = env::args().skip(1).collect();
+    let check = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => false,
+        ["--check"] => true,
+        ["--help" | "-h"] => {
+            println!("{USAGE}");
+            return ExitCode::SUCCESS;
+        }
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    run(check).unwrap_or_else(|error| {
+        eprintln!("error: {error}");
+        ExitCode::FAILURE
+    })
+}
+
+fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
+    // At run time: a target folder may be shared by several checkouts.
+    let package =
+        env::var_os("CARGO_MANIFEST_DIR").ok_or("CARGO_MANIFEST_DIR is not set: run this as `cargo shaders`")?;
+    let root = fs::canonicalize(Path::new(&package).join("..").join(".."))?;
+    let backend = Backend::find(&root)?;
+    if let Some(code) = run_prepared(&backend)? {
+        return Ok(code);
+    }
+    let inputs = Inputs::read(&root)?;
+    let program = env::current_exe()?;
+    let target = program.parent().and_then(Path::parent).ok_or("the program lies in no target folder")?.join("shaders");
+    let module = compile(&backend, &root, &target)?;
+    let validated = validate(&module, &target)?;
+    let stamp = Stamp { compiler: backend.version()?, module: sha256(&module), inputs };
+    if check {
+        return compare(&root, &module, &stamp);
+    }
+    fs::write(root.join(MODULE), &module).map_err(|error| format!("{MODULE}: {error}"))?;
+    fs::write(root.join(STAMP), stamp.text()).map_err(|error| format!("{STAMP}: {error}"))?;
+    let validated = if validated { "spirv-val has no objection" } else { "not validated: there is no spirv-val" };
+    println!("{MODULE}: {} bytes by {}; {validated}", module.len(), stamp.compiler);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Compares what was just compiled with what is checked in.
+fn compare(root: &Path, module: &[u8], compiled: &Stamp) -> Result<ExitCode, Box<dyn Error>> {
+    let stored = fs::read(root.join(MODULE)).map_err(|error| format!("{MODULE}: {error}"))?;
+    let stamp = Stamp::read(root)?;
+    let mut stale = stamp.stale(&compiled.inputs, &stored);
+    if stored != module {
+        stale.push(format!(
+            "{MODULE} is not what the sources give: it has {} bytes, made by {}; compiled now: {} bytes by {}",
+            stored.len(),
+            stamp.compiler,
+            module.len(),
+            compiled.compiler
+        ));
+    }
+    if stale.is_empty() {
+        println!("{MODULE} is what the sources give");
+        return Ok(ExitCode::SUCCESS);
+    }
+    stale.iter().for_each(|difference| eprintln!("{difference}"));
+    eprintln!("stale: run `cargo shaders` and commit {MODULE} and {STAMP}");
+    Ok(ExitCode::FAILURE)
+}
+
+/// spirv-builder takes cargo from the search path and options from the environment. Where those are not as they must be,
+/// this program runs itself again in an environment that is, and returns how that ended.
+fn run_prepared(backend: &Backend) -> Result<Option<ExitCode>, Box<dyn Error>> {
+    let search = backend.program_path();
+    let is_right =
+        search.as_ref().is_none_or(|search| first_of(Some(search)) == first_of(env::var_os("PATH").as_ref()));
+    if is_right && FORBIDDEN.iter().all(|variable| env::var_os(variable).is_none()) {
+        return Ok(None);
+    }
+    let mut again = Command::new(env::current_exe()?);
+    again.args(env::args_os().skip(1));
+    FORBIDDEN.iter().for_each(|variable| _ = again.env_remove(variable));
+    if let (Some(search), Toolchain::Folder(bin)) = (search, &backend.toolchain) {
+        again.env("PATH", search);
+        again.env(HOME_VARIABLE, bin.join(".."));
+    }
+    let code = again.status()?.code().and_then(|code| u8::try_from(code).ok());
+    Ok(Some(code.map_or(ExitCode::FAILURE, ExitCode::from)))
+}
+
+/// The first folder of a search path.
+fn first_of(search: Option<&OsString>) -> Option<PathBuf> {
+    env::split_paths(search?).next().and_then(|folder| fs::canonicalize(folder).ok())
+}

@@ -1,0 +1,195 @@
+//! What a module was made from: `kernels.toml`.
+//!
+//! It holds the sha256 of every file that decides the module's bytes, the locked versions of the libraries that become
+//! part of it, the sha256 of the module and the version of the compiler. Whether the checked-in module is fresh can so
+//! be told without a compiler.
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The module, relative to the repository.
+pub const MODULE: &str = "vulkan/src/kernels.spv";
+/// What it was made from.
+pub const STAMP: &str = "vulkan/src/kernels.toml";
+/// Files, and folders with all their Rust files, that the module is made from.
+pub const SOURCES: [&str; 6] = [
+    "core/Cargo.toml",
+    "core/src",
+    "vulkan/compiler/src/compile.rs",
+    "vulkan/compiler/src/refine.rs",
+    "vulkan/shaders/Cargo.toml",
+    "vulkan/shaders/src",
+];
+/// Libraries of which parts are in the module.
+pub const LIBRARIES: [&str; 6] = ["bytemuck", "bytemuck_derive", "glam", "libm", "spirv-std", "spirv-std-macros"];
+
+/// Why it cannot be told what a module was made from.
+#[derive(Debug, thiserror::Error)]
+pub enum StampError {
+    /// A file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A file is not what it should be.
+    #[error("{}: {source}", path.display())]
+    Format {
+        /// Which.
+        path: PathBuf,
+        /// Where and why.
+        source: toml::de::Error,
+    },
+    /// A library is not locked.
+    #[error("{}: there is no package {library}", path.display())]
+    Unlocked {
+        /// Cargo.lock.
+        path: PathBuf,
+        /// The library.
+        library: &'static str,
+    },
+}
+
+/// What decides a module's bytes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Inputs {
+    /// Locked versions by library, with their checksums.
+    pub libraries: BTreeMap<String, String>,
+    /// sha256 by file, relative to the repository.
+    pub sources: BTreeMap<String, String>,
+}
+
+/// What a module was made from, and by what.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Stamp {
+    /// Versions of rust-gpu and rustc.
+    pub compiler: String,
+    /// sha256 of the module.
+    pub module: String,
+    /// What it was made from.
+    #[serde(flatten)]
+    pub inputs: Inputs,
+}
+
+#[derive(Deserialize)]
+struct Lock {
+    package: Vec<Locked>,
+}
+
+#[derive(Deserialize)]
+struct Locked {
+    name: String,
+    version: String,
+    #[serde(default)]
+    checksum: String,
+}
+
+impl Inputs {
+    /// Of the repository in `root` as it is now.
+    ///
+    /// # Errors
+    /// [`StampError`], with the file.
+    pub fn read(root: &Path) -> Result<Inputs, StampError> {
+        let mut sources = BTreeMap::new();
+        for source in SOURCES {
+            hash_all(root, source, &mut sources)?;
+        }
+        let path = root.join("Cargo.lock");
+        let lock: Lock =
+            toml::from_str(&read_text(&path)?).map_err(|source| StampError::Format { path: path.clone(), source })?;
+        let mut libraries = BTreeMap::new();
+        for library in LIBRARIES {
+            let locked: Vec<String> = lock
+                .package
+                .iter()
+                .filter(|package| package.name == library)
+                .map(|package| format!("{} {}", package.version, package.checksum))
+                .collect();
+            if locked.is_empty() {
+                return Err(StampError::Unlocked { path, library });
+            }
+            libraries.insert(library.to_owned(), locked.join(", "));
+        }
+        Ok(Inputs { libraries, sources })
+    }
+}
+
+impl Stamp {
+    /// The one that is checked in.
+    ///
+    /// # Errors
+    /// [`StampError`], with the file.
+    pub fn read(root: &Path) -> Result<Stamp, StampError> {
+        let path = root.join(STAMP);
+        toml::from_str(&read_text(&path)?).map_err(|source| StampError::Format { path, source })
+    }
+
+    /// The file's text.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "# What kernels.spv was made from; written by `cargo shaders`.\ncompiler = {:?}\nmodule = {:?}\n",
+            self.compiler, self.module
+        );
+        for (name, table) in [("libraries", &self.inputs.libraries), ("sources", &self.inputs.sources)] {
+            text += &format!("\n[{name}]\n");
+            for (key, value) in table {
+                text += &format!("{key:?} = {value:?}\n");
+            }
+        }
+        text
+    }
+
+    /// Whether a module was made from these inputs: every difference as a sentence that names it, none if it is fresh.
+    pub fn stale(&self, inputs: &Inputs, module: &[u8]) -> Vec<String> {
+        let mut stale = differences("library", &self.inputs.libraries, &inputs.libraries);
+        stale.extend(differences("source", &self.inputs.sources, &inputs.sources));
+        if sha256(module) != self.module {
+            stale.push(format!("{MODULE} is not the module that {STAMP} speaks of"));
+        }
+        stale
+    }
+}
+
+/// sha256 as hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn differences(kind: &str, then: &BTreeMap<String, String>, now: &BTreeMap<String, String>) -> Vec<String> {
+    let changed = then.iter().filter_map(|(name, value)| match now.get(name) {
+        None => Some(format!("{kind} {name} is gone")),
+        Some(other) if other != value => Some(format!("{kind} {name} has changed")),
+        Some(_) => None,
+    });
+    let new = now.keys().filter(|name| !then.contains_key(*name)).map(|name| format!("{kind} {name} is new"));
+    changed.chain(new).collect()
+}
+
+/// Hashes a file, or all Rust files of a folder and those in it. Carriage returns do not count: a checkout may add them.
+fn hash_all(root: &Path, relative: &str, hashes: &mut BTreeMap<String, String>) -> Result<(), StampError> {
+    let path = root.join(relative);
+    if !path.is_dir() {
+        let bytes = fs::read(&path).map_err(|source| StampError::File { path, source })?;
+        let bytes: Vec<u8> = bytes.into_iter().filter(|byte| *byte != b'\r').collect();
+        hashes.insert(relative.to_owned(), sha256(&bytes));
+        return Ok(());
+    }
+    let failed = |source| StampError::File { path: path.clone(), source };
+    for entry in fs::read_dir(&path).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() || name.ends_with(".rs") {
+            hash_all(root, &format!("{relative}/{name}"), hashes)?;
+        }
+    }
+    Ok(())
+}
+
+fn read_text(path: &Path) -> Result<String, StampError> {
+    fs::read_to_string(path).map_err(|source| StampError::File { path: path.to_path_buf(), source })
+}

@@ -1,0 +1,42 @@
+//! Entry points of the kernels on Vulkan devices.
+//!
+//! Nothing is computed here. An entry point has the name of its kernel, takes its arrays in the order of the list of
+//! kernels (`viewfuse_vulkan::kernel`), its parameters and the piece as push constants, looks whether its element exists,
+//! calls the function of `viewfuse-core` that is the kernel, and stores what that returns. Arrays that may be longer
+//! than a device can bind at once come as four pages.
+//!
+//! ```text
+//! weighting   how relevant each source is               weigh, embed_pose, attend
+//! light       views become one, samples become a pixel  fuse_views, composite
+//! sweep       the depths of source pixels               hull_entry, match_cost, sum_row, mean_column, pick_depth
+//! march       a target pixel's ray                      march
+//! ```
+//!
+//! On the host the same entry points are plain functions, which tests call.
+#![cfg_attr(target_arch = "spirv", no_std)]
+
+pub mod light;
+pub mod march;
+pub mod sweep;
+pub mod weighting;
+
+/// Which elements a dispatch has: its invocation `i` works on element `first + i`, if `i < count`. The same bytes as
+/// `viewfuse_vulkan::kernel::Piece`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(C)]
+pub struct Piece {
+    /// The first element.
+    pub first: u32,
+    /// How many there are.
+    pub count: u32,
+}
+
+/// Push constants of a kernel with parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct Push<P> {
+    /// What the kernel is told.
+    pub parameters: P,
+    /// Which elements.
+    pub piece: Piece,
+}
