@@ -46,8 +46,8 @@ fn elementary(inputs: Inputs, emit: Emit) {
 }
 
 fn weights(inputs: Inputs, emit: Emit) {
-    // Far out the formulas take other ways, and very near the squares vanish.
-    for scale in [2.0, 1.0e8, 1.0e24, 1.0e-18] {
+    // Far out the formulas take other ways, and very near the squares vanish; a great beta needs small distances.
+    for scale in [2.0, 1.0e-3, 1.0e8, 1.0e24, 1.0e-18] {
         every_scheme(&Rig::around(inputs, scale), emit);
     }
     every_scheme(&Rig::at_a_source(inputs), emit);
@@ -117,7 +117,7 @@ pub fn samples(inputs: Inputs) -> [[f32; 4]; SAMPLES] {
         *green = 0.5 + 0.5 * wave(inputs, index + 1000);
         *blue = 0.5 + 0.5 * wave(inputs, index + 2000);
         // Thin at first, then denser.
-        *optical_depth = 1.0e-4 * (1 + index * index) as f32 * (1.2 + wave(inputs, index + 3000));
+        *optical_depth = 2.0e-5 * (1 + index * index) as f32 * (1.2 + wave(inputs, index + 3000));
     }
     samples
 }

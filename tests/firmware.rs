@@ -1,0 +1,245 @@
+//! core on a bare Cortex-M4F, in an emulator: the same bits as on the host, and what the calls take.
+//!
+//! Where the emulator or Rust's library for the target is missing, these tests are ignored and say what is missing;
+//! with `VIEWFUSE_REQUIRE_FIRMWARE=1` they fail instead.
+
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+use viewfuse_list::Inputs;
+use viewfuse_list::attended::attention;
+use viewfuse_list::formulas::formulas;
+use viewfuse_list::rig::schemes;
+use viewfuse_tests::emulator::Emulator;
+use viewfuse_tests::emulator::image::Image;
+use viewfuse_tests::emulator::list::{Difference, Line, compare, gathered, parsed};
+use viewfuse_tests::emulator::trace::{Call, calls};
+
+const REQUIRED: &str = "VIEWFUSE_REQUIRE_FIRMWARE";
+
+/// What the default scheme may take for 8 sources.
+const MOST_INSTRUCTIONS: u64 = 6000;
+const MOST_STACK: u32 = 2048;
+/// What the firmware without attention may have of code and constants.
+const MOST_BYTES: u64 = 32 * 1024;
+
+/// For size, and for speed.
+const PROFILES: [&str; 2] = ["release", "fast"];
+const PROGRAMS: [&str; 2] = ["formulas", "attention"];
+/// Of so many different numbers a list consists at least.
+const LEAST_DIFFERENT: usize = 200;
+
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn host_list(program: &str, inputs: Inputs) -> Vec<Line> {
+    match program {
+        "formulas" => gathered(|emit| formulas(inputs, emit)),
+        _ => gathered(|emit| attention(inputs, emit)),
+    }
+}
+
+/// Builds once, whichever test comes first.
+struct Firmware {
+    emulator: Result<Emulator, String>,
+    built: Mutex<Vec<(&'static str, PathBuf)>>,
+}
+
+impl Firmware {
+    fn folder(&self, profile: &'static str) -> Result<PathBuf, Failed> {
+        let mut built = self.built.lock().expect("no test panicked in here");
+        if let Some((_, folder)) = built.iter().find(|(name, _)| *name == profile) {
+            return Ok(folder.clone());
+        }
+        let folder = self.emulator()?.build(&repository(), profile)?;
+        built.push((profile, folder.clone()));
+        Ok(folder)
+    }
+
+    fn emulator(&self) -> Result<&Emulator, Failed> {
+        self.emulator.as_ref().map_err(|missing| Failed::from(missing.as_str()))
+    }
+}
+
+fn main() {
+    let arguments = Arguments::from_args();
+    let emulator = Emulator::find(&repository(), Path::new(env!("CARGO_TARGET_TMPDIR")));
+    let missing = emulator.as_ref().err().cloned();
+    let ignored = missing.is_some() && !std::env::var(REQUIRED).is_ok_and(|value| value == "1");
+    let firmware = Arc::new(Firmware { emulator, built: Mutex::default() });
+    let on_device = |name: String, test: Box<dyn FnOnce(&Firmware) -> Result<(), Failed> + Send>| {
+        let firmware = Arc::clone(&firmware);
+        let trial = Trial::test(name, move || test(&firmware)).with_ignored_flag(ignored);
+        // The kind is printed in front of the name: why a test is ignored.
+        if ignored { trial.with_kind(missing.clone().unwrap_or_default()) } else { trial }
+    };
+    let mut trials = vec![
+        Trial::test("the_lists_are_worth_comparing", the_lists_are_worth_comparing),
+        Trial::test("every_kind_of_number_depends_on_the_inputs", every_kind_of_number_depends_on_the_inputs),
+        Trial::test("lists_that_differ_are_rejected", lists_that_differ_are_rejected),
+        Trial::test("a_trace_without_return_is_rejected", a_trace_without_return_is_rejected),
+        Trial::test("both_workspaces_lock_the_same_mathematics", both_workspaces_lock_the_same_mathematics),
+    ];
+    for profile in PROFILES {
+        for program in PROGRAMS {
+            let name = format!("bits_equal_the_hosts::{program}::{profile}");
+            trials.push(on_device(name, Box::new(move |firmware| bits_equal_the_hosts(firmware, profile, program))));
+        }
+    }
+    trials.push(on_device("what_the_calls_take".into(), Box::new(what_the_calls_take)));
+    libtest_mimic::run(&arguments, trials).exit();
+}
+
+fn the_lists_are_worth_comparing() -> Result<(), Failed> {
+    for program in PROGRAMS {
+        let list = host_list(program, Inputs::STANDARD);
+        compare(&list, &list, LEAST_DIFFERENT).map_err(|difference| format!("{program}: {difference:?}"))?;
+    }
+    Ok(())
+}
+
+/// The negative control: a phase that differs by 1 %, or another seed, changes some number of every kind.
+fn every_kind_of_number_depends_on_the_inputs() -> Result<(), Failed> {
+    let changed = Inputs { phase: 1.01 * Inputs::STANDARD.phase, seed: Inputs::STANDARD.seed + 1 };
+    // Equal weights whatever the cameras.
+    const INDEPENDENT: [&str; 2] = ["mean", "gaussian:beta=0"];
+    for program in PROGRAMS {
+        let (list, other) = (host_list(program, Inputs::STANDARD), host_list(program, changed));
+        assert!(compare(&other, &list, LEAST_DIFFERENT).is_err());
+        assert_eq!(list.len(), other.len());
+        let mut names: Vec<&str> = list.iter().map(|(name, _)| name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert!(names.len() > 5);
+        for name in names {
+            let same = list.iter().zip(&other).filter(|(line, _)| line.0 == name).all(|(line, other)| line == other);
+            assert_eq!(same, INDEPENDENT.contains(&name), "{name}");
+        }
+    }
+    Ok(())
+}
+
+fn lists_that_differ_are_rejected() -> Result<(), Failed> {
+    let list: Vec<Line> = (0..9).map(|index| ("n".to_owned(), (index as f32).to_bits())).collect();
+    let with = |index: usize, line: Line| {
+        let mut changed = list.clone();
+        changed[index] = line;
+        changed
+    };
+    assert_eq!(compare(&list, &list, 9), Ok(()));
+    let last_bit = ("n".to_owned(), list[4].1 ^ 1);
+    assert_eq!(compare(&with(4, last_bit.clone()), &list, 9), Err(Difference::Line(4, last_bit, list[4].clone())));
+    let renamed = ("m".to_owned(), list[8].1);
+    assert_eq!(compare(&with(8, renamed.clone()), &list, 9), Err(Difference::Line(8, renamed, list[8].clone())));
+    assert_eq!(compare(&list[..8], &list, 9), Err(Difference::Length(8, 9)));
+    assert_eq!(compare(&[], &[], 1), Err(Difference::Poor(0)));
+    assert_eq!(compare(&list, &list, 10), Err(Difference::Poor(9)));
+    let nan = with(3, ("n".to_owned(), f32::NAN.to_bits()));
+    assert_eq!(compare(&nan, &nan, 9), Err(Difference::NotFinite(3, nan[3].clone())));
+    assert_eq!(parsed("3f800000 one"), Ok(vec![("one".to_owned(), 1.0_f32.to_bits())]));
+    assert!(parsed("3f80000 one").is_err() && parsed("one").is_err());
+    Ok(())
+}
+
+fn a_trace_without_return_is_rejected() -> Result<(), Failed> {
+    use viewfuse_tests::emulator::image::Function;
+    let function = |name: &str, address| Function { name: name.into(), address, size: 8 };
+    let functions = vec![function("main", 0x100), function("measured_it", 0x108), function("within", 0x110)];
+    let image = Image { sections: Vec::new(), functions };
+    let line = |address: u32, stack: u32, link: u32| {
+        format!("R00=00000000\nR12=00000000 R13={stack:08x} R14={link:08x} R15={address:08x}\n")
+    };
+    let start = [line(0x100, 0x800, 0), line(0x108, 0x800, 0x105), line(0x110, 0x7f0, 0x10d)].concat();
+    assert!(calls(start.as_bytes(), &image).is_err_and(|error| error.contains("does not return")));
+    let lost = [start.as_str(), &line(0x900, 0x7f0, 0)].concat();
+    assert!(calls(lost.as_bytes(), &image).is_err_and(|error| error.contains("no function")));
+    let whole = [start.as_str(), &line(0x10c, 0x800, 0), &line(0x104, 0x800, 0)].concat();
+    let call = Call { name: "it".into(), instructions: 3, stack: 16, code: 16 };
+    assert_eq!(calls(whole.as_bytes(), &image), Ok(vec![call]));
+    Ok(())
+}
+
+/// Equal bits are only promised for equal sources.
+fn both_workspaces_lock_the_same_mathematics() -> Result<(), Failed> {
+    let read =
+        |path: &str| std::fs::read_to_string(repository().join(path)).map_err(|error| format!("{path}: {error}"));
+    let (ours, firmware) = (read("Cargo.lock")?, read("tests/firmware/Cargo.lock")?);
+    for name in ["glam", "libm", "bytemuck"] {
+        let version = |lock: &str| {
+            let (_, behind) = lock.split_once(&format!("name = \"{name}\"\n"))?;
+            behind.lines().next().map(str::to_owned)
+        };
+        let locked = version(&ours).ok_or_else(|| format!("{name} is not locked"))?;
+        assert_eq!(Some(locked), version(&firmware), "{name}");
+    }
+    Ok(())
+}
+
+fn bits_equal_the_hosts(firmware: &Firmware, profile: &'static str, program: &str) -> Result<(), Failed> {
+    let path = firmware.folder(profile)?.join(program);
+    let printed = parsed(&firmware.emulator()?.run(&path)?)?;
+    let expected = host_list(program, Inputs::STANDARD);
+    compare(&printed, &expected, LEAST_DIFFERENT).map_err(|difference| format!("{difference:?}"))?;
+    let changed = Inputs { phase: 1.01 * Inputs::STANDARD.phase, ..Inputs::STANDARD };
+    assert!(compare(&printed, &host_list(program, changed), LEAST_DIFFERENT).is_err());
+    Ok(())
+}
+
+/// What a call is in the table.
+fn title(call: &Call, weighed: &mut impl Iterator<Item = &'static str>) -> Option<String> {
+    Some(match call.name.as_str() {
+        "weigh" => format!("weights of 8 sources, {}", weighed.next()?),
+        "attend" => "attention weights of 8 sources".into(),
+        "embed" => "one pose embedded".into(),
+        "fuse" => "fusing 8 x 16 latents".into(),
+        "fuse_visible" => "fusing 8 x 16 latents with visibility".into(),
+        "ray" => "one composited ray of 64 samples".into(),
+        "depths" => "64 stratified depths with random numbers".into(),
+        "sqrt" => "one square root".into(),
+        _ => return None,
+    })
+}
+
+fn what_the_calls_take(firmware: &Firmware) -> Result<(), Failed> {
+    let emulator = firmware.emulator()?;
+    let mut measured = Vec::new();
+    let mut without_attention = Vec::new();
+    for profile in PROFILES {
+        let folder = firmware.folder(profile)?;
+        let program = folder.join("calls");
+        let image = Image::open(&program)?;
+        let calls = emulator.trace(&program, &image)?;
+        if profile == PROFILES[0] {
+            assert_eq!(calls, emulator.trace(&program, &image)?, "the counts repeat exactly");
+        }
+        measured.push(calls);
+        without_attention.push(Image::open(&folder.join("formulas"))?);
+    }
+    let mut table = format!("{:52}{:>26}{:>26}\n", "", "for size", "for speed");
+    let columns = ["instr.", "stack", "code"];
+    writeln!(table, "{:52}{1:>12}{2:>7}{3:>7}{1:>12}{2:>7}{3:>7}", "call", columns[0], columns[1], columns[2])?;
+    let mut names = schemes().into_iter().map(|(name, _)| name);
+    assert_eq!(measured[0].len(), measured[1].len());
+    for (small, fast) in measured[0].iter().zip(&measured[1]) {
+        assert_eq!(small.name, fast.name);
+        let title = title(small, &mut names).ok_or("a call without a title")?;
+        write!(table, "{title:52}")?;
+        for call in [small, fast] {
+            write!(table, "{:>12}{:>7}{:>7}", call.instructions, call.stack, call.code)?;
+        }
+        table.push('\n');
+    }
+    assert_eq!(names.next(), None, "every scheme was measured");
+    for image in &without_attention {
+        writeln!(table, "all without attention: {} bytes of code and constants, {:?}", image.bytes(), image.sections)?;
+    }
+    println!("\n{table}");
+    let default = &measured[0][0];
+    assert_eq!(default.name, "weigh");
+    assert!(default.instructions <= MOST_INSTRUCTIONS && default.stack <= MOST_STACK, "{default:?}");
+    assert!(default.instructions > 100, "nothing was computed: {default:?}");
+    assert!(without_attention[0].bytes() <= MOST_BYTES);
+    Ok(())
+}
