@@ -197,6 +197,7 @@ fn title(call: &Call, weighed: &mut impl Iterator<Item = &'static str>) -> Optio
         "fuse_visible" => "fusing 8 x 16 latents with visibility".into(),
         "ray" => "one composited ray of 64 samples".into(),
         "depths" => "64 stratified depths with random numbers".into(),
+        "step" => "one denoiser step of 16 values, without the network".into(),
         "sqrt" => "one square root".into(),
         _ => return None,
     })

@@ -1,12 +1,12 @@
 //! Everything but attention.
 
+use crate::denoised::denoising;
 use crate::rig::{Rig, VIEWS, schemes};
 use crate::{Emit, Inputs, emit_all, wave};
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::depths::{inverse_cdf, stratified_depth};
 use viewfuse_core::fuse::{fuse_views, fuse_visible};
 use viewfuse_core::math::{angle_from_components, exp, norm3, sin_cos, sqrt};
-use viewfuse_core::pose::Pose;
 use viewfuse_core::random::{threefry_2x32, uniform};
 use viewfuse_core::weighting::{Scheme, weigh};
 use viewfuse_core::weights::Weights;
@@ -25,6 +25,7 @@ pub fn formulas(inputs: Inputs, emit: Emit) {
     ray(inputs, emit);
     depths(inputs, emit);
     random(inputs, emit);
+    denoising(inputs, emit);
 }
 
 fn elementary(inputs: Inputs, emit: Emit) {
@@ -177,9 +178,4 @@ fn random(inputs: Inputs, emit: Emit) {
             emit("threefry", (word & 0xffff) as f32);
         }
     }
-}
-
-/// The target pose of the measured calls, for programs that need nothing else of a rig.
-pub fn target(inputs: Inputs) -> Pose {
-    Rig::around(inputs, 2.0).target
 }

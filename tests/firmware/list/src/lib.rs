@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod attended;
+pub mod denoised;
 pub mod formulas;
 pub mod rig;
 

@@ -10,12 +10,14 @@ use viewfuse_core::composite::Composite;
 use viewfuse_core::fuse::{fuse_views, fuse_visible};
 use viewfuse_core::math::sqrt;
 use viewfuse_core::pose::Pose;
+use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{Scheme, weigh};
 use viewfuse_core::weights::Weights;
 use viewfuse_firmware::finish;
 use viewfuse_list::Inputs;
 use viewfuse_list::attended::fourier;
+use viewfuse_list::denoised::{denoiser_step, noise};
 use viewfuse_list::formulas::{CHANNELS, SAMPLES, composite_ray, latents, samples, stratified, visibility};
 use viewfuse_list::rig::{Rig, VIEWS, schemes};
 
@@ -67,6 +69,12 @@ fn measured_depths(seed: u64) -> [f32; SAMPLES] {
 
 #[unsafe(no_mangle)]
 #[inline(never)]
+fn measured_step(schedule: &NoiseSchedule, index: u32, noisy: &[f32; CHANNELS]) -> [f32; CHANNELS] {
+    denoiser_step(schedule, index, noisy)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
 fn measured_sqrt(x: f32) -> f32 {
     sqrt(x)
 }
@@ -84,6 +92,7 @@ fn main() -> ! {
     black_box(measured_fuse_visible(&weights, &visibility(), &latents));
     black_box(measured_ray(&samples(inputs)));
     black_box(measured_depths(inputs.seed));
+    black_box(measured_step(&NoiseSchedule::published(), 12, &noise(inputs)));
     black_box(measured_sqrt(inputs.phase));
     let embedding = fourier(inputs);
     black_box(measured_embed(&embedding, &target));
