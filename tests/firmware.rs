@@ -4,7 +4,6 @@
 //! with `VIEWFUSE_REQUIRE_FIRMWARE=1` they fail instead.
 
 use libtest_mimic::{Arguments, Failed, Trial};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use viewfuse_list::Inputs;
@@ -63,13 +62,16 @@ impl Firmware {
     }
 }
 
+/// A test that needs the emulator.
+type OnDevice = Box<dyn FnOnce(&Firmware) -> Result<(), Failed> + Send>;
+
 fn main() {
     let arguments = Arguments::from_args();
     let emulator = Emulator::find(&repository(), Path::new(env!("CARGO_TARGET_TMPDIR")));
     let missing = emulator.as_ref().err().cloned();
     let ignored = missing.is_some() && !std::env::var(REQUIRED).is_ok_and(|value| value == "1");
     let firmware = Arc::new(Firmware { emulator, built: Mutex::default() });
-    let on_device = |name: String, test: Box<dyn FnOnce(&Firmware) -> Result<(), Failed> + Send>| {
+    let on_device = |name: String, test: OnDevice| {
         let firmware = Arc::clone(&firmware);
         let trial = Trial::test(name, move || test(&firmware)).with_ignored_flag(ignored);
         // The kind is printed in front of the name: why a test is ignored.
@@ -88,6 +90,7 @@ fn main() {
             trials.push(on_device(name, Box::new(move |firmware| bits_equal_the_hosts(firmware, profile, program))));
         }
     }
+    trials.push(on_device("a_program_that_panics_is_noticed".into(), Box::new(a_program_that_panics_is_noticed)));
     trials.push(on_device("what_the_calls_take".into(), Box::new(what_the_calls_take)));
     libtest_mimic::run(&arguments, trials).exit();
 }
@@ -187,6 +190,12 @@ fn bits_equal_the_hosts(firmware: &Firmware, profile: &'static str, program: &st
     Ok(())
 }
 
+fn a_program_that_panics_is_noticed(firmware: &Firmware) -> Result<(), Failed> {
+    let path = firmware.folder(PROFILES[0])?.join("fails");
+    assert!(firmware.emulator()?.run(&path).is_err_and(|error| error.contains("failed")));
+    Ok(())
+}
+
 /// What a call is in the table.
 fn title(call: &Call, weighed: &mut impl Iterator<Item = &'static str>) -> Option<String> {
     Some(match call.name.as_str() {
@@ -203,6 +212,9 @@ fn title(call: &Call, weighed: &mut impl Iterator<Item = &'static str>) -> Optio
     })
 }
 
+/// A row of the table: what it is about, and its numbers.
+type Row = (String, Vec<u64>);
+
 fn what_the_calls_take(firmware: &Firmware) -> Result<(), Failed> {
     let emulator = firmware.emulator()?;
     let mut measured = Vec::new();
@@ -218,29 +230,52 @@ fn what_the_calls_take(firmware: &Firmware) -> Result<(), Failed> {
         measured.push(calls);
         without_attention.push(Image::open(&folder.join("formulas"))?);
     }
-    let mut table = format!("{:52}{:>26}{:>26}\n", "", "for size", "for speed");
-    let columns = ["instr.", "stack", "code"];
-    writeln!(table, "{:52}{1:>12}{2:>7}{3:>7}{1:>12}{2:>7}{3:>7}", "call", columns[0], columns[1], columns[2])?;
-    let mut names = schemes().into_iter().map(|(name, _)| name);
-    assert_eq!(measured[0].len(), measured[1].len());
-    for (small, fast) in measured[0].iter().zip(&measured[1]) {
-        assert_eq!(small.name, fast.name);
-        let title = title(small, &mut names).ok_or("a call without a title")?;
-        write!(table, "{title:52}")?;
-        for call in [small, fast] {
-            write!(table, "{:>12}{:>7}{:>7}", call.instructions, call.stack, call.code)?;
-        }
-        table.push('\n');
+    let rows = rows(&measured[0], &measured[1])?;
+    println!("\n| call | for size: instructions | stack | code | for speed: instructions | stack | code |");
+    println!("|---|---|---|---|---|---|---|");
+    rows.iter().for_each(|row| println!("{}", markdown(row)));
+    for (profile, image) in PROFILES.iter().zip(&without_attention) {
+        println!("{profile}, all without attention: {} bytes: {:?}", image.bytes(), image.sections);
     }
-    assert_eq!(names.next(), None, "every scheme was measured");
-    for image in &without_attention {
-        writeln!(table, "all without attention: {} bytes of code and constants, {:?}", image.bytes(), image.sections)?;
-    }
-    println!("\n{table}");
+    println!();
     let default = &measured[0][0];
     assert_eq!(default.name, "weigh");
     assert!(default.instructions <= MOST_INSTRUCTIONS && default.stack <= MOST_STACK, "{default:?}");
     assert!(default.instructions > 100, "nothing was computed: {default:?}");
     assert!(without_attention[0].bytes() <= MOST_BYTES);
+    the_readme_says_so(&rows)
+}
+
+/// The rows of the table from the calls of the two profiles.
+fn rows(small: &[Call], fast: &[Call]) -> Result<Vec<Row>, Failed> {
+    assert_eq!(small.len(), fast.len());
+    let mut names = schemes().into_iter().map(|(name, _)| name);
+    let mut rows = Vec::new();
+    for (small, fast) in small.iter().zip(fast) {
+        assert_eq!(small.name, fast.name);
+        let title = title(small, &mut names).ok_or("a call without a title")?;
+        let numbers = |call: &Call| [call.instructions, u64::from(call.stack), call.code];
+        rows.push((title, [numbers(small), numbers(fast)].concat()));
+    }
+    assert_eq!(names.next(), None, "every scheme was measured");
+    Ok(rows)
+}
+
+fn markdown((title, numbers): &Row) -> String {
+    numbers.iter().fold(format!("| {title} |"), |line, number| format!("{line} {number} |"))
+}
+
+/// The README's rows are rows of the table, to a tenth: another compiler gives a few instructions more or less.
+fn the_readme_says_so(rows: &[Row]) -> Result<(), Failed> {
+    let readme = std::fs::read_to_string(repository().join("README.md"))?;
+    let mut found = 0;
+    for (title, numbers) in rows {
+        let Some(line) = readme.lines().find(|line| line.starts_with(&format!("| {title} |"))) else { continue };
+        let said: Vec<u64> = line.split('|').filter_map(|cell| cell.trim().parse().ok()).collect();
+        let close = |(said, measured): (&u64, &u64)| said.abs_diff(*measured) <= measured / 10;
+        assert!(said.len() == numbers.len() && said.iter().zip(numbers).all(close), "{line}: {numbers:?}");
+        found += 1;
+    }
+    assert!(found >= 4, "{found} rows");
     Ok(())
 }

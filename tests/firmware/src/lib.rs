@@ -43,12 +43,16 @@ impl Output {
 /// Ends the program: everything was done.
 pub fn finish() -> ! {
     debug::exit(debug::EXIT_SUCCESS);
-    loop {}
+    loop {
+        core::hint::spin_loop();
+    }
 }
 
 fn fail() -> ! {
     debug::exit(debug::EXIT_FAILURE);
-    loop {}
+    loop {
+        core::hint::spin_loop();
+    }
 }
 
 #[panic_handler]
