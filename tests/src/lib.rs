@@ -4,6 +4,7 @@
 
 pub mod command;
 pub mod compare;
+pub mod emulator;
 pub mod oracle;
 pub mod poses;
 pub mod scenes;
