@@ -3,8 +3,8 @@
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::fuse::{VisibleFusion, fuse_views, fuse_visible};
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::poses::Random;
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::poses::Random;
 
 const S: usize = 5;
 const C: usize = 4;

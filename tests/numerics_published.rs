@@ -7,8 +7,8 @@ use viewfuse_core::metrics::{mean_squared_error, psnr, ssim};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, weigh};
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::oracle::Formula;
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::oracle::Formula;
 
 /// The scheme that a published name means.
 fn formula(name: &str) -> Formula {

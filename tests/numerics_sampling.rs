@@ -4,8 +4,8 @@
 use viewfuse_core::depths::{PROBABILITY_FLOOR, inverse_cdf, stratified_depth};
 use viewfuse_core::lookup::{bilinear, trilinear};
 use viewfuse_core::random::{threefry_2x32, uniform};
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::poses::Random;
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::poses::Random;
 
 #[test]
 fn threefry_known_answers() {

@@ -1,5 +1,6 @@
 //! The command line: what each command takes. What each does is in its own file.
 
+mod check;
 mod evaluate;
 mod inspect;
 mod options;
@@ -42,6 +43,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Compare this build with files of reference values.
     Verify(verify::Arguments),
+    /// Check how closely each device agrees with the mathematics, kernel by kernel.
+    Check(check::Arguments),
 }
 
 /// Runs the command that the process was started with.
@@ -54,6 +57,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
     }
 }
 

@@ -1,0 +1,161 @@
+//! Every kernel on every device against `f64`, and the negative controls: an input that is off by 1 % must show.
+//!
+//! One trial for each kernel and device. A device that is not there gives ignored trials, or, where
+//! `VIEWFUSE_REQUIRE_VULKAN=1` asks for it, failing ones.
+
+#[path = "parity/faulty.rs"]
+mod faulty;
+
+use faulty::Faulty;
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::process::ExitCode;
+use std::sync::Arc;
+use viewfuse::check::agreement::{Disagreement, measure};
+use viewfuse::check::bounded::Bounded;
+use viewfuse::check::case::{Case, Visitor, visit};
+use viewfuse::check::measure::Role;
+use viewfuse::check::{Report, check_device};
+use viewfuse::device::Device;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::progress::Progress;
+use viewfuse_vulkan::kernel::{Access, Kernel};
+
+/// A device under test: it opens itself when its first trial runs.
+struct Candidate<D> {
+    name: &'static str,
+    /// The device, or why it is not there.
+    device: Result<Arc<D>, String>,
+    /// How often it ran a kernel, if it counts.
+    dispatch_count: fn(&D, Kernel) -> Option<u64>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let mut trials = Vec::new();
+    // The CPU has no dispatches to count. Vulkan devices come here as further candidates, with their counters.
+    let cpu = Candidate { name: "cpu", device: Ok(Arc::new(Cpu)), dispatch_count: |_, _| None };
+    trials.extend(trials_of(&cpu));
+    trials.push(Trial::test("every_input_has_a_control", every_input_has_a_control));
+    for kernel in Kernel::ALL {
+        let name = format!("check_reports_a_faulty::{}", kernel.name());
+        trials.push(Trial::test(name, move || a_fault_is_reported(kernel)));
+    }
+    libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+/// The trials of a device, one for each kernel.
+fn trials_of<D: Device + Send + Sync + 'static>(candidate: &Candidate<D>) -> Vec<Trial> {
+    let is_required = std::env::var("VIEWFUSE_REQUIRE_VULKAN").is_ok_and(|value| value == "1");
+    let count = candidate.dispatch_count;
+    let trial = |kernel: Kernel| {
+        let name = format!("{}::{}", candidate.name, kernel.name());
+        match candidate.device.clone() {
+            Ok(device) => Trial::test(name, move || parity(&*device, kernel, count)),
+            Err(missing) => Trial::test(name, move || Err(missing.into())).with_ignored_flag(!is_required),
+        }
+    };
+    Kernel::ALL.into_iter().map(trial).collect()
+}
+
+/// What a kernel must stand, beyond agreeing: a kernel that is not listed here does not compile.
+fn seed_count(kernel: Kernel) -> u64 {
+    match kernel {
+        // As many as give every scheme every number of sources.
+        Kernel::Weigh => 32,
+        Kernel::Attend | Kernel::FuseViews | Kernel::Composite => 8,
+        Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth | Kernel::HullEntry | Kernel::MatchCost => 4,
+        Kernel::EmbedPose | Kernel::March => 3,
+    }
+}
+
+/// Sizes of the trials: one element, an odd number, and several workgroups with a rest.
+const SIZES: [u32; 3] = [1, 7, 500];
+
+fn parity<D: Device>(device: &D, kernel: Kernel, count: fn(&D, Kernel) -> Option<u64>) -> Result<(), Failed> {
+    let before = count(device, kernel);
+    visit(kernel, Parity { device })?;
+    // The kernel really ran: nobody answered for it.
+    match (before, count(device, kernel)) {
+        (Some(before), Some(after)) if after <= before => Err("the kernel was never dispatched".into()),
+        _ => Ok(()),
+    }
+}
+
+struct Parity<'a, D> {
+    device: &'a D,
+}
+
+impl<D: Device> Visitor for Parity<'_, D> {
+    type Output = Result<(), Failed>;
+
+    fn visit<C: Case>(self) -> Result<(), Failed> {
+        let seeds = 1..=seed_count(C::KERNEL);
+        let inputs: Vec<C::Inputs> =
+            seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
+        let expected: Vec<Vec<Option<Bounded>>> = inputs.iter().map(C::expected).collect();
+        let mut actual = Vec::new();
+        for inputs in &inputs {
+            actual.extend(C::results(self.device, inputs)?);
+        }
+        if let Some(disagreement) = measure(&actual, &expected.concat(), C::LIMITS).disagreement {
+            return Err(disagreement.to_string().into());
+        }
+        // The last world has several workgroups, the first ones may be too small to show anything.
+        let last = inputs.len() - 1;
+        for (input, spoil) in C::SPOILERS {
+            let mut spoilt = inputs[last].clone();
+            spoil(&mut spoilt);
+            let outcome = measure(&C::results(self.device, &spoilt)?, &expected[last], C::LIMITS).disagreement;
+            if !matches!(outcome, Some(Disagreement::Mismatch { .. })) {
+                return Err(format!("{input} off by 1 %: {outcome:?}").into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Every array that a kernel reads is put off by 1 % in a negative control, and so are its parameters.
+fn every_input_has_a_control() -> Result<(), Failed> {
+    struct Controls;
+    impl Visitor for Controls {
+        type Output = Vec<&'static str>;
+        fn visit<C: Case>(self) -> Vec<&'static str> {
+            C::SPOILERS.iter().map(|(input, _)| *input).collect()
+        }
+    }
+    for kernel in Kernel::ALL {
+        let controls = visit(kernel, Controls);
+        let read = kernel.arrays().iter().filter(|array| array.access == Access::Read).map(|array| array.name);
+        // Of the cameras this one takes only where their pixels are.
+        let read: Vec<&str> = read.filter(|array| (kernel, *array) != (Kernel::PickDepth, "views")).collect();
+        let missing: Vec<&&str> = read.iter().filter(|array| !controls.contains(array)).collect();
+        let unknown: Vec<&&str> =
+            controls.iter().filter(|control| **control != "parameters" && !read.contains(control)).collect();
+        if !missing.is_empty() || !unknown.is_empty() {
+            return Err(format!("{}: without a control {missing:?}, unknown {unknown:?}", kernel.name()).into());
+        }
+        let has_numbers = match kernel {
+            // Which view, how many sources, the shape of a band: whole numbers, or none at all.
+            Kernel::EmbedPose | Kernel::Attend | Kernel::FuseViews | Kernel::HullEntry => false,
+            Kernel::SumRow | Kernel::MeanColumn => false,
+            Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
+        };
+        if controls.contains(&"parameters") != has_numbers {
+            return Err(format!("{}: parameters", kernel.name()).into());
+        }
+    }
+    Ok(())
+}
+
+/// A device whose results of one kernel are off by 1e-3 breaches that kernel's tolerance, and no other's.
+fn a_fault_is_reported(kernel: Kernel) -> Result<(), Failed> {
+    let device = Faulty { kernel };
+    let checked = check_device(&device, Role::Other, 1, &Progress::hidden())?;
+    let breaches = checked.breaches();
+    let report = Report { viewfuse: "", seed_count: 1, sizes: Vec::new(), devices: vec![checked] };
+    if breaches != [kernel.name()] || report.exit_code() != 1 {
+        return Err(format!("reported: {breaches:?}, exit code {}", report.exit_code()).into());
+    }
+    let nothing = Report { devices: Vec::new(), ..report };
+    if nothing.passes() { Err("nothing was checked, and that passes".into()) } else { Ok(()) }
+}
