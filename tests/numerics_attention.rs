@@ -1,6 +1,9 @@
 //! The attention weightings: against the published implementations, with parameters by formula, and against `f64`.
 
 use serde_json::Value;
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::oracle::{Matrix, WidePose};
+use viewfuse::check::poses::{Random, pose_of};
 use viewfuse::formula;
 use viewfuse_core::attention::{
     EMBEDDING, FlatEmbedding, FourierEmbedding, LearnedCrossAttention, Linear, POSE_FEATURES, PoseEmbedding,
@@ -8,9 +11,6 @@ use viewfuse_core::attention::{
 };
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
-use viewfuse::check::compare::Comparator;
-use viewfuse::check::oracle::{Matrix, WidePose};
-use viewfuse::check::poses::{Random, pose_of};
 
 const VARIANTS: [&str; 5] =
     ["paper_fourier", "paper_flat", "cross_attention", "learned_cross_attention", "relative_pose_self_attention"];

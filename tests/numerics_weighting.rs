@@ -1,11 +1,11 @@
 //! Every formula weighting against `f64` on the same poses, with the derived bound, and what must not change it.
 
-use viewfuse_core::pose::Pose;
-use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{AngleKind, Scheme, SchemeError, weigh};
 use viewfuse::check::compare::relative_units;
 use viewfuse::check::oracle::{Arithmetic, FORMULAS, Formula, Matrix, WidePose, minus, norm, normalised};
 use viewfuse::check::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
+use viewfuse_core::pose::Pose;
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weighting::{AngleKind, Scheme, SchemeError, weigh};
 
 /// Weights below this may be cut off: `exp` knows no subnormals.
 const NEGLIGIBLE: f64 = 4.0e-38;

@@ -14,7 +14,7 @@ use viewfuse::check::agreement::{Disagreement, measure};
 use viewfuse::check::bounded::Bounded;
 use viewfuse::check::case::{Case, Visitor, visit};
 use viewfuse::check::measure::Role;
-use viewfuse::check::{Report, check_device};
+use viewfuse::check::{Report, check_device, check_kernel};
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::progress::Progress;
@@ -40,6 +40,7 @@ fn main() -> ExitCode {
         let name = format!("check_reports_a_faulty::{}", kernel.name());
         trials.push(Trial::test(name, move || a_fault_is_reported(kernel)));
     }
+    trials.push(Trial::test("a_faulty_device_fails_the_check", a_faulty_device_fails_the_check));
     libtest_mimic::run(&arguments, trials).exit_code()
 }
 
@@ -90,8 +91,7 @@ impl<D: Device> Visitor for Parity<'_, D> {
 
     fn visit<C: Case>(self) -> Result<(), Failed> {
         let seeds = 1..=seed_count(C::KERNEL);
-        let inputs: Vec<C::Inputs> =
-            seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
+        let inputs: Vec<C::Inputs> = seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
         let expected: Vec<Vec<Option<Bounded>>> = inputs.iter().map(C::expected).collect();
         let mut actual = Vec::new();
         for inputs in &inputs {
@@ -147,13 +147,26 @@ fn every_input_has_a_control() -> Result<(), Failed> {
     Ok(())
 }
 
-/// A device whose results of one kernel are off by 1e-3 breaches that kernel's tolerance, and no other's.
+/// A device whose results of a kernel are off by 1e-3 breaches its tolerance.
 fn a_fault_is_reported(kernel: Kernel) -> Result<(), Failed> {
-    let device = Faulty { kernel };
+    let report = check_kernel(&Faulty { kernel }, Role::Other, kernel, 1)?;
+    match (report.breach, report.versus_cpu) {
+        (Some(_), Some(versus)) if versus.absolute > 0.0 && versus.equal < 1.0 => Ok(()),
+        (breach, versus) => Err(format!("reported: {breach:?}, {versus:?}").into()),
+    }
+}
+
+/// And no other kernel's; the whole check fails with it.
+fn a_faulty_device_fails_the_check() -> Result<(), Failed> {
+    let device = Faulty { kernel: Kernel::FuseViews };
     let checked = check_device(&device, Role::Other, 1, &Progress::hidden())?;
     let breaches = checked.breaches();
+    let others_equal = checked
+        .kernels
+        .iter()
+        .all(|report| report.kernel == "fuse_views" || report.versus_cpu.is_some_and(|versus| versus.equal == 1.0));
     let report = Report { viewfuse: "", seed_count: 1, sizes: Vec::new(), devices: vec![checked] };
-    if breaches != [kernel.name()] || report.exit_code() != 1 {
+    if breaches != ["fuse_views"] || !others_equal || report.exit_code() != 1 {
         return Err(format!("reported: {breaches:?}, exit code {}", report.exit_code()).into());
     }
     let nothing = Report { devices: Vec::new(), ..report };

@@ -109,8 +109,12 @@ fn sample_agrees() {
             (0..3).for_each(|c| results.push(found.colour[c], wanted.map(|sample| sample.1[c])));
         }
     };
-    let spoilers: [Spoiler; 4] =
-        [("focal length", World::spoil_focal), ("texels", World::spoil_texels), ("depths", World::spoil_depths), ("weight", |world| world.weights[1] *= 1.01)];
+    let spoilers: [Spoiler; 4] = [
+        ("focal length", World::spoil_focal),
+        ("texels", World::spoil_texels),
+        ("depths", World::spoil_depths),
+        ("weight", |world| world.weights[1] *= 1.01),
+    ];
     check("sample", 1.0e-3, case, &spoilers);
 }
 

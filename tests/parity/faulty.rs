@@ -190,9 +190,7 @@ impl Device for Faulty {
         row_count: u32,
         pixels: &mut Pixels<Self>,
     ) -> Result<(), Infallible> {
-        with_pixels(pixels, |pixels| {
-            Cpu.march(&on_cpu(scene), depths, weights, target, first_row, row_count, pixels)
-        });
+        with_pixels(pixels, |pixels| Cpu.march(&on_cpu(scene), depths, weights, target, first_row, row_count, pixels));
         self.spoil(Kernel::March, pixels.colours.as_flattened_mut());
         Ok(())
     }

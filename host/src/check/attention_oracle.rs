@@ -64,9 +64,7 @@ pub fn attend(query: &[f32], keys: &[f32]) -> Vec<Bounded> {
     let scores: Vec<f64> = logits.iter().map(|logit| (logit.value - largest).exp()).collect();
     let sum: f64 = scores.iter().sum();
     // The logit's own, the subtraction's, those of the exponential, and of the quotient by the largest score.
-    let error = |logit: &Bounded| {
-        logit.error + ROUNDING * (logit.value - largest).abs() + 2.0 * ROUNDING + DIVISION
-    };
+    let error = |logit: &Bounded| logit.error + ROUNDING * (logit.value - largest).abs() + 2.0 * ROUNDING + DIVISION;
     let errors: Vec<f64> = logits.iter().map(error).collect();
     let mean: f64 = errors.iter().zip(&scores).map(|(error, score)| error * score / sum).sum();
     // Additions, the reciprocal of the sum, and the product with it.

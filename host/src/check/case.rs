@@ -2,7 +2,9 @@
 
 use super::agreement::Limits;
 use super::bounded::Bounded;
-use super::cases::{attend, composite, embed_pose, fuse_views, hull_entry, march, match_cost, pick_depth, weigh, window};
+use super::cases::{
+    attend, composite, embed_pose, fuse_views, hull_entry, march, match_cost, pick_depth, weigh, window,
+};
 use crate::device::Device;
 use viewfuse_vulkan::kernel::Kernel;
 

@@ -17,8 +17,12 @@ pub fn fuse_element(weights: &[f32], latents: &[f32], block: &FuseBlock, element
 /// The sums are taken by parts: `sum (T_i - T_(i+1)) c_i` is `c_0 + sum T_i (c_i - c_(i-1))`, so that an error of a
 /// transmittance counts as far as what is seen changes there, not twice as far as what is seen.
 pub fn composite(samples: &[[f32; 4]], depths: &[f32], block: &CompositeBlock) -> [Option<Bounded>; 5] {
-    let met: Vec<(&[f32; 4], f32)> =
-        samples.iter().zip(depths).filter(|(sample, _)| sample[3] > 0.0).map(|(sample, depth)| (sample, *depth)).collect();
+    let met: Vec<(&[f32; 4], f32)> = samples
+        .iter()
+        .zip(depths)
+        .filter(|(sample, _)| sample[3] > 0.0)
+        .map(|(sample, depth)| (sample, *depth))
+        .collect();
     // In front of each sample, and behind the last.
     let mut optical_depth = Bounded::ZERO;
     let mut passes = vec![Bounded::ONE];

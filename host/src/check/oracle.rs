@@ -201,9 +201,10 @@ impl Formula {
             .map(|(source, &distance)| match self {
                 Formula::Mean | Formula::Gaussian(_) => (1.0, 0.0),
                 Formula::L1 => (l1(source, &target), 12.0),
-                Formula::Frobenius => {
-                    (source.rotation_difference_squared(&target).sqrt().hypot(distance), distance_units + 4.0 + norm_units)
-                }
+                Formula::Frobenius => (
+                    source.rotation_difference_squared(&target).sqrt().hypot(distance),
+                    distance_units + 4.0 + norm_units,
+                ),
                 Formula::RelativeFrobenius => {
                     let (error, units) = relative_frobenius(source, &target);
                     (error, units + 2.0 * norm_units)
@@ -275,15 +276,14 @@ fn gaussian(distances: &[f64], beta: f64, arithmetic: Arithmetic) -> (Vec<f64>, 
     let sum: f64 = logits.iter().map(|l| l.exp()).sum();
     let weights: Vec<f64> = logits.iter().map(|l| l.exp() / sum).collect();
     let is_exact = beta <= 1.0e6 && distances.iter().all(|d| *d <= 1.0e6);
-    let units: Vec<f64> = distances
-        .iter()
-        .zip(&logits)
-        .map(
-            |(d, logit)| {
+    let units: Vec<f64> =
+        distances
+            .iter()
+            .zip(&logits)
+            .map(|(d, logit)| {
                 if is_exact { 8.0 } else { square_units * beta * (d * d + nearest * nearest) + 4.0 * logit.abs() + 4.0 }
-            },
-        )
-        .collect();
+            })
+            .collect();
     let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| if *w > 0.0 { w * u } else { 0.0 }).sum();
     let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 3.0 + 3.0 * division).collect();
     (weights, bounds)

@@ -69,7 +69,8 @@ impl Picture {
             view_count: Some(MOST_SOURCES),
         };
         let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&PhotoField::default()))?;
-        let options = RenderOptions { size: job.targets.first().and_then(|t| size(&t.camera)), ..RenderOptions::default() };
+        let options =
+            RenderOptions { size: job.targets.first().and_then(|t| size(&t.camera)), ..RenderOptions::default() };
         let (reference, reference_time) = rendered(&Cpu, &scene, &job, &options, progress)?;
         Ok(Picture { scene, name, job, options, reference, reference_time, _folder: folder })
     }

@@ -175,10 +175,13 @@ impl World {
         self.views[1].intrinsics[0] *= 1.01;
     }
 
-    /// Puts the texels of all views but the first off by 1 %.
+    /// Puts red and alpha of all views but the first off by 1 %, in opposite directions: together they would leave the
+    /// colour as it is.
     pub fn spoil_texels(&mut self) {
         let first = self.views[1].first_texel as usize;
-        self.texels[first..].iter_mut().for_each(|texel| *texel = texel.map(|value| value * 0.99));
+        for [red, _, _, alpha] in &mut self.texels[first..] {
+            (*red, *alpha) = (*red * 1.01, *alpha * 0.99);
+        }
     }
 
     /// Puts the depths off by 1 %.

@@ -147,7 +147,9 @@ fn row(kernel: &KernelReport, has_cpu: bool) -> Vec<String> {
 
 fn print_picture(picture: &PictureReport) -> std::io::Result<()> {
     let PictureReport { scene, target, source_count, size: [width, height], seconds, .. } = picture;
-    say(format_args!("picture: {scene}, view {target} from {source_count} others at {width}x{height}: {seconds:.2} s"))?;
+    say(format_args!(
+        "picture: {scene}, view {target} from {source_count} others at {width}x{height}: {seconds:.2} s"
+    ))?;
     if let Some(PictureVersusCpu { worst, differing, psnr }) = picture.versus_cpu {
         let psnr = psnr.map_or_else(|| "equal".to_owned(), |psnr| format!("PSNR {psnr:.1} dB"));
         say(format_args!("from the CPU's: worst pixel {worst}/255, {differing} pixels differ, {psnr}"))?;

@@ -62,13 +62,14 @@ impl Case for Attend {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (queries, keys, weights))| {
-            device.attend(job.source_count, queries, keys, weights)
-        })
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, (queries, keys, weights))| device.attend(job.source_count, queries, keys, weights))
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
-        let rows: Vec<Vec<f32>> = loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
+        let rows: Vec<Vec<f32>> =
+            loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
         Ok(rows.concat())
     }
 

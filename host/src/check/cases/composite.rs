@@ -27,7 +27,8 @@ pub struct LoadedJob<D: Device> {
 }
 
 /// Samples on a ray, and the least and greatest optical depth of one.
-const KINDS: [(u32, f64, f64); 5] = [(1, 0.1, 2.0), (2, 1.0e-3, 1.0), (17, 1.0, 1.0e3), (64, 1.0e-3, 0.3), (128, 1.0e-5, 1.0e-2)];
+const KINDS: [(u32, f64, f64); 5] =
+    [(1, 0.1, 2.0), (2, 1.0e-3, 1.0), (17, 1.0, 1.0e3), (64, 1.0e-3, 0.3), (128, 1.0e-5, 1.0e-2)];
 
 fn job(random: &mut Random, size: u32, (sample_count, low, high): (u32, f64, f64)) -> Job {
     let count = (size * sample_count) as usize;
@@ -41,7 +42,9 @@ fn job(random: &mut Random, size: u32, (sample_count, low, high): (u32, f64, f64
         [random.unit(), random.unit(), random.unit(), optical_depth].map(|value| value as f32)
     };
     let first = numbers(size as usize, || random.range(1.0, 2.0));
-    let depth = |index: usize| first[index / sample_count as usize] + (index as u32 % sample_count) as f32 / sample_count as f32;
+    let depth = |index: usize| {
+        first[index / sample_count as usize] + (index as u32 % sample_count) as f32 / sample_count as f32
+    };
     Job {
         block: CompositeBlock { background: [1.0, 0.5, 0.25], empty_depth: 7.0, sample_count },
         sample_depths: (0..count).map(depth).collect(),

@@ -37,10 +37,8 @@ impl Case for EmbedPose {
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "sines of arguments that are rounded at up to 48 times a centre, then sums over 42, 64 and \
         64 inputs, every rounding counted as if none cancelled";
-    const SPOILERS: &'static [Spoiler<Inputs>] = &[
-        ("embedding", |inputs| inputs.embedding[3] *= 1.01),
-        ("poses", |inputs| inputs.poses[0].right[3] *= 1.01),
-    ];
+    const SPOILERS: &'static [Spoiler<Inputs>] =
+        &[("embedding", |inputs| inputs.embedding[3] *= 1.01), ("poses", |inputs| inputs.poses[0].right[3] *= 1.01)];
 
     type Inputs = Inputs;
     type Loaded<D: Device> = (D::Buffer<f32>, D::Buffer<PoseBlock>, D::Buffer<f32>);

@@ -62,13 +62,14 @@ impl Case for FuseViews {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (weights, latents, fused))| {
-            device.fuse_views(&job.block, weights, latents, fused)
-        })
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, (weights, latents, fused))| device.fuse_views(&job.block, weights, latents, fused))
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
-        let fused: Vec<Vec<f32>> = loaded.iter().map(|(_, _, fused)| device.download(fused)).collect::<Result<_, _>>()?;
+        let fused: Vec<Vec<f32>> =
+            loaded.iter().map(|(_, _, fused)| device.download(fused)).collect::<Result<_, _>>()?;
         Ok(fused.concat())
     }
 

@@ -82,6 +82,9 @@ impl Case for MatchCost {
         let cost = |pixel, plane| {
             photo_oracle::match_cost(&world.scene(), sweep, &world.entries, &world.pair_weights, pixel, plane)
         };
-        pixels.into_par_iter().flat_map_iter(|pixel| (0..sweep.plane_count).map(move |plane| cost(pixel, plane))).collect()
+        pixels
+            .into_par_iter()
+            .flat_map_iter(|pixel| (0..sweep.plane_count).map(move |plane| cost(pixel, plane)))
+            .collect()
     }
 }

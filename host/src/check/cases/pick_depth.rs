@@ -97,7 +97,8 @@ impl Case for PickDepth {
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
-        let maps: Vec<Vec<f32>> = loaded.guesses.iter().map(|(_, picked)| device.download(picked)).collect::<Result<_, _>>()?;
+        let maps: Vec<Vec<f32>> =
+            loaded.guesses.iter().map(|(_, picked)| device.download(picked)).collect::<Result<_, _>>()?;
         Ok(maps.concat())
     }
 
@@ -111,9 +112,8 @@ impl Case for PickDepth {
                 let first = (world.views[sweep.view as usize].first_texel + sweep.first_row * sweep.width) as usize;
                 let (entries, guess) = (&world.entries[first..], &guess[first..]);
                 let pixels = rows(sweep).start * sweep.width..rows(sweep).end * sweep.width;
-                let pick = |pixel| {
-                    photo_oracle::pick_depth(&world.object, sweep, sweep.width, means, entries, guess, pixel)
-                };
+                let pick =
+                    |pixel| photo_oracle::pick_depth(&world.object, sweep, sweep.width, means, entries, guess, pixel);
                 let written = first + pixels.start as usize..first + pixels.end as usize;
                 let picked: Vec<_> = pixels.into_par_iter().map(pick).collect();
                 map[written].copy_from_slice(&picked);

@@ -34,7 +34,8 @@ fn cameras(random: &mut Random, arrangement: u32, source_count: usize, target_co
         3 => targets.iter_mut().step_by(2).enumerate().for_each(|(i, target)| *target = sources[i % source_count]),
         4 => {
             sources = ring(source_count, scale, 0.5, random.range(0.0, 1.0));
-            let place = |random: &mut Random| [random.range(0.5, 1.0), random.range(-1.0, 1.0), random.range(-0.7, 0.7)];
+            let place =
+                |random: &mut Random| [random.range(0.5, 1.0), random.range(-1.0, 1.0), random.range(-0.7, 0.7)];
             targets = (0..target_count).map(|_| looking_at_origin(place(random), random.range(0.0, 3.0))).collect();
         }
         // Some sources are a hundred million times as far as others.
@@ -95,13 +96,14 @@ impl Case for Weigh {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (sources, targets, weights))| {
-            device.weigh(&job.block, sources, targets, weights)
-        })
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, (sources, targets, weights))| device.weigh(&job.block, sources, targets, weights))
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
-        let rows: Vec<Vec<f32>> = loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
+        let rows: Vec<Vec<f32>> =
+            loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
         Ok(rows.concat())
     }
 
