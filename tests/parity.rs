@@ -9,7 +9,6 @@ mod faulty;
 use faulty::Faulty;
 use libtest_mimic::{Arguments, Failed, Trial};
 use std::process::ExitCode;
-use std::sync::Arc;
 use viewfuse::check::agreement::{Disagreement, measure};
 use viewfuse::check::bounded::Bounded;
 use viewfuse::check::case::{Case, Visitor, visit};
@@ -20,11 +19,12 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::progress::Progress;
 use viewfuse_vulkan::kernel::{Access, Kernel};
 
-/// A device under test: it opens itself when its first trial runs.
+/// A device under test. Every trial opens it for itself: its counters then are the trial's own.
 struct Candidate<D> {
-    name: &'static str,
-    /// The device, or why it is not there.
-    device: Result<Arc<D>, String>,
+    name: String,
+    open: fn() -> Result<D, String>,
+    /// Why there is no such device here, if there is none.
+    missing: Option<String>,
     /// How often it ran a kernel, if it counts.
     dispatch_count: fn(&D, Kernel) -> Option<u64>,
 }
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let mut trials = Vec::new();
     // The CPU has no dispatches to count. Vulkan devices come here as further candidates, with their counters.
-    let cpu = Candidate { name: "cpu", device: Ok(Arc::new(Cpu)), dispatch_count: |_, _| None };
+    let cpu = Candidate { name: "cpu".to_owned(), open: || Ok(Cpu), missing: None, dispatch_count: |_, _| None };
     trials.extend(trials_of(&cpu));
     trials.push(Trial::test("every_input_has_a_control", every_input_has_a_control));
     for kernel in Kernel::ALL {
@@ -44,15 +44,15 @@ fn main() -> ExitCode {
     libtest_mimic::run(&arguments, trials).exit_code()
 }
 
-/// The trials of a device, one for each kernel.
-fn trials_of<D: Device + Send + Sync + 'static>(candidate: &Candidate<D>) -> Vec<Trial> {
+/// The trials of a device, one for each kernel. Without the device they are ignored, or fail where it is required.
+fn trials_of<D: Device + 'static>(candidate: &Candidate<D>) -> Vec<Trial> {
     let is_required = std::env::var("VIEWFUSE_REQUIRE_VULKAN").is_ok_and(|value| value == "1");
-    let count = candidate.dispatch_count;
+    let &Candidate { open, dispatch_count, .. } = candidate;
     let trial = |kernel: Kernel| {
         let name = format!("{}::{}", candidate.name, kernel.name());
-        match candidate.device.clone() {
-            Ok(device) => Trial::test(name, move || parity(&*device, kernel, count)),
-            Err(missing) => Trial::test(name, move || Err(missing.into())).with_ignored_flag(!is_required),
+        match candidate.missing.clone() {
+            None => Trial::test(name, move || parity(&open()?, kernel, dispatch_count)),
+            Some(missing) => Trial::test(name, move || Err(missing.into())).with_ignored_flag(!is_required),
         }
     };
     Kernel::ALL.into_iter().map(trial).collect()

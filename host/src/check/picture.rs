@@ -57,10 +57,13 @@ impl Picture {
     }
 
     fn prepare(path: Option<&Path>, name: String, progress: &Progress) -> Result<Picture, AnyError> {
-        let folder = if path.is_some() { None } else { Some(synthetic()?) };
-        let scene = match (&folder, path) {
-            (Some(folder), _) => Scene::open(&folder.path().join("lorry"))?,
-            (None, path) => Scene::open(path.unwrap_or(Path::new(".")))?,
+        let (folder, scene) = match path {
+            Some(path) => (None, Scene::open(path)?),
+            None => {
+                let folder = synthetic()?;
+                let scene = Scene::open(folder.path().join("lorry"))?;
+                (Some(folder), scene)
+            }
         };
         let selection = Selection {
             targets: scene.views.last().map(|view| view.name.clone()),

@@ -48,7 +48,7 @@ impl Case for March {
 
     fn inputs(seed: u64, size: u32) -> Inputs {
         let world = World::of_size(seed, size);
-        let settled = if seed % 2 == 0 { 0.1 } else { 0.0 };
+        let settled = if seed.is_multiple_of(2) { 0.1 } else { 0.0 };
         let block = MarchBlock { target: world.target, background: [1.0, 0.5, 0.25], settled };
         Inputs { world, block }
     }
