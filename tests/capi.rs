@@ -4,7 +4,7 @@
 //! Set `VIEWFUSE_WRITE_HEADER=1` to write the header instead of comparing it.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")

@@ -1,5 +1,7 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
+#[path = "commands/check.rs"]
+mod check;
 #[path = "commands/inspect.rs"]
 mod inspect;
 #[path = "commands/interrupt.rs"]
@@ -45,7 +47,7 @@ fn help_fits_and_gives_examples() {
     let here = Path::new(".");
     let version = done(here, "--version");
     assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
-    for name in ["", "render", "weights", "inspect", "evaluate", "verify"] {
+    for name in ["", "render", "weights", "inspect", "evaluate", "verify", "check"] {
         let help = done(here, &format!("{name} --help"));
         assert!(name.is_empty() || help.contains(&format!("viewfuse {name} ")), "an example of {name}:\n{help}");
         assert!(name.is_empty() || help.contains("Example"), "an example of {name}:\n{help}");

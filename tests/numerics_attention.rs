@@ -1,6 +1,9 @@
 //! The attention weightings: against the published implementations, with parameters by formula, and against `f64`.
 
 use serde_json::Value;
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::oracle::{Matrix, WidePose};
+use viewfuse::check::poses::{Random, pose_of};
 use viewfuse::formula;
 use viewfuse_core::attention::{
     EMBEDDING, FlatEmbedding, FourierEmbedding, LearnedCrossAttention, Linear, POSE_FEATURES, PoseEmbedding,
@@ -8,9 +11,6 @@ use viewfuse_core::attention::{
 };
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::oracle::{Matrix, WidePose};
-use viewfuse_tests::poses::{Random, pose_of};
 
 const VARIANTS: [&str; 5] =
     ["paper_fourier", "paper_flat", "cross_attention", "learned_cross_attention", "relative_pose_self_attention"];
@@ -144,8 +144,8 @@ fn flat_entries(pose: &Pose) -> Vec<f64> {
 fn relative(source: &Pose, target: &Pose) -> Vec<f64> {
     let (s, t) = (WidePose::new(source), WidePose::new(target));
     let gl: Matrix = [s.axes[0], s.axes[1].map(|c| -c), s.axes[2].map(|c| -c)];
-    let offset = viewfuse_tests::oracle::minus(t.centre, s.centre);
-    let project = |v: [f64; 3]| gl.map(|axis| viewfuse_tests::oracle::dot(axis, v));
+    let offset = viewfuse::check::oracle::minus(t.centre, s.centre);
+    let project = |v: [f64; 3]| gl.map(|axis| viewfuse::check::oracle::dot(axis, v));
     features(project(offset), project(t.axes[2].map(|c| -c)))
 }
 
@@ -225,7 +225,7 @@ fn relative_self_attention_ignores_the_world() {
         let shift = random.vector();
         let moved = |pose: &Pose| {
             let wide = WidePose::new(pose);
-            let turn = |v: [f64; 3]| rotation.map(|row| viewfuse_tests::oracle::dot(row, v));
+            let turn = |v: [f64; 3]| rotation.map(|row| viewfuse::check::oracle::dot(row, v));
             let axes = wide.axes.map(turn);
             let centre = turn(wide.centre);
             let columns: Matrix = std::array::from_fn(|row| std::array::from_fn(|column| axes[column][row]));

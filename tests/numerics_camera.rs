@@ -2,10 +2,10 @@
 //! camera is refused.
 
 use glam::Vec3;
+use viewfuse::check::poses::Random;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
 use viewfuse_core::pose::{LARGEST_COORDINATE, Pose, PoseError};
 use viewfuse_core::sources::{Sources, SourcesError};
-use viewfuse_tests::poses::Random;
 
 const UNIT: [[f32; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 

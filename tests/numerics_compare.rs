@@ -1,6 +1,6 @@
 //! The comparator can fail: each kind of wrong result is refused.
 
-use viewfuse_tests::compare::{Comparator, Mismatch, relative_units, unit_in_last_place};
+use viewfuse::check::compare::{Comparator, Mismatch, relative_units, unit_in_last_place};
 
 const TIGHT: Comparator = Comparator { absolute: 1.0e-9, relative: 1.0e-6 };
 const LOOSE: Comparator = Comparator { absolute: 1.0, relative: 0.0 };

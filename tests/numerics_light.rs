@@ -1,10 +1,10 @@
 //! Fusing views and compositing samples against `f64`.
 
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::poses::Random;
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::fuse::{VisibleFusion, fuse_views, fuse_visible};
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::poses::Random;
 
 const S: usize = 5;
 const C: usize = 4;

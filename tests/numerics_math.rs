@@ -1,8 +1,8 @@
 //! The elementary functions against `f64`: dense sweeps, extremes, and the errors that their documentation states.
 
+use viewfuse::check::compare::unit_in_last_place;
+use viewfuse::check::poses::Random;
 use viewfuse_core::math;
-use viewfuse_tests::compare::unit_in_last_place;
-use viewfuse_tests::poses::Random;
 
 /// Every `stride`-th `f32` from `low` to `high`, both at least 0, and both ends.
 fn sweep(low: f32, high: f32, stride: usize) -> impl Iterator<Item = f32> {

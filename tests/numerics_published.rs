@@ -3,12 +3,12 @@
 //! `VIEWFUSE_WEIGHTING_JSON` names another file of the same format to check instead of the excerpt kept here.
 
 use serde_json::Value;
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::oracle::Formula;
 use viewfuse_core::metrics::{mean_squared_error, psnr, ssim};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, weigh};
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::oracle::Formula;
 
 /// The scheme that a published name means.
 fn formula(name: &str) -> Formula {

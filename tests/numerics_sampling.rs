@@ -1,11 +1,11 @@
 //! Random numbers, depth samples and look-ups: known answers, distributions, `f64` oracles, and what degenerate input
 //! gives.
 
+use viewfuse::check::compare::Comparator;
+use viewfuse::check::poses::Random;
 use viewfuse_core::depths::{PROBABILITY_FLOOR, inverse_cdf, stratified_depth};
 use viewfuse_core::lookup::{bilinear, trilinear};
 use viewfuse_core::random::{threefry_2x32, uniform};
-use viewfuse_tests::compare::Comparator;
-use viewfuse_tests::poses::Random;
 
 #[test]
 fn threefry_known_answers() {

@@ -2,11 +2,11 @@
 //! `f64`, at the extremes, and on a problem with a closed-form solution.
 
 use serde_json::Value;
+use viewfuse::check::compare::{Comparator, relative_units, unit_in_last_place};
+use viewfuse::check::poses::Random;
 use viewfuse_core::schedule::{
     HeunStep, LARGEST_LEVEL, NoiseSchedule, Preconditioning, SIGMA_DATA, SMALLEST_LEVEL, ScheduleError,
 };
-use viewfuse_tests::compare::{Comparator, relative_units, unit_in_last_place};
-use viewfuse_tests::poses::Random;
 
 #[test]
 fn the_published_levels() {

@@ -1,11 +1,11 @@
 //! Every formula weighting against `f64` on the same poses, with the derived bound, and what must not change it.
 
+use viewfuse::check::compare::relative_units;
+use viewfuse::check::oracle::{Arithmetic, FORMULAS, Formula, Matrix, WidePose, minus, norm, normalised};
+use viewfuse::check::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, Scheme, SchemeError, weigh};
-use viewfuse_tests::compare::relative_units;
-use viewfuse_tests::oracle::{FORMULAS, Formula, Matrix, WidePose, minus, norm, normalised};
-use viewfuse_tests::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
 
 /// Weights below this may be cut off: `exp` knows no subnormals.
 const NEGLIGIBLE: f64 = 4.0e-38;
@@ -21,7 +21,7 @@ fn weights(formula: Formula, sources: &[Pose], target: &Pose) -> Vec<f32> {
 #[track_caller]
 fn check(formula: Formula, sources: &[Pose], target: &Pose) -> f64 {
     let actual = weights(formula, sources, target);
-    let (expected, bounds) = formula.evaluate(sources, target);
+    let (expected, bounds) = formula.evaluate(sources, target, Arithmetic::EXACT);
     let sum: f64 = actual.iter().map(|w| f64::from(*w)).sum();
     assert!((sum - 1.0).abs() <= sources.len() as f64 / 16_777_216.0, "{formula:?}: sum {sum}");
     let mut worst = 0.0_f64;
@@ -178,7 +178,7 @@ fn a_rigid_motion_of_the_world_changes_nothing() {
         let moved_target = self::moved(&target, &motion, 1.0);
         for formula in FORMULAS {
             let (before, after) = (weights(formula, &sources, &target), weights(formula, &moved, &moved_target));
-            let bounds = formula.evaluate(&sources, &target).1;
+            let bounds = formula.evaluate(&sources, &target, Arithmetic::EXACT).1;
             // Rounding the moved poses moves centres by 2e-7 and axes by 1e-7 or so; all distances here exceed 0.01.
             let nearest = sources.iter().map(|s| f64::from(s.distance(&target))).fold(1.0, f64::min);
             let steepness = 3.0 * 6.0e-7 / nearest.max(1.0e-2) + 40.0e-7;

@@ -1,5 +1,6 @@
 //! The command line: what each command takes. What each does is in its own file.
 
+mod check;
 mod devices;
 mod evaluate;
 mod inspect;
@@ -45,6 +46,8 @@ enum Command {
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
     Verify(verify::Arguments),
+    /// Check how closely each device agrees with the mathematics, kernel by kernel.
+    Check(check::Arguments),
 }
 
 /// Runs the command that the process was started with.
@@ -58,6 +61,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
     }
 }
 

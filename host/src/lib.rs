@@ -16,6 +16,7 @@
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
 //! evaluate, inspect, verify     the other jobs
+//! check                         how closely devices agree with the mathematics
 //! ```
 //!
 //! The command line is the binary's (`main.rs`, `cli/`).
@@ -23,6 +24,7 @@
 
 pub mod attention;
 pub mod canvas;
+pub mod check;
 pub mod device;
 pub mod evaluate;
 pub mod few_shot;

@@ -1,13 +1,7 @@
-//! What the tests of viewfuse share: scenes built on disk, seeded inputs, comparators that NaN cannot slip through,
-//! and the same formulas evaluated in `f64`.
+//! What the tests of viewfuse share: scenes built on disk, and running the command. Seeded inputs, comparators that NaN
+//! cannot slip through and the evaluations in `f64` are the program's own, in `viewfuse::check`.
 #![forbid(unsafe_code)]
 
 pub mod command;
-pub mod compare;
 pub mod emulator;
-pub mod oracle;
-pub mod poses;
 pub mod scenes;
-
-pub mod bounded;
-pub mod photo_oracle;

@@ -1,7 +1,7 @@
 //! The sweep: costs of planes, their means over windows, the depth of least cost.
 
 use super::{NOWHERE, Scene, along, centre, look_up, project, radius, towards};
-use crate::bounded::{Bounded, ROUNDING};
+use crate::check::bounded::{Bounded, ROUNDING};
 use viewfuse_core::photo::hull::SWEPT_ALPHA;
 use viewfuse_core::photo::sweep::{
     DEPTH_COST, MOST_DIFFERENCE, MOST_ROUGHNESS, NO_WITNESS, OUTSIDE, ROUGHNESS_COST, SEEN_BEHIND_ENTRY,

@@ -9,7 +9,7 @@ mod sweep;
 pub use shade::{Colour, Pixel, depth_at, march, sample};
 pub use sweep::{match_cost, mean_column, pick_depth, sum_row};
 
-use crate::bounded::{Bounded, ROUNDING};
+use crate::check::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::hull::{ENTRY_ALPHA, ENTRY_STEP, LEAST_ALPHA};
 use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};

@@ -1,6 +1,6 @@
 //! Seeded poses: random, on rings, close together, far away.
 
-use crate::oracle::{Matrix, cross, normalised};
+use crate::check::oracle::{Matrix, cross, normalised};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::threefry_2x32;
 

@@ -1,7 +1,7 @@
 //! Occupancy and colour at a point, and a ray through them.
 
 use super::{NOWHERE, Scene, Seen, Vector, along, centre, interval, look_up, project, radius, tents, towards};
-use crate::bounded::{Bounded, ROUNDING};
+use crate::check::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::NO_SURFACE;
 use viewfuse_core::photo::march::{MOST_STEPS, STEP};
@@ -164,8 +164,9 @@ pub fn march(
     let (origin, direction) = (centre(target), towards(target, at));
     let (enter, leave) = interval(scene.object, origin, direction);
     let (mut passes, mut lost) = (Bounded::ONE, 0.0);
-    let (mut colour, mut behind_first) = ([Bounded::ZERO; 3], Bounded::ZERO);
-    let (mut first, mut met) = (None, 0);
+    // What is met, and what passes behind it.
+    let mut layers: Vec<(Bounded, [Bounded; 3])> = Vec::new();
+    let (mut first, mut behind_first) = (None, Bounded::ZERO);
     if enter.below(leave)? {
         let footprint = (enter + leave) / (Bounded::from(2.0) * Bounded::from(target.intrinsics[0]));
         let wanted = ((leave - enter) / (Bounded::from(STEP) * footprint)).clamped(1.0, (MOST_STEPS - 1) as f32);
@@ -192,29 +193,47 @@ pub fn march(
                 continue;
             }
             let weight = passes - behind;
-            for channel in 0..3 {
-                colour[channel] = colour[channel] + weight * here[channel];
-            }
             // Relative to the first depth: an error of a weight counts as far as its depth differs.
             behind_first = behind_first + weight * (depth - *first.get_or_insert(depth));
-            met += 1;
+            layers.push((behind, here));
             passes = behind;
         }
     }
-    for channel in 0..3 {
-        colour[channel] = colour[channel] + passes * Bounded::from(background[channel]);
-        colour[channel].error += lost;
-    }
+    let colour = [0, 1, 2].map(|channel| {
+        let seen = blended(&layers, channel, background[channel]);
+        Bounded { error: seen.error + lost, ..seen }
+    });
     let opacity = Bounded::ONE - passes;
     let depth = match opacity.below(Bounded::from(0.5)) {
         Some(true) => Some(Bounded::ZERO),
         Some(false) => {
             let mean = first.unwrap_or(Bounded::ZERO) + behind_first / opacity;
             // The sum of weights times whole depths rounds once for each of them.
-            let own = f64::from(met + 2) * ROUNDING * mean.value + 2.0 * lost * mean.value;
+            let own = (layers.len() + 2) as f64 * ROUNDING * mean.value + 2.0 * lost * mean.value;
             Some(Bounded { error: mean.error + own, ..mean })
         }
         None => None,
     };
     Some(Pixel { colour, depth, opacity: Bounded { error: opacity.error + lost, ..opacity } })
+}
+
+/// A channel of layers before a background, by parts: `sum (T_i - T_(i+1)) c_i` is `c_0 + sum T_i (c_i - c_(i-1))`, so that
+/// an error of what passes counts as far as the colour changes there. `layers` say what passes behind each.
+fn blended(layers: &[(Bounded, [Bounded; 3])], channel: usize, background: f32) -> Bounded {
+    let background = Bounded::from(background);
+    let colour = |layer: usize| layers.get(layer).map_or(background, |(_, colour)| colour[channel]);
+    let (mut before, mut value, mut error) = (Bounded::ONE, 0.0, 0.0);
+    let mut largest = background.value.abs();
+    for (index, (behind, _)) in layers.iter().enumerate() {
+        let (here, next) = (colour(index), colour(index + 1));
+        let weight = before.value - behind.value;
+        value += weight * here.value;
+        error += (weight + before.error + behind.error) * here.error;
+        error += behind.error * ((next.value - here.value).abs() + next.error);
+        largest = largest.max(here.value.abs());
+        before = *behind;
+    }
+    value += before.value * background.value;
+    // Every partial sum is rounded, and every product and weight in it.
+    Bounded { value, error: error + (layers.len() + 2) as f64 * ROUNDING * largest }
 }

@@ -1,0 +1,35 @@
+//! How closely devices agree with the mathematics: every kernel against an `f64` evaluation, and whole pictures.
+//!
+//! Each kernel runs through a device's trait method on small random inputs. What must come out is evaluated in `f64` by
+//! code that shares nothing with the kernel, with a bound for each number: running error analysis, or roundings counted
+//! by hand. The bounds hold on every device, also on one whose divisions are as coarse as Vulkan allows. Where rounding
+//! decides (which side of a threshold), there is no answer; such elements must be few.
+//!
+//! ```text
+//! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
+//! poses, world                  inputs for a seed
+//! oracle, photo_oracle,         what must come out
+//!   attention_oracle,
+//!   light_oracle
+//! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
+//! report, measure               a device's kernels, checked
+//! picture                       a whole picture against the CPU's
+//! ```
+
+pub mod agreement;
+pub mod attention_oracle;
+pub mod bounded;
+pub mod case;
+pub mod cases;
+pub mod compare;
+pub mod light_oracle;
+pub mod measure;
+pub mod oracle;
+pub mod photo_oracle;
+pub mod picture;
+pub mod poses;
+pub mod report;
+pub mod world;
+
+pub use measure::{check_device, check_kernel};
+pub use report::{CheckError, DeviceReport, KernelReport, PictureReport, Report};

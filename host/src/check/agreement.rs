@@ -1,0 +1,171 @@
+//! How well numbers agree with those expected, each within its own bound.
+//!
+//! A check must be able to fail: a NaN, another length, nothing at all, the same number everywhere and too many elements
+//! that hang on rounding are disagreements, whatever the bounds.
+
+use super::bounded::Bounded;
+use super::compare::unit_in_last_place;
+use std::fmt;
+
+/// Largest share of elements that may hang on rounding.
+pub const MOST_UNDECIDED: f64 = 0.02;
+
+/// Why numbers are not those expected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Disagreement {
+    /// There are more or fewer of them, or none at all.
+    Length,
+    /// They are all the same: nothing was tested.
+    Constant,
+    /// More than [`MOST_UNDECIDED`] of the elements hang on rounding.
+    Undecided {
+        /// Their share.
+        share: f64,
+    },
+    /// One is NaN or further off than its bound: of several, the worst in units of its bound.
+    Mismatch {
+        /// Which.
+        index: usize,
+        /// What came out.
+        actual: f32,
+        /// What should have.
+        expected: Bounded,
+    },
+}
+
+impl fmt::Display for Disagreement {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Disagreement::Length => write!(formatter, "not as many numbers as expected"),
+            Disagreement::Constant => write!(formatter, "every number is the same"),
+            Disagreement::Undecided { share } => {
+                write!(formatter, "{:.1} % of the elements hang on rounding", 100.0 * share)
+            }
+            Disagreement::Mismatch { index, actual, expected: Bounded { value, error } } => {
+                write!(formatter, "[{index}] is {actual:e} instead of {value:e}, which may be off by {error:.1e}")
+            }
+        }
+    }
+}
+
+/// How far from what is expected an element may be, and from which size on its relative error is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Elements whose own bound is larger than this are undecided.
+    pub tolerance: f64,
+    /// Relative differences and those in ULP are taken of elements of at least this size.
+    pub least: f64,
+}
+
+/// Differences of numbers, the largest of each kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Differences {
+    /// `|a - e|`.
+    pub absolute: f64,
+    /// `|a - e| / |e|`.
+    pub relative: f64,
+    /// `|a - e|` in units of the last place of `e` as `f32`.
+    pub ulps: f64,
+}
+
+impl Differences {
+    /// Counts a pair of numbers; NaN is infinitely far off.
+    pub fn add(&mut self, actual: f32, expected: f64, least: f64) {
+        let difference = difference(actual, expected);
+        self.absolute = self.absolute.max(difference);
+        if expected.abs() >= least {
+            self.relative = self.relative.max(difference / expected.abs());
+            self.ulps = self.ulps.max(difference / unit_in_last_place(expected));
+        }
+    }
+}
+
+/// `|actual - expected|`; infinite if either is NaN.
+fn difference(actual: f32, expected: f64) -> f64 {
+    let difference = (f64::from(actual) - expected).abs();
+    if difference.is_nan() { f64::INFINITY } else { difference }
+}
+
+/// How well numbers agree with those expected.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Agreement {
+    /// How many were compared.
+    pub compared: usize,
+    /// Share of those that hang on rounding and were not.
+    pub undecided: f64,
+    /// Largest differences of those compared.
+    pub worst: Differences,
+    /// Largest quotient of a difference and its bound.
+    pub worst_of_bound: f64,
+    /// Largest bound of those compared.
+    pub largest_bound: f64,
+    /// What is wrong, if anything: a mismatch before all others but the length.
+    pub disagreement: Option<Disagreement>,
+}
+
+/// Whether an element is compared: there is an expectation, and it is no worse than `tolerance`.
+pub fn is_decided(expected: &Option<Bounded>, tolerance: f64) -> Option<Bounded> {
+    expected.filter(|expected| expected.error <= tolerance)
+}
+
+/// Measures results against what was expected of them, each within its own bound. Elements without an expectation, or with
+/// one that is no better than the tolerance, are undecided and must be few; NaN is wrong also there.
+pub fn measure(actual: &[f32], expected: &[Option<Bounded>], limits: Limits) -> Agreement {
+    let mut agreement = Agreement::default();
+    if actual.len() != expected.len() || actual.is_empty() {
+        return Agreement { disagreement: Some(Disagreement::Length), ..agreement };
+    }
+    let mut worst_mismatch = 0.0;
+    for (index, (&actual, expected)) in actual.iter().zip(expected).enumerate() {
+        let expected = match is_decided(expected, limits.tolerance) {
+            Some(expected) => {
+                agreement.compared += 1;
+                agreement.worst.add(actual, expected.value, limits.least);
+                agreement.largest_bound = agreement.largest_bound.max(expected.error);
+                expected
+            }
+            None if actual.is_nan() => Bounded::ZERO,
+            None => continue,
+        };
+        let difference = difference(actual, expected.value);
+        let of_bound = if difference > 0.0 { difference / expected.error } else { 0.0 };
+        agreement.worst_of_bound = agreement.worst_of_bound.max(of_bound);
+        if !(difference <= expected.error) && of_bound > worst_mismatch {
+            worst_mismatch = of_bound;
+            agreement.disagreement = Some(Disagreement::Mismatch { index, actual, expected });
+        }
+    }
+    agreement.undecided = 1.0 - agreement.compared as f64 / actual.len() as f64;
+    agreement.disagreement = agreement.disagreement.or_else(|| {
+        if agreement.undecided > MOST_UNDECIDED {
+            Some(Disagreement::Undecided { share: agreement.undecided })
+        } else if actual.iter().all(|value| *value == actual[0]) {
+            Some(Disagreement::Constant)
+        } else {
+            None
+        }
+    });
+    agreement
+}
+
+/// How a device's results differ from another's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Versus {
+    /// Largest differences of the elements that do not hang on rounding.
+    pub worst: Differences,
+    /// Share of all elements that are the same bit for bit.
+    pub equal: f64,
+}
+
+/// Measures results against those of another device, which are as many. `expected` says which elements hang on rounding.
+pub fn versus(actual: &[f32], other: &[f32], expected: &[Option<Bounded>], limits: Limits) -> Versus {
+    let mut worst = Differences::default();
+    let mut equal = 0;
+    for ((&actual, &other), expected) in actual.iter().zip(other).zip(expected) {
+        equal += usize::from(actual.to_bits() == other.to_bits());
+        if is_decided(expected, limits.tolerance).is_some() {
+            worst.add(actual, f64::from(other), limits.least);
+        }
+    }
+    Versus { worst, equal: equal as f64 / actual.len().max(1) as f64 }
+}

@@ -1,0 +1,77 @@
+//! The paper's attention in `f64`: embeddings of poses, and the softmax of their products, with bounds on what `f32` may
+//! make of them.
+
+use super::bounded::{Bounded, DIVISION, ROUNDING};
+use viewfuse_core::attention::{EMBEDDING, FREQUENCY_COUNT, FREQUENCY_FACTOR, FourierEmbedding, Linear};
+use viewfuse_core::pose::PoseBlock;
+
+/// Absolute error of our sine and cosine for arguments up to 8192.
+const SINE_ERROR: f64 = 9.0e-8;
+
+/// What the exponential has lost of a weight, and what a device may flush to 0.
+const NEGLIGIBLE: f64 = 4.0e-38;
+
+/// The embedding of a pose, `[EMBEDDING]`. Coordinates of the centre must be below 170, so that no sine is asked of more
+/// than 8192.
+pub fn embed(embedding: &FourierEmbedding, pose: &PoseBlock) -> Vec<Bounded> {
+    let features = features(pose);
+    let hidden = relu(apply(&embedding.first, &features));
+    apply(&embedding.third, &relu(apply(&embedding.second, &hidden)))
+}
+
+/// Centre, sines and cosines, backward axis.
+fn features(pose: &PoseBlock) -> Vec<Bounded> {
+    let centre = [pose.right[3], pose.down[3], pose.forward[3]].map(Bounded::from);
+    let mut features = centre.to_vec();
+    for k in 0..FREQUENCY_COUNT {
+        let angles = centre.map(|c| Bounded::from(FREQUENCY_FACTOR * (1 << k) as f32) * c);
+        // Neither function is steeper than 1.
+        let of = |function: fn(f64) -> f64| {
+            angles.map(|angle| Bounded { value: function(angle.value), error: angle.error + SINE_ERROR })
+        };
+        features.extend(of(f64::sin));
+        features.extend(of(f64::cos));
+    }
+    features.extend([0, 1, 2].map(|axis| Bounded::from(-pose.forward[axis])));
+    features
+}
+
+fn apply<const I: usize, const O: usize>(layer: &Linear<I, O>, x: &[Bounded]) -> Vec<Bounded> {
+    let terms = |row: &[f32; I], bias: f32| {
+        row.iter().zip(x).fold(Bounded::from(bias), |sum, (weight, x)| sum + Bounded::from(*weight) * *x)
+    };
+    layer.weight.iter().zip(&layer.bias).map(|(row, bias)| terms(row, *bias)).collect()
+}
+
+fn relu(values: Vec<Bounded>) -> Vec<Bounded> {
+    values.into_iter().map(|value| value.greater(Bounded::ZERO)).collect()
+}
+
+/// The weights of the keys, `keys[source][EMBEDDING]`, for a query.
+///
+/// An error of a logit is a relative error of its weight, and those of all logits, weighted, come in through the sum: the
+/// largest, which is subtracted from all, cancels.
+pub fn attend(query: &[f32], keys: &[f32]) -> Vec<Bounded> {
+    let scale = Bounded::from(std::f32::consts::SQRT_2 / 16.0);
+    let product = |key: &[f32]| {
+        let terms = query.iter().zip(key).map(|(q, k)| Bounded::from(*q) * Bounded::from(*k));
+        // The scale is 1 / sqrt(EMBEDDING), rounded once.
+        let logit = terms.fold(Bounded::ZERO, |sum, term| sum + term) * scale;
+        Bounded { error: logit.error + ROUNDING * logit.value.abs(), ..logit }
+    };
+    let logits: Vec<Bounded> = keys.chunks_exact(EMBEDDING).map(product).collect();
+    let largest = logits.iter().map(|logit| logit.value).fold(f64::NEG_INFINITY, f64::max);
+    let scores: Vec<f64> = logits.iter().map(|logit| (logit.value - largest).exp()).collect();
+    let sum: f64 = scores.iter().sum();
+    // The logit's own, the subtraction's, those of the exponential, and of the quotient by the largest score.
+    let error = |logit: &Bounded| logit.error + ROUNDING * (logit.value - largest).abs() + 2.0 * ROUNDING + DIVISION;
+    let errors: Vec<f64> = logits.iter().map(error).collect();
+    let mean: f64 = errors.iter().zip(&scores).map(|(error, score)| error * score / sum).sum();
+    // Additions, the reciprocal of the sum, and the product with it.
+    let last = (scores.len() + 1) as f64 * ROUNDING + DIVISION;
+    let weight = |(score, error): (&f64, &f64)| {
+        let value = score / sum;
+        Bounded { value, error: value * ((error + mean).exp_m1() + last) + NEGLIGIBLE }
+    };
+    scores.iter().zip(&errors).map(weight).collect()
+}

@@ -1,0 +1,80 @@
+//! [`Kernel::FuseViews`]: sums over 1 to 32 views, also where the next view's latents lie further on than there are
+//! elements.
+
+use super::{numbers, random};
+use crate::check::agreement::Limits;
+use crate::check::bounded::Bounded;
+use crate::check::case::{Case, Spoiler};
+use crate::check::light_oracle::fuse_element;
+use crate::device::Device;
+use viewfuse_core::fuse::FuseBlock;
+use viewfuse_vulkan::kernel::Kernel;
+
+/// A dispatch.
+#[derive(Clone, Debug)]
+pub struct Job {
+    block: FuseBlock,
+    element_count: usize,
+    weights: Vec<f32>,
+    latents: Vec<f32>,
+}
+
+/// See the module.
+pub enum FuseViews {}
+
+impl Case for FuseViews {
+    const KERNEL: Kernel = Kernel::FuseViews;
+    const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
+    const REASON: &'static str = "a product and an addition a view, two roundings each";
+    const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
+        ("weights", |jobs| jobs.iter_mut().for_each(|job| job.weights[0] *= 1.01)),
+        ("latents", |jobs| jobs.iter_mut().for_each(|job| job.latents[0] *= 1.01)),
+    ];
+
+    type Inputs = Vec<Job>;
+    type Loaded<D: Device> = Vec<(D::Buffer<f32>, D::Buffer<f32>, D::Buffer<f32>)>;
+
+    fn inputs(seed: u64, size: u32) -> Vec<Job> {
+        let random = &mut random(3, seed, size);
+        let job = |view_count: usize| {
+            let stride = size + random.below(3) as u32;
+            let weights = numbers(view_count, || random.unit());
+            let sum: f32 = weights.iter().sum();
+            Job {
+                block: FuseBlock { view_count: view_count as u32, stride },
+                element_count: size as usize,
+                weights: weights.iter().map(|weight| weight / sum).collect(),
+                latents: numbers(stride as usize * view_count, || random.normal()),
+            }
+        };
+        [1, 2, 3, 8, 15, 32].map(job).to_vec()
+    }
+
+    fn element_count(jobs: &Vec<Job>) -> usize {
+        jobs.iter().map(|job| job.element_count).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+        let load = |job: &Job| {
+            Ok((device.upload(&job.weights)?, device.upload(&job.latents)?, device.zeros(job.element_count)?))
+        };
+        jobs.iter().map(load).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, (weights, latents, fused))| device.fuse_views(&job.block, weights, latents, fused))
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        let fused: Vec<Vec<f32>> =
+            loaded.iter().map(|(_, _, fused)| device.download(fused)).collect::<Result<_, _>>()?;
+        Ok(fused.concat())
+    }
+
+    fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
+        let element = |job: &Job, element: usize| Some(fuse_element(&job.weights, &job.latents, &job.block, element));
+        jobs.iter().flat_map(|job| (0..job.element_count).map(move |index| element(job, index))).collect()
+    }
+}

@@ -1,0 +1,130 @@
+//! What the kernels of the weight-free field are made of, against `f64`: functions that are no kernels themselves.
+//!
+//! Every element has its own tolerance: the oracle counts the roundings on the way to it (two for each operation) and
+//! multiplies them by what follows; an image coordinate's error counts as far as the image changes over it. Elements
+//! whose bound is larger than the tolerance stated here, or that hang on a threshold, are left out and must be few.
+
+use viewfuse::check::agreement::{Disagreement, Limits, measure};
+use viewfuse::check::bounded::Bounded;
+use viewfuse::check::photo_oracle as oracle;
+use viewfuse::check::world::{Numbers, World};
+use viewfuse_core::photo::NO_SURFACE;
+use viewfuse_core::photo::hull::{hull_alpha, hull_entry};
+use viewfuse_core::photo::shade::{JUMP, depth_at, sample};
+
+const SEEDS: std::ops::Range<u64> = 1..5;
+
+/// What a function computed and what was expected.
+#[derive(Default)]
+struct Results {
+    actual: Vec<f32>,
+    expected: Vec<Option<Bounded>>,
+}
+
+impl Results {
+    fn push(&mut self, actual: f32, expected: Option<Bounded>) {
+        self.actual.push(actual);
+        self.expected.push(expected);
+    }
+}
+
+/// Runs a function on one world and the oracle on another.
+type Case = fn(&World, &World, &mut Results);
+
+/// An input by name, and how to put it off by 1 %.
+type Spoiler = (&'static str, fn(&mut World));
+
+/// Compares on several worlds, prints the figures, and makes sure that each spoilt input shows.
+fn check(function: &str, tolerance: f64, case: Case, spoilers: &[Spoiler]) {
+    let run = |spoil: fn(&mut World)| {
+        let mut results = Results::default();
+        for seed in SEEDS {
+            let world = World::new(seed);
+            let mut spoilt = world.clone();
+            spoil(&mut spoilt);
+            case(&spoilt, &world, &mut results);
+        }
+        measure(&results.actual, &results.expected, Limits { tolerance, least: 1.0e-2 })
+    };
+    let agreement = run(|_| {});
+    assert_eq!(agreement.disagreement, None, "{function}: {agreement:?}");
+    println!(
+        "{function}: {} elements, {:.2} % undecided, worst error {:.1e} ({:.0} % of its bound), tolerance {tolerance:.0e}",
+        agreement.compared,
+        100.0 * agreement.undecided,
+        agreement.worst.absolute,
+        100.0 * agreement.worst_of_bound,
+    );
+    for (input, spoil) in spoilers {
+        let outcome = run(*spoil).disagreement;
+        assert!(matches!(outcome, Some(Disagreement::Mismatch { .. })), "{function}, {input} off by 1 %: {outcome:?}");
+    }
+}
+
+// Ten roundings on the way to an image coordinate of at most 40, times an alpha's slope of at most 0.5 a pixel.
+#[test]
+fn hull_alpha_agrees() {
+    let case: Case = |actual, expected, results| {
+        for point in expected.points(2000) {
+            for least in [0.02, 0.3] {
+                let found = hull_alpha(&actual.object, &actual.views, &actual.texels[..], point, least);
+                results.push(found, oracle::hull_alpha(&expected.scene(), oracle::point(point.into()), least));
+            }
+        }
+    };
+    check("hull_alpha", 1.0e-4, case, &[("focal length", World::spoil_focal), ("texels", World::spoil_texels)]);
+}
+
+// A coordinate's error times the change of depth over a pixel, at most a jump of 0.4.
+#[test]
+fn depth_at_agrees() {
+    let case: Case = |actual, expected, results| {
+        let numbers = &mut Numbers::new(8);
+        for (view, camera) in expected.views.iter().enumerate() {
+            let jump = JUMP * expected.footprints[view];
+            for _ in 0..1000 {
+                let x = numbers.between(0.0, camera.width as f32);
+                let y = numbers.between(0.0, camera.height as f32);
+                let found = depth_at(camera, &actual.depths[..], x, y, jump);
+                let at = [x, y, jump].map(Bounded::from);
+                results.push(found, oracle::depth_at(camera, &expected.depths, at[0], at[1], at[2]));
+            }
+        }
+    };
+    check("depth_at", 1.0e-4, case, &[("depths", World::spoil_depths)]);
+}
+
+// Depths in footprints are good to 1e-4, and the logistic step has a slope of 1 / (4 SURFACE_WIDTH); colours as a
+// look-up divided by an alpha of at least 0.02.
+#[test]
+fn sample_agrees() {
+    let case: Case = |actual, expected, results| {
+        for point in expected.points(4000) {
+            let World { object, views, footprints, texels, depths, weights, .. } = actual;
+            let found = sample(object, views, footprints, &texels[..], &depths[..], weights, point);
+            let World { footprints, depths, weights, .. } = expected;
+            let place = oracle::point(point.into());
+            let wanted = oracle::sample(&expected.scene(), footprints, depths, weights, place);
+            results.push(found.occupancy, wanted.map(|sample| sample.0));
+            (0..3).for_each(|c| results.push(found.colour[c], wanted.map(|sample| sample.1[c])));
+        }
+    };
+    let spoilers: [Spoiler; 4] = [
+        ("focal length", World::spoil_focal),
+        ("texels", World::spoil_texels),
+        ("depths", World::spoil_depths),
+        ("weight", |world| world.weights[1] *= 1.01),
+    ];
+    check("sample", 1.0e-3, case, &spoilers);
+}
+
+#[test]
+fn hull_entry_ends_at_any_focal_length() {
+    let mut world = World::new(1);
+    world.views.iter_mut().for_each(|view| view.intrinsics[0] = 1.0e9);
+    // Enough for a pixel to ask, too little for any point to belong to the hull.
+    world.texels.iter_mut().for_each(|texel| texel[3] = 0.15);
+    let World { object, views, texels, .. } = &world;
+    let pixel = views[0].width * views[0].height / 2;
+    assert_eq!(hull_entry(object, views, &texels[..], 0, pixel), NO_SURFACE);
+}
