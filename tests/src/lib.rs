@@ -4,6 +4,8 @@
 
 pub mod command;
 pub mod compare;
+pub mod contract;
+pub mod module;
 pub mod oracle;
 pub mod poses;
 pub mod scenes;
