@@ -1,6 +1,6 @@
 //! The compiled kernels are what the list of kernels says; and the checker that says so rejects what is not.
 
-use rspirv::dr::{Module, Operand};
+use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Capability, Decoration, ExecutionMode, Op};
 use std::path::Path;
 use std::sync::LazyLock;
@@ -185,6 +185,17 @@ fn a_further_capability_is_seen() {
 }
 
 #[test]
+fn a_composite_of_pointers_is_seen() {
+    let said = breaches_with(|module| {
+        let is_pointer = |kind: &&Instruction| kind.class.opcode == Op::TypePointer;
+        let pointer = module.types_global_values.iter().find(is_pointer).and_then(|kind| kind.result_id);
+        let members = vec![Operand::IdRef(pointer.expect("a pointer"))];
+        module.types_global_values.push(Instruction::new(Op::TypeStruct, None, Some(u32::MAX), members));
+    });
+    assert_one(&said, "1 composites of pointers");
+}
+
+#[test]
 fn arithmetic_that_could_be_contracted_is_seen() {
     let is_mark = |operands: &[Operand]| operands.get(1) == Some(&Operand::Decoration(Decoration::NoContraction));
     let mark = kernels().annotations.iter().rposition(|annotation| is_mark(&annotation.operands)).expect("a mark");
@@ -219,7 +230,7 @@ fn a_read_of_what_is_written_is_seen() {
         let function = module.functions.iter_mut().find(|function| function.def_id() == Some(entry)).expect("sum_row");
         let mut instructions = function.blocks.iter_mut().flat_map(|block| &mut block.instructions);
         let store = instructions.rfind(|instruction| instruction.class.opcode == Op::Store).expect("a store");
-        store.class = rspirv::dr::Instruction::new(Op::Load, None, None, Vec::new()).class;
+        store.class = Instruction::new(Op::Load, None, None, Vec::new()).class;
         store.result_type = Some(1);
         store.result_id = None;
         store.operands.truncate(1);

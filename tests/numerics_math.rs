@@ -57,6 +57,44 @@ fn exp_never_decreases_by_more_than_its_error() {
 }
 
 #[test]
+fn ln_is_within_its_error() {
+    let error = |x: f32| {
+        let expected = f64::from(x).ln();
+        (x, (f64::from(math::ln(x)) - expected).abs() / unit_in_last_place(expected))
+    };
+    assert_below("ln, ULP", worst(sweep(f32::MIN_POSITIVE, f32::MAX, 197).map(error)), 0.9);
+    assert_below("ln around 1, ULP", worst(sweep(0.7, 1.5, 1).map(error)), 0.9);
+}
+
+#[test]
+fn ln_at_its_ends() {
+    assert_eq!(math::ln(1.0), 0.0);
+    let lowest = math::ln(f32::MIN_POSITIVE);
+    assert!((-87.4..-87.3).contains(&lowest), "{lowest}");
+    for low in [0.0, -0.0, 1.0e-40, -1.0, f32::NEG_INFINITY, f32::NAN] {
+        assert_eq!(math::ln(low), lowest, "{low}");
+    }
+    assert_eq!(math::ln(f32::INFINITY), math::ln(f32::MAX));
+    assert!((88.7..88.8).contains(&math::ln(f32::MAX)));
+}
+
+#[test]
+fn seventh_roots_are_within_their_error() {
+    let error = |x: f32| {
+        let expected = f64::from(x).powf(1.0 / 7.0);
+        (x, (f64::from(math::seventh_root(x)) - expected).abs() / unit_in_last_place(expected))
+    };
+    assert_below("seventh_root, ULP", worst(sweep(f32::MIN_POSITIVE, f32::MAX, 197).map(error)), 1.3);
+    assert_below("seventh_root around 1, ULP", worst(sweep(0.5, 2.0, 3).map(error)), 1.3);
+    assert_eq!(math::seventh_root(1.0), 1.0);
+    assert_eq!(math::seventh_root(128.0), 2.0);
+    for low in [0.0, -0.0, 1.0e-40, -1.0, f32::NEG_INFINITY, f32::NAN] {
+        assert_eq!(math::seventh_root(low), 0.0, "{low}");
+    }
+    assert_eq!(math::seventh_root(f32::INFINITY), math::seventh_root(f32::MAX));
+}
+
+#[test]
 fn sin_cos_is_within_its_absolute_error() {
     let error = |x: f32| {
         let (sin, cos) = math::sin_cos(x);

@@ -19,6 +19,38 @@ pub struct Compositor<const C: usize> {
     transmittance: f32,
 }
 
+/// A [`Compositor`] of three channels as plain data. Made by [`Compositor::block`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RayBlock {
+    /// Channels gathered so far.
+    pub accumulated: [f32; 3],
+    /// Depths gathered so far, by weight.
+    pub weighted_depth: f32,
+    /// Sum of the optical depths.
+    pub optical_depth: f32,
+    /// How much light passes what was met so far.
+    pub transmittance: f32,
+}
+
+impl Compositor<3> {
+    /// The state as plain data.
+    #[inline]
+    pub fn block(&self) -> RayBlock {
+        let Compositor { accumulated, weighted_depth, optical_depth, transmittance } = *self;
+        RayBlock { accumulated, weighted_depth, optical_depth, transmittance }
+    }
+}
+
+impl RayBlock {
+    /// The ray that goes on from this state.
+    #[inline]
+    pub fn compositor(&self) -> Compositor<3> {
+        let RayBlock { accumulated, weighted_depth, optical_depth, transmittance } = *self;
+        Compositor { accumulated, weighted_depth, optical_depth, transmittance }
+    }
+}
+
 /// What a ray saw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Composite<const C: usize> {

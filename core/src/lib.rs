@@ -16,6 +16,7 @@
 //! lookup            what a view shows there                       bilinear, trilinear
 //! fuse              the views' latents become one                 fuse_views, fuse_visible
 //! composite         samples along a ray become a pixel            Compositor<C>
+//! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
 //! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
 //! ```
@@ -37,6 +38,7 @@ pub mod pages;
 pub mod photo;
 pub mod pose;
 pub mod random;
+pub mod schedule;
 pub mod sources;
 pub mod weighting;
 pub mod weights;

@@ -87,6 +87,51 @@ pub fn exp(x: f32) -> f32 {
     e * exact_power_of_two(half) * exact_power_of_two(power - half)
 }
 
+/// Natural logarithm: error at most 0.9 ULP for normal numbers. Zero, negative numbers, subnormals (devices may flush
+/// them) and NaN give the logarithm of the smallest normal number, -87.3; infinity that of the largest finite one, 88.7.
+#[inline]
+pub fn ln(x: f32) -> f32 {
+    // ln 2 in two parts, as in `exp`.
+    const LN_2_HIGH: f32 = 0.693_359_4;
+    const LN_2_LOW: f32 = -2.121_944_4e-4;
+    let bits = clamp(x, f32::MIN_POSITIVE, f32::MAX).to_bits();
+    let mantissa = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000);
+    let exponent = (bits >> 23) as i32 - 127;
+    // x = 2^k (1 + r) with 1 + r within a factor sqrt(2) of 1.
+    let (k, r) = if mantissa > core::f32::consts::SQRT_2 {
+        ((exponent + 1) as f32, 0.5 * mantissa - 1.0)
+    } else {
+        (exponent as f32, mantissa - 1.0)
+    };
+    let z = r * r;
+    let p = 7.037_683_6e-2;
+    let p = p * r - 1.151_461e-1;
+    let p = p * r + 1.167_699_9e-1;
+    let p = p * r - 1.242_014_1e-1;
+    let p = p * r + 1.424_932_3e-1;
+    let p = p * r - 1.666_805_8e-1;
+    let p = p * r + 2.000_071_5e-1;
+    let p = p * r - 2.499_999_4e-1;
+    let p = p * r + 3.333_333e-1;
+    let rest = p * r * z + LN_2_LOW * k - 0.5 * z;
+    (r + rest) + LN_2_HIGH * k
+}
+
+/// The seventh root: error at most 1.3 ULP for normal numbers. Below them, and for NaN, it is 0; that of infinity is
+/// the root of the largest finite number.
+#[inline]
+pub fn seventh_root(x: f32) -> f32 {
+    if !(x >= f32::MIN_POSITIVE) {
+        return 0.0;
+    }
+    let x = min(x, f32::MAX);
+    let root = exp(ln(x) / 7.0);
+    // One step of Newton's method: what is left of the first error is its square. Powers stay between 1e-33 and 1e33.
+    let square = root * root;
+    let cube = square * root;
+    root + (x / (cube * cube) - root) / 7.0
+}
+
 /// `2^k` exactly, for `k` in `[-126, 127]`.
 #[inline]
 pub fn exact_power_of_two(k: i32) -> f32 {

@@ -69,7 +69,8 @@ impl<const S: usize> Sources<S> {
     /// How many sources there are: at least 1, at most `S`.
     #[inline]
     pub fn count(&self) -> u32 {
-        self.count
+        // Never larger as it is, but said here it saves every loop over the views its checks of bounds.
+        self.count.min(S as u32)
     }
 
     /// The pose of one source, `view < count`.

@@ -299,15 +299,16 @@ fn inverse_distance<const S: usize>(sources: &Sources<S>, target: &Pose, power: 
 fn gaussian<const S: usize>(sources: &Sources<S>, target: &Pose, beta: f32) -> Weights<S> {
     let count = sources.count() as usize;
     let (distances, largest) = distances(sources, target);
-    let mut nearest = 0;
+    let (mut nearest, mut least) = (0, distances[0]);
     let mut view = 1;
     while view < count {
-        if distances[view] < distances[nearest] {
-            nearest = view;
+        if distances[view] < least {
+            (nearest, least) = (view, distances[view]);
         }
         view += 1;
     }
-    let nearest_squared = squared_distance(sources.pose(nearest as u32), target);
+    // The limit only tells the compiler that the nearest is one of them.
+    let nearest_squared = squared_distance(sources.pose(nearest.min(S - 1) as u32), target);
     let mut scores = [0.0; S];
     view = 0;
     while view < count {
@@ -319,7 +320,7 @@ fn gaussian<const S: usize>(sources: &Sources<S>, target: &Pose, beta: f32) -> W
         let rest = rest + (squared.1 - nearest_squared.1);
         scores[view] = if largest > LARGEST_EXACT_DISTANCE || beta > LARGEST_EXACT_BETA {
             // So far away the squares overflow; d^2 - n^2 = (d - n)(d + n).
-            let (far, near) = (distances[view], distances[nearest]);
+            let (far, near) = (distances[view], least);
             if far > near && beta > 0.0 { exp(-(beta * (far - near)) * (far + near)) } else { 1.0 }
         } else {
             let (exponent, error) = two_product(beta, excess);

@@ -129,7 +129,8 @@ impl<const S: usize> Weights<S> {
     /// How many views there are, those with weight 0 included.
     #[inline]
     pub fn count(&self) -> u32 {
-        self.count
+        // Never larger as it is, but said here it saves every loop over the views its checks of bounds.
+        self.count.min(S as u32)
     }
 
     /// All values in view order; 0 at and beyond [`Weights::count`].

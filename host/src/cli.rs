@@ -1,5 +1,6 @@
 //! The command line: what each command takes. What each does is in its own file.
 
+mod devices;
 mod evaluate;
 mod inspect;
 mod options;
@@ -40,6 +41,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Compare weighting schemes on views that are left out of the sources.
     Evaluate(evaluate::Arguments),
+    /// List the devices that kernels can run on, and what those that cannot be used lack.
+    Devices(devices::Arguments),
     /// Compare this build with files of reference values.
     Verify(verify::Arguments),
 }
@@ -53,6 +56,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
     }
 }

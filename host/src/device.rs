@@ -4,10 +4,13 @@
 //! only does not compile. The body of every kernel is a function in `viewfuse-core`; a device decides how its elements
 //! are spread over cores or invocations. Nothing is downloaded before the end of a render.
 
+pub mod choice;
 pub mod cpu;
+pub mod vulkan;
 
 use bytemuck::Pod;
 use std::ops::Range;
+use std::time::Duration;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
@@ -25,6 +28,8 @@ impl<T: Pod + Default + Send + Sync> Element for T {}
 pub struct PhotoScene<D: Device + ?Sized> {
     /// The object's box and the number of views.
     pub object: ObjectBlock,
+    /// The same in the device's memory.
+    pub object_buffer: D::Buffer<ObjectBlock>,
     /// The source cameras on the host: shapes of the buffers.
     pub cameras: Vec<CameraBlock>,
     /// `[view]`: the source cameras.
@@ -41,6 +46,19 @@ pub struct Pixels<D: Device + ?Sized> {
     pub colours: D::Buffer<[f32; 4]>,
     /// `[row][column]`: depth along the principal axis; 0 where nothing is met.
     pub depths: D::Buffer<f32>,
+}
+
+/// What a kernel took.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KernelTime {
+    /// Its name.
+    pub kernel: &'static str,
+    /// How many times it was dispatched.
+    pub dispatches: u64,
+    /// How many elements it computed.
+    pub elements: u64,
+    /// Its time on the device.
+    pub time: Duration,
 }
 
 /// Something that runs kernels.
@@ -67,6 +85,19 @@ pub trait Device {
 
     /// Most elements of a buffer that is bound as a whole: what grows with the work is cut so that it fits.
     fn most_elements<T: Element>(&self) -> usize;
+
+    /// Fewest elements of a kernel that keep the device busy: work between two looks at the interrupt flag is not cut
+    /// finer.
+    fn busy_elements(&self) -> usize;
+
+    /// Waits until everything that was asked for is done, so that its time can be told.
+    ///
+    /// # Errors
+    /// If the device is lost, or a kernel took too long.
+    fn finish(&self) -> Result<(), Self::Error>;
+
+    /// What each kernel took so far, kernels that never ran left out; nothing for devices that do not tell.
+    fn kernel_times(&self) -> Vec<KernelTime>;
 
     /// The values of a buffer.
     ///

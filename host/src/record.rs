@@ -1,5 +1,6 @@
 //! The run record: everything needed to say how a picture came about, as JSON.
 
+use crate::device::KernelTime;
 use crate::few_shot::FewShot;
 use crate::render::{Frame, RenderOptions, StageTimes};
 use crate::scene::Scene;
@@ -15,6 +16,8 @@ pub struct RunRecord {
     pub scene: String,
     /// The device.
     pub device: String,
+    /// Why it is this one.
+    pub device_reason: String,
     /// The field.
     pub field: &'static str,
     /// The weighting scheme.
@@ -35,6 +38,8 @@ pub struct RunRecord {
     pub sources: Vec<String>,
     /// Times of what all frames share.
     pub times: TimesRecord,
+    /// What each kernel took, for devices that tell.
+    pub kernels: Vec<KernelRecord>,
     /// One entry a target.
     pub frames: Vec<FrameRecord>,
 }
@@ -63,6 +68,32 @@ pub struct TimesRecord {
     pub frames: f64,
     /// Everything, writing the pictures included.
     pub total: f64,
+}
+
+/// See [`RunRecord::kernels`].
+#[derive(Clone, Debug, Serialize)]
+pub struct KernelRecord {
+    /// Its name.
+    pub kernel: &'static str,
+    /// How many times it was dispatched.
+    pub dispatches: u64,
+    /// How many elements it computed.
+    pub elements: u64,
+    /// Its time on the device.
+    pub seconds: f64,
+    /// Its share of the time of all kernels.
+    pub share: f64,
+}
+
+/// What each kernel took.
+pub fn kernel_records(times: &[KernelTime]) -> Vec<KernelRecord> {
+    let all: f64 = times.iter().map(|time| time.time.as_secs_f64()).sum();
+    let record = |time: &KernelTime| {
+        let seconds = time.time.as_secs_f64();
+        let share = if all > 0.0 { seconds / all } else { 0.0 };
+        KernelRecord { kernel: time.kernel, dispatches: time.dispatches, elements: time.elements, seconds, share }
+    };
+    times.iter().map(record).collect()
 }
 
 /// One target.

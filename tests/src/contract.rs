@@ -70,6 +70,13 @@ impl Breaches<'_> {
         });
         let names = module.debug_string_source.len() + module.debug_names.len() + module.debug_module_processed.len();
         self.unless(names == 0, || format!("{names} names of things or files"));
+        let is_pointer = |id: Word| self.declarations.definition(id).class.opcode == Op::TypePointer;
+        let of_pointers = module.types_global_values.iter().filter(|kind| {
+            matches!(kind.class.opcode, Op::TypeStruct | Op::TypeArray)
+                && kind.operands.iter().filter_map(Operand::id_ref_any).any(is_pointer)
+        });
+        let of_pointers = of_pointers.count();
+        self.unless(of_pointers == 0, || format!("{of_pointers} composites of pointers, where addressing is logical"));
         for constant in &module.types_global_values {
             let number = constant.result_id.and_then(|id| self.declarations.decorated(id, Decoration::SpecId));
             self.unless(number.is_none_or(|number| number == 0), || format!("specialisation constant {number:?}"));

@@ -5,6 +5,7 @@
 pub mod command;
 pub mod compare;
 pub mod contract;
+pub mod emulator;
 pub mod module;
 pub mod oracle;
 pub mod poses;

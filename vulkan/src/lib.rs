@@ -1,3 +1,33 @@
 //! The kernels of viewfuse on any Vulkan device.
+//!
+//! The kernels are functions of `viewfuse-core`; rust-gpu makes them into SPIR-V (`shaders/`, `cargo shaders`), which lies in
+//! this crate. Vulkan is loaded at run time. The modules stand in the order of the data:
+//!
+//! ```text
+//! error                          what can go wrong, with numbers
+//! messages, instance, adapter    the loader, its drivers, their devices and what those lack
+//! kernel                         the list of kernels: names, arrays, parameters
+//! handle, buffer                 an opened device, memory in it
+//! pipelines, submissions         kernels made ready, commands on their way
+//! gpu                            upload, dispatch, download: cut into pieces that fit the device
+//! ```
+//!
+//! Unsafe code is only here, in calls of Vulkan; each says why it is sound.
 
+mod adapter;
+mod buffer;
+mod error;
+mod gpu;
+mod handle;
+mod instance;
 pub mod kernel;
+mod messages;
+mod pipelines;
+mod submissions;
+
+pub use adapter::{Adapter, AdapterKind, Limits};
+pub use buffer::{Bound, Buffer};
+pub use error::{Missing, VulkanError, version};
+pub use gpu::{Gpu, GpuOptions, Tally};
+pub use instance::{Instance, InstanceOptions};
+pub use messages::Messages;

@@ -1,12 +1,13 @@
 //! `viewfuse evaluate`.
 
-use super::options::{PictureOptions, SourceOptions};
+use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::table::table;
 use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse::device::cpu::Cpu;
+use viewfuse::device::Device;
+use viewfuse::device::choice::{AnyDevice, Chosen};
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
 use viewfuse::field::photo::PhotoField;
 use viewfuse::files::{check_writable, write_whole};
@@ -32,6 +33,8 @@ pub(crate) struct Arguments {
     weights: Vec<String>,
     #[command(flatten)]
     picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
     /// Write every single score to this CSV file
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -46,13 +49,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let options = arguments.picture.to_render_options();
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
+    let Chosen { device, reason } = arguments.device.open()?;
     let mut all: Vec<(String, Score)> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
     let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in arguments.scenes.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
-        let scores = on_threads(arguments.picture.threads, || {
-            evaluate(scene, &selection, &weightings, &Cpu, &PhotoField::default(), &options, &progress)
+        let field = PhotoField::default();
+        let scores = on_threads(arguments.picture.threads, || -> anyhow::Result<Vec<Score>> {
+            Ok(match &device {
+                AnyDevice::Cpu(cpu) => evaluate(scene, &selection, &weightings, cpu, &field, &options, &progress)?,
+                AnyDevice::Vulkan(vulkan) => {
+                    evaluate(scene, &selection, &weightings, vulkan.as_ref(), &field, &options, &progress)?
+                }
+            })
         })??;
         drop(progress);
         print_table(&path.display().to_string(), &means(&scores))?;
@@ -62,6 +72,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         let scores: Vec<Score> = all.iter().map(|(_, score)| score.clone()).collect();
         print_table(&format!("all {} scenes", arguments.scenes.len()), &means(&scores))?;
     }
+    let name = match &device {
+        AnyDevice::Cpu(cpu) => cpu.name(),
+        AnyDevice::Vulkan(vulkan) => vulkan.name(),
+    };
+    say(format_args!("device: {name} ({reason})"))?;
     if let Some(path) = &arguments.output {
         write_whole(path, &csv_of(&all)?)?;
         say(format_args!("{}", path.display()))?;

@@ -1,9 +1,12 @@
 //! Options that several commands share.
 
 use clap::Args;
+use std::time::Duration;
+use viewfuse::device::choice::{self, Chosen, DeviceChoice};
 use viewfuse::few_shot::Selection;
 use viewfuse::photographs::BackgroundChoice;
 use viewfuse::render::{DEFAULT_LEAVE_OUT, DEFAULT_SETTLED, RenderOptions};
+use viewfuse_vulkan::VulkanError;
 
 /// How pictures are made.
 #[derive(Args)]
@@ -28,6 +31,23 @@ pub(crate) struct PictureOptions {
 impl PictureOptions {
     pub(crate) fn to_render_options(&self) -> RenderOptions {
         RenderOptions { size: self.size, background: self.background, leave_out: self.leave_out, settled: self.settled }
+    }
+}
+
+/// Where kernels run.
+#[derive(Args)]
+pub(crate) struct DeviceOptions {
+    /// Device: auto (a graphics processor if there is one, otherwise the CPU), cpu, vulkan, vulkan:NUMBER or vulkan:NAME
+    #[arg(long, value_name = "DEVICE", default_value = "auto")]
+    device: DeviceChoice,
+    /// Longest time that a submission to a Vulkan device may run
+    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = parse_seconds)]
+    time_limit: Duration,
+}
+
+impl DeviceOptions {
+    pub(crate) fn open(&self) -> Result<Chosen, VulkanError> {
+        choice::open(&self.device, &choice::gpu_options(self.time_limit))
     }
 }
 
@@ -60,6 +80,13 @@ fn parse_share(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(share) if (0.0..1.0).contains(&share) => Ok(share),
         _ => Err("a share is a number of at least 0 and less than 1".to_owned()),
+    }
+}
+
+fn parse_seconds(text: &str) -> Result<Duration, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
+        _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
     }
 }
 

@@ -1,6 +1,6 @@
 //! `viewfuse render`.
 
-use super::options::{PictureOptions, SourceOptions, parse_count};
+use super::options::{DeviceOptions, PictureOptions, SourceOptions, parse_count};
 use super::{on_threads, say};
 use clap::Args;
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use viewfuse::device::Device;
+use viewfuse::device::choice::{AnyDevice, Chosen};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::few_shot::FewShot;
 use viewfuse::field::Field;
@@ -15,7 +16,9 @@ use viewfuse::field::photo::PhotoField;
 use viewfuse::files::{check_writable, remove_if_there, write_png, write_whole};
 use viewfuse::photographs::{SourceImages, to_rgb8};
 use viewfuse::progress::Progress;
-use viewfuse::record::{FrameRecord, RunRecord, background_record, depth_step, source_names, times_record};
+use viewfuse::record::{
+    FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
+};
 use viewfuse::render::{Frame, RenderOptions, render};
 use viewfuse::scene::Scene;
 use viewfuse::sheet::{Sheet, SheetSource, depth_picture};
@@ -44,6 +47,8 @@ pub(crate) struct Arguments {
     weights: String,
     #[command(flatten)]
     picture: PictureOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
     /// Seed of every random number (the weight-free field draws none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -57,13 +62,18 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting: Weighting = arguments.weights.parse()?;
     let scene = Scene::open(&arguments.scene)?;
     let open_time = start.elapsed();
-    let (device, field) = (Cpu, PhotoField::default());
+    let field = PhotoField::default();
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.orbit);
     let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&field))?;
     let options = arguments.picture.to_render_options();
     check_writable(&arguments.output.join("run.json"))?;
-    let run = Run { arguments, scene: &scene, job: &job, weighting: &weighting, options: &options, start, open_time };
-    on_threads(arguments.picture.threads, || run.render(&device, &field))??;
+    let Chosen { device, reason } = arguments.device.open()?;
+    let (scene, job, weighting, options) = (&scene, &job, &weighting, &options);
+    let run = Run { arguments, scene, job, weighting, options, device_reason: reason, start, open_time };
+    on_threads(arguments.picture.threads, || match &device {
+        AnyDevice::Cpu(cpu) => run.render(cpu, &field),
+        AnyDevice::Vulkan(vulkan) => run.render(vulkan.as_ref(), &field),
+    })??;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -73,6 +83,7 @@ struct Run<'a> {
     job: &'a FewShot,
     weighting: &'a Weighting,
     options: &'a RenderOptions,
+    device_reason: String,
     start: Instant,
     open_time: Duration,
 }
@@ -112,6 +123,7 @@ impl Run<'_> {
             viewfuse: env!("CARGO_PKG_VERSION"),
             scene: self.arguments.scene.display().to_string(),
             device: device.name(),
+            device_reason: self.device_reason.clone(),
             field: field.name(),
             weighting: self.weighting.to_string(),
             seed: self.arguments.seed,
@@ -122,6 +134,7 @@ impl Run<'_> {
             warnings: warning.into_iter().collect(),
             sources: names,
             times: times_record(self.open_time, stages, frame_time, self.start.elapsed()),
+            kernels: kernel_records(&device.kernel_times()),
             frames,
         };
         write_whole(&record_path, &serde_json::to_vec_pretty(&record)?)?;
@@ -137,6 +150,12 @@ impl Run<'_> {
             record.device,
             record.times.total
         ))?;
+        if let Some(largest) = record.kernels.iter().max_by(|a, b| a.share.total_cmp(&b.share)) {
+            let seconds: f64 = record.kernels.iter().map(|kernel| kernel.seconds).sum();
+            let (name, share) = (largest.kernel, 100.0 * largest.share);
+            say(format_args!("kernels took {seconds:.2} s, {share:.0} % of it {name}; all in run.json"))?;
+        }
+        say(format_args!("device: {}", self.device_reason))?;
         Ok(())
     }
 

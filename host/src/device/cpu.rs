@@ -1,6 +1,6 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
 
-use super::{Device, Element, PhotoScene, Pixels};
+use super::{Device, Element, KernelTime, PhotoScene, Pixels};
 use rayon::prelude::*;
 use std::convert::Infallible;
 use std::ops::Range;
@@ -36,6 +36,18 @@ impl Device for Cpu {
 
     fn most_elements<T: Element>(&self) -> usize {
         usize::MAX
+    }
+
+    fn busy_elements(&self) -> usize {
+        1
+    }
+
+    fn finish(&self) -> Result<(), Infallible> {
+        Ok(())
+    }
+
+    fn kernel_times(&self) -> Vec<KernelTime> {
+        Vec::new()
     }
 
     fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, Infallible> {

@@ -67,6 +67,7 @@ impl<D: Device> Field<D> for PhotoField {
         let failed = FieldError::Device;
         let scene = PhotoScene {
             object,
+            object_buffer: device.upload(&[object]).map_err(failed)?,
             views: device.upload(&cameras).map_err(failed)?,
             footprints: device.upload(&footprints).map_err(failed)?,
             texels: device.upload(&texels).map_err(failed)?,
@@ -79,6 +80,7 @@ impl<D: Device> Field<D> for PhotoField {
             device.hull_entry(&scene, view, &mut entries).map_err(failed)?;
             progress.step();
         }
+        device.finish().map_err(failed)?;
         Ok(Prepared { scene, entries, texel_count: texels.len(), background: sources.background })
     }
 
@@ -95,6 +97,8 @@ impl<D: Device> Field<D> for PhotoField {
         let pair_weights: Vec<f32> =
             relevance.iter().flat_map(|weights| weights.values()[..view_count as usize].iter().copied()).collect();
         let pair_weights = device.upload(&pair_weights).map_err(failed)?;
+        // The widest of a sweep's three buffers is bound as a whole.
+        let most_values = self.most_band_values.min(device.most_elements::<[f32; 2]>());
         let nothing = device.upload(&vec![NO_SURFACE; prepared.texel_count]).map_err(failed)?;
         let mut first_guess = device.zeros(prepared.texel_count).map_err(failed)?;
         let mut depths = device.zeros(prepared.texel_count).map_err(failed)?;
@@ -102,7 +106,7 @@ impl<D: Device> Field<D> for PhotoField {
         for view in 0..view_count {
             let camera = &scene.cameras[view as usize];
             let whole = SweepBlock::new(&scene.object, camera, view);
-            for (sweep, kept_rows) in bands(whole, self.most_band_values) {
+            for (sweep, kept_rows) in bands(whole, most_values) {
                 interrupt::check()?;
                 let count = (sweep.row_count * camera.width * sweep.plane_count) as usize;
                 let mut costs = device.zeros(count).map_err(failed)?;
@@ -122,6 +126,7 @@ impl<D: Device> Field<D> for PhotoField {
             }
             progress.step();
         }
+        device.finish().map_err(failed)?;
         Ok(depths)
     }
 
@@ -143,10 +148,11 @@ impl<D: Device> Field<D> for PhotoField {
         let target = MarchBlock { target: target.block(0), background: prepared.background, settled };
         let mut pixels =
             Pixels { colours: device.zeros(count).map_err(failed)?, depths: device.zeros(count).map_err(failed)? };
-        progress.expect(height.div_ceil(BAND_ROWS) as usize);
-        for first_row in (0..height).step_by(BAND_ROWS as usize) {
+        let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
+        progress.expect(height.div_ceil(band_rows) as usize);
+        for first_row in (0..height).step_by(band_rows as usize) {
             interrupt::check()?;
-            let row_count = BAND_ROWS.min(height - first_row);
+            let row_count = band_rows.min(height - first_row);
             device
                 .march(&prepared.scene, depths, &weights, &target, first_row, row_count, &mut pixels)
                 .map_err(failed)?;

@@ -4,6 +4,7 @@
 //! - The result of every float operation that a device could fuse with another is decorated `NoContraction`: sums and
 //!   products with their rounding errors (`viewfuse_core::math::two_sum`) mean nothing otherwise.
 
+use crate::legalise::legalise;
 use rspirv::binary::{Assemble, ParseState};
 use rspirv::dr::{Instruction, Module, Operand, load_bytes};
 use rspirv::spirv::{Decoration, Op};
@@ -44,6 +45,7 @@ pub fn is_float_arithmetic(operation: Op) -> bool {
 pub fn refine(bytes: &[u8]) -> Result<Vec<u8>, RefineError> {
     let mut module = read(bytes)?;
     leave_out_names(&mut module);
+    legalise(&mut module);
     forbid_contraction(&mut module);
     Ok(module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect())
 }

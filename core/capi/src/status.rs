@@ -1,0 +1,76 @@
+//! What can be wrong with a call.
+
+use core::ffi::{CStr, c_char};
+use viewfuse_core::pose::PoseError;
+
+/// What came of a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i32)]
+pub enum Status {
+    /// Done.
+    Ok = 0,
+    /// A pointer is null or not aligned.
+    Pointer = 1,
+    /// A count is 0, larger than the function takes, or larger than the memory.
+    Count = 2,
+    /// The scheme's formula or choice is none of those listed.
+    Formula = 3,
+    /// The scheme's parameter is out of its range.
+    Parameter = 4,
+    /// An entry of a pose is NaN or infinite.
+    PoseNotFinite = 5,
+    /// A camera is further than 1e30 from the origin.
+    PoseTooFar = 6,
+    /// The last row of a pose is not 0 0 0 1.
+    PoseLastRow = 7,
+    /// The upper left 3x3 block of a pose is scaled or skewed: an entry of R^T R is more than 1e-3 off the identity's.
+    PoseNotRigid = 8,
+    /// The 3x3 block of a pose has the determinant -1: an axis is mirrored.
+    PoseMirrored = 9,
+    /// A weight is negative, NaN or infinite.
+    Weight = 10,
+    /// A noise level is negative, NaN or infinite, or the ends of a schedule are not positive levels in order.
+    NoiseLevel = 11,
+}
+
+impl From<PoseError> for Status {
+    fn from(error: PoseError) -> Status {
+        match error {
+            PoseError::NotFinite { .. } => Status::PoseNotFinite,
+            PoseError::TooFar => Status::PoseTooFar,
+            PoseError::LastRow => Status::PoseLastRow,
+            PoseError::NotRigid { .. } => Status::PoseNotRigid,
+            PoseError::Mirrored => Status::PoseMirrored,
+        }
+    }
+}
+
+impl Status {
+    pub(crate) fn of(result: Result<(), Status>) -> Status {
+        match result {
+            Ok(()) => Status::Ok,
+            Err(status) => status,
+        }
+    }
+}
+
+/// A status in words, in English, as a string that stays for good. Any number may be asked.
+#[unsafe(no_mangle)]
+pub extern "C" fn viewfuse_status_text(status: i32) -> *const c_char {
+    let text: &'static CStr = match status {
+        0 => c"done",
+        1 => c"a pointer is null or not aligned",
+        2 => c"a count is 0 or too large",
+        3 => c"the scheme's formula or choice is unknown",
+        4 => c"the scheme's parameter is out of its range",
+        5 => c"an entry of a pose is not finite",
+        6 => c"a camera is too far from the origin",
+        7 => c"the last row of a pose is not 0 0 0 1",
+        8 => c"a pose is scaled or skewed",
+        9 => c"a pose has a mirrored axis",
+        10 => c"a weight is negative or not finite",
+        11 => c"a noise level is out of its range",
+        _ => c"no status of viewfuse",
+    };
+    text.as_ptr()
+}

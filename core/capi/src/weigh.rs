@@ -1,0 +1,284 @@
+//! How much each source counts.
+
+use crate::lent::{Input, Output, checked, read};
+use crate::status::Status;
+use viewfuse_core::attention::{FourierEmbedding, cross_attention};
+use viewfuse_core::pages::{Fetch, StartingAt};
+use viewfuse_core::pose::Pose;
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weighting::{self, AngleKind};
+use viewfuse_core::weights::Weights;
+
+/// The formulas of camera weighting. Weights are proportional to `1 / (e + 1e-6)`, except for the Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Formula {
+    /// Every source counts the same. Choice and parameter are not used.
+    Mean = 0,
+    /// `exp(-parameter d^2)` with `d` the distance of the centres; the parameter is finite and at least 0.
+    Gaussian = 1,
+    /// `e = d^choice`; the choice is 1, 2 or 3, the parameter is not used.
+    Distance = 2,
+    /// `e = parameter angle / pi + (1 - parameter) d / max d`; the parameter lies in 0 to 1, the choice is a
+    /// viewfuse_angle. With the parameter 1 and the angle between principal axes the best of the formulas.
+    Error = 3,
+    /// `e` is the sum of the absolute differences of the two matrices. Choice and parameter are not used.
+    L1 = 4,
+    /// `e` is the Frobenius norm of the difference of the two matrices. Choice and parameter are not used.
+    Frobenius = 5,
+    /// `e` is the Frobenius norm of the relative pose. Choice and parameter are not used.
+    RelativeFrobenius = 6,
+}
+
+/// Which angle between two cameras counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Angle {
+    /// Between the principal axes.
+    PrincipalAxis = 0,
+    /// Of the full relative rotation: roll counts.
+    FullRotation = 1,
+}
+
+/// A weighting scheme.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Scheme {
+    /// A viewfuse_formula.
+    pub formula: u32,
+    /// What the formula says.
+    pub choice: u32,
+    /// What the formula says.
+    pub parameter: f32,
+}
+
+impl Scheme {
+    fn checked(self) -> Result<weighting::Scheme, Status> {
+        const MEAN: u32 = Formula::Mean as u32;
+        const GAUSSIAN: u32 = Formula::Gaussian as u32;
+        const DISTANCE: u32 = Formula::Distance as u32;
+        const ERROR: u32 = Formula::Error as u32;
+        const L1: u32 = Formula::L1 as u32;
+        const FROBENIUS: u32 = Formula::Frobenius as u32;
+        const RELATIVE_FROBENIUS: u32 = Formula::RelativeFrobenius as u32;
+        match self.formula {
+            MEAN => Ok(weighting::Scheme::MEAN),
+            GAUSSIAN => weighting::Scheme::gaussian(self.parameter).map_err(|_| Status::Parameter),
+            DISTANCE => weighting::Scheme::distance(self.choice).map_err(|_| Status::Formula),
+            ERROR => {
+                let angle = match self.choice {
+                    c if c == Angle::PrincipalAxis as u32 => AngleKind::PrincipalAxis,
+                    c if c == Angle::FullRotation as u32 => AngleKind::FullRotation,
+                    _ => return Err(Status::Formula),
+                };
+                weighting::Scheme::error(self.parameter, angle).map_err(|_| Status::Parameter)
+            }
+            L1 => Ok(weighting::Scheme::L1),
+            FROBENIUS => Ok(weighting::Scheme::FROBENIUS),
+            RELATIVE_FROBENIUS => Ok(weighting::Scheme::RELATIVE_FROBENIUS),
+            _ => Err(Status::Formula),
+        }
+    }
+}
+
+/// How many parameters the attention's embedding has.
+pub const ATTENTION_PARAMETERS: u32 = 15232;
+
+const _: () = assert!(ATTENTION_PARAMETERS as usize == FourierEmbedding::PARAMETERS);
+
+/// The weights of up to 8 sources for a target, by formula: finite, at least 0, with the sum 1.
+///
+/// `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count]. Needs 2 KiB of stack at most.
+///
+/// # Safety
+/// Pointers are null or valid for these shapes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn viewfuse_weigh_8(
+    scheme: *const Scheme,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Status {
+    // SAFETY: the caller's promise is the same.
+    Status::of(unsafe { weigh::<8>(scheme, source_poses, source_count, target_pose, weights) })
+}
+
+/// As viewfuse_weigh_8, for up to 16 sources.
+///
+/// # Safety
+/// As viewfuse_weigh_8.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn viewfuse_weigh_16(
+    scheme: *const Scheme,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Status {
+    // SAFETY: the caller's promise is the same.
+    Status::of(unsafe { weigh::<16>(scheme, source_poses, source_count, target_pose, weights) })
+}
+
+/// As viewfuse_weigh_8, for up to 32 sources.
+///
+/// # Safety
+/// As viewfuse_weigh_8.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn viewfuse_weigh_32(
+    scheme: *const Scheme,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Status {
+    // SAFETY: the caller's promise is the same.
+    Status::of(unsafe { weigh::<32>(scheme, source_poses, source_count, target_pose, weights) })
+}
+
+/// The weights of up to 8 sources for a target, by learned attention: finite, at least 0, with the sum 1.
+///
+/// `parameters` is [VIEWFUSE_ATTENTION_PARAMETERS]: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
+/// weights [output][input], then the biases [output]. They are read where they lie, in flash for instance.
+/// `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count].
+///
+/// # Safety
+/// Pointers are null or valid for these shapes; nobody changes the parameters meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn viewfuse_attend_8(
+    parameters: *const f32,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Status {
+    // SAFETY: the caller's promise is the same.
+    Status::of(unsafe { attend::<8>(parameters, source_poses, source_count, target_pose, weights) })
+}
+
+/// As viewfuse_attend_8, for up to 16 sources.
+///
+/// # Safety
+/// As viewfuse_attend_8.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn viewfuse_attend_16(
+    parameters: *const f32,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Status {
+    // SAFETY: the caller's promise is the same.
+    Status::of(unsafe { attend::<16>(parameters, source_poses, source_count, target_pose, weights) })
+}
+
+/// As viewfuse_attend_8, for up to 32 sources.
+///
+/// # Safety
+/// As viewfuse_attend_8.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn viewfuse_attend_32(
+    parameters: *const f32,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Status {
+    // SAFETY: the caller's promise is the same.
+    Status::of(unsafe { attend::<32>(parameters, source_poses, source_count, target_pose, weights) })
+}
+
+/// # Safety
+/// As [`viewfuse_weigh_8`].
+unsafe fn weigh<const S: usize>(
+    scheme: *const Scheme,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Result<(), Status> {
+    // SAFETY: the caller's promise; every bit pattern is a scheme.
+    let scheme = unsafe { read(scheme) }?;
+    // SAFETY: the caller's promise.
+    let views = unsafe { Views::<S>::new(source_poses, source_count, target_pose, weights) }?;
+    let scheme = scheme.checked()?;
+    views.weigh(|sources, target| weighting::weigh(scheme, sources, target))
+}
+
+/// # Safety
+/// As [`viewfuse_attend_8`].
+unsafe fn attend<const S: usize>(
+    parameters: *const f32,
+    source_poses: *const f32,
+    source_count: u32,
+    target_pose: *const f32,
+    weights: *mut f32,
+) -> Result<(), Status> {
+    checked(parameters, FourierEmbedding::PARAMETERS)?;
+    // SAFETY: the caller's promise.
+    let views = unsafe { Views::<S>::new(source_poses, source_count, target_pose, weights) }?;
+    views.weigh(|sources, target| {
+        // SAFETY: aligned, and of that many floats, which is all that the struct is made of (C's layout, no padding); it
+        // is not used any more when the weights are written.
+        let embedding = unsafe { &*parameters.cast::<FourierEmbedding>() };
+        cross_attention(embedding, sources, target)
+    })
+}
+
+/// The cameras of a call and the place for their weights.
+struct Views<const S: usize> {
+    sources: Input,
+    count: u32,
+    target: Input,
+    weights: Output,
+}
+
+impl<const S: usize> Views<S> {
+    /// # Safety
+    /// Pointers are null or valid for as many poses and weights as there are sources.
+    unsafe fn new(
+        source_poses: *const f32,
+        source_count: u32,
+        target_pose: *const f32,
+        weights: *mut f32,
+    ) -> Result<Views<S>, Status> {
+        if source_count == 0 || source_count as usize > S {
+            return Err(Status::Count);
+        }
+        let count = source_count as usize;
+        // SAFETY: the caller's promise, for each of the three.
+        let (sources, target, weights) = unsafe {
+            (Input::new(source_poses, 16 * count)?, Input::new(target_pose, 16)?, Output::new(weights, count)?)
+        };
+        Ok(Views { sources, count: source_count, target, weights })
+    }
+
+    #[inline(always)]
+    fn weigh(mut self, weigh: impl FnOnce(&Sources<S>, &Pose) -> Weights<S>) -> Result<(), Status> {
+        let mut poses = [Pose::IDENTITY; S];
+        let mut view = 0;
+        while view < (self.count as usize).min(S) {
+            poses[view] = pose(&self.sources, 16 * view)?;
+            view += 1;
+        }
+        let target = pose(&self.target, 0)?;
+        let weights = weigh(&Sources::from_array(poses, self.count), &target);
+        for (view, weight) in weights.values().iter().enumerate() {
+            // Nothing is stored beyond the count.
+            self.weights.store(view, *weight);
+        }
+        Ok(())
+    }
+}
+
+/// The pose whose 16 entries start at `first`.
+fn pose(entries: &Input, first: usize) -> Result<Pose, Status> {
+    let entries = StartingAt { all: entries, first };
+    let mut matrix = [[0.0; 4]; 4];
+    for (row, numbers) in matrix.iter_mut().enumerate() {
+        for (column, number) in numbers.iter_mut().enumerate() {
+            *number = entries.fetch(4 * row + column);
+        }
+    }
+    Ok(Pose::from_opencv(&matrix)?)
+}

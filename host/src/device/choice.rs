@@ -1,0 +1,128 @@
+//! Which device: what is there, what a person asked for, and why it became this one.
+
+use super::cpu::Cpu;
+use super::vulkan::Vulkan;
+use std::env;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::sync::Arc;
+use std::time::Duration;
+use viewfuse_vulkan::{Adapter, GpuOptions, Instance, InstanceOptions, VulkanError};
+
+/// The device that a person asks for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceChoice {
+    /// A graphics processor if there is one that can do the work, otherwise the CPU.
+    Auto,
+    /// All cores of this machine.
+    Cpu,
+    /// A Vulkan device: its number or a part of its name; empty for the best.
+    Vulkan(String),
+}
+
+/// A text that names no device.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is no device; there are: auto, cpu, vulkan, vulkan:NUMBER, vulkan:NAME (see `viewfuse devices`)")]
+pub struct UnknownDevice(String);
+
+impl FromStr for DeviceChoice {
+    type Err = UnknownDevice;
+
+    fn from_str(text: &str) -> Result<DeviceChoice, UnknownDevice> {
+        match text.split_once(':') {
+            None if text == "auto" => Ok(DeviceChoice::Auto),
+            None if text == "cpu" => Ok(DeviceChoice::Cpu),
+            None if text == "vulkan" => Ok(DeviceChoice::Vulkan(String::new())),
+            Some(("vulkan", wanted)) if !wanted.is_empty() => Ok(DeviceChoice::Vulkan(wanted.to_owned())),
+            _ => Err(UnknownDevice(text.to_owned())),
+        }
+    }
+}
+
+impl fmt::Display for DeviceChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            DeviceChoice::Auto => f.write_str("auto"),
+            DeviceChoice::Cpu => f.write_str("cpu"),
+            DeviceChoice::Vulkan(wanted) if wanted.is_empty() => f.write_str("vulkan"),
+            DeviceChoice::Vulkan(wanted) => write!(f, "vulkan:{wanted}"),
+        }
+    }
+}
+
+/// One of the devices.
+pub enum AnyDevice {
+    /// All cores of this machine.
+    Cpu(Cpu),
+    /// A Vulkan device.
+    Vulkan(Box<Vulkan>),
+}
+
+/// A device, and why it is this one.
+pub struct Chosen {
+    /// The device.
+    pub device: AnyDevice,
+    /// Why, in a sentence.
+    pub reason: String,
+}
+
+/// Opens what a person asked for.
+///
+/// # Errors
+/// [`VulkanError`] if a Vulkan device was asked for and cannot be had; the automatic choice falls back on the CPU.
+pub fn open(choice: &DeviceChoice, options: &GpuOptions) -> Result<Chosen, VulkanError> {
+    let cpu = |reason: String| Chosen { device: AnyDevice::Cpu(Cpu), reason };
+    match choice {
+        DeviceChoice::Cpu => Ok(cpu("asked for".to_owned())),
+        DeviceChoice::Vulkan(wanted) => {
+            let (instance, adapters) = vulkan_devices()?;
+            let adapter = Adapter::choose(&adapters, wanted)?;
+            let device = Vulkan::open(&instance, adapter, options)?;
+            Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "asked for".to_owned() })
+        }
+        DeviceChoice::Auto => Ok(match automatic(options) {
+            Ok((device, name)) => Chosen {
+                device: AnyDevice::Vulkan(Box::new(device)),
+                reason: format!("{name} is a graphics processor that can do the work"),
+            },
+            Err(reason) => cpu(reason),
+        }),
+    }
+}
+
+/// The first graphics processor that can do the work and its name, or why there is none.
+fn automatic(options: &GpuOptions) -> Result<(Vulkan, String), String> {
+    let (instance, adapters) = vulkan_devices().map_err(|error| error.to_string())?;
+    let mut reasons = Vec::new();
+    for adapter in &adapters {
+        if !adapter.kind.is_gpu() {
+            reasons.push(format!("{} is no graphics processor", adapter.name));
+            continue;
+        }
+        match Vulkan::open(&instance, adapter, options) {
+            Ok(device) => return Ok((device, adapter.name.clone())),
+            Err(error) => reasons.push(error.to_string()),
+        }
+    }
+    Err(reasons.join("; "))
+}
+
+/// Vulkan with its devices, the ones to prefer first. Two environment variables are heeded: `VIEWFUSE_VULKAN_LOADER`, the
+/// path of another loader, and `VIEWFUSE_VALIDATION=1` for the validation layers, each of whose messages is an error.
+///
+/// # Errors
+/// [`VulkanError`] without a loader, a driver or a device.
+pub fn vulkan_devices() -> Result<(Arc<Instance>, Vec<Adapter>), VulkanError> {
+    let instance = Instance::load(&InstanceOptions {
+        loader: env::var_os("VIEWFUSE_VULKAN_LOADER").map(PathBuf::from),
+        validation: env::var_os("VIEWFUSE_VALIDATION").is_some_and(|value| value == "1"),
+    })?;
+    let adapters = instance.adapters()?;
+    Ok((instance, adapters))
+}
+
+/// Options with a time limit in seconds.
+pub fn gpu_options(time_limit: Duration) -> GpuOptions {
+    GpuOptions { time_limit, ..GpuOptions::default() }
+}

@@ -1,0 +1,101 @@
+//! The calls that are measured, one after another. Nothing is measured in here: `tests/firmware.rs` reads the
+//! emulator's trace, from the first instruction of a function named `measured_...` to its return, so that the counts
+//! have no overhead in them.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding, cross_attention};
+use viewfuse_core::composite::Composite;
+use viewfuse_core::fuse::{fuse_views, fuse_visible};
+use viewfuse_core::math::sqrt;
+use viewfuse_core::pose::Pose;
+use viewfuse_core::schedule::NoiseSchedule;
+use viewfuse_core::sources::Sources;
+use viewfuse_core::weighting::{Scheme, weigh};
+use viewfuse_core::weights::Weights;
+use viewfuse_firmware::finish;
+use viewfuse_list::Inputs;
+use viewfuse_list::attended::fourier;
+use viewfuse_list::denoised::{denoiser_step, noise};
+use viewfuse_list::formulas::{CHANNELS, SAMPLES, composite_ray, latents, samples, stratified, visibility};
+use viewfuse_list::rig::{Rig, VIEWS, schemes};
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_weigh(scheme: Scheme, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
+    weigh(scheme, sources, target)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_embed(embedding: &FourierEmbedding, pose: &Pose) -> [f32; EMBEDDING] {
+    embedding.embed(pose)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_attend(embedding: &FourierEmbedding, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
+    cross_attention(embedding, sources, target)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_fuse(weights: &Weights<VIEWS>, latents: &[[f32; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
+    fuse_views(weights, latents)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_fuse_visible(
+    weights: &Weights<VIEWS>,
+    visibility: &[f32; VIEWS],
+    latents: &[[f32; CHANNELS]; VIEWS],
+) -> [f32; CHANNELS] {
+    fuse_visible(weights, visibility, latents, [0.0; CHANNELS])
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_ray(samples: &[[f32; 4]; SAMPLES]) -> Composite<3> {
+    composite_ray(samples)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_depths(seed: u64) -> [f32; SAMPLES] {
+    stratified(seed)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_step(schedule: &NoiseSchedule, index: u32, noisy: &[f32; CHANNELS]) -> [f32; CHANNELS] {
+    denoiser_step(schedule, index, noisy)
+}
+
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_sqrt(x: f32) -> f32 {
+    sqrt(x)
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let inputs = black_box(Inputs::STANDARD);
+    let Rig { sources, target } = Rig::around(inputs, 2.0);
+    for (_, scheme) in schemes() {
+        black_box(measured_weigh(black_box(scheme), &sources, &target));
+    }
+    let weights = weigh(Scheme::ERROR, &sources, &target);
+    let latents = latents(inputs);
+    black_box(measured_fuse(&weights, &latents));
+    black_box(measured_fuse_visible(&weights, &visibility(), &latents));
+    black_box(measured_ray(&samples(inputs)));
+    black_box(measured_depths(inputs.seed));
+    black_box(measured_step(&NoiseSchedule::published(), 12, &noise(inputs)));
+    black_box(measured_sqrt(inputs.phase));
+    let embedding = fourier(inputs);
+    black_box(measured_embed(&embedding, &target));
+    black_box(measured_attend(&embedding, &sources, &target));
+    finish()
+}

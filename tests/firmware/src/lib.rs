@@ -1,0 +1,61 @@
+//! What the programs share: printing numbers by their bits, and ending.
+//!
+//! Nothing here formats: `core::fmt` would be the largest part of the firmware.
+#![no_std]
+#![forbid(unsafe_code)]
+
+use core::panic::PanicInfo;
+use cortex_m_semihosting::debug;
+use cortex_m_semihosting::hio::{self, HostStream};
+
+/// The emulator's standard output.
+pub struct Output(HostStream);
+
+impl Output {
+    /// Opens it; ends the program with a failure if there is none.
+    pub fn open() -> Output {
+        match hio::hstdout() {
+            Ok(stream) => Output(stream),
+            Err(()) => fail(),
+        }
+    }
+
+    /// Prints a line: eight hexadecimal digits of the number's bits, a space and its name.
+    pub fn number(&mut self, name: &str, value: f32) {
+        const LONGEST: usize = 64;
+        let mut line = [b' '; LONGEST];
+        for (digit, place) in line.iter_mut().zip((0..8).rev()) {
+            let nibble = (value.to_bits() >> (4 * place)) as u8 & 15;
+            *digit = if nibble < 10 { b'0' + nibble } else { b'a' + nibble - 10 };
+        }
+        let mut length = 9;
+        for (letter, own) in line[9..LONGEST - 1].iter_mut().zip(name.as_bytes()) {
+            *letter = *own;
+            length += 1;
+        }
+        line[length.min(LONGEST - 1)] = b'\n';
+        if self.0.write_all(&line[..(length + 1).min(LONGEST)]).is_err() {
+            fail();
+        }
+    }
+}
+
+/// Ends the program: everything was done.
+pub fn finish() -> ! {
+    debug::exit(debug::EXIT_SUCCESS);
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+fn fail() -> ! {
+    debug::exit(debug::EXIT_FAILURE);
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    fail()
+}

@@ -1,0 +1,201 @@
+//! A Cortex-M4F for tests: builds the programs of `tests/firmware`, runs them in QEMU and reads what they print and
+//! which instructions they executed.
+
+pub mod image;
+pub mod list;
+pub mod trace;
+
+use image::Image;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use trace::Call;
+
+const EMULATOR: &str = "qemu-system-arm";
+const TARGET: &str = "thumbv7em-none-eabihf";
+/// Where the library's sources may be instead of at the compiler's own place for them.
+const SOURCES: &str = "VIEWFUSE_RUST_LIBRARY";
+/// A program takes a second; a hard fault would otherwise wait for ever.
+const TIME_LIMIT: Duration = Duration::from_secs(120);
+
+/// What was found that the firmware needs.
+pub struct Emulator {
+    library: Library,
+    /// Where to build.
+    folder: PathBuf,
+}
+
+/// Where Rust's own library for the target comes from.
+enum Library {
+    /// The toolchain has it compiled.
+    Installed,
+    /// To be compiled from the sources that the toolchain has.
+    Component,
+    /// To be compiled from the sources in a folder.
+    Sources(PathBuf),
+    /// The same, in an archive.
+    Archive(PathBuf),
+}
+
+impl Emulator {
+    /// Looks for the emulator and for Rust's library for the target.
+    ///
+    /// # Errors
+    /// What is missing, in a few words.
+    pub fn find(repository: &Path, folder: &Path) -> Result<Emulator, String> {
+        let there = Command::new(EMULATOR).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+        if !there.is_ok_and(|status| status.success()) {
+            return Err(format!("no {EMULATOR}"));
+        }
+        let library = Library::find(repository)?;
+        Ok(Emulator { library, folder: folder.join("firmware") })
+    }
+
+    /// Builds all programs with a profile and returns the folder that they are in.
+    ///
+    /// # Errors
+    /// What the compiler said.
+    pub fn build(&self, repository: &Path, profile: &str) -> Result<PathBuf, String> {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo
+            .args(["build", "--quiet", "--locked", "--target", TARGET, "--profile", profile, "--target-dir"])
+            .arg(&self.folder)
+            .current_dir(repository.join("tests/firmware"));
+        // Flags for the host's processor are none for this one.
+        for name in ["RUSTFLAGS", "CARGO_ENCODED_RUSTFLAGS", "CARGO_BUILD_TARGET"] {
+            cargo.env_remove(name);
+        }
+        let sources = match &self.library {
+            Library::Installed => None,
+            Library::Component => Some(None),
+            Library::Sources(folder) => Some(Some(folder.clone())),
+            Library::Archive(archive) => Some(Some(self.unpacked(archive)?)),
+        };
+        if let Some(folder) = sources {
+            // Building the library is not a stable option, and the sources' place not even an official one.
+            cargo.arg("-Zbuild-std=core").env("RUSTC_BOOTSTRAP", "1");
+            if let Some(folder) = folder {
+                cargo.env("__CARGO_TESTS_ONLY_SRC_ROOT", folder);
+            }
+        }
+        let output = cargo.output().map_err(|error| format!("cargo does not start: {error}"))?;
+        if !output.status.success() {
+            return Err(String::from_utf8_lossy(&output.stderr).into_owned());
+        }
+        Ok(self.folder.join(TARGET).join(profile))
+    }
+
+    /// Unpacks the library's sources, once, and returns their folder.
+    fn unpacked(&self, archive: &Path) -> Result<PathBuf, String> {
+        let folder = self.folder.join("sources");
+        let library = folder.join("library");
+        // The last file to be written says that all are there.
+        let done = folder.join("unpacked");
+        if !done.exists() {
+            let failed = |error: io::Error| format!("{}: {error}", folder.display());
+            std::fs::create_dir_all(&folder).map_err(failed)?;
+            let tar = Command::new("tar").arg("-xJf").arg(archive).arg("-C").arg(&folder).output().map_err(failed)?;
+            if !tar.status.success() || !library.is_dir() {
+                return Err(format!("{}: {}", archive.display(), String::from_utf8_lossy(&tar.stderr)));
+            }
+            std::fs::write(&done, "").map_err(failed)?;
+        }
+        Ok(library)
+    }
+
+    /// Runs a program to its end and returns what it printed.
+    ///
+    /// # Errors
+    /// If it does not end, or ends with a failure.
+    pub fn run(&self, program: &Path) -> Result<String, String> {
+        let mut machine = machine(program);
+        machine.stdout(Stdio::piped());
+        let text = supervised(machine, |child| child.stdout.take(), io::read_to_string)?;
+        text.map_err(|error| format!("{}: {error}", program.display()))
+    }
+
+    /// Runs a program to its end and returns what its measured calls took.
+    ///
+    /// # Errors
+    /// As [`Emulator::run`], or if the trace is not what it should be.
+    pub fn trace(&self, program: &Path, image: &Image) -> Result<Vec<Call>, String> {
+        let mut machine = machine(program);
+        // One instruction a block, and none without its line: what ran and the registers before it.
+        machine.args(["-accel", "tcg,one-insn-per-tb=on", "-d", "exec,cpu,nochain"]);
+        // The trace would go to the standard error otherwise, which has no buffer: that takes thirty times as long.
+        machine.args(["-D", "/dev/stdout"]).stdout(Stdio::piped());
+        supervised(machine, |child| child.stdout.take(), |stream| trace::calls(io::BufReader::new(stream), image))?
+    }
+}
+
+impl Library {
+    fn find(repository: &Path) -> Result<Library, String> {
+        let libraries = PathBuf::from(asked("rustc", &["--print", "target-libdir", "--target", TARGET])?);
+        if libraries.is_dir() {
+            return Ok(Library::Installed);
+        }
+        let root = PathBuf::from(asked("rustc", &["--print", "sysroot"])?);
+        if root.join("lib/rustlib/src/rust/library/core").is_dir() {
+            return Ok(Library::Component);
+        }
+        if let Some(folder) = std::env::var_os(SOURCES).map(PathBuf::from) {
+            let found = folder.join("core").is_dir();
+            return if found { Ok(Library::Sources(folder)) } else { Err(format!("no core in {}", folder.display())) };
+        }
+        // "rustc 1.95.0 (hash date)": the library fits its own compiler only.
+        let version = asked("rustc", &["--version"])?;
+        let version = version.split_whitespace().nth(1).unwrap_or_default();
+        let archive = repository.join(format!("../shared/rust-src/library-{version}.tar.xz"));
+        if archive.is_file() { Ok(Library::Archive(archive)) } else { Err(format!("no Rust library for {TARGET}")) }
+    }
+}
+
+/// The first line of what a program answers.
+fn asked(program: &str, arguments: &[&str]) -> Result<String, String> {
+    let output = Command::new(program).args(arguments).output().map_err(|error| format!("no {program}: {error}"))?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines().next().map(str::to_owned).ok_or_else(|| format!("{program} says nothing"))
+}
+
+/// The board with a program in it.
+fn machine(program: &Path) -> Command {
+    let mut machine = Command::new(EMULATOR);
+    machine
+        .args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none"])
+        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+        .arg(program)
+        .stdin(Stdio::null());
+    machine
+}
+
+/// Runs a command to its end, reading one of its streams meanwhile.
+fn supervised<Stream: Send, T: Send>(
+    mut command: Command,
+    stream: impl FnOnce(&mut Child) -> Option<Stream>,
+    read: impl FnOnce(Stream) -> T + Send,
+) -> Result<T, String> {
+    let mut child = command.spawn().map_err(|error| format!("{EMULATOR} does not start: {error}"))?;
+    let stream = stream(&mut child).ok_or("the stream is not there")?;
+    let (status, text) = std::thread::scope(|scope| {
+        let reader = scope.spawn(|| read(stream));
+        let deadline = Instant::now() + TIME_LIMIT;
+        let status = loop {
+            match child.try_wait() {
+                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(5)),
+                Ok(None) => {
+                    // It may have ended just now: then there is nothing to kill, and nothing to say.
+                    child.kill().ok();
+                    break child.wait().and(Err(io::Error::from(io::ErrorKind::TimedOut)));
+                }
+                ended => break ended.map(|status| status.is_some_and(|status| status.success())),
+            }
+        };
+        (status, reader.join())
+    });
+    match (status, text) {
+        (Ok(true), Ok(text)) => Ok(text),
+        (Ok(_), _) => Err("the program says that it failed".into()),
+        (Err(error), _) => Err(error.to_string()),
+    }
+}

@@ -1,0 +1,233 @@
+//! A device before it is opened: what it is, and whether it can do the work.
+
+use crate::error::{Missing, VulkanError};
+use crate::instance::Instance;
+use crate::kernel::{Kernel, WORKGROUP};
+use ash::{ext, khr, vk};
+use std::fmt;
+
+/// What kind of device it is, the kinds to prefer first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AdapterKind {
+    /// A graphics card.
+    Discrete,
+    /// A graphics processor that shares the memory of the machine.
+    Integrated,
+    /// A graphics processor handed to a virtual machine.
+    Virtual,
+    /// Something else.
+    Other,
+    /// A processor that plays one.
+    Software,
+}
+
+impl AdapterKind {
+    /// Whether there is a graphics processor behind it.
+    pub fn is_gpu(self) -> bool {
+        self <= AdapterKind::Virtual
+    }
+}
+
+impl fmt::Display for AdapterKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            AdapterKind::Discrete => "discrete",
+            AdapterKind::Integrated => "integrated",
+            AdapterKind::Virtual => "virtual",
+            AdapterKind::Other => "other",
+            AdapterKind::Software => "software",
+        })
+    }
+}
+
+/// Limits that work is cut by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// Most bytes of a storage buffer that a kernel can bind (`maxStorageBufferRange`).
+    pub buffer_range: u64,
+    /// Most bytes of an allocation (`maxMemoryAllocationSize`).
+    pub allocation: u64,
+    /// Most workgroups of a dispatch (`maxComputeWorkGroupCount[0]`).
+    pub workgroup_count: u32,
+    /// Bytes of memory that may be used.
+    pub memory: u64,
+}
+
+/// A device that could be opened.
+#[derive(Clone, Debug)]
+pub struct Adapter {
+    pub(crate) raw: vk::PhysicalDevice,
+    /// Its number in the list of [`Instance::adapters`].
+    pub index: usize,
+    /// What its driver calls it.
+    pub name: String,
+    /// What it is.
+    pub kind: AdapterKind,
+    /// The driver and its version.
+    pub driver: String,
+    /// The version of Vulkan that it speaks, packed.
+    pub api_version: u32,
+    /// Bytes of its largest local heap.
+    pub memory: u64,
+    /// What work is cut by.
+    pub limits: Limits,
+    /// What it lacks; if anything, it cannot be opened.
+    pub missing: Vec<Missing>,
+    pub(crate) queue_family: u32,
+    pub(crate) timestamp_bits: u32,
+    pub(crate) timestamp_period: f32,
+    pub(crate) offset_alignment: u64,
+    pub(crate) extensions: Vec<&'static std::ffi::CStr>,
+    pub(crate) has_memory_budget: bool,
+}
+
+impl Adapter {
+    pub(crate) fn new(instance: &Instance, raw: vk::PhysicalDevice) -> Adapter {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut maintenance = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut properties =
+            vk::PhysicalDeviceProperties2::default().push_next(&mut maintenance).push_next(&mut driver);
+        // SAFETY: the chained structs are known to 1.1, or ignored.
+        unsafe { instance.raw.get_physical_device_properties2(raw, &mut properties) };
+        let properties = properties.properties;
+        let own = &properties.limits;
+        // SAFETY: the device is the instance's.
+        let (families, memory_types, offered) = unsafe {
+            (
+                instance.raw.get_physical_device_queue_family_properties(raw),
+                instance.raw.get_physical_device_memory_properties(raw),
+                instance.raw.enumerate_device_extension_properties(raw).unwrap_or_default(),
+            )
+        };
+        let has = |name| offered.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let heaps = memory_types.memory_heaps_as_slice().iter();
+        let memory = heaps
+            .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+            .map(|heap| heap.size)
+            .max()
+            .unwrap_or(0);
+        let family = best_family(&families);
+        let mut extensions = Vec::new();
+        if has(khr::portability_subset::NAME) {
+            extensions.push(khr::portability_subset::NAME);
+        }
+        if properties.api_version < vk::API_VERSION_1_2 && has(khr::vulkan_memory_model::NAME) {
+            extensions.push(khr::vulkan_memory_model::NAME);
+        }
+        let has_memory_budget = has(ext::memory_budget::NAME);
+        if has_memory_budget {
+            extensions.push(ext::memory_budget::NAME);
+        }
+        let has_model = memory_model(instance, raw, properties.api_version, has(khr::vulkan_memory_model::NAME));
+        Adapter {
+            raw,
+            index: 0,
+            name: text(properties.device_name_as_c_str()),
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::DISCRETE_GPU => AdapterKind::Discrete,
+                vk::PhysicalDeviceType::INTEGRATED_GPU => AdapterKind::Integrated,
+                vk::PhysicalDeviceType::VIRTUAL_GPU => AdapterKind::Virtual,
+                vk::PhysicalDeviceType::CPU => AdapterKind::Software,
+                _ => AdapterKind::Other,
+            },
+            driver: match text(driver.driver_name_as_c_str()) {
+                name if name.is_empty() => format!("version {:#x}", properties.driver_version),
+                name => format!("{name} {}", text(driver.driver_info_as_c_str())).trim_end().to_owned(),
+            },
+            api_version: properties.api_version,
+            memory,
+            limits: Limits {
+                buffer_range: own.max_storage_buffer_range.into(),
+                // Devices may say 0 where they mean no limit.
+                allocation: match maintenance.max_memory_allocation_size {
+                    0 => u64::MAX,
+                    size => size,
+                },
+                workgroup_count: own.max_compute_work_group_count[0],
+                memory,
+            },
+            missing: missing(&properties, has_model, family.is_some()),
+            queue_family: family.unwrap_or(0),
+            timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
+            timestamp_period: own.timestamp_period,
+            offset_alignment: own.min_storage_buffer_offset_alignment,
+            extensions,
+            has_memory_budget,
+        }
+    }
+
+    /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text, the
+    /// first that lacks nothing.
+    ///
+    /// # Errors
+    /// [`VulkanError::NoDevice`] if none is meant, [`VulkanError::Missing`] if the one that is meant cannot be used.
+    pub fn choose<'a>(adapters: &'a [Adapter], wanted: &str) -> Result<&'a Adapter, VulkanError> {
+        let lower = wanted.to_lowercase();
+        let found = match wanted.parse::<usize>() {
+            Ok(index) => adapters.get(index),
+            Err(_) if wanted.is_empty() => {
+                adapters.iter().find(|adapter| adapter.missing.is_empty()).or(adapters.first())
+            }
+            Err(_) => adapters.iter().find(|adapter| adapter.name.to_lowercase().contains(&lower)),
+        };
+        let Some(adapter) = found else {
+            let there: Vec<String> = adapters.iter().map(|a| format!("{}: {}", a.index, a.name)).collect();
+            let detail = format!("none is called '{wanted}'; there are {}", there.join(", "));
+            return Err(VulkanError::NoDevice { detail });
+        };
+        match adapter.missing.is_empty() {
+            true => Ok(adapter),
+            false => Err(VulkanError::Missing { device: adapter.name.clone(), missing: adapter.missing.clone() }),
+        }
+    }
+}
+
+fn text(name: Result<&std::ffi::CStr, std::ffi::FromBytesUntilNulError>) -> String {
+    name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// A queue that computes, rather one that does not draw: it runs beside the desktop's.
+fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let computes = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
+    let draws = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::GRAPHICS);
+    let alone = families.iter().position(|family| computes(family) && !draws(family));
+    alone.or(families.iter().position(computes)).map(|index| index as u32)
+}
+
+fn memory_model(instance: &Instance, raw: vk::PhysicalDevice, api_version: u32, has_extension: bool) -> bool {
+    if api_version < vk::API_VERSION_1_1 || (api_version < vk::API_VERSION_1_2 && !has_extension) {
+        return false;
+    }
+    let mut model = vk::PhysicalDeviceVulkanMemoryModelFeatures::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut model);
+    // SAFETY: the device knows the chained struct.
+    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
+    model.vulkan_memory_model == vk::TRUE
+}
+
+fn missing(properties: &vk::PhysicalDeviceProperties, has_memory_model: bool, has_queue: bool) -> Vec<Missing> {
+    let limits = &properties.limits;
+    let mut missing = Vec::new();
+    if properties.api_version < vk::API_VERSION_1_1 {
+        missing.push(Missing::Version { found: properties.api_version });
+    }
+    if !has_queue {
+        missing.push(Missing::ComputeQueue);
+    }
+    if !has_memory_model {
+        missing.push(Missing::Feature("vulkanMemoryModel"));
+    }
+    let most = |of: fn(Kernel) -> usize| Kernel::ALL.into_iter().map(of).max().unwrap_or(0) as u64;
+    let bindings = most(|kernel| kernel.binding_count());
+    let mut need = |name, needed: u64, found: u32| {
+        if u64::from(found) < needed {
+            missing.push(Missing::Limit { name, needed, found: found.into() });
+        }
+    };
+    need("maxPerStageDescriptorStorageBuffers", bindings, limits.max_per_stage_descriptor_storage_buffers);
+    need("maxDescriptorSetStorageBuffers", bindings, limits.max_descriptor_set_storage_buffers);
+    need("maxPushConstantsSize", most(|kernel| kernel.push_bytes()), limits.max_push_constants_size);
+    need("maxComputeWorkGroupInvocations", WORKGROUP.into(), limits.max_compute_work_group_invocations);
+    need("maxComputeWorkGroupSize[0]", WORKGROUP.into(), limits.max_compute_work_group_size[0]);
+    missing
+}

@@ -1,0 +1,471 @@
+//! A device that runs kernels.
+
+use crate::adapter::{Adapter, Limits};
+use crate::buffer::{Array, Bound, Buffer, Stretch};
+use crate::error::VulkanError;
+use crate::handle::{Handle, Memory};
+use crate::instance::Instance;
+use crate::kernel::{Access, Kernel, Layout, Piece, WORKGROUP};
+use crate::pipelines::{Pipeline, Pipelines};
+use crate::submissions::{Done, Submission, Submissions, ranges};
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+use viewfuse_core::pages::MOST_PAGES;
+
+/// Bytes that go between host and device at once.
+const STAGING: u64 = 16 << 20;
+/// Bytes of the widest element of an array in pages.
+const WIDEST_PAGED: u64 = 16;
+
+/// How to use a device.
+#[derive(Clone, Copy, Debug)]
+pub struct GpuOptions {
+    /// How long a submission may run.
+    pub time_limit: Duration,
+    /// Limits to keep to where they are lower than the device's own: so can work that needs cutting be tested anywhere.
+    pub limits: Limits,
+}
+
+impl Default for GpuOptions {
+    /// Two minutes, and the device's own limits.
+    fn default() -> GpuOptions {
+        let limits =
+            Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
+        GpuOptions { time_limit: Duration::from_secs(120), limits }
+    }
+}
+
+/// What a kernel did so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// How many times it was dispatched; cut work counts once a piece.
+    pub dispatches: u64,
+    /// How many elements it computed.
+    pub elements: u64,
+    /// Its time on the device; 0 where the device has no timestamps.
+    pub time: Duration,
+}
+
+/// An opened device. Kernels run one after another in the order in which they are dispatched; what does not depend on
+/// one another may overlap.
+pub struct Gpu {
+    // Dropped in this order: submissions are waited for before anything that they use goes.
+    state: Mutex<State>,
+    handle: Arc<Handle>,
+    page_shift: u32,
+}
+
+struct State {
+    submissions: Submissions,
+    pipelines: Pipelines,
+    upload: Option<Memory>,
+    download: Option<Memory>,
+    /// The number of the stretch of commands since the last barrier.
+    stretch: u64,
+    tallies: [Tally; Kernel::ALL.len()],
+    /// Once a device failed, what it holds cannot be trusted.
+    failed: Option<VulkanError>,
+}
+
+impl Gpu {
+    /// Opens a device.
+    ///
+    /// # Errors
+    /// [`VulkanError::Missing`] if it cannot do the work, and others if Vulkan fails.
+    pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Gpu, VulkanError> {
+        if !adapter.missing.is_empty() {
+            let (device, missing) = (adapter.name.clone(), adapter.missing.clone());
+            return Err(VulkanError::Missing { device, missing });
+        }
+        let (own, asked) = (adapter.limits, options.limits);
+        let limits = Limits {
+            buffer_range: own.buffer_range.min(asked.buffer_range),
+            allocation: own.allocation.min(asked.allocation),
+            workgroup_count: own.workgroup_count.min(asked.workgroup_count).max(1),
+            memory: own.memory.min(asked.memory),
+        };
+        let handle = Arc::new(Handle::open(instance, adapter, limits)?);
+        let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
+        let submissions = Submissions::new(&handle, adapter.queue_family, timestamps, options.time_limit)?;
+        let pipelines = Pipelines::new(&handle)?;
+        // The longest page that is within the limits in every array, but long enough to start at allowed offsets.
+        let page_len =
+            (limits.buffer_range.min(limits.allocation) / WIDEST_PAGED).max(adapter.offset_alignment).max(64);
+        let state = State {
+            submissions,
+            pipelines,
+            upload: None,
+            download: None,
+            stretch: 1,
+            tallies: [Tally::default(); Kernel::ALL.len()],
+            failed: None,
+        };
+        Ok(Gpu { state: Mutex::new(state), handle, page_shift: page_len.ilog2().min(31) })
+    }
+
+    /// What its driver calls it.
+    pub fn name(&self) -> &str {
+        &self.handle.name
+    }
+
+    /// The limits that work is cut by.
+    pub fn limits(&self) -> Limits {
+        self.handle.limits
+    }
+
+    /// Most elements of `bytes` bytes each in an array that is bound as a whole.
+    pub fn most_elements(&self, bytes: usize) -> usize {
+        let most = self.handle.limits.buffer_range.min(self.handle.limits.allocation);
+        usize::try_from(most).unwrap_or(usize::MAX) / bytes
+    }
+
+    /// An array with these values.
+    ///
+    /// # Errors
+    /// [`VulkanError::OutOfMemory`], or another if the device fails.
+    pub fn upload<T: Pod>(&self, values: &[T]) -> Result<Buffer<T>, VulkanError> {
+        let buffer = self.array::<T>(values.len())?;
+        let bytes: &[u8] = bytemuck::cast_slice(values);
+        self.transfer(|gpu, state| {
+            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
+                gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
+                let Some(staging) = &mut state.upload else { return Ok(()) };
+                let from = staging.buffer;
+                if let Some(mapped) = staging.mapped() {
+                    mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
+                }
+                let copy = [vk::BufferCopy::default().dst_offset(offset).size(range.len() as u64)];
+                let to = memory.buffer;
+                gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
+                    // SAFETY: both ranges exist; the submission is waited for before staging is written again.
+                    unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
+                    Ok(())
+                })?;
+                state.wait()
+            })
+        })?;
+        Ok(buffer)
+    }
+
+    /// An array of zeros.
+    ///
+    /// # Errors
+    /// As [`Gpu::upload`].
+    pub fn zeros<T: Pod>(&self, count: usize) -> Result<Buffer<T>, VulkanError> {
+        let buffer = self.array::<T>(count)?;
+        self.transfer(|gpu, state| {
+            gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
+                for memory in &buffer.array.chunks {
+                    // SAFETY: the buffer is a multiple of four bytes long.
+                    unsafe { device.cmd_fill_buffer(submission.commands, memory.buffer, 0, vk::WHOLE_SIZE, 0) };
+                }
+                Ok(())
+            })
+        })?;
+        Ok(buffer)
+    }
+
+    /// The values of an array, when everything that was dispatched before is done.
+    ///
+    /// # Errors
+    /// If the device fails, or failed before.
+    pub fn download<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
+        let mut values = vec![T::zeroed(); buffer.len()];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
+        self.transfer(|gpu, state| {
+            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
+                gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
+                let Some(to) = state.download.as_ref().map(|staging| staging.buffer) else { return Ok(()) };
+                let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
+                let from = memory.buffer;
+                gpu.record(state, &[(&buffer.array, Access::Read)], |device, submission, _| {
+                    let seen = [vk::MemoryBarrier::default()
+                        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                        .dst_access_mask(vk::AccessFlags::HOST_READ)];
+                    // SAFETY: both ranges exist; the submission is waited for before staging is read.
+                    unsafe {
+                        device.cmd_copy_buffer(submission.commands, from, to, &copy);
+                        device.cmd_pipeline_barrier(
+                            submission.commands,
+                            vk::PipelineStageFlags::TRANSFER,
+                            vk::PipelineStageFlags::HOST,
+                            vk::DependencyFlags::empty(),
+                            &seen,
+                            &[],
+                            &[],
+                        );
+                    }
+                    Ok(())
+                })?;
+                state.wait()?;
+                if let Some(mapped) = state.download.as_mut().and_then(Memory::mapped) {
+                    bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
+                }
+                Ok(())
+            })
+        })?;
+        Ok(values)
+    }
+
+    /// Runs a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` what it binds,
+    /// both as in its list.
+    ///
+    /// # Errors
+    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::Limit`] if an array cannot be bound, and others if the
+    /// device fails, or failed before.
+    pub fn dispatch(
+        &self,
+        kernel: Kernel,
+        parameters: &[u8],
+        elements: Range<u32>,
+        arrays: &[Bound<'_>],
+    ) -> Result<(), VulkanError> {
+        self.check_arguments(kernel, parameters, arrays)?;
+        if elements.is_empty() {
+            return Ok(());
+        }
+        let listed = kernel.arrays().iter().zip(arrays);
+        let page_len = 1_usize << self.page_shift;
+        let needs_pages = listed.clone().any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
+        let page_shift = if needs_pages { self.page_shift } else { 0 };
+        let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
+        self.transfer(|gpu, state| {
+            let pipeline = state.pipelines.get(kernel, page_shift)?;
+            let per_piece = gpu.handle.limits.workgroup_count.saturating_mul(WORKGROUP);
+            let mut dispatches = 0;
+            gpu.record(state, &uses, |device, submission, submissions| {
+                let set = gpu.bind(submission, &pipeline, listed, page_shift)?;
+                submissions.start_clock(submission, kernel);
+                // SAFETY: pipeline, set and constants are of the kernel's layout; the counts are within the limits.
+                unsafe {
+                    let (commands, compute) = (submission.commands, vk::PipelineBindPoint::COMPUTE);
+                    device.cmd_bind_pipeline(commands, compute, pipeline.raw);
+                    device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
+                    for first in elements.clone().step_by(per_piece as usize) {
+                        let piece = Piece { first, count: per_piece.min(elements.end - first) };
+                        let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
+                        let stage = vk::ShaderStageFlags::COMPUTE;
+                        device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
+                        device.cmd_dispatch(commands, piece.count.div_ceil(WORKGROUP), 1, 1);
+                        dispatches += 1;
+                    }
+                }
+                submissions.stop_clock(submission);
+                Ok(())
+            })?;
+            let tally = &mut state.tallies[kernel as usize];
+            tally.dispatches += dispatches;
+            tally.elements += u64::from(elements.end - elements.start);
+            Ok(())
+        })
+    }
+
+    /// Waits until everything is done.
+    ///
+    /// # Errors
+    /// If the device fails, or failed before.
+    pub fn wait(&self) -> Result<(), VulkanError> {
+        self.transfer(|_, state| state.wait())
+    }
+
+    /// What each kernel did, up to the last thing that was waited for.
+    pub fn tally(&self, kernel: Kernel) -> Tally {
+        self.lock().tallies[kernel as usize]
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Works on the state; a failure of the device is remembered.
+    fn transfer<T>(&self, work: impl FnOnce(&Gpu, &mut State) -> Result<T, VulkanError>) -> Result<T, VulkanError> {
+        let state = &mut *self.lock();
+        if let Some(error) = &state.failed {
+            return Err(error.clone());
+        }
+        let outcome = work(self, state).and_then(|value| self.handle.check_messages().map(|()| value));
+        if let Err(error) = &outcome {
+            use VulkanError::{Call, DeviceLost, TimeLimit, Validation};
+            if matches!(error, Call { .. } | DeviceLost { .. } | TimeLimit { .. } | Validation { .. }) {
+                state.failed = Some(error.clone());
+            }
+        }
+        outcome
+    }
+
+    /// Memory for an array: one buffer, or one a page where no allocation is large enough.
+    fn array<T: Pod>(&self, len: usize) -> Result<Buffer<T>, VulkanError> {
+        let stride = size_of::<T>();
+        let affordable = usize::try_from(self.handle.limits.allocation).unwrap_or(usize::MAX) / stride;
+        let chunk_len = if len <= affordable { len.max(1) } else { 1 << self.page_shift };
+        let chunks = (0..len.max(1)).step_by(chunk_len).map(|first| {
+            let bytes = (chunk_len.min(len.max(1) - first) * stride) as u64;
+            match self.handle.memory(bytes, MemoryLocation::GpuOnly) {
+                // What was let go while submissions that use it were on their way is free when they are done.
+                Err(VulkanError::OutOfMemory { .. }) => {
+                    self.wait()?;
+                    self.handle.memory(bytes, MemoryLocation::GpuOnly)
+                }
+                memory => memory,
+            }
+        });
+        let chunks = chunks.collect::<Result<_, _>>()?;
+        let (read_in, written_in) = (Stretch::default(), Stretch::default());
+        Ok(Buffer::new(Array { chunks, chunk_len, len, stride, read_in, written_in }))
+    }
+
+    fn staging_bytes(&self) -> usize {
+        STAGING.min(self.handle.limits.allocation) as usize
+    }
+
+    fn staging(&self, staging: &mut Option<Memory>, location: MemoryLocation) -> Result<(), VulkanError> {
+        if staging.is_none() {
+            *staging = Some(self.handle.memory(self.staging_bytes() as u64, location)?);
+        }
+        Ok(())
+    }
+
+    /// Records commands that use these arrays, after a barrier if they depend on what came since the last one, and sends
+    /// them on their way.
+    fn record(
+        &self,
+        state: &mut State,
+        uses: &[(&Arc<Array>, Access)],
+        commands: impl FnOnce(&ash::Device, &mut Submission, &Submissions) -> Result<(), VulkanError>,
+    ) -> Result<(), VulkanError> {
+        let State { submissions, tallies, stretch, .. } = state;
+        let mut submission = submissions.begin(&mut |done| count(tallies, done))?;
+        let depends = uses.iter().any(|(array, access)| {
+            array.written_in.is(*stretch) || (*access == Access::Write && array.read_in.is(*stretch))
+        });
+        if depends {
+            barrier(&self.handle.device, submission.commands);
+            *stretch += 1;
+        }
+        for (array, access) in uses {
+            Submissions::hold(&mut submission, array);
+            match access {
+                Access::Read => array.read_in.set(*stretch),
+                Access::Write => array.written_in.set(*stretch),
+            }
+        }
+        match commands(&self.handle.device, &mut submission, submissions) {
+            Ok(()) => submissions.submit(submission),
+            Err(error) => {
+                submissions.discard(submission);
+                Err(error)
+            }
+        }
+    }
+
+    fn bind<'a>(
+        &self,
+        submission: &Submission,
+        pipeline: &Pipeline,
+        arrays: impl Iterator<Item = (&'a crate::kernel::Array, &'a Bound<'a>)>,
+        page_shift: u32,
+    ) -> Result<vk::DescriptorSet, VulkanError> {
+        let layouts = [pipeline.set_layout];
+        let info =
+            vk::DescriptorSetAllocateInfo::default().descriptor_pool(submission.descriptors).set_layouts(&layouts);
+        // SAFETY: the pool is as large as the largest set, and empty.
+        let set = unsafe { self.handle.device.allocate_descriptor_sets(&info) }
+            .map_err(|result| self.handle.failure("vkAllocateDescriptorSets", result))?[0];
+        let infos: Vec<[vk::DescriptorBufferInfo; 1]> = arrays
+            .flat_map(|(array, bound)| ranges(bound.0, array.layout, page_shift))
+            .map(|range| [vk::DescriptorBufferInfo { buffer: range.buffer, offset: range.offset, range: range.bytes }])
+            .collect();
+        let writes: Vec<_> = (0..)
+            .zip(&infos)
+            .map(|(binding, info)| {
+                vk::WriteDescriptorSet::default()
+                    .dst_set(set)
+                    .dst_binding(binding)
+                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                    .buffer_info(info)
+            })
+            .collect();
+        // SAFETY: the ranges lie in their buffers, which the submission holds.
+        unsafe { self.handle.device.update_descriptor_sets(&writes, &[]) };
+        Ok(set)
+    }
+
+    fn check_arguments(&self, kernel: Kernel, parameters: &[u8], arrays: &[Bound<'_>]) -> Result<(), VulkanError> {
+        let refuse = |detail| Err(VulkanError::Arguments { kernel: kernel.name(), detail });
+        if parameters.len() != kernel.parameter_bytes() {
+            return refuse(format!("{} bytes of parameters instead of {}", parameters.len(), kernel.parameter_bytes()));
+        }
+        let listed = kernel.arrays();
+        if arrays.len() != listed.len() {
+            return refuse(format!("{} arrays instead of {}", arrays.len(), listed.len()));
+        }
+        for (array, bound) in listed.iter().zip(arrays) {
+            let (len, stride) = (bound.0.len, bound.0.stride);
+            if array.stride % stride != 0 {
+                return refuse(format!("{} of {stride} bytes an element instead of {}", array.name, array.stride));
+            }
+            let limit = |limit, needed, available| {
+                let what = format!("array {} of kernel {}", array.name, kernel.name());
+                Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available })
+            };
+            let (bytes, range) = ((len * stride) as u64, self.handle.limits.buffer_range);
+            match array.layout {
+                Layout::Whole if bytes > range => return limit("maxStorageBufferRange", bytes, range),
+                Layout::Whole if bound.0.chunks.len() > 1 => {
+                    return limit("maxMemoryAllocationSize", bytes, self.handle.limits.allocation);
+                }
+                Layout::Pages if len > MOST_PAGES << self.page_shift => {
+                    let most = ((MOST_PAGES << self.page_shift) * stride) as u64;
+                    return limit("maxStorageBufferRange of four pages", bytes, most);
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+impl State {
+    fn wait(&mut self) -> Result<(), VulkanError> {
+        let State { submissions, tallies, .. } = self;
+        submissions.wait(&mut |done| count(tallies, done))
+    }
+}
+
+fn count(tallies: &mut [Tally; Kernel::ALL.len()], done: Done) {
+    tallies[done.kernel as usize].time += done.time.unwrap_or_default();
+}
+
+/// Everything before is seen by everything after.
+fn barrier(device: &ash::Device, commands: vk::CommandBuffer) {
+    let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+    let written = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
+    let used = written | vk::AccessFlags::SHADER_READ | vk::AccessFlags::TRANSFER_READ;
+    let all = [vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(used)];
+    // SAFETY: the commands are being recorded.
+    unsafe {
+        device.cmd_pipeline_barrier(commands, stages, stages, vk::DependencyFlags::empty(), &all, &[], &[]);
+    }
+}
+
+/// Calls with each stretch of at most `most` bytes of an array that lies in one chunk: the chunk, the byte in it, and the
+/// bytes of the whole array.
+fn for_each_stretch(
+    array: &Array,
+    most: usize,
+    mut work: impl FnMut(&Memory, u64, Range<usize>) -> Result<(), VulkanError>,
+) -> Result<(), VulkanError> {
+    let most_elements = (most / array.stride).max(1);
+    let mut first = 0;
+    while first < array.len {
+        let (memory, offset, there) = array.place(first);
+        let count = there.min(most_elements);
+        work(memory, offset, first * array.stride..(first + count) * array.stride)?;
+        first += count;
+    }
+    Ok(())
+}

@@ -1,0 +1,220 @@
+//! An opened device: its functions, its queue, its memory.
+
+use crate::adapter::{Adapter, Limits};
+use crate::error::{VulkanError, failed};
+use crate::instance::Instance;
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings};
+use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Bytes that are taken from the device at once, for many buffers.
+const BLOCK: u64 = 64 << 20;
+
+/// Everything that buffers and submissions share. Dropped last.
+pub(crate) struct Handle {
+    pub(crate) name: String,
+    pub(crate) device: ash::Device,
+    pub(crate) queue: vk::Queue,
+    pub(crate) limits: Limits,
+    allocator: ManuallyDrop<Mutex<Allocator>>,
+    /// Bytes of all buffers that live.
+    used: AtomicU64,
+    /// A submission may still run and will not be waited for any more: nothing that it uses may be given back.
+    abandoned: AtomicBool,
+    adapter: Adapter,
+    pub(crate) instance: Arc<Instance>,
+}
+
+impl Handle {
+    pub(crate) fn open(instance: &Arc<Instance>, adapter: &Adapter, limits: Limits) -> Result<Handle, VulkanError> {
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default()
+            .queue_family_index(adapter.queue_family)
+            .queue_priorities(&priorities)];
+        let extensions: Vec<_> = adapter.extensions.iter().map(|name| name.as_ptr()).collect();
+        let mut model = vk::PhysicalDeviceVulkanMemoryModelFeatures::default().vulkan_memory_model(true);
+        let info = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut model);
+        // SAFETY: everything that `info` points to lives until the call returns; the adapter has what is enabled.
+        let device =
+            unsafe { instance.raw.create_device(adapter.raw, &info, None) }.map_err(|result| match result {
+                vk::Result::ERROR_DEVICE_LOST => {
+                    VulkanError::DeviceLost { device: adapter.name.clone(), call: "vkCreateDevice" }
+                }
+                result => VulkanError::Call { call: "vkCreateDevice", result },
+            })?;
+        // SAFETY: one queue of this family was created.
+        let queue = unsafe { device.get_device_queue(adapter.queue_family, 0) };
+        let block = BLOCK.min(limits.allocation).max(1 << 16);
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: device.clone(),
+            physical_device: adapter.raw,
+            debug_settings: AllocatorDebugSettings::default(),
+            buffer_device_address: false,
+            allocation_sizes: AllocationSizes::new(block, block),
+        });
+        let allocator = match allocator {
+            Ok(allocator) => allocator,
+            Err(error) => {
+                // SAFETY: nothing of the device is in use.
+                unsafe { device.destroy_device(None) };
+                return Err(unexpected(&adapter.name, &error));
+            }
+        };
+        Ok(Handle {
+            name: adapter.name.clone(),
+            device,
+            queue,
+            limits,
+            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            used: AtomicU64::new(0),
+            abandoned: AtomicBool::new(false),
+            adapter: adapter.clone(),
+            instance: instance.clone(),
+        })
+    }
+
+    /// A buffer of this many bytes.
+    pub(crate) fn memory(self: &Arc<Self>, bytes: u64, location: MemoryLocation) -> Result<Memory, VulkanError> {
+        let out_of_memory = || self.out_of_memory(bytes);
+        if self.used.load(Ordering::Relaxed).saturating_add(bytes) > self.limits.memory {
+            return Err(out_of_memory());
+        }
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage).sharing_mode(vk::SharingMode::EXCLUSIVE);
+        // SAFETY: `info` is complete.
+        let buffer = unsafe { self.device.create_buffer(&info, None) }.map_err(|result| match result {
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => out_of_memory(),
+            result => self.failure("vkCreateBuffer", result),
+        })?;
+        // SAFETY: the buffer was just made.
+        let requirements = unsafe { self.device.get_buffer_memory_requirements(buffer) };
+        let allocation = self.lock_allocator().allocate(&AllocationCreateDesc {
+            name: "viewfuse",
+            requirements,
+            location,
+            linear: true,
+            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        });
+        let mut memory = Memory { buffer, bytes, allocation: None, handle: self.clone() };
+        self.used.fetch_add(bytes, Ordering::Relaxed);
+        match allocation {
+            // From here on, dropping `memory` gives everything back.
+            Ok(allocation) => memory.allocation = Some(allocation),
+            Err(AllocationError::OutOfMemory) => return Err(out_of_memory()),
+            Err(error) => return Err(unexpected(&self.name, &error)),
+        }
+        if let Some(allocation) = &memory.allocation {
+            // SAFETY: the allocation fits the buffer's requirements and is used by nothing else.
+            unsafe { self.device.bind_buffer_memory(buffer, allocation.memory(), allocation.offset()) }
+                .map_err(|result| self.failure("vkBindBufferMemory", result))?;
+        }
+        Ok(memory)
+    }
+
+    fn lock_allocator(&self) -> std::sync::MutexGuard<'_, Allocator> {
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn out_of_memory(&self, asked: u64) -> VulkanError {
+        let total = self.limits.memory;
+        let mut available = total.saturating_sub(self.used.load(Ordering::Relaxed));
+        if self.adapter.has_memory_budget {
+            let mut budget = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+            let mut properties = vk::PhysicalDeviceMemoryProperties2::default().push_next(&mut budget);
+            // SAFETY: the device has the extension ext::memory_budget.
+            unsafe {
+                self.instance.raw.get_physical_device_memory_properties2(self.adapter.raw, &mut properties);
+            }
+            let properties = properties.memory_properties;
+            let free = properties.memory_heaps_as_slice().iter().enumerate();
+            let free = free.filter(|(_, heap)| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL));
+            let free = free.map(|(at, _)| budget.heap_budget[at].saturating_sub(budget.heap_usage[at])).max();
+            available = available.min(free.unwrap_or(available));
+        }
+        let device = self.name.clone();
+        VulkanError::OutOfMemory { device, asked, available, total }
+    }
+
+    /// A failed call as an error; what means a lost device or no memory says so.
+    pub(crate) fn failure(&self, call: &'static str, result: vk::Result) -> VulkanError {
+        match result {
+            vk::Result::ERROR_DEVICE_LOST => VulkanError::DeviceLost { device: self.name.clone(), call },
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => self.out_of_memory(0),
+            result => failed(call)(result),
+        }
+    }
+
+    /// The oldest message of the validation layers, as an error.
+    pub(crate) fn check_messages(&self) -> Result<(), VulkanError> {
+        match self.instance.messages().first() {
+            Some(message) => Err(VulkanError::Validation { message }),
+            None => Ok(()),
+        }
+    }
+
+    /// From now on nothing is given back to the device.
+    pub(crate) fn abandon(&self) {
+        self.abandoned.store(true, Ordering::Relaxed);
+    }
+
+    pub(crate) fn is_abandoned(&self) -> bool {
+        self.abandoned.load(Ordering::Relaxed)
+    }
+}
+
+impl Drop for Handle {
+    fn drop(&mut self) {
+        if self.is_abandoned() {
+            return;
+        }
+        // SAFETY: buffers and submissions hold the handle alive: none is left, and the allocator is not used again.
+        unsafe {
+            ManuallyDrop::drop(&mut self.allocator);
+            self.device.destroy_device(None);
+        }
+    }
+}
+
+fn unexpected(device: &str, error: &AllocationError) -> VulkanError {
+    VulkanError::Memory { device: device.to_owned(), detail: error.to_string() }
+}
+
+/// A buffer with its memory.
+pub(crate) struct Memory {
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) bytes: u64,
+    allocation: Option<Allocation>,
+    handle: Arc<Handle>,
+}
+
+impl Memory {
+    /// What the host sees of it, if it is in a place that the host sees.
+    pub(crate) fn mapped(&mut self) -> Option<&mut [u8]> {
+        self.allocation.as_mut().and_then(Allocation::mapped_slice_mut)
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        if self.handle.is_abandoned() {
+            return;
+        }
+        // SAFETY: submissions that use the buffer hold it alive: none is left.
+        unsafe { self.handle.device.destroy_buffer(self.buffer, None) };
+        if let Some(allocation) = self.allocation.take() {
+            // It was allocated here; freeing what was allocated here cannot fail.
+            let _ = self.handle.lock_allocator().free(allocation);
+        }
+        self.handle.used.fetch_sub(self.bytes, Ordering::Relaxed);
+    }
+}

@@ -1,0 +1,160 @@
+//! The loader, its drivers, and the validation layers.
+
+use crate::adapter::Adapter;
+use crate::error::{VulkanError, failed};
+use crate::messages::Messages;
+use ash::{ext, khr, vk};
+use std::ffi::CStr;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// What to start Vulkan with.
+#[derive(Clone, Debug, Default)]
+pub struct InstanceOptions {
+    /// The loader's file; otherwise the system's.
+    pub loader: Option<PathBuf>,
+    /// Validation and synchronization validation: each message fails the work that follows it.
+    pub validation: bool,
+}
+
+/// Vulkan itself: loaded at run time, so that a machine without it runs everything else.
+pub struct Instance {
+    _entry: ash::Entry,
+    pub(crate) raw: ash::Instance,
+    messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messages: Messages,
+}
+
+impl Instance {
+    /// Loads the loader and the drivers that it finds.
+    ///
+    /// # Errors
+    /// [`VulkanError::NoLoader`], [`VulkanError::LoaderTooOld`], [`VulkanError::NoDevice`] without a driver,
+    /// [`VulkanError::NoValidation`].
+    pub fn load(options: &InstanceOptions) -> Result<Arc<Instance>, VulkanError> {
+        // SAFETY: loading a library runs its initialisers; it is the system's or the person's own choice.
+        let entry = unsafe {
+            match &options.loader {
+                Some(path) => ash::Entry::load_from(path),
+                None => ash::Entry::load(),
+            }
+        };
+        let entry = entry.map_err(|error| VulkanError::NoLoader { detail: error.to_string() })?;
+        // SAFETY: no requirements.
+        let found = unsafe { entry.try_enumerate_instance_version() }.map_err(failed("vkEnumerateInstanceVersion"))?;
+        // A loader of Vulkan 1.0 does not have this function.
+        let found = found.unwrap_or(vk::API_VERSION_1_0);
+        if found < vk::API_VERSION_1_1 {
+            return Err(VulkanError::LoaderTooOld { found });
+        }
+        let messages = Messages::default();
+        let raw = create(&entry, options, &messages)?;
+        let mut instance = Instance { raw, messenger: None, messages, _entry: entry };
+        if options.validation {
+            let functions = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
+            // SAFETY: the extension is enabled; the messages outlive the messenger.
+            let messenger = unsafe { functions.create_debug_utils_messenger(&instance.messages.create_info(), None) }
+                .map_err(failed("vkCreateDebugUtilsMessengerEXT"))?;
+            instance.messenger = Some((functions, messenger));
+        }
+        Ok(Arc::new(instance))
+    }
+
+    /// Every device, the ones to prefer first: discrete, integrated, virtual, other, software; among equals the one with
+    /// more memory, then in the order of the loader.
+    ///
+    /// # Errors
+    /// [`VulkanError::NoDevice`] if there is none.
+    pub fn adapters(&self) -> Result<Vec<Adapter>, VulkanError> {
+        // SAFETY: no requirements.
+        let devices = unsafe { self.raw.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
+        if devices.is_empty() {
+            return Err(VulkanError::NoDevice { detail: "the drivers that are installed have no device".to_owned() });
+        }
+        let mut adapters: Vec<Adapter> = devices.into_iter().map(|raw| Adapter::new(self, raw)).collect();
+        adapters.sort_by_key(|adapter| (adapter.kind, std::cmp::Reverse(adapter.memory)));
+        adapters.iter_mut().enumerate().for_each(|(index, adapter)| adapter.index = index);
+        Ok(adapters)
+    }
+
+    /// What the validation layers said.
+    pub fn messages(&self) -> &Messages {
+        &self.messages
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: devices hold the instance alive: none is left.
+        unsafe {
+            if let Some((functions, messenger)) = &self.messenger {
+                functions.destroy_debug_utils_messenger(*messenger, None);
+            }
+            self.raw.destroy_instance(None);
+        }
+    }
+}
+
+fn create(entry: &ash::Entry, options: &InstanceOptions, messages: &Messages) -> Result<ash::Instance, VulkanError> {
+    let application = vk::ApplicationInfo::default().application_name(c"viewfuse").api_version(vk::API_VERSION_1_2);
+    let (mut layers, mut extensions) = (Vec::new(), Vec::new());
+    let mut flags = vk::InstanceCreateFlags::empty();
+    // SAFETY: no requirements.
+    let offered = unsafe { entry.enumerate_instance_extension_properties(None) }
+        .map_err(failed("vkEnumerateInstanceExtensionProperties"))?;
+    if offered.iter().any(|extension| extension.extension_name_as_c_str() == Ok(khr::portability_enumeration::NAME)) {
+        // Drivers on top of another interface (MoltenVK) show themselves only to those who ask.
+        extensions.push(khr::portability_enumeration::NAME.as_ptr());
+        flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+    }
+    let yes = [vk::TRUE];
+    let on = |name: &'static CStr| {
+        let setting = vk::LayerSettingEXT::default().layer_name(VALIDATION_LAYER).setting_name(name);
+        let values = yes.as_ptr().cast();
+        vk::LayerSettingEXT { ty: vk::LayerSettingTypeEXT::BOOL32, value_count: 1, p_values: values, ..setting }
+    };
+    let settings = [on(c"validate_sync"), on(c"syncval_shader_accesses_heuristic")];
+    let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
+    let synchronization = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+    let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&synchronization);
+    let mut messenger = messages.create_info();
+    let mut info = vk::InstanceCreateInfo::default().application_info(&application);
+    if options.validation {
+        let layer_extensions = layer_extensions(entry)?;
+        layers.push(VALIDATION_LAYER.as_ptr());
+        extensions.push(ext::debug_utils::NAME.as_ptr());
+        // Layers since 1.3.250 are set in this way, those before in that.
+        if layer_extensions.iter().any(|extension| extension.extension_name_as_c_str() == Ok(ext::layer_settings::NAME))
+        {
+            extensions.push(ext::layer_settings::NAME.as_ptr());
+            info = info.push_next(&mut settings);
+        } else {
+            extensions.push(ext::validation_features::NAME.as_ptr());
+            info = info.push_next(&mut features);
+        }
+        info = info.push_next(&mut messenger);
+    }
+    let info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions).flags(flags);
+    // SAFETY: everything that `info` points to lives until the call returns.
+    unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => VulkanError::NoDevice {
+            detail: "no driver is installed; Debian's software driver is the package mesa-vulkan-drivers".to_owned(),
+        },
+        result => VulkanError::Call { call: "vkCreateInstance", result },
+    })
+}
+
+/// What the validation layer brings with it.
+fn layer_extensions(entry: &ash::Entry) -> Result<Vec<vk::ExtensionProperties>, VulkanError> {
+    // SAFETY: no requirements.
+    let layers =
+        unsafe { entry.enumerate_instance_layer_properties() }.map_err(failed("vkEnumerateInstanceLayerProperties"))?;
+    if !layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+        return Err(VulkanError::NoValidation { layer: "VK_LAYER_KHRONOS_validation" });
+    }
+    // SAFETY: no requirements.
+    unsafe { entry.enumerate_instance_extension_properties(Some(VALIDATION_LAYER)) }
+        .map_err(failed("vkEnumerateInstanceExtensionProperties"))
+}

@@ -1,0 +1,144 @@
+//! One pipeline per kernel and specialisation, made when it is first needed.
+
+use crate::error::VulkanError;
+use crate::handle::Handle;
+use crate::kernel::Kernel;
+use ash::vk;
+use std::collections::HashMap;
+use std::ffi::CString;
+use std::sync::Arc;
+
+/// The kernels, as `cargo shaders` makes them.
+const MODULE: &[u8] = include_bytes!("kernels.spv");
+
+/// A kernel that is ready to run.
+#[derive(Clone, Copy)]
+pub(crate) struct Pipeline {
+    pub(crate) raw: vk::Pipeline,
+    pub(crate) layout: vk::PipelineLayout,
+    pub(crate) set_layout: vk::DescriptorSetLayout,
+}
+
+/// All pipelines of a device.
+pub(crate) struct Pipelines {
+    module: vk::ShaderModule,
+    cache: vk::PipelineCache,
+    layouts: HashMap<Kernel, (vk::DescriptorSetLayout, vk::PipelineLayout)>,
+    pipelines: HashMap<(Kernel, u32), vk::Pipeline>,
+    handle: Arc<Handle>,
+}
+
+impl Pipelines {
+    pub(crate) fn new(handle: &Arc<Handle>) -> Result<Pipelines, VulkanError> {
+        let mut pipelines = Pipelines {
+            module: vk::ShaderModule::null(),
+            cache: vk::PipelineCache::null(),
+            layouts: HashMap::new(),
+            pipelines: HashMap::new(),
+            handle: handle.clone(),
+        };
+        let code: Vec<u32> = MODULE.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+        let info = vk::ShaderModuleCreateInfo::default().code(&code);
+        // SAFETY: the module was validated when it was made; the device has the feature that it needs.
+        pipelines.module = unsafe { handle.device.create_shader_module(&info, None) }
+            .map_err(|result| handle.failure("vkCreateShaderModule", result))?;
+        // SAFETY: an empty cache needs nothing.
+        pipelines.cache = unsafe { handle.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
+            .map_err(|result| handle.failure("vkCreatePipelineCache", result))?;
+        Ok(pipelines)
+    }
+
+    /// The pipeline of a kernel for pages of `2^page_shift` elements; 0 leaves the choice of pages out.
+    pub(crate) fn get(&mut self, kernel: Kernel, page_shift: u32) -> Result<Pipeline, VulkanError> {
+        let (set_layout, layout) = self.layouts(kernel)?;
+        let raw = match self.pipelines.get(&(kernel, page_shift)) {
+            Some(pipeline) => *pipeline,
+            None => self.create(kernel, layout, page_shift)?,
+        };
+        Ok(Pipeline { raw, layout, set_layout })
+    }
+
+    fn layouts(&mut self, kernel: Kernel) -> Result<(vk::DescriptorSetLayout, vk::PipelineLayout), VulkanError> {
+        if let Some(layouts) = self.layouts.get(&kernel) {
+            return Ok(*layouts);
+        }
+        let bindings: Vec<_> = (0..kernel.binding_count() as u32)
+            .map(|binding| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::COMPUTE)
+            })
+            .collect();
+        let Handle { device, .. } = &*self.handle;
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: the number of bindings was checked against the device's limit.
+        let set_layout = unsafe { device.create_descriptor_set_layout(&info, None) }
+            .map_err(|result| self.handle.failure("vkCreateDescriptorSetLayout", result))?;
+        let sets = [set_layout];
+        let constants = [vk::PushConstantRange::default()
+            .stage_flags(vk::ShaderStageFlags::COMPUTE)
+            .size(kernel.push_bytes() as u32)];
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&constants);
+        // SAFETY: the layout was just made; the size was checked against the device's limit.
+        let layout = match unsafe { device.create_pipeline_layout(&info, None) } {
+            Ok(layout) => layout,
+            Err(result) => {
+                // SAFETY: nothing uses it.
+                unsafe { device.destroy_descriptor_set_layout(set_layout, None) };
+                return Err(self.handle.failure("vkCreatePipelineLayout", result));
+            }
+        };
+        self.layouts.insert(kernel, (set_layout, layout));
+        Ok((set_layout, layout))
+    }
+
+    fn create(
+        &mut self,
+        kernel: Kernel,
+        layout: vk::PipelineLayout,
+        page_shift: u32,
+    ) -> Result<vk::Pipeline, VulkanError> {
+        let entries = [vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: size_of::<u32>() }];
+        let data = page_shift.to_ne_bytes();
+        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+        // No kernel's name has a zero in it.
+        let name = CString::new(kernel.name()).unwrap_or_default();
+        let mut stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(self.module)
+            .name(&name);
+        if kernel.has_pages() {
+            stage = stage.specialization_info(&specialization);
+        }
+        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        // SAFETY: the module has an entry point of this name with these bindings: a test reads it back.
+        let created = unsafe { self.handle.device.create_compute_pipelines(self.cache, &info, None) };
+        let pipeline = match created {
+            Ok(pipelines) => pipelines[0],
+            Err((_, result)) => return Err(self.handle.failure("vkCreateComputePipelines", result)),
+        };
+        self.pipelines.insert((kernel, page_shift), pipeline);
+        Ok(pipeline)
+    }
+}
+
+impl Drop for Pipelines {
+    fn drop(&mut self) {
+        if self.handle.is_abandoned() {
+            return;
+        }
+        let Handle { device, .. } = &*self.handle;
+        // SAFETY: submissions are waited for before the pipelines are dropped; null handles are ignored.
+        unsafe {
+            self.pipelines.values().for_each(|pipeline| device.destroy_pipeline(*pipeline, None));
+            for (set_layout, layout) in self.layouts.values() {
+                device.destroy_pipeline_layout(*layout, None);
+                device.destroy_descriptor_set_layout(*set_layout, None);
+            }
+            device.destroy_pipeline_cache(self.cache, None);
+            device.destroy_shader_module(self.module, None);
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! Commands on their way through the queue.
+//!
+//! Up to [`MOST_IN_FLIGHT`] submissions are on their way at once, so that the device works while the host prepares the next
+//! ones. A submission keeps everything that it uses alive until its fence says that it is done.
+
+use crate::buffer::Array;
+use crate::error::VulkanError;
+use crate::handle::Handle;
+use crate::kernel::{Kernel, Layout};
+use ash::vk;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// How many submissions are on their way at once.
+const MOST_IN_FLIGHT: usize = 8;
+
+/// How long a device is waited for, at the least, before it is given up when it is closed.
+const LAST_WAIT: Duration = Duration::from_secs(10);
+
+/// What a submission did, for whoever counts.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Done {
+    pub(crate) kernel: Kernel,
+    /// Time on the device, if it has timestamps.
+    pub(crate) time: Option<Duration>,
+}
+
+/// Commands that are being recorded or on their way.
+pub(crate) struct Submission {
+    pub(crate) commands: vk::CommandBuffer,
+    pub(crate) descriptors: vk::DescriptorPool,
+    queries: vk::QueryPool,
+    fence: vk::Fence,
+    held: Vec<Arc<Array>>,
+    kernel: Option<Kernel>,
+}
+
+/// The queue's submissions, in order.
+pub(crate) struct Submissions {
+    pool: vk::CommandPool,
+    free: Vec<Submission>,
+    running: VecDeque<Submission>,
+    time_limit: Duration,
+    /// Nanoseconds of a timestamp's unit; `None` without timestamps.
+    tick: Option<f32>,
+    /// Bits of a timestamp that mean something.
+    tick_mask: u64,
+    handle: Arc<Handle>,
+}
+
+impl Submissions {
+    pub(crate) fn new(
+        handle: &Arc<Handle>,
+        queue_family: u32,
+        timestamps: Option<(f32, u32)>,
+        time_limit: Duration,
+    ) -> Result<Submissions, VulkanError> {
+        let info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(queue_family)
+            .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
+        // SAFETY: the device has this family.
+        let pool = unsafe { handle.device.create_command_pool(&info, None) }
+            .map_err(|result| handle.failure("vkCreateCommandPool", result))?;
+        Ok(Submissions {
+            pool,
+            free: Vec::new(),
+            running: VecDeque::new(),
+            time_limit,
+            tick: timestamps.map(|(period, _)| period),
+            tick_mask: timestamps.map_or(0, |(_, bits)| u64::MAX >> (64 - bits.clamp(1, 64))),
+            handle: handle.clone(),
+        })
+    }
+
+    /// Starts recording. If all submissions are on their way, the oldest is waited for first.
+    pub(crate) fn begin(&mut self, done: &mut impl FnMut(Done)) -> Result<Submission, VulkanError> {
+        if self.running.len() >= MOST_IN_FLIGHT {
+            self.wait_for_oldest(done)?;
+        }
+        let submission = match self.free.pop() {
+            Some(submission) => submission,
+            None => self.create()?,
+        };
+        let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the commands are not on their way; the pool allows to record them again.
+        let begun = unsafe { self.handle.device.begin_command_buffer(submission.commands, &info) };
+        match begun {
+            Ok(()) => Ok(submission),
+            Err(result) => {
+                self.free.push(submission);
+                Err(self.handle.failure("vkBeginCommandBuffer", result))
+            }
+        }
+    }
+
+    /// Takes back a submission whose recording failed.
+    pub(crate) fn discard(&mut self, mut submission: Submission) {
+        submission.held.clear();
+        submission.kernel = None;
+        self.free.push(submission);
+    }
+
+    /// Sends recorded commands on their way.
+    pub(crate) fn submit(&mut self, submission: Submission) -> Result<(), VulkanError> {
+        let commands = [submission.commands];
+        let info = [vk::SubmitInfo::default().command_buffers(&commands)];
+        let Handle { device, queue, .. } = &*self.handle;
+        // SAFETY: the commands are recorded, and hold all that they use; the fence is not in use.
+        let submitted = unsafe {
+            device
+                .end_command_buffer(submission.commands)
+                .map_err(|result| self.handle.failure("vkEndCommandBuffer", result))
+                .and_then(|()| {
+                    let submitted = device.queue_submit(*queue, &info, submission.fence);
+                    submitted.map_err(|result| self.handle.failure("vkQueueSubmit", result))
+                })
+        };
+        match submitted {
+            Ok(()) => self.running.push_back(submission),
+            Err(_) => self.discard(submission),
+        }
+        submitted
+    }
+
+    /// Waits until everything is done.
+    pub(crate) fn wait(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
+        while !self.running.is_empty() {
+            self.wait_for_oldest(done)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for the oldest submission, but not longer than the time limit: the ones before it are done, so all of that
+    /// time is its own.
+    fn wait_for_oldest(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
+        let Some(oldest) = self.running.front() else { return Ok(()) };
+        let nanoseconds = u64::try_from(self.time_limit.as_nanos()).unwrap_or(u64::MAX);
+        let Handle { device, .. } = &*self.handle;
+        // SAFETY: the fence belongs to a submission that is on its way.
+        let waited = unsafe { device.wait_for_fences(&[oldest.fence], true, nanoseconds) };
+        waited.map_err(|result| match result {
+            vk::Result::TIMEOUT => VulkanError::TimeLimit {
+                device: self.handle.name.clone(),
+                work: oldest.kernel.map_or("a transfer".to_owned(), |kernel| format!("kernel {}", kernel.name())),
+                limit: self.time_limit,
+            },
+            result => self.handle.failure("vkWaitForFences", result),
+        })?;
+        if let Some(kernel) = oldest.kernel {
+            done(Done { kernel, time: self.time_of(oldest)? });
+        }
+        let reset = |result| self.handle.failure("vkResetFences", result);
+        // SAFETY: the submission is done.
+        unsafe { device.reset_fences(&[oldest.fence]).map_err(reset)? };
+        unsafe { device.reset_descriptor_pool(oldest.descriptors, vk::DescriptorPoolResetFlags::empty()) }
+            .map_err(|result| self.handle.failure("vkResetDescriptorPool", result))?;
+        if let Some(mut oldest) = self.running.pop_front() {
+            oldest.held.clear();
+            oldest.kernel = None;
+            self.free.push(oldest);
+        }
+        self.handle.check_messages()
+    }
+
+    fn time_of(&self, submission: &Submission) -> Result<Option<Duration>, VulkanError> {
+        let Some(tick) = self.tick else { return Ok(None) };
+        let mut ticks = [0_u64; 2];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: both queries were written by the submission, which is done.
+        unsafe { self.handle.device.get_query_pool_results(submission.queries, 0, &mut ticks, flags) }
+            .map_err(|result| self.handle.failure("vkGetQueryPoolResults", result))?;
+        let passed = ticks[1].wrapping_sub(ticks[0]) & self.tick_mask;
+        Ok(Some(Duration::from_nanos((passed as f64 * f64::from(tick)) as u64)))
+    }
+
+    /// Starts the clock of a kernel.
+    pub(crate) fn start_clock(&self, submission: &mut Submission, kernel: Kernel) {
+        submission.kernel = Some(kernel);
+        if self.tick.is_some() {
+            let Handle { device, .. } = &*self.handle;
+            // SAFETY: the commands are being recorded; the pool has two queries.
+            unsafe {
+                device.cmd_reset_query_pool(submission.commands, submission.queries, 0, 2);
+                let top = vk::PipelineStageFlags::TOP_OF_PIPE;
+                device.cmd_write_timestamp(submission.commands, top, submission.queries, 0);
+            }
+        }
+    }
+
+    /// Stops it.
+    pub(crate) fn stop_clock(&self, submission: &Submission) {
+        if self.tick.is_some() {
+            let bottom = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
+            // SAFETY: as above.
+            unsafe { self.handle.device.cmd_write_timestamp(submission.commands, bottom, submission.queries, 1) };
+        }
+    }
+
+    /// Keeps an array alive until the submission is done.
+    pub(crate) fn hold(submission: &mut Submission, array: &Arc<Array>) {
+        submission.held.push(array.clone());
+    }
+
+    fn create(&self) -> Result<Submission, VulkanError> {
+        let Handle { device, .. } = &*self.handle;
+        let failed = |call| move |result| self.handle.failure(call, result);
+        let bindings = Kernel::ALL.into_iter().map(|kernel| kernel.binding_count()).max().unwrap_or(1);
+        let sizes = [vk::DescriptorPoolSize::default()
+            .ty(vk::DescriptorType::STORAGE_BUFFER)
+            .descriptor_count(bindings as u32)];
+        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
+        let commands = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+        let mut submission = Submission {
+            commands: vk::CommandBuffer::null(),
+            descriptors: vk::DescriptorPool::null(),
+            queries: vk::QueryPool::null(),
+            fence: vk::Fence::null(),
+            held: Vec::new(),
+            kernel: None,
+        };
+        // SAFETY: all infos are complete. What was made before a failure is destroyed.
+        let made = unsafe {
+            (|| {
+                submission.commands =
+                    device.allocate_command_buffers(&commands).map_err(failed("vkAllocateCommandBuffers"))?[0];
+                submission.descriptors =
+                    device.create_descriptor_pool(&pool, None).map_err(failed("vkCreateDescriptorPool"))?;
+                submission.fence =
+                    device.create_fence(&vk::FenceCreateInfo::default(), None).map_err(failed("vkCreateFence"))?;
+                if self.tick.is_some() {
+                    submission.queries =
+                        device.create_query_pool(&queries, None).map_err(failed("vkCreateQueryPool"))?;
+                }
+                Ok(())
+            })()
+        };
+        match made {
+            Ok(()) => Ok(submission),
+            Err(error) => {
+                self.destroy(&submission);
+                Err(error)
+            }
+        }
+    }
+
+    fn destroy(&self, submission: &Submission) {
+        let Handle { device, .. } = &*self.handle;
+        // SAFETY: the submission is not on its way; null handles are ignored. Commands go with their pool.
+        unsafe {
+            device.destroy_query_pool(submission.queries, None);
+            device.destroy_fence(submission.fence, None);
+            device.destroy_descriptor_pool(submission.descriptors, None);
+        }
+    }
+}
+
+impl Drop for Submissions {
+    fn drop(&mut self) {
+        // One that ran out of time may still run: it gets a little longer, then it is left alone with all that it uses.
+        self.time_limit = self.time_limit.max(LAST_WAIT);
+        while !self.running.is_empty() {
+            match self.wait_for_oldest(&mut |_| ()) {
+                Ok(()) | Err(VulkanError::Validation { .. }) => {}
+                Err(_) => {
+                    self.handle.abandon();
+                    self.running.drain(..).for_each(std::mem::forget);
+                    return;
+                }
+            }
+        }
+        self.free.iter().for_each(|submission| self.destroy(submission));
+        // SAFETY: no commands of the pool are on their way.
+        unsafe { self.handle.device.destroy_command_pool(self.pool, None) };
+    }
+}
+
+/// The byte range of a binding.
+pub(crate) struct Range {
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) offset: u64,
+    pub(crate) bytes: u64,
+}
+
+/// The ranges that an array is bound as: itself, or its pages; pages that it does not have are its first one again.
+pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Range> {
+    let page_len = match (layout, page_shift) {
+        (Layout::Whole, _) | (_, 0) => array.len,
+        (Layout::Pages, shift) => 1 << shift,
+    };
+    let binding_count = if layout == Layout::Whole { 1 } else { viewfuse_core::pages::MOST_PAGES };
+    (0..binding_count)
+        .map(|page| {
+            let first = if page * page_len < array.len { page * page_len } else { 0 };
+            let (memory, offset, there) = array.place(first);
+            // An empty array still binds something.
+            let len = page_len.min(there).max(1);
+            Range { buffer: memory.buffer, offset, bytes: (len * array.stride) as u64 }
+        })
+        .collect()
+}
