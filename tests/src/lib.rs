@@ -3,5 +3,7 @@
 #![forbid(unsafe_code)]
 
 pub mod command;
+pub mod contract;
 pub mod emulator;
+pub mod module;
 pub mod scenes;

@@ -15,8 +15,10 @@ pub fn legalise(module: &mut Module) {
     let is_aggregate = |kind: &&Instruction| matches!(kind.class.opcode, Op::TypeStruct | Op::TypeArray);
     let aggregates = module.types_global_values.iter().filter(is_aggregate).filter_map(|kind| kind.result_id).collect();
     for function in &mut module.functions {
-        forward_members(function, &aggregates);
-        leave_out_unneeded(function);
+        // What was taken out of a composite may be one itself, whose members are seen only then.
+        while forward_members(function, &aggregates) {
+            leave_out_unneeded(function);
+        }
     }
     leave_out_unneeded_globals(module);
 }
@@ -46,7 +48,8 @@ fn path(operands: &[Operand]) -> Vec<u32> {
     operands.iter().filter_map(index).collect()
 }
 
-fn forward_members(function: &mut Function, aggregates: &HashSet<u32>) {
+/// Returns whether it found anything to replace.
+fn forward_members(function: &mut Function, aggregates: &HashSet<u32>) -> bool {
     let mut made = HashMap::new();
     for instruction in instructions(function) {
         let (Some(result), operands) = (instruction.result_id, &instruction.operands) else { continue };
@@ -61,6 +64,7 @@ fn forward_members(function: &mut Function, aggregates: &HashSet<u32>) {
         }
     }
     let mut replaced = HashMap::new();
+    let mut shortened = false;
     for block in &mut function.blocks {
         for instruction in &mut block.instructions {
             if instruction.class.opcode != Op::CompositeExtract {
@@ -72,7 +76,8 @@ fn forward_members(function: &mut Function, aggregates: &HashSet<u32>) {
             let (source, rest) = source_of(&made, composite, path(&instruction.operands[1..]));
             if rest.is_empty() {
                 replaced.insert(result, source);
-            } else {
+            } else if source != composite {
+                shortened = true;
                 instruction.operands = vec![Operand::IdRef(source)];
                 instruction.operands.extend(rest.into_iter().map(Operand::LiteralBit32));
             }
@@ -91,6 +96,7 @@ fn forward_members(function: &mut Function, aggregates: &HashSet<u32>) {
             }
         }
     }
+    shortened || !replaced.is_empty()
 }
 
 /// Follows a path into a composite as far back as it is known how the composite was made.

@@ -6,13 +6,17 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
-use viewfuse_shader_compiler::backend::{Backend, HOME_VARIABLE, Toolchain};
+use viewfuse_shader_compiler::backend::{Backend, BackendError, HOME_VARIABLE, Toolchain};
 use viewfuse_shader_compiler::compile::{compile, validate};
 use viewfuse_shader_compiler::stamp::{Inputs, MODULE, STAMP, Stamp, sha256};
 
 const USAGE: &str = "usage: cargo shaders [--check]
 Makes vulkan/src/kernels.spv and kernels.toml from the sources.
-  --check    writes nothing; compiles and compares, exit code 1 if anything differs";
+  --check    writes nothing; compiles and compares, exit code 1 if anything differs
+Exit code 3 if there is no shader compiler.";
+
+/// Exit code where there is no compiler: nothing is known to be wrong.
+const NO_COMPILER: u8 = 3;
 
 /// Environment variables by which somebody could change what is compiled.
 const FORBIDDEN: [&str; 3] = ["RUSTGPU_CODEGEN_ARGS", "RUSTGPU_RUSTFLAGS", "RUSTGPU_CARGOFLAGS"];
@@ -42,7 +46,13 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     let package =
         env::var_os("CARGO_MANIFEST_DIR").ok_or("CARGO_MANIFEST_DIR is not set: run this as `cargo shaders`")?;
     let root = fs::canonicalize(Path::new(&package).join("..").join(".."))?;
-    let backend = Backend::find(&root)?;
+    let backend = match Backend::find(&root) {
+        Err(error @ BackendError::None) => {
+            eprintln!("{error}");
+            return Ok(ExitCode::from(NO_COMPILER));
+        }
+        found => found?,
+    };
     if let Some(code) = run_prepared(&backend)? {
         return Ok(code);
     }

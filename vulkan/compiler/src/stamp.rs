@@ -15,10 +15,11 @@ pub const MODULE: &str = "vulkan/src/kernels.spv";
 /// What it was made from.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
 /// Files, and folders with all their Rust files, that the module is made from.
-pub const SOURCES: [&str; 6] = [
+pub const SOURCES: [&str; 7] = [
     "core/Cargo.toml",
     "core/src",
     "vulkan/compiler/src/compile.rs",
+    "vulkan/compiler/src/legalise.rs",
     "vulkan/compiler/src/refine.rs",
     "vulkan/shaders/Cargo.toml",
     "vulkan/shaders/src",

@@ -1,0 +1,222 @@
+//! Whether a compiled module is what the list of kernels says: the checker.
+
+use crate::module::{Content, Declarations, id_of, instructions};
+use rspirv::dr::{Function, Module, Operand};
+use rspirv::spirv::{
+    AddressingModel, Capability, Decoration, ExecutionMode, ExecutionModel, MemoryModel, Op, StorageClass, Word,
+};
+use std::collections::{BTreeMap, BTreeSet};
+use viewfuse_core::attention::FourierEmbedding;
+use viewfuse_vulkan::kernel::{Access, Array, Kernel, Layout, WORKGROUP};
+
+/// `Sqrt` of `GLSL.std.450`: the only function that is the device's.
+const SQUARE_ROOT: u32 = 31;
+
+/// Every breach as a sentence, none if the module is what [`Kernel::ALL`] says.
+pub fn breaches(module: &Module) -> Vec<String> {
+    let mut breaches = Breaches { declarations: Declarations::new(module), said: Vec::new() };
+    breaches.look_at_header(module);
+    let mut entries = BTreeMap::new();
+    for entry in &module.entry_points {
+        let name = entry.operands[2].unwrap_literal_string().to_owned();
+        breaches.unless(entry.operands[0] == Operand::ExecutionModel(ExecutionModel::GLCompute), || {
+            format!("{name}: not a compute shader")
+        });
+        breaches.unless(Kernel::ALL.iter().any(|kernel| kernel.name() == name), || format!("{name}: not a kernel"));
+        let double = entries.insert(name.clone(), id_of(entry, 1));
+        breaches.unless(double.is_none(), || format!("{name}: two entry points"));
+    }
+    for kernel in Kernel::ALL {
+        match entries.get(kernel.name()) {
+            Some(entry) => breaches.look_at_kernel(module, kernel, *entry),
+            None => breaches.said.push(format!("{}: no entry point", kernel.name())),
+        }
+    }
+    breaches.look_at_arithmetic(module);
+    breaches.said
+}
+
+struct Breaches<'a> {
+    declarations: Declarations<'a>,
+    said: Vec<String>,
+}
+
+impl Breaches<'_> {
+    fn unless(&mut self, holds: bool, say: impl FnOnce() -> String) {
+        if !holds {
+            self.said.push(say());
+        }
+    }
+
+    fn look_at_header(&mut self, module: &Module) {
+        let version = module.header.as_ref().map(|header| header.version());
+        self.unless(version.is_some_and(|version| version <= (1, 3)), || {
+            format!("version {version:?}: Vulkan 1.1 reads SPIR-V up to 1.3")
+        });
+        let capabilities: BTreeSet<String> =
+            module.capabilities.iter().map(|capability| format!("{:?}", capability.operands[0])).collect();
+        let allowed = [Capability::Shader, Capability::VulkanMemoryModel];
+        let allowed: BTreeSet<String> =
+            allowed.iter().map(|capability| format!("{:?}", Operand::Capability(*capability))).collect();
+        self.unless(capabilities == allowed, || format!("capabilities {capabilities:?}, not {allowed:?}"));
+        for extension in &module.extensions {
+            let name = extension.operands[0].unwrap_literal_string();
+            self.unless(name == "SPV_KHR_vulkan_memory_model", || format!("extension {name}"));
+        }
+        let model = module.memory_model.as_ref().map(|model| model.operands.clone());
+        let logical = Operand::AddressingModel(AddressingModel::Logical);
+        self.unless(model == Some(vec![logical, Operand::MemoryModel(MemoryModel::Vulkan)]), || {
+            format!("memory model {model:?}")
+        });
+        let names = module.debug_string_source.len() + module.debug_names.len() + module.debug_module_processed.len();
+        self.unless(names == 0, || format!("{names} names of things or files"));
+        let is_pointer = |id: Word| self.declarations.definition(id).class.opcode == Op::TypePointer;
+        let of_pointers = module.types_global_values.iter().filter(|kind| {
+            matches!(kind.class.opcode, Op::TypeStruct | Op::TypeArray)
+                && kind.operands.iter().filter_map(Operand::id_ref_any).any(is_pointer)
+        });
+        let of_pointers = of_pointers.count();
+        self.unless(of_pointers == 0, || format!("{of_pointers} composites of pointers, where addressing is logical"));
+        for constant in &module.types_global_values {
+            let number = constant.result_id.and_then(|id| self.declarations.decorated(id, Decoration::SpecId));
+            self.unless(number.is_none_or(|number| number == 0), || format!("specialisation constant {number:?}"));
+            if number == Some(0) {
+                let kind = self.declarations.definition(constant.result_type.expect("a constant's type"));
+                let is_u32 = kind.class.opcode == Op::TypeInt && kind.operands[0] == Operand::LiteralBit32(32);
+                self.unless(is_u32 && constant.operands[0] == Operand::LiteralBit32(0), || {
+                    "the specialisation constant is not a u32 that is 0 unless told".to_owned()
+                });
+            }
+        }
+    }
+
+    fn look_at_kernel(&mut self, module: &Module, kernel: Kernel, entry: Word) {
+        let name = kernel.name();
+        let sizes: Vec<&[Operand]> = module
+            .execution_modes
+            .iter()
+            .filter(|mode| mode.operands[0] == Operand::IdRef(entry))
+            .map(|mode| &mode.operands[1..])
+            .collect();
+        let size = [WORKGROUP, 1, 1].map(Operand::LiteralBit32);
+        let size = [&[Operand::ExecutionMode(ExecutionMode::LocalSize)], &size[..]].concat();
+        self.unless(sizes == [&size[..]], || format!("{name}: a workgroup is {sizes:?}, not {WORKGROUP}"));
+
+        let functions = self.declarations.functions(entry);
+        let used = self.declarations.used(&functions);
+        let of_class = |class: StorageClass| -> Vec<Word> {
+            used.iter().copied().filter(|id| self.declarations.storage_class(*id) == Some(class)).collect()
+        };
+        let buffers = of_class(StorageClass::StorageBuffer);
+        let pushed: Vec<Content> =
+            of_class(StorageClass::PushConstant).iter().map(|push| self.declarations.content(*push)).collect();
+        let specialised = used.iter().any(|id| self.declarations.is_decorated(*id, Decoration::SpecId));
+        let foreign = [StorageClass::Uniform, StorageClass::UniformConstant, StorageClass::Workgroup]
+            .into_iter()
+            .find(|class| !of_class(*class).is_empty());
+        self.unless(foreign.is_none(), || format!("{name}: uses {foreign:?}"));
+        self.unless(pushed == [Content::Fixed { bytes: kernel.push_bytes() }], || {
+            format!("{name}: push constants {pushed:?}, not {} bytes", kernel.push_bytes())
+        });
+        self.unless(specialised == kernel.has_pages(), || {
+            format!("{name}: {} the specialisation constant", if specialised { "uses" } else { "does not use" })
+        });
+        self.look_at_buffers(kernel, &buffers);
+        self.look_at_accesses(name, &functions);
+    }
+
+    fn look_at_buffers(&mut self, kernel: Kernel, buffers: &[Word]) {
+        let name = kernel.name();
+        let mut bound = BTreeMap::new();
+        for buffer in buffers {
+            let set = self.declarations.decorated(*buffer, Decoration::DescriptorSet);
+            self.unless(set == Some(0), || format!("{name}: a buffer of set {set:?}"));
+            let binding = self.declarations.decorated(*buffer, Decoration::Binding);
+            let double = bound.insert(binding, *buffer);
+            self.unless(double.is_none(), || format!("{name}: binding {binding:?} is bound twice"));
+        }
+        let wanted = kernel.arrays().iter().flat_map(|array| std::iter::repeat_n(array, array.binding_count()));
+        for (number, array) in wanted.enumerate() {
+            let Some(buffer) = bound.remove(&Some(number as u32)) else {
+                self.said.push(format!("{name}: binding {number} ({}) is missing", array.name));
+                continue;
+            };
+            let access = match self.declarations.is_decorated(buffer, Decoration::NonWritable) {
+                true => Access::Read,
+                false => Access::Write,
+            };
+            self.unless(access == array.access, || {
+                format!("{name}: binding {number} ({}): {access:?}, not {:?}", array.name, array.access)
+            });
+            let content = self.declarations.content(buffer);
+            self.unless(content == wanted_content(kernel, array), || {
+                format!("{name}: binding {number} ({}): {content:?}, not {} bytes", array.name, array.stride)
+            });
+        }
+        self.unless(bound.is_empty(), || format!("{name}: bindings {:?} are not on the list", bound.keys()));
+    }
+
+    /// Reads and writes go where the list says: what is written is never read.
+    fn look_at_accesses(&mut self, name: &str, functions: &[&Function]) {
+        for instruction in functions.iter().flat_map(|function| instructions(function)) {
+            let operation = instruction.class.opcode;
+            if !matches!(operation, Op::Load | Op::Store | Op::CopyMemory | Op::ArrayLength)
+                && !format!("{operation:?}").starts_with("Atomic")
+            {
+                continue;
+            }
+            let variable = self.declarations.variable_behind(id_of(instruction, 0));
+            if self.declarations.storage_class(variable) != Some(StorageClass::StorageBuffer) {
+                continue;
+            }
+            let is_read_only = self.declarations.is_decorated(variable, Decoration::NonWritable);
+            let binding = self.declarations.decorated(variable, Decoration::Binding);
+            let holds = match operation {
+                Op::Load => is_read_only,
+                Op::Store => !is_read_only,
+                Op::ArrayLength => true,
+                _ => false,
+            };
+            self.unless(holds, || format!("{name}: {operation:?} on binding {binding:?}, read only: {is_read_only}"));
+        }
+    }
+
+    fn look_at_arithmetic(&mut self, module: &Module) {
+        let mut unmarked = 0;
+        for instruction in module.functions.iter().flat_map(instructions) {
+            let result = instruction.result_id.unwrap_or_default();
+            let operation = instruction.class.opcode;
+            if is_float_arithmetic(operation) && !self.declarations.is_decorated(result, Decoration::NoContraction) {
+                unmarked += 1;
+            }
+            if operation == Op::ExtInst {
+                let function = &instruction.operands[1];
+                self.unless(*function == Operand::LiteralExtInstInteger(SQUARE_ROOT), || {
+                    format!("the device's function {function:?}, where core has its own")
+                });
+            }
+        }
+        self.unless(unmarked == 0, || format!("{unmarked} results of float arithmetic are not NoContraction"));
+    }
+}
+
+/// What a binding should hold. Blocks that exist once are no arrays.
+fn wanted_content(kernel: Kernel, array: &Array) -> Content {
+    let single = match (kernel, array.name) {
+        (Kernel::EmbedPose, "embedding") => Some(FourierEmbedding::PARAMETERS * array.stride),
+        (_, "object") => Some(array.stride),
+        _ => None,
+    };
+    match (single, array.layout) {
+        (Some(bytes), Layout::Whole) => Content::Fixed { bytes },
+        _ => Content::Elements { stride: array.stride },
+    }
+}
+
+/// Operations whose results a device may fuse with others. Written down here again on purpose: the checker does not
+/// believe the compiler's list.
+fn is_float_arithmetic(operation: Op) -> bool {
+    let name = format!("{operation:?}");
+    ["FNegate", "FAdd", "FSub", "FMul", "FDiv", "FRem", "FMod", "Dot", "OuterProduct"].contains(&name.as_str())
+        || name.contains("Times")
+}
