@@ -1,8 +1,8 @@
 /*
  * viewfuse for C: how much each source view counts for a target view, and what is made of the views with these weights.
  *
- * No function allocates, keeps a pointer, has state or may be interrupted by a panic. Each returns a viewfuse_status;
- * unless it is VIEWFUSE_STATUS_OK, nothing was written. The same input gives the same bits on every processor.
+ * No function allocates, keeps a pointer, has state or can panic. Each that can fail returns a viewfuse_status: unless it
+ * is VIEWFUSE_STATUS_OK, nothing was written. The same input gives the same bits on every processor.
  *
  * Poses are row-major 4x4 camera-to-world matrices in OpenCV axes (x right, y down, z forward), 16 floats each; the last
  * row is 0 0 0 1. Lengths are in the world's units, whatever these are. Arrays are given by their shape with the slowest
@@ -265,7 +265,7 @@ const char *viewfuse_status_text(int32_t status);
 /*
  The weights of up to 8 sources for a target, by formula: finite, at least 0, with the sum 1.
 
- `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count]. Needs 2 KiB of stack at most.
+ `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count].
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -343,9 +343,9 @@ viewfuse_status viewfuse_attend_32(const float *parameters,
 /*
  The weighted sum of the views' latents, in view order.
 
- `weights` is [view_count], each finite and at least 0, `latents` [view_count][channel_count], `fused` [channel_count]. Latents
- that are not finite give channels that are not. `fused` may be the place of the first view's latents, but may not overlap
- the weights or the latents otherwise.
+ `weights` is [view_count], each finite and at least 0, `latents` [view_count][channel_count], `fused`
+ [channel_count]. Latents that are not finite give channels that are not. `fused` may be the place of the first view's
+ latents, but may not overlap the weights or the latents otherwise.
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -406,7 +406,8 @@ viewfuse_status viewfuse_ray_finish(const viewfuse_ray *ray,
 viewfuse_status viewfuse_noise_level(float sigma_min, float sigma_max, uint32_t index, uint32_t count, float *level);
 
 /*
- The factors at a noise level of at least 0. At 0 the network counts nothing and its `noise` is that of 1.2e-38.
+ The factors at a noise level of at least 0. At 0 the network's output counts nothing; `noise` is then that of the
+ level 1.2e-38 instead of minus infinity.
 
  # Safety
  The pointer is null or valid.

@@ -52,7 +52,8 @@ pub unsafe extern "C" fn viewfuse_noise_level(
     }
 }
 
-/// The factors at a noise level of at least 0. At 0 the network counts nothing and its `noise` is that of 1.2e-38.
+/// The factors at a noise level of at least 0. At 0 the network's output counts nothing; `noise` is then that of the
+/// level 1.2e-38 instead of minus infinity.
 ///
 /// # Safety
 /// The pointer is null or valid.

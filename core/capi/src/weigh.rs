@@ -88,7 +88,7 @@ const _: () = assert!(ATTENTION_PARAMETERS as usize == FourierEmbedding::PARAMET
 
 /// The weights of up to 8 sources for a target, by formula: finite, at least 0, with the sum 1.
 ///
-/// `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count]. Needs 2 KiB of stack at most.
+/// `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count].
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
