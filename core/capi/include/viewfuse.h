@@ -1,8 +1,8 @@
 /*
  * viewfuse for C: how much each source view counts for a target view, and what is made of the views with these weights.
  *
- * No function allocates, keeps a pointer, has state or may be interrupted by a panic. Each returns a viewfuse_status;
- * unless it is VIEWFUSE_STATUS_OK, nothing was written. The same input gives the same bits on every processor.
+ * No function allocates, keeps a pointer, has state or can panic. Each that can fail returns a viewfuse_status: unless it
+ * is VIEWFUSE_STATUS_OK, nothing was written. The same input gives the same bits on every processor.
  *
  * Poses are row-major 4x4 camera-to-world matrices in OpenCV axes (x right, y down, z forward), 16 floats each; the last
  * row is 0 0 0 1. Lengths are in the world's units, whatever these are. Arrays are given by their shape with the slowest
@@ -265,7 +265,7 @@ const char *viewfuse_status_text(int32_t status);
 /*
  The weights of up to 8 sources for a target, by formula: finite, at least 0, with the sum 1.
 
- `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count]. Needs 2 KiB of stack at most.
+ `source_poses` is `[source_count][4][4]`, `target_pose` is `[4][4]`, `weights` is `[source_count]`.
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -303,9 +303,9 @@ viewfuse_status viewfuse_weigh_32(const viewfuse_scheme *scheme,
 /*
  The weights of up to 8 sources for a target, by learned attention: finite, at least 0, with the sum 1.
 
- `parameters` is [VIEWFUSE_ATTENTION_PARAMETERS]: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
- weights [output][input], then the biases [output]. They are read where they lie, in flash for instance.
- `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count].
+ `parameters` is `[VIEWFUSE_ATTENTION_PARAMETERS]`: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
+ weights `[output][input]`, then the biases `[output]`. They are read where they lie, in flash for instance.
+ `source_poses` is `[source_count][4][4]`, `target_pose` is `[4][4]`, `weights` is `[source_count]`.
 
  # Safety
  Pointers are null or valid for these shapes; nobody changes the parameters meanwhile.
@@ -343,9 +343,9 @@ viewfuse_status viewfuse_attend_32(const float *parameters,
 /*
  The weighted sum of the views' latents, in view order.
 
- `weights` is [view_count], each finite and at least 0, `latents` [view_count][channel_count], `fused` [channel_count]. Latents
- that are not finite give channels that are not. `fused` may be the place of the first view's latents, but may not overlap
- the weights or the latents otherwise.
+ `weights` is `[view_count]`, each finite and at least 0; `latents` is `[view_count][channel_count]`, `fused` is
+ `[channel_count]`. Latents that are not finite give channels that are not. `fused` may be the place of the first
+ view's latents, but may not overlap the weights or the latents otherwise.
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -365,7 +365,7 @@ viewfuse_status viewfuse_fuse_views(const float *weights,
 viewfuse_status viewfuse_ray_start(viewfuse_ray *ray);
 
 /*
- Adds the next sample, front to back: its colour [3], its optical depth (density times length; negative or NaN counts
+ Adds the next sample, front to back: its colour `[3]`, its optical depth (density times length; negative or NaN counts
  as 0, infinity as opaque) and its distance along the ray.
 
  # Safety
@@ -374,7 +374,7 @@ viewfuse_status viewfuse_ray_start(viewfuse_ray *ray);
 viewfuse_status viewfuse_ray_add(viewfuse_ray *ray, const float *rgb, float optical_depth, float depth);
 
 /*
- Adds the next sample of a solid with a soft boundary, front to back: its colour [3], its occupancy in 0 to 1 (NaN
+ Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy in 0 to 1 (NaN
  counts as 0), which the ray's opacity will at least be, and its distance along the ray. For one ray use either this or
  viewfuse_ray_add.
 
@@ -384,7 +384,7 @@ viewfuse_status viewfuse_ray_add(viewfuse_ray *ray, const float *rgb, float opti
 viewfuse_status viewfuse_ray_add_solid(viewfuse_ray *ray, const float *rgb, float occupancy, float depth);
 
 /*
- The pixel, with the background [3] behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
+ The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
  stays as it is.
 
  # Safety
@@ -406,7 +406,8 @@ viewfuse_status viewfuse_ray_finish(const viewfuse_ray *ray,
 viewfuse_status viewfuse_noise_level(float sigma_min, float sigma_max, uint32_t index, uint32_t count, float *level);
 
 /*
- The factors at a noise level of at least 0. At 0 the network counts nothing and its `noise` is that of 1.2e-38.
+ The factors at a noise level of at least 0. At 0 the network's output counts nothing; `noise` is then that of the
+ level 1.2e-38 instead of minus infinity.
 
  # Safety
  The pointer is null or valid.
@@ -424,7 +425,7 @@ viewfuse_status viewfuse_step_between(float sigma, float next, viewfuse_step *st
 /*
  What the network is given: `input * noisy`, for `count` values.
 
- `noisy` and `given` are [count]; they may be the same array, but may not overlap otherwise.
+ `noisy` and `given` are `[count]`; they may be the same array, but may not overlap otherwise.
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -438,7 +439,7 @@ viewfuse_status viewfuse_network_input(const viewfuse_preconditioning *factors,
  The denoised picture from the noisy one and the network's output: `skip * noisy + output * network_output`, for
  `count` values.
 
- All arrays are [count]; `denoised` may be one of the others, but may not overlap them otherwise.
+ All arrays are `[count]`; `denoised` may be one of the others, but may not overlap them otherwise.
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -453,7 +454,7 @@ viewfuse_status viewfuse_denoised(const viewfuse_preconditioning *factors,
  The first-order step of a picture: from the noisy one and the denoised one at the level before to the level reached.
  The step to level 0 gives the denoised picture.
 
- All arrays are [count]; `stepped` may be one of the others, but may not overlap them otherwise. Keep the denoised
+ All arrays are `[count]`; `stepped` may be one of the others, but may not overlap them otherwise. Keep the denoised
  picture for the correction.
 
  # Safety
@@ -469,7 +470,7 @@ viewfuse_status viewfuse_step_euler(const viewfuse_step *step,
  The second-order step of a picture: from the first-order one, the denoised picture that led to it, and the denoised
  picture there.
 
- All arrays are [count]; `corrected` may be one of the others, but may not overlap them otherwise.
+ All arrays are `[count]`; `corrected` may be one of the others, but may not overlap them otherwise.
 
  # Safety
  Pointers are null or valid for these shapes.

@@ -7,9 +7,9 @@ use viewfuse_core::pages::{Fetch, StartingAt};
 
 /// The weighted sum of the views' latents, in view order.
 ///
-/// `weights` is [view_count], each finite and at least 0, `latents` [view_count][channel_count], `fused` [channel_count]. Latents
-/// that are not finite give channels that are not. `fused` may be the place of the first view's latents, but may not overlap
-/// the weights or the latents otherwise.
+/// `weights` is `[view_count]`, each finite and at least 0; `latents` is `[view_count][channel_count]`, `fused` is
+/// `[channel_count]`. Latents that are not finite give channels that are not. `fused` may be the place of the first
+/// view's latents, but may not overlap the weights or the latents otherwise.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.

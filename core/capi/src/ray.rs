@@ -56,7 +56,7 @@ pub unsafe extern "C" fn viewfuse_ray_start(ray: *mut Ray) -> Status {
     Status::of(unsafe { write(ray, Ray::from(Compositor::<3>::START.block())) })
 }
 
-/// Adds the next sample, front to back: its colour [3], its optical depth (density times length; negative or NaN counts
+/// Adds the next sample, front to back: its colour `[3]`, its optical depth (density times length; negative or NaN counts
 /// as 0, infinity as opaque) and its distance along the ray.
 ///
 /// # Safety
@@ -71,7 +71,7 @@ pub unsafe extern "C" fn viewfuse_ray_add(ray: *mut Ray, rgb: *const f32, optica
     })
 }
 
-/// Adds the next sample of a solid with a soft boundary, front to back: its colour [3], its occupancy in 0 to 1 (NaN
+/// Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy in 0 to 1 (NaN
 /// counts as 0), which the ray's opacity will at least be, and its distance along the ray. For one ray use either this or
 /// viewfuse_ray_add.
 ///
@@ -87,7 +87,7 @@ pub unsafe extern "C" fn viewfuse_ray_add_solid(ray: *mut Ray, rgb: *const f32, 
     })
 }
 
-/// The pixel, with the background [3] behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
+/// The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
 /// stays as it is.
 ///
 /// # Safety

@@ -52,7 +52,8 @@ pub unsafe extern "C" fn viewfuse_noise_level(
     }
 }
 
-/// The factors at a noise level of at least 0. At 0 the network counts nothing and its `noise` is that of 1.2e-38.
+/// The factors at a noise level of at least 0. At 0 the network's output counts nothing; `noise` is then that of the
+/// level 1.2e-38 instead of minus infinity.
 ///
 /// # Safety
 /// The pointer is null or valid.
@@ -82,7 +83,7 @@ pub unsafe extern "C" fn viewfuse_step_between(sigma: f32, next: f32, step: *mut
 
 /// What the network is given: `input * noisy`, for `count` values.
 ///
-/// `noisy` and `given` are [count]; they may be the same array, but may not overlap otherwise.
+/// `noisy` and `given` are `[count]`; they may be the same array, but may not overlap otherwise.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn viewfuse_network_input(
 /// The denoised picture from the noisy one and the network's output: `skip * noisy + output * network_output`, for
 /// `count` values.
 ///
-/// All arrays are [count]; `denoised` may be one of the others, but may not overlap them otherwise.
+/// All arrays are `[count]`; `denoised` may be one of the others, but may not overlap them otherwise.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
@@ -125,7 +126,7 @@ pub unsafe extern "C" fn viewfuse_denoised(
 /// The first-order step of a picture: from the noisy one and the denoised one at the level before to the level reached.
 /// The step to level 0 gives the denoised picture.
 ///
-/// All arrays are [count]; `stepped` may be one of the others, but may not overlap them otherwise. Keep the denoised
+/// All arrays are `[count]`; `stepped` may be one of the others, but may not overlap them otherwise. Keep the denoised
 /// picture for the correction.
 ///
 /// # Safety
@@ -148,7 +149,7 @@ pub unsafe extern "C" fn viewfuse_step_euler(
 /// The second-order step of a picture: from the first-order one, the denoised picture that led to it, and the denoised
 /// picture there.
 ///
-/// All arrays are [count]; `corrected` may be one of the others, but may not overlap them otherwise.
+/// All arrays are `[count]`; `corrected` may be one of the others, but may not overlap them otherwise.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.

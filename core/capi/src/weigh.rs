@@ -88,7 +88,7 @@ const _: () = assert!(ATTENTION_PARAMETERS as usize == FourierEmbedding::PARAMET
 
 /// The weights of up to 8 sources for a target, by formula: finite, at least 0, with the sum 1.
 ///
-/// `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count]. Needs 2 KiB of stack at most.
+/// `source_poses` is `[source_count][4][4]`, `target_pose` is `[4][4]`, `weights` is `[source_count]`.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
@@ -138,9 +138,9 @@ pub unsafe extern "C" fn viewfuse_weigh_32(
 
 /// The weights of up to 8 sources for a target, by learned attention: finite, at least 0, with the sum 1.
 ///
-/// `parameters` is [VIEWFUSE_ATTENTION_PARAMETERS]: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
-/// weights [output][input], then the biases [output]. They are read where they lie, in flash for instance.
-/// `source_poses` is [source_count][4][4], `target_pose` [4][4], `weights` [source_count].
+/// `parameters` is `[VIEWFUSE_ATTENTION_PARAMETERS]`: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
+/// weights `[output][input]`, then the biases `[output]`. They are read where they lie, in flash for instance.
+/// `source_poses` is `[source_count][4][4]`, `target_pose` is `[4][4]`, `weights` is `[source_count]`.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes; nobody changes the parameters meanwhile.
