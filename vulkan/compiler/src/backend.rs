@@ -105,10 +105,9 @@ impl Backend {
             let home = PathBuf::from(output_of(&mut Command::new(&install))?.trim());
             return Backend::in_folder(&home).map_err(|missing| BackendError::Incomplete { home, missing });
         }
-        if let Ok(installed) = output_of(Command::new("rustup").args(["toolchain", "list"])) {
-            if installed.lines().any(|line| line.starts_with(NIGHTLY)) {
-                return official();
-            }
+        let installed = output_of(Command::new("rustup").args(["toolchain", "list"])).unwrap_or_default();
+        if installed.lines().any(|line| line.starts_with(NIGHTLY)) {
+            return official();
         }
         Err(BackendError::None)
     }

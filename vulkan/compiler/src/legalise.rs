@@ -1,6 +1,6 @@
 //! Composites that hold pointers go.
 //!
-//! A slice is a pointer and a length, [`viewfuse_core::pages::Pages`] are several slices: rust-gpu makes them composites of
+//! A slice is a pointer and a length, `viewfuse_core::pages::Pages` are several slices: rust-gpu makes them composites of
 //! pointers that nobody may have in a module with logical addressing. It only ever puts such a composite together and
 //! takes its members out again, so each extracted member is replaced by what was put in, and what nobody then needs is
 //! left out.

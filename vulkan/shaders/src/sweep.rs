@@ -10,6 +10,7 @@ use viewfuse_core::photo::{ObjectBlock, hull, sweep};
 
 /// Where the ray of pixel number `first + id.x` of a view, the parameter, enters the hull.
 #[spirv(compute(threads(64), entry_point_name = "hull_entry"))]
+#[allow(clippy::too_many_arguments)]
 pub fn hull_entry(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<u32>,
