@@ -1,5 +1,6 @@
 //! What `bits.c` prints, computed by calls of core.
 
+use viewfuse::check::poses::Random;
 use viewfuse_core::attention::{FourierEmbedding, cross_attention};
 use viewfuse_core::composite::Compositor;
 use viewfuse_core::fuse::fuse_views;
@@ -8,7 +9,6 @@ use viewfuse_core::schedule::{HeunStep, NoiseSchedule, Preconditioning};
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
 use viewfuse_core::weights::Weights;
-use viewfuse_tests::poses::Random;
 
 const SOURCES: usize = 32;
 const CHANNELS: usize = 16;

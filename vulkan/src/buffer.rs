@@ -1,9 +1,12 @@
 //! Arrays in a device's memory.
 
 use crate::handle::Memory;
+use crate::kernel::Layout;
+use ash::vk;
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use viewfuse_core::pages::MOST_PAGES;
 
 /// An array of `T` in a device's memory. What no allocation of the device can hold lies in several chunks of a page each.
 pub struct Buffer<T> {
@@ -58,6 +61,31 @@ impl Array {
         let end = if chunk + 1 == self.chunks.len() { self.len } else { start + self.chunk_len };
         (&self.chunks[chunk], ((first - start) * self.stride) as u64, end - first)
     }
+}
+
+/// The byte range of a binding.
+pub(crate) struct Range {
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) offset: u64,
+    pub(crate) bytes: u64,
+}
+
+/// The ranges that an array is bound as: itself, or its pages; pages that it does not have are its first one again.
+pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Range> {
+    let page_len = match (layout, page_shift) {
+        (Layout::Whole, _) | (_, 0) => array.len,
+        (Layout::Pages, shift) => 1 << shift,
+    };
+    let binding_count = if layout == Layout::Whole { 1 } else { MOST_PAGES };
+    (0..binding_count)
+        .map(|page| {
+            let first = if page * page_len < array.len { page * page_len } else { 0 };
+            let (memory, offset, there) = array.place(first);
+            // An empty array still binds something.
+            let len = page_len.min(there).max(1);
+            Range { buffer: memory.buffer, offset, bytes: (len * array.stride) as u64 }
+        })
+        .collect()
 }
 
 /// A stretch of commands between two barriers, by number; 0 is none.

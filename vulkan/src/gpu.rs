@@ -1,23 +1,19 @@
 //! A device that runs kernels.
 
 use crate::adapter::{Adapter, Limits};
-use crate::buffer::{Array, Bound, Buffer, Stretch};
+use crate::buffer::{Array, Bound, ranges};
 use crate::error::VulkanError;
 use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
 use crate::kernel::{Access, Kernel, Layout, Piece, WORKGROUP};
 use crate::pipelines::{Pipeline, Pipelines};
-use crate::submissions::{Done, Submission, Submissions, ranges};
+use crate::submissions::{Done, Submission, Submissions};
 use ash::vk;
-use bytemuck::Pod;
-use gpu_allocator::MemoryLocation;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use viewfuse_core::pages::MOST_PAGES;
 
-/// Bytes that go between host and device at once.
-const STAGING: u64 = 16 << 20;
 /// Bytes of the widest element of an array in pages.
 const WIDEST_PAGED: u64 = 16;
 
@@ -26,6 +22,9 @@ const WIDEST_PAGED: u64 = 16;
 pub struct GpuOptions {
     /// How long a submission may run.
     pub time_limit: Duration,
+    /// Whether what depends on one another is kept apart. Without barriers results are wrong; it is how one shows that the
+    /// validation layers would have said so.
+    pub barriers: bool,
     /// Limits to keep to where they are lower than the device's own: so can work that needs cutting be tested anywhere.
     pub limits: Limits,
 }
@@ -35,7 +34,7 @@ impl Default for GpuOptions {
     fn default() -> GpuOptions {
         let limits =
             Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
-        GpuOptions { time_limit: Duration::from_secs(120), limits }
+        GpuOptions { time_limit: Duration::from_secs(120), barriers: true, limits }
     }
 }
 
@@ -55,15 +54,16 @@ pub struct Tally {
 pub struct Gpu {
     // Dropped in this order: submissions are waited for before anything that they use goes.
     state: Mutex<State>,
-    handle: Arc<Handle>,
-    page_shift: u32,
+    pub(crate) handle: Arc<Handle>,
+    pub(crate) page_shift: u32,
+    barriers: bool,
 }
 
-struct State {
+pub(crate) struct State {
     submissions: Submissions,
     pipelines: Pipelines,
-    upload: Option<Memory>,
-    download: Option<Memory>,
+    pub(crate) upload: Option<Memory>,
+    pub(crate) download: Option<Memory>,
     /// The number of the stretch of commands since the last barrier.
     stretch: u64,
     tallies: [Tally; Kernel::ALL.len()],
@@ -104,7 +104,7 @@ impl Gpu {
             tallies: [Tally::default(); Kernel::ALL.len()],
             failed: None,
         };
-        Ok(Gpu { state: Mutex::new(state), handle, page_shift: page_len.ilog2().min(31) })
+        Ok(Gpu { state: Mutex::new(state), handle, page_shift: page_len.ilog2().min(31), barriers: options.barriers })
     }
 
     /// What its driver calls it.
@@ -121,94 +121,6 @@ impl Gpu {
     pub fn most_elements(&self, bytes: usize) -> usize {
         let most = self.handle.limits.buffer_range.min(self.handle.limits.allocation);
         usize::try_from(most).unwrap_or(usize::MAX) / bytes
-    }
-
-    /// An array with these values.
-    ///
-    /// # Errors
-    /// [`VulkanError::OutOfMemory`], or another if the device fails.
-    pub fn upload<T: Pod>(&self, values: &[T]) -> Result<Buffer<T>, VulkanError> {
-        let buffer = self.array::<T>(values.len())?;
-        let bytes: &[u8] = bytemuck::cast_slice(values);
-        self.transfer(|gpu, state| {
-            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
-                gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
-                let Some(staging) = &mut state.upload else { return Ok(()) };
-                let from = staging.buffer;
-                if let Some(mapped) = staging.mapped() {
-                    mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
-                }
-                let copy = [vk::BufferCopy::default().dst_offset(offset).size(range.len() as u64)];
-                let to = memory.buffer;
-                gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
-                    // SAFETY: both ranges exist; the submission is waited for before staging is written again.
-                    unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
-                    Ok(())
-                })?;
-                state.wait()
-            })
-        })?;
-        Ok(buffer)
-    }
-
-    /// An array of zeros.
-    ///
-    /// # Errors
-    /// As [`Gpu::upload`].
-    pub fn zeros<T: Pod>(&self, count: usize) -> Result<Buffer<T>, VulkanError> {
-        let buffer = self.array::<T>(count)?;
-        self.transfer(|gpu, state| {
-            gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
-                for memory in &buffer.array.chunks {
-                    // SAFETY: the buffer is a multiple of four bytes long.
-                    unsafe { device.cmd_fill_buffer(submission.commands, memory.buffer, 0, vk::WHOLE_SIZE, 0) };
-                }
-                Ok(())
-            })
-        })?;
-        Ok(buffer)
-    }
-
-    /// The values of an array, when everything that was dispatched before is done.
-    ///
-    /// # Errors
-    /// If the device fails, or failed before.
-    pub fn download<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
-        let mut values = vec![T::zeroed(); buffer.len()];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
-        self.transfer(|gpu, state| {
-            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
-                gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
-                let Some(to) = state.download.as_ref().map(|staging| staging.buffer) else { return Ok(()) };
-                let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
-                let from = memory.buffer;
-                gpu.record(state, &[(&buffer.array, Access::Read)], |device, submission, _| {
-                    let seen = [vk::MemoryBarrier::default()
-                        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                        .dst_access_mask(vk::AccessFlags::HOST_READ)];
-                    // SAFETY: both ranges exist; the submission is waited for before staging is read.
-                    unsafe {
-                        device.cmd_copy_buffer(submission.commands, from, to, &copy);
-                        device.cmd_pipeline_barrier(
-                            submission.commands,
-                            vk::PipelineStageFlags::TRANSFER,
-                            vk::PipelineStageFlags::HOST,
-                            vk::DependencyFlags::empty(),
-                            &seen,
-                            &[],
-                            &[],
-                        );
-                    }
-                    Ok(())
-                })?;
-                state.wait()?;
-                if let Some(mapped) = state.download.as_mut().and_then(Memory::mapped) {
-                    bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
-                }
-                Ok(())
-            })
-        })?;
-        Ok(values)
     }
 
     /// Runs a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` what it binds,
@@ -233,7 +145,7 @@ impl Gpu {
         let needs_pages = listed.clone().any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
         let page_shift = if needs_pages { self.page_shift } else { 0 };
         let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
-        self.transfer(|gpu, state| {
+        self.with_state(|gpu, state| {
             let pipeline = state.pipelines.get(kernel, page_shift)?;
             let per_piece = gpu.handle.limits.workgroup_count.saturating_mul(WORKGROUP);
             let mut dispatches = 0;
@@ -269,7 +181,7 @@ impl Gpu {
     /// # Errors
     /// If the device fails, or failed before.
     pub fn wait(&self) -> Result<(), VulkanError> {
-        self.transfer(|_, state| state.wait())
+        self.with_state(|_, state| state.wait())
     }
 
     /// What each kernel did, up to the last thing that was waited for.
@@ -282,7 +194,10 @@ impl Gpu {
     }
 
     /// Works on the state; a failure of the device is remembered.
-    fn transfer<T>(&self, work: impl FnOnce(&Gpu, &mut State) -> Result<T, VulkanError>) -> Result<T, VulkanError> {
+    pub(crate) fn with_state<T>(
+        &self,
+        work: impl FnOnce(&Gpu, &mut State) -> Result<T, VulkanError>,
+    ) -> Result<T, VulkanError> {
         let state = &mut *self.lock();
         if let Some(error) = &state.failed {
             return Err(error.clone());
@@ -297,41 +212,9 @@ impl Gpu {
         outcome
     }
 
-    /// Memory for an array: one buffer, or one a page where no allocation is large enough.
-    fn array<T: Pod>(&self, len: usize) -> Result<Buffer<T>, VulkanError> {
-        let stride = size_of::<T>();
-        let affordable = usize::try_from(self.handle.limits.allocation).unwrap_or(usize::MAX) / stride;
-        let chunk_len = if len <= affordable { len.max(1) } else { 1 << self.page_shift };
-        let chunks = (0..len.max(1)).step_by(chunk_len).map(|first| {
-            let bytes = (chunk_len.min(len.max(1) - first) * stride) as u64;
-            match self.handle.memory(bytes, MemoryLocation::GpuOnly) {
-                // What was let go while submissions that use it were on their way is free when they are done.
-                Err(VulkanError::OutOfMemory { .. }) => {
-                    self.wait()?;
-                    self.handle.memory(bytes, MemoryLocation::GpuOnly)
-                }
-                memory => memory,
-            }
-        });
-        let chunks = chunks.collect::<Result<_, _>>()?;
-        let (read_in, written_in) = (Stretch::default(), Stretch::default());
-        Ok(Buffer::new(Array { chunks, chunk_len, len, stride, read_in, written_in }))
-    }
-
-    fn staging_bytes(&self) -> usize {
-        STAGING.min(self.handle.limits.allocation) as usize
-    }
-
-    fn staging(&self, staging: &mut Option<Memory>, location: MemoryLocation) -> Result<(), VulkanError> {
-        if staging.is_none() {
-            *staging = Some(self.handle.memory(self.staging_bytes() as u64, location)?);
-        }
-        Ok(())
-    }
-
     /// Records commands that use these arrays, after a barrier if they depend on what came since the last one, and sends
     /// them on their way.
-    fn record(
+    pub(crate) fn record(
         &self,
         state: &mut State,
         uses: &[(&Arc<Array>, Access)],
@@ -343,7 +226,9 @@ impl Gpu {
             array.written_in.is(*stretch) || (*access == Access::Write && array.read_in.is(*stretch))
         });
         if depends {
-            barrier(&self.handle.device, submission.commands);
+            if self.barriers {
+                barrier(&self.handle.device, submission.commands);
+            }
             *stretch += 1;
         }
         for (array, access) in uses {
@@ -430,7 +315,7 @@ impl Gpu {
 }
 
 impl State {
-    fn wait(&mut self) -> Result<(), VulkanError> {
+    pub(crate) fn wait(&mut self) -> Result<(), VulkanError> {
         let State { submissions, tallies, .. } = self;
         submissions.wait(&mut |done| count(tallies, done))
     }
@@ -450,22 +335,4 @@ fn barrier(device: &ash::Device, commands: vk::CommandBuffer) {
     unsafe {
         device.cmd_pipeline_barrier(commands, stages, stages, vk::DependencyFlags::empty(), &all, &[], &[]);
     }
-}
-
-/// Calls with each stretch of at most `most` bytes of an array that lies in one chunk: the chunk, the byte in it, and the
-/// bytes of the whole array.
-fn for_each_stretch(
-    array: &Array,
-    most: usize,
-    mut work: impl FnMut(&Memory, u64, Range<usize>) -> Result<(), VulkanError>,
-) -> Result<(), VulkanError> {
-    let most_elements = (most / array.stride).max(1);
-    let mut first = 0;
-    while first < array.len {
-        let (memory, offset, there) = array.place(first);
-        let count = there.min(most_elements);
-        work(memory, offset, first * array.stride..(first + count) * array.stride)?;
-        first += count;
-    }
-    Ok(())
 }

@@ -9,7 +9,8 @@
 //! kernel                         the list of kernels: names, arrays, parameters
 //! handle, buffer                 an opened device, memory in it
 //! pipelines, submissions         kernels made ready, commands on their way
-//! gpu                            upload, dispatch, download: cut into pieces that fit the device
+//! gpu                            dispatches, cut into pieces that fit the device
+//! transfers                      arrays between host and device
 //! ```
 //!
 //! Unsafe code is only here, in calls of Vulkan; each says why it is sound.
@@ -24,6 +25,7 @@ pub mod kernel;
 mod messages;
 mod pipelines;
 mod submissions;
+mod transfers;
 
 pub use adapter::{Adapter, AdapterKind, Limits};
 pub use buffer::{Bound, Buffer};

@@ -6,7 +6,7 @@
 use crate::buffer::Array;
 use crate::error::VulkanError;
 use crate::handle::Handle;
-use crate::kernel::{Kernel, Layout};
+use crate::kernel::Kernel;
 use ash::vk;
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -150,11 +150,13 @@ impl Submissions {
         if let Some(kernel) = oldest.kernel {
             done(Done { kernel, time: self.time_of(oldest)? });
         }
-        let reset = |result| self.handle.failure("vkResetFences", result);
+        let no_flags = vk::DescriptorPoolResetFlags::empty();
         // SAFETY: the submission is done.
-        unsafe { device.reset_fences(&[oldest.fence]).map_err(reset)? };
-        unsafe { device.reset_descriptor_pool(oldest.descriptors, vk::DescriptorPoolResetFlags::empty()) }
-            .map_err(|result| self.handle.failure("vkResetDescriptorPool", result))?;
+        let (fences, descriptors) = unsafe {
+            (device.reset_fences(&[oldest.fence]), device.reset_descriptor_pool(oldest.descriptors, no_flags))
+        };
+        fences.map_err(|result| self.handle.failure("vkResetFences", result))?;
+        descriptors.map_err(|result| self.handle.failure("vkResetDescriptorPool", result))?;
         if let Some(mut oldest) = self.running.pop_front() {
             oldest.held.clear();
             oldest.kernel = None;
@@ -274,29 +276,4 @@ impl Drop for Submissions {
         // SAFETY: no commands of the pool are on their way.
         unsafe { self.handle.device.destroy_command_pool(self.pool, None) };
     }
-}
-
-/// The byte range of a binding.
-pub(crate) struct Range {
-    pub(crate) buffer: vk::Buffer,
-    pub(crate) offset: u64,
-    pub(crate) bytes: u64,
-}
-
-/// The ranges that an array is bound as: itself, or its pages; pages that it does not have are its first one again.
-pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Range> {
-    let page_len = match (layout, page_shift) {
-        (Layout::Whole, _) | (_, 0) => array.len,
-        (Layout::Pages, shift) => 1 << shift,
-    };
-    let binding_count = if layout == Layout::Whole { 1 } else { viewfuse_core::pages::MOST_PAGES };
-    (0..binding_count)
-        .map(|page| {
-            let first = if page * page_len < array.len { page * page_len } else { 0 };
-            let (memory, offset, there) = array.place(first);
-            // An empty array still binds something.
-            let len = page_len.min(there).max(1);
-            Range { buffer: memory.buffer, offset, bytes: (len * array.stride) as u64 }
-        })
-        .collect()
 }

@@ -1,0 +1,154 @@
+//! Arrays between host and device.
+
+use crate::buffer::{Array, Buffer, Stretch};
+use crate::error::VulkanError;
+use crate::gpu::Gpu;
+use crate::handle::Memory;
+use crate::kernel::Access;
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+use std::ops::Range;
+
+/// Bytes that go between host and device at once.
+const STAGING: u64 = 16 << 20;
+
+impl Gpu {
+    /// An array with these values.
+    ///
+    /// # Errors
+    /// [`VulkanError::OutOfMemory`], or another if the device fails.
+    pub fn upload<T: Pod>(&self, values: &[T]) -> Result<Buffer<T>, VulkanError> {
+        let buffer = self.array::<T>(values.len())?;
+        let bytes: &[u8] = bytemuck::cast_slice(values);
+        self.with_state(|gpu, state| {
+            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
+                gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
+                let Some(staging) = &mut state.upload else { return Ok(()) };
+                let from = staging.buffer;
+                if let Some(mapped) = staging.mapped() {
+                    mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
+                }
+                let copy = [vk::BufferCopy::default().dst_offset(offset).size(range.len() as u64)];
+                let to = memory.buffer;
+                gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
+                    // SAFETY: both ranges exist; the submission is waited for before staging is written again.
+                    unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
+                    Ok(())
+                })?;
+                state.wait()
+            })
+        })?;
+        Ok(buffer)
+    }
+
+    /// An array of zeros.
+    ///
+    /// # Errors
+    /// As [`Gpu::upload`].
+    pub fn zeros<T: Pod>(&self, count: usize) -> Result<Buffer<T>, VulkanError> {
+        let buffer = self.array::<T>(count)?;
+        self.with_state(|gpu, state| {
+            gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
+                for memory in &buffer.array.chunks {
+                    // SAFETY: the buffer is a multiple of four bytes long.
+                    unsafe { device.cmd_fill_buffer(submission.commands, memory.buffer, 0, vk::WHOLE_SIZE, 0) };
+                }
+                Ok(())
+            })
+        })?;
+        Ok(buffer)
+    }
+
+    /// The values of an array, when everything that was dispatched before is done.
+    ///
+    /// # Errors
+    /// If the device fails, or failed before.
+    pub fn download<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
+        let mut values = vec![T::zeroed(); buffer.len()];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
+        self.with_state(|gpu, state| {
+            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
+                gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
+                let Some(to) = state.download.as_ref().map(|staging| staging.buffer) else { return Ok(()) };
+                let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
+                let from = memory.buffer;
+                gpu.record(state, &[(&buffer.array, Access::Read)], |device, submission, _| {
+                    let seen = [vk::MemoryBarrier::default()
+                        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                        .dst_access_mask(vk::AccessFlags::HOST_READ)];
+                    // SAFETY: both ranges exist; the submission is waited for before staging is read.
+                    unsafe {
+                        device.cmd_copy_buffer(submission.commands, from, to, &copy);
+                        device.cmd_pipeline_barrier(
+                            submission.commands,
+                            vk::PipelineStageFlags::TRANSFER,
+                            vk::PipelineStageFlags::HOST,
+                            vk::DependencyFlags::empty(),
+                            &seen,
+                            &[],
+                            &[],
+                        );
+                    }
+                    Ok(())
+                })?;
+                state.wait()?;
+                if let Some(mapped) = state.download.as_mut().and_then(Memory::mapped) {
+                    bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
+                }
+                Ok(())
+            })
+        })?;
+        Ok(values)
+    }
+
+    /// Memory for an array: one buffer, or one a page where no allocation is large enough.
+    fn array<T: Pod>(&self, len: usize) -> Result<Buffer<T>, VulkanError> {
+        let stride = size_of::<T>();
+        let affordable = usize::try_from(self.handle.limits.allocation).unwrap_or(usize::MAX) / stride;
+        let chunk_len = if len <= affordable { len.max(1) } else { 1 << self.page_shift };
+        let chunks = (0..len.max(1)).step_by(chunk_len).map(|first| {
+            let bytes = (chunk_len.min(len.max(1) - first) * stride) as u64;
+            match self.handle.memory(bytes, MemoryLocation::GpuOnly) {
+                // What was let go while submissions that use it were on their way is free when they are done.
+                Err(VulkanError::OutOfMemory { .. }) => {
+                    self.wait()?;
+                    self.handle.memory(bytes, MemoryLocation::GpuOnly)
+                }
+                memory => memory,
+            }
+        });
+        let chunks = chunks.collect::<Result<_, _>>()?;
+        let (read_in, written_in) = (Stretch::default(), Stretch::default());
+        Ok(Buffer::new(Array { chunks, chunk_len, len, stride, read_in, written_in }))
+    }
+
+    fn staging_bytes(&self) -> usize {
+        STAGING.min(self.handle.limits.allocation) as usize
+    }
+
+    fn staging(&self, staging: &mut Option<Memory>, location: MemoryLocation) -> Result<(), VulkanError> {
+        if staging.is_none() {
+            *staging = Some(self.handle.memory(self.staging_bytes() as u64, location)?);
+        }
+        Ok(())
+    }
+}
+
+/// Calls with each stretch of at most `most` bytes of an array that lies in one chunk: the chunk, the byte in it, and the
+/// bytes of the whole array.
+fn for_each_stretch(
+    array: &Array,
+    most: usize,
+    mut work: impl FnMut(&Memory, u64, Range<usize>) -> Result<(), VulkanError>,
+) -> Result<(), VulkanError> {
+    let most_elements = (most / array.stride).max(1);
+    let mut first = 0;
+    while first < array.len {
+        let (memory, offset, there) = array.place(first);
+        let count = there.min(most_elements);
+        work(memory, offset, first * array.stride..(first + count) * array.stride)?;
+        first += count;
+    }
+    Ok(())
+}
