@@ -161,7 +161,7 @@ fn match_cost_is_core_s() {
     assert!(expected.iter().any(|cost| *cost >= 0.0) && expected.iter().any(|cost| *cost < 0.0));
     for shift in shifts(&world) {
         let mut costs = vec![UNTOUCHED; count as usize];
-        dispatch(block, count, |id, push| {
+        dispatch(block, block.width * block.row_count, |id, push| {
             let [ta, tb, tc, td] = pages(&world.texels, shift);
             let [ea, eb, ec, ed] = pages(&world.entries, shift);
             let World { object, views, pair_weights, .. } = &world;

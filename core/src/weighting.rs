@@ -22,7 +22,7 @@
 //!
 //! The Gaussian's exponent is kept with its rounding error, because an error of an exponent is a relative error of the
 //! weight; where squares approach overflow it is not. Weights below 4e-38 may be 0.
-//! `viewfuse-tests` derives these bounds in its oracle and asserts them for each weight.
+//! `viewfuse::check::oracle` derives these bounds, and tests assert them for each weight.
 
 use crate::math::{abs, angle_from_squares, clamp, exp, max, min, norm3, sqrt, two_product, two_sum};
 use crate::pose::Pose;

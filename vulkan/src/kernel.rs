@@ -49,7 +49,7 @@ pub enum Kernel {
     Composite,
     /// Where a source pixel's ray enters the hull. An element is a pixel of the view.
     HullEntry,
-    /// How badly other views match. An element is a plane of a pixel of the band.
+    /// How badly other views match, at all planes. An element is a pixel of the band.
     MatchCost,
     /// Costs summed over a window's columns. An element is a plane of a pixel of the band.
     SumRow,

@@ -3,12 +3,13 @@
 //! Costs are laid out `[row][column][plane]`, planes from near to far, for the band of rows being worked on. A cost is a
 //! mean absolute difference of colour in `[0, MOST_DIFFERENCE]`; a negative one says that the place is outside the hull.
 
-use super::hull::{SWEPT_ALPHA, look_up, look_up_alpha};
+use super::hull::{SWEPT_ALPHA, look_up};
 use super::{NO_SURFACE, ObjectBlock, fade};
 use crate::camera::CameraBlock;
 use crate::math::{abs, clamp, max, min};
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
 
 /// Largest difference that counts: beyond it, a pixel is simply another thing.
 pub const MOST_DIFFERENCE: f32 = 0.2;
@@ -94,12 +95,7 @@ impl SweepBlock {
     }
 }
 
-/// How badly the other views' colours match a source pixel's at the depth of a plane: a mean of absolute differences,
-/// weighted by `pair_weights[view][other]` (how relevant the other view is to this one; 0 on the diagonal) and by how
-/// likely the other view sees the place. `entries` are the depths of entry into the hull of all views.
-///
-/// [`OUTSIDE`] where the pixel shows background, or the place is outside the hull, in front of its ray's entry or too far
-/// behind it.
+/// How badly the other views' colours match a source pixel's at the depth of a plane; see [`SweptPixel::match_cost`].
 #[inline]
 #[allow(clippy::too_many_arguments)]
 pub fn match_cost(
@@ -112,46 +108,104 @@ pub fn match_cost(
     pixel: u32,
     plane: u32,
 ) -> f32 {
-    let camera = &views[sweep.view as usize];
-    let texel = (camera.first_texel + pixel) as usize;
-    let depth = sweep.depth(plane);
-    // Half a plane in front of the entry still touches the hull.
-    let behind_entry = depth - entries.fetch(texel);
-    if behind_entry < -0.5 * sweep.plane_step || behind_entry > SWEPT_BEHIND_ENTRY * object.radius {
-        return OUTSIDE;
+    let swept = SweptPixel::new(sweep, views, texels, entries, pixel);
+    swept.match_cost(object, sweep, views, texels, entries, pair_weights, plane)
+}
+
+/// A source pixel that planes are swept through.
+#[derive(Clone, Copy, Debug)]
+pub struct SweptPixel {
+    /// Its colour.
+    own: [f32; 3],
+    /// The source's centre.
+    origin: Vec3,
+    /// Along its ray, 1 along the principal axis.
+    direction: Vec3,
+    /// Depth of entry into the hull.
+    entry: f32,
+}
+
+impl SweptPixel {
+    /// Pixel number `pixel` of the source's image.
+    #[inline]
+    pub fn new(
+        sweep: &SweepBlock,
+        views: &[CameraBlock],
+        texels: &(impl Fetch<[f32; 4]> + ?Sized),
+        entries: &(impl Fetch<f32> + ?Sized),
+        pixel: u32,
+    ) -> SweptPixel {
+        let camera = &views[sweep.view as usize];
+        let texel = (camera.first_texel + pixel) as usize;
+        let (column, row) = (pixel % camera.width, pixel / camera.width);
+        SweptPixel {
+            own: straight(&texels.fetch(texel)),
+            origin: camera.centre_world(),
+            direction: camera.towards(column as f32 + 0.5, row as f32 + 0.5),
+            entry: entries.fetch(texel),
+        }
     }
-    let own = straight(&texels.fetch(texel));
-    let (column, row) = (pixel % camera.width, pixel / camera.width);
-    let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
-    let reach = 1.0 / (SEEN_BEHIND_ENTRY * object.radius);
-    let (mut sum, mut share_sum) = (NO_WITNESS * MOST_DIFFERENCE, NO_WITNESS);
-    let mut containing = 1;
-    let mut other = 0;
-    while other < object.view_count {
-        let seen = views[other as usize].project(point);
-        if other != sweep.view && seen.in_image {
-            containing += 1;
-            let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
-            let entry = entries.fetch(views[other as usize].texel_at(seen.x, seen.y));
-            let behind = max(seen.depth - entry, 0.0) * reach;
-            let share = weight * fade(behind);
-            if share <= 0.0 {
-                // Only the silhouette counts.
-                if look_up_alpha(&views[other as usize], texels, seen.x, seen.y) < SWEPT_ALPHA {
-                    return OUTSIDE;
-                }
-            } else {
+
+    /// The first plane that may lie inside the hull, and one behind the last: all others are [`OUTSIDE`]. A plane more at
+    /// either end, so that no rounding matters.
+    #[inline]
+    pub fn planes(&self, object: &ObjectBlock, sweep: &SweepBlock) -> (u32, u32) {
+        let most = sweep.plane_count as f32;
+        let first = (self.entry - sweep.near) / sweep.plane_step - 2.0;
+        let end = (self.entry + SWEPT_BEHIND_ENTRY * object.radius - sweep.near) / sweep.plane_step + 2.0;
+        (clamp(first, 0.0, most) as u32, clamp(end, 0.0, most) as u32)
+    }
+
+    /// How badly the other views' colours match the pixel's at the depth of a plane: a mean of absolute differences,
+    /// weighted by `pair_weights[view][other]` (how relevant the other view is to this one; 0 on the diagonal) and by how
+    /// likely the other view sees the place. `entries` are the depths of entry into the hull of all views.
+    ///
+    /// [`OUTSIDE`] where the pixel shows background, or the place is outside the hull, in front of its ray's entry or too
+    /// far behind it.
+    #[inline]
+    #[allow(clippy::too_many_arguments)]
+    pub fn match_cost(
+        &self,
+        object: &ObjectBlock,
+        sweep: &SweepBlock,
+        views: &[CameraBlock],
+        texels: &(impl Fetch<[f32; 4]> + ?Sized),
+        entries: &(impl Fetch<f32> + ?Sized),
+        pair_weights: &[f32],
+        plane: u32,
+    ) -> f32 {
+        let depth = sweep.depth(plane);
+        // Half a plane in front of the entry still touches the hull.
+        let behind_entry = depth - self.entry;
+        if behind_entry < -0.5 * sweep.plane_step || behind_entry > SWEPT_BEHIND_ENTRY * object.radius {
+            return OUTSIDE;
+        }
+        let point = self.origin + self.direction * depth;
+        let reach = 1.0 / (SEEN_BEHIND_ENTRY * object.radius);
+        let (mut sum, mut share_sum) = (NO_WITNESS * MOST_DIFFERENCE, NO_WITNESS);
+        let mut containing = 1;
+        let mut other = 0;
+        while other < object.view_count {
+            let seen = views[other as usize].project(point);
+            if other != sweep.view && seen.in_image {
+                containing += 1;
                 let colour = look_up(&views[other as usize], texels, seen.x, seen.y);
                 if colour[3] < SWEPT_ALPHA {
                     return OUTSIDE;
                 }
-                sum += share * min(mean_difference(&straight(&colour), &own), MOST_DIFFERENCE);
-                share_sum += share;
+                let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
+                let entry = entries.fetch(views[other as usize].texel_at(seen.x, seen.y));
+                let share = weight * fade(max(seen.depth - entry, 0.0) * reach);
+                // Of a view that does not see the place only the silhouette counts.
+                if share > 0.0 {
+                    sum += share * min(mean_difference(&straight(&colour), &self.own), MOST_DIFFERENCE);
+                    share_sum += share;
+                }
             }
+            other += 1;
         }
-        other += 1;
+        if containing < object.least_containing { OUTSIDE } else { sum / share_sum }
     }
-    if containing < object.least_containing { OUTSIDE } else { sum / share_sum }
 }
 
 /// Colour of a premultiplied texel. The divisor is kept away from 0; such texels are masked elsewhere.

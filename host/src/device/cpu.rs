@@ -9,7 +9,7 @@ use viewfuse_core::composite::{CompositeBlock, composite_samples};
 use viewfuse_core::fuse::{FuseBlock, fuse_element};
 use viewfuse_core::photo::hull::hull_entry;
 use viewfuse_core::photo::march::{MarchBlock, march};
-use viewfuse_core::photo::sweep::{SweepBlock, match_cost, mean_column, pick_depth, sum_row};
+use viewfuse_core::photo::sweep::{OUTSIDE, SweepBlock, SweptPixel, mean_column, pick_depth, sum_row};
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock, weigh};
@@ -147,25 +147,20 @@ impl Device for Cpu {
         pair_weights: &Vec<f32>,
         costs: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        let width = sweep.width;
-        for_each_pixel(sweep, costs, |pixel, plane, cost| {
-            let pixel = sweep.first_row * width + pixel;
-            *cost = match_cost(
-                &scene.object,
-                sweep,
-                &scene.views,
-                &scene.texels[..],
-                &entries[..],
-                pair_weights,
-                pixel,
-                plane,
-            );
+        let (width, texels, entries) = (sweep.width, &scene.texels[..], &entries[..]);
+        for_each_pixel(sweep, costs, |pixel, costs| {
+            let swept = SweptPixel::new(sweep, &scene.views, texels, entries, sweep.first_row * width + pixel);
+            let (first, end) = swept.planes(&scene.object, sweep);
+            costs.fill(OUTSIDE);
+            for (cost, plane) in costs[first as usize..end as usize].iter_mut().zip(first..) {
+                *cost = swept.match_cost(&scene.object, sweep, &scene.views, texels, entries, pair_weights, plane);
+            }
         });
         Ok(())
     }
 
     fn sum_row(&self, sweep: &SweepBlock, costs: &Vec<f32>, row_sums: &mut Vec<[f32; 2]>) -> Result<(), Infallible> {
-        for_each_pixel(sweep, row_sums, |pixel, plane, sums| {
+        for_each_plane(sweep, row_sums, |pixel, plane, sums| {
             *sums = sum_row(sweep, costs, pixel, plane);
         });
         Ok(())
@@ -178,7 +173,7 @@ impl Device for Cpu {
         row_sums: &Vec<[f32; 2]>,
         means: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        for_each_pixel(sweep, means, |pixel, plane, mean| {
+        for_each_plane(sweep, means, |pixel, plane, mean| {
             *mean = mean_column(sweep, costs, row_sums, pixel, plane);
         });
         Ok(())
@@ -251,15 +246,21 @@ fn of_view_mut<'a>(scene: &PhotoScene<Cpu>, view: u32, map: &'a mut [f32]) -> &'
     &mut map[first..first + (camera.width * camera.height) as usize]
 }
 
-/// Runs a kernel for every pixel and plane of a band, rows in parallel.
-fn for_each_pixel<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn(u32, u32, &mut T) + Sync) {
+/// Runs a kernel for every pixel of a band, rows in parallel; it gets the values of all planes.
+fn for_each_pixel<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn(u32, &mut [T]) + Sync) {
     let (plane_count, width) = (sweep.plane_count as usize, sweep.width);
     values.par_chunks_mut(plane_count * width as usize).enumerate().for_each(|(row, values)| {
         for (column, values) in values.chunks_exact_mut(plane_count).enumerate() {
-            let pixel = row as u32 * width + column as u32;
-            for (plane, value) in values.iter_mut().enumerate() {
-                kernel(pixel, plane as u32, value);
-            }
+            kernel(row as u32 * width + column as u32, values);
+        }
+    });
+}
+
+/// Runs a kernel for every pixel and plane of a band.
+fn for_each_plane<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn(u32, u32, &mut T) + Sync) {
+    for_each_pixel(sweep, values, |pixel, values| {
+        for (value, plane) in values.iter_mut().zip(0..) {
+            kernel(pixel, plane, value);
         }
     });
 }

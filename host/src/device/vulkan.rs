@@ -157,7 +157,7 @@ impl Device for Vulkan {
         let PhotoScene { object_buffer, views, texels, .. } = scene;
         let arrays =
             [object_buffer.bind(), views.bind(), texels.bind(), entries.bind(), pair_weights.bind(), costs.bind()];
-        self.gpu.dispatch(Kernel::MatchCost, bytes_of(sweep), 0..planes_of(sweep), &arrays)
+        self.gpu.dispatch(Kernel::MatchCost, bytes_of(sweep), 0..sweep.row_count * sweep.width, &arrays)
     }
 
     fn sum_row(

@@ -5,7 +5,7 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pages::{Pages, PagesMut, StartingAt};
-use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_core::photo::sweep::{OUTSIDE, SweepBlock, SweptPixel};
 use viewfuse_core::photo::{ObjectBlock, hull, sweep};
 
 /// Where the ray of pixel number `first + id.x` of a view, the parameter, enters the hull.
@@ -37,7 +37,7 @@ pub fn hull_entry(
     entries.store((views[view as usize].first_texel + pixel) as usize, entry);
 }
 
-/// How badly other views match at plane and pixel number `first + id.x` of the band.
+/// How badly other views match at all planes of pixel number `first + id.x` of the band.
 #[spirv(compute(threads(64), entry_point_name = "match_cost"))]
 #[allow(clippy::too_many_arguments)]
 pub fn match_cost(
@@ -61,12 +61,26 @@ pub fn match_cost(
         return;
     }
     let sweep = &push.parameters;
-    let element = push.piece.first + id.x;
-    let pixel = sweep.first_row * sweep.width + element / sweep.plane_count;
-    let plane = element % sweep.plane_count;
+    let pixel = push.piece.first + id.x;
     let texels = Pages { a: texels_a, b: texels_b, c: texels_c, d: texels_d, shift: page_shift };
     let entries = Pages { a: entries_a, b: entries_b, c: entries_c, d: entries_d, shift: page_shift };
-    costs[element as usize] = sweep::match_cost(object, sweep, views, &texels, &entries, pair_weights, pixel, plane);
+    let swept = SweptPixel::new(sweep, views, &texels, &entries, sweep.first_row * sweep.width + pixel);
+    let (first, end) = swept.planes(object, sweep);
+    let costs_of_pixel = pixel * sweep.plane_count;
+    let mut plane = 0;
+    while plane < first {
+        costs[(costs_of_pixel + plane) as usize] = OUTSIDE;
+        plane += 1;
+    }
+    while plane < end {
+        costs[(costs_of_pixel + plane) as usize] =
+            swept.match_cost(object, sweep, views, &texels, &entries, pair_weights, plane);
+        plane += 1;
+    }
+    while plane < sweep.plane_count {
+        costs[(costs_of_pixel + plane) as usize] = OUTSIDE;
+        plane += 1;
+    }
 }
 
 /// Costs summed over a window's columns at plane and pixel number `first + id.x` of the band.
