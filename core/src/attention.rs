@@ -8,7 +8,7 @@
 //! Layer parameters are row-major `[output][input]` like PyTorch's; every sum starts from the bias and runs over the
 //! inputs in order.
 
-use crate::math::{max, sin_cos, sqrt};
+use crate::math::{abs, max, sin_cos, sqrt, two_product, two_sum};
 use crate::pages::{Fetch, StartingAt};
 use crate::pose::Pose;
 use crate::sources::Sources;
@@ -185,7 +185,13 @@ pub fn cross_attention<const S: usize>(
     target: &Pose,
 ) -> Weights<S> {
     let query = embedding.embed(target);
-    softmax_over(sources, |source| scaled_dot(&query, &embedding.embed(source)))
+    let mut products = Products::<S>::NONE;
+    let mut view = 0;
+    while view < sources.count() {
+        products.add(&query, &embedding.embed(sources.pose(view)));
+        view += 1;
+    }
+    products.softmax()
 }
 
 /// The same from embeddings that were computed before: of one pose as `queries[0..EMBEDDING]`, of `count` sources as
@@ -196,29 +202,73 @@ pub fn attend<const S: usize>(
     count: u32,
 ) -> Weights<S> {
     const { assert!(S > 0) };
-    let count = count.clamp(1, S as u32);
-    let mut logits = [0.0; S];
+    let mut products = Products::<S>::NONE;
     let mut view = 0;
-    while view < count as usize {
-        logits[view] = scaled_dot(queries, &StartingAt { all: keys, first: view * EMBEDDING });
+    while view < count.clamp(1, S as u32) {
+        products.add(queries, &StartingAt { all: keys, first: view as usize * EMBEDDING });
         view += 1;
     }
-    Weights::from_logits(&logits, count)
+    products.softmax()
 }
 
-/// `q . k / sqrt(A)` of two embeddings; the sum runs in order.
-#[inline]
-fn scaled_dot(query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized)) -> f32 {
-    // 1 / sqrt(128) = sqrt(2) / 16
-    const SCALE: f32 = core::f32::consts::SQRT_2 / 16.0;
-    const { assert!(EMBEDDING == 128) };
-    let mut sum = 0.0;
-    let mut feature = 0;
-    while feature < EMBEDDING {
-        sum += query.fetch(feature) * key.fetch(feature);
-        feature += 1;
+/// Scalar products of a query with keys, as rounded sums and what rounding took from them: an error of a logit is a
+/// relative error of its weight, and 128 roundings of sums of 50 would cost 1e-5.
+struct Products<const S: usize> {
+    sums: [f32; S],
+    rests: [f32; S],
+    count: u32,
+}
+
+impl<const S: usize> Products<S> {
+    const NONE: Products<S> = Products { sums: [0.0; S], rests: [0.0; S], count: 0 };
+
+    /// Takes the next key; at most `S` are taken. The sum runs in order.
+    #[inline]
+    fn add(&mut self, query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized)) {
+        let (mut sum, mut rest) = (0.0, 0.0);
+        let mut feature = 0;
+        while feature < EMBEDDING {
+            let (product, lost) = two_product(query.fetch(feature), key.fetch(feature));
+            let (total, carry) = two_sum(sum, product);
+            sum = total;
+            rest += carry + lost;
+            feature += 1;
+        }
+        let view = self.count as usize;
+        if view < S {
+            self.sums[view] = sum;
+            // Where products overflow there is no rest.
+            self.rests[view] = if abs(rest) <= f32::MAX { rest } else { 0.0 };
+            self.count += 1;
+        }
     }
-    sum * SCALE
+
+    /// `softmax(products / sqrt(A))`. Differences from the largest are taken before anything is rounded again.
+    #[inline]
+    fn softmax(&self) -> Weights<S> {
+        // 1 / sqrt(128) = sqrt(2) / 16
+        const SCALE: f32 = core::f32::consts::SQRT_2 / 16.0;
+        const { assert!(EMBEDDING == 128) };
+        let count = (self.count as usize).min(S);
+        let (mut largest, mut largest_rest) = (f32::NEG_INFINITY, 0.0);
+        let mut view = 0;
+        while view < count {
+            if self.sums[view] > largest {
+                largest = self.sums[view];
+                largest_rest = self.rests[view];
+            }
+            view += 1;
+        }
+        let mut logits = [0.0; S];
+        view = 0;
+        while view < count {
+            // Equality first: infinity minus infinity is NaN.
+            let apart = if self.sums[view] == largest { 0.0 } else { self.sums[view] - largest };
+            logits[view] = (apart + (self.rests[view] - largest_rest)) * SCALE;
+            view += 1;
+        }
+        Weights::from_logits(&logits, self.count)
+    }
 }
 
 /// The published cross attention without parameters: softmax of the dot products of the pose features themselves. Raw

@@ -49,22 +49,29 @@ fn relu(values: Vec<Bounded>) -> Vec<Bounded> {
 
 /// The weights of the keys, `keys[source][EMBEDDING]`, for a query.
 ///
-/// An error of a logit is a relative error of its weight, and those of all logits, weighted, come in through the sum: the
-/// largest, which is subtracted from all, cancels.
+/// An error of a logit is a relative error of its weight, and those of all logits, weighted, come in through the sum.
+/// Products are summed with their rounding errors and compared with the largest, so that what is rounded is small.
 pub fn attend(query: &[f32], keys: &[f32]) -> Vec<Bounded> {
-    let scale = Bounded::from(std::f32::consts::SQRT_2 / 16.0);
+    let scale = 1.0 / (EMBEDDING as f64).sqrt();
+    // Sums with their errors leave errors of second order: of 128 products, each of 128 partial sums.
+    let second_order = (EMBEDDING * EMBEDDING) as f64 * ROUNDING * ROUNDING;
     let product = |key: &[f32]| {
-        let terms = query.iter().zip(key).map(|(q, k)| Bounded::from(*q) * Bounded::from(*k));
-        // The scale is 1 / sqrt(EMBEDDING), rounded once.
-        let logit = terms.fold(Bounded::ZERO, |sum, term| sum + term) * scale;
-        Bounded { error: logit.error + ROUNDING * logit.value.abs(), ..logit }
+        let terms = || query.iter().zip(key).map(|(q, k)| f64::from(*q) * f64::from(*k));
+        let size: f64 = terms().map(f64::abs).sum();
+        Bounded { value: terms().sum::<f64>() * scale, error: second_order * size * scale }
     };
     let logits: Vec<Bounded> = keys.chunks_exact(EMBEDDING).map(product).collect();
-    let largest = logits.iter().map(|logit| logit.value).fold(f64::NEG_INFINITY, f64::max);
-    let scores: Vec<f64> = logits.iter().map(|logit| (logit.value - largest).exp()).collect();
+    let largest = logits.iter().fold(Bounded { value: f64::NEG_INFINITY, error: 0.0 }, |largest, logit| {
+        if logit.value > largest.value { *logit } else { largest }
+    });
+    let scores: Vec<f64> = logits.iter().map(|logit| (logit.value - largest.value).exp()).collect();
     let sum: f64 = scores.iter().sum();
-    // The logit's own, the subtraction's, those of the exponential, and of the quotient by the largest score.
-    let error = |logit: &Bounded| logit.error + ROUNDING * (logit.value - largest).abs() + 2.0 * ROUNDING + DIVISION;
+    // The difference from the largest is rounded five times: two differences, their sum, the scale (which is rounded
+    // itself), and once more in the softmax; then there are the exponential, and the quotient by the largest score.
+    let error = |logit: &Bounded| {
+        let apart = (logit.value - largest.value).abs();
+        logit.error + largest.error + 3.0 * ROUNDING * apart + 2.0 * ROUNDING + DIVISION
+    };
     let errors: Vec<f64> = logits.iter().map(error).collect();
     let mean: f64 = errors.iter().zip(&scores).map(|(error, score)| error * score / sum).sum();
     // Additions, the reciprocal of the sum, and the product with it.
