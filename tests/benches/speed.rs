@@ -8,17 +8,20 @@
 //!   look-ups hit the second-level cache: it is the chain of dependent operations that bounds a sample, not memory.
 //! - `prepare`, `encode`, `render`: the stages of the sample scene at its own size, on all cores.
 //! - with `VIEWFUSE_BENCH_SCENE=FOLDER` (a full path): the first view of that scene from all others at 160 pixels across, from the
-//!   photographs in memory to the picture, on all cores.
+//!   photographs in memory to the picture, on the CPU and on each Vulkan device.
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
 use std::path::Path;
+use viewfuse::device::Device;
+use viewfuse::device::choice::vulkan_devices;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::few_shot::target_of;
+use viewfuse::device::vulkan::Vulkan;
+use viewfuse::few_shot::{Target, target_of};
 use viewfuse::field::photo::{PhotoField, find_object};
 use viewfuse::photographs::Album;
 use viewfuse::progress::Progress;
-use viewfuse::render::{RenderOptions, Stage};
+use viewfuse::render::{Frame, RenderOptions, Stage};
 use viewfuse::scene::Scene;
 use viewfuse::weighting::Weighting;
 use viewfuse_core::Vec3;
@@ -27,6 +30,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
+use viewfuse_vulkan::GpuOptions;
 
 /// Cameras spread over the upper part of a sphere, looking at the origin.
 fn spiral(first: u32, count: u32) -> Vec<Pose> {
@@ -130,18 +134,38 @@ fn own_scene(criterion: &mut Criterion) {
     let pinhole = scene.views[0].camera.pinhole;
     let size = [160, (160.0 * pinhole.height() as f32 / pinhole.width() as f32).round() as u32];
     let options = RenderOptions { size: Some(size), ..RenderOptions::default() };
-    let (weighting, field, target) = (Weighting::default_scheme(), PhotoField::default(), target_of(&scene, 0));
-    let mut group = criterion.benchmark_group(format!("own scene, {} sources", sources.len()));
+    let (field, target) = (PhotoField::default(), target_of(&scene, 0));
+    let mut group = criterion.benchmark_group(format!("own scene, {} sources, {}x{}", sources.len(), size[0], size[1]));
     group.sample_size(10);
-    group.bench_function(format!("photographs to picture, {}x{}", size[0], size[1]), |bencher| {
-        bencher.iter(|| {
-            let mut stage =
-                Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &progress).expect("prepared");
-            let latents = stage.encode(&weighting, &progress).expect("encoded");
-            black_box(stage.frame(&weighting, &latents, &target, &progress).expect("rendered"))
-        });
-    });
+    let views = Views { scene: &scene, album: &album, sources: &sources, options: &options, field: &field };
+    group.bench_function("cpu", |bencher| bencher.iter(|| views.picture(&Cpu, &target)));
+    if let Ok((instance, adapters)) = vulkan_devices() {
+        for adapter in adapters.iter().filter(|adapter| adapter.missing.is_empty()) {
+            let device = Vulkan::open(&instance, adapter, &GpuOptions::default()).expect("a device that lacks nothing");
+            group.bench_function(&adapter.name, |bencher| bencher.iter(|| views.picture(&device, &target)));
+        }
+    }
     group.finish();
+}
+
+/// A scene with its photographs in memory.
+struct Views<'a> {
+    scene: &'a Scene,
+    album: &'a Album<'a>,
+    sources: &'a [usize],
+    options: &'a RenderOptions,
+    field: &'a PhotoField,
+}
+
+impl Views<'_> {
+    /// From photographs to a picture.
+    fn picture<D: Device>(&self, device: &D, target: &Target) -> Frame {
+        let Views { scene, album, sources, options, field } = self;
+        let (weighting, progress) = (Weighting::default_scheme(), Progress::hidden());
+        let mut stage = Stage::prepare(scene, album, sources, device, *field, options, &progress).expect("prepared");
+        let latents = stage.encode(&weighting, &progress).expect("encoded");
+        black_box(stage.frame(&weighting, &latents, target, &progress).expect("rendered"))
+    }
 }
 
 criterion_group!(benches, weights, stages, own_scene);

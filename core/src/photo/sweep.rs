@@ -146,13 +146,13 @@ impl SweptPixel {
         }
     }
 
-    /// The first plane that may lie inside the hull, and one behind the last: all others are [`OUTSIDE`]. A plane more at
-    /// either end, so that no rounding matters.
+    /// The first plane that may lie inside the hull, and one behind the last: all others are [`OUTSIDE`]. Half a plane more
+    /// at either end, so that no rounding matters.
     #[inline]
     pub fn planes(&self, object: &ObjectBlock, sweep: &SweepBlock) -> (u32, u32) {
         let most = sweep.plane_count as f32;
-        let first = (self.entry - sweep.near) / sweep.plane_step - 2.0;
-        let end = (self.entry + SWEPT_BEHIND_ENTRY * object.radius - sweep.near) / sweep.plane_step + 2.0;
+        let first = (self.entry - sweep.near) / sweep.plane_step - 1.5;
+        let end = (self.entry + SWEPT_BEHIND_ENTRY * object.radius - sweep.near) / sweep.plane_step + 1.0;
         (clamp(first, 0.0, most) as u32, clamp(end, 0.0, most) as u32)
     }
 

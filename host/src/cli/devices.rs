@@ -3,6 +3,7 @@
 use super::say;
 use super::table::table;
 use clap::Args;
+use comfy_table::CellAlignment;
 use serde_json::json;
 use std::process::ExitCode;
 use viewfuse::device::Device;
@@ -31,6 +32,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let mut rows = table(["device", "name", "kind", "memory", "Vulkan", "driver", "missing"].map(str::to_owned));
+    for column in [1, 2, 5, 6] {
+        if let Some(column) = rows.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Left);
+        }
+    }
     let cpu_name = Cpu.name();
     rows.add_row(["cpu", cpu_name.as_str(), "", "", "", "", "nothing"]);
     for adapter in &adapters {
