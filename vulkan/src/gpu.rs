@@ -165,6 +165,11 @@ impl Gpu {
                         let piece = Piece { first, count: per_piece.min(elements.end - first) };
                         let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
                         let stage = vk::ShaderStageFlags::COMPUTE;
+                        // Pieces write elements of their own, but nobody sees that who looks at whole arrays, as the
+                        // validation layers do. Pieces are large: waiting between them costs nothing.
+                        if dispatches > 0 && gpu.barriers {
+                            barrier(device, commands);
+                        }
                         device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
                         device.cmd_dispatch(commands, piece.count.div_ceil(WORKGROUP), 1, 1);
                         dispatches += 1;
