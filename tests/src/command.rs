@@ -17,6 +17,15 @@ pub struct Outcome {
     pub stderr: String,
 }
 
+impl Outcome {
+    /// Runs a command to its end.
+    pub fn of(mut command: Command) -> Outcome {
+        let output = command.output().expect("the command starts");
+        let text = |bytes| String::from_utf8(bytes).expect("the command prints UTF-8");
+        Outcome { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    }
+}
+
 /// The command, ready to be started in a folder with arguments that are separated by blanks.
 pub fn command(binary: &str, folder: &Path, arguments: &str) -> Command {
     let mut command = Command::new(binary);
@@ -26,9 +35,7 @@ pub fn command(binary: &str, folder: &Path, arguments: &str) -> Command {
 
 /// Runs the command to its end.
 pub fn run(binary: &str, folder: &Path, arguments: &str) -> Outcome {
-    let output = command(binary, folder, arguments).output().expect("the command starts");
-    let text = |bytes| String::from_utf8(bytes).expect("the command prints UTF-8");
-    Outcome { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+    Outcome::of(command(binary, folder, arguments))
 }
 
 /// Runs the command, which must succeed and say nothing on standard error (no progress bar either: it is no terminal).
@@ -44,8 +51,15 @@ pub fn done(binary: &str, folder: &Path, arguments: &str) -> String {
 /// folder as it was.
 #[track_caller]
 pub fn assert_refused(binary: &str, folder: &Path, arguments: &str, parts: &[&str]) {
+    assert_command_refused(command(binary, folder, arguments), folder, parts);
+}
+
+/// The same for a command that was made with [`command`] and changed.
+#[track_caller]
+pub fn assert_command_refused(command: Command, folder: &Path, parts: &[&str]) {
     let before = files_below(folder);
-    let Outcome { code, stdout, stderr } = run(binary, folder, arguments);
+    let arguments = command.get_args().map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ");
+    let Outcome { code, stdout, stderr } = Outcome::of(command);
     assert_eq!(code, Some(1), "viewfuse {arguments}\n{stderr}");
     let message = stderr.strip_prefix("viewfuse: ").and_then(|rest| rest.strip_suffix('\n')).unwrap_or_default();
     assert!(!message.is_empty() && !message.contains('\n') && message.len() < 500, "viewfuse {arguments}\n{stderr}");

@@ -1,6 +1,7 @@
 //! Arrays in a device's memory.
 
-use crate::handle::Memory;
+use crate::error::VulkanError;
+use crate::handle::{Handle, Memory};
 use crate::kernel::Layout;
 use ash::vk;
 use std::marker::PhantomData;
@@ -41,9 +42,11 @@ pub struct Bound<'a>(pub(crate) &'a Arc<Array>);
 
 /// Memory of an array, and when it was last used.
 pub(crate) struct Array {
+    /// At least one.
     pub(crate) chunks: Vec<Memory>,
     /// Elements of every chunk but the last.
     pub(crate) chunk_len: usize,
+    /// Elements in all.
     pub(crate) len: usize,
     /// Bytes of an element.
     pub(crate) stride: usize,
@@ -54,6 +57,15 @@ pub(crate) struct Array {
 }
 
 impl Array {
+    /// Handles of one device mean nothing to another.
+    pub(crate) fn check_owner(&self, handle: &Handle) -> Result<(), VulkanError> {
+        let owner = self.chunks[0].owner();
+        match std::ptr::eq(owner, handle) {
+            true => Ok(()),
+            false => Err(VulkanError::OtherDevice { device: handle.name.clone(), owner: owner.name.clone() }),
+        }
+    }
+
     /// Where elements from `first` on lie: the chunk, the byte in it, and how many elements follow there.
     pub(crate) fn place(&self, first: usize) -> (&Memory, u64, usize) {
         let chunk = (first / self.chunk_len).min(self.chunks.len() - 1);

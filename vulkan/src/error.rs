@@ -105,6 +105,14 @@ pub enum VulkanError {
         /// What does not fit.
         detail: String,
     },
+    /// An array lies in the memory of another device.
+    #[error("the array lies in the memory of {owner}, not of {device}")]
+    OtherDevice {
+        /// The device that was to use it.
+        device: String,
+        /// The device that has it.
+        owner: String,
+    },
     /// Any other call that failed.
     #[error("{call}: {result}")]
     Call {

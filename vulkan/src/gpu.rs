@@ -25,16 +25,19 @@ pub struct GpuOptions {
     /// Whether what depends on one another is kept apart. Without barriers results are wrong; it is how one shows that the
     /// validation layers would have said so.
     pub barriers: bool,
+    /// How long, at the least, a device that is closed is waited for. One that still works then is left alone with all
+    /// that it uses.
+    pub closing: Duration,
     /// Limits to keep to where they are lower than the device's own: so can work that needs cutting be tested anywhere.
     pub limits: Limits,
 }
 
 impl Default for GpuOptions {
-    /// Two minutes, and the device's own limits.
+    /// Two minutes, ten seconds, and the device's own limits.
     fn default() -> GpuOptions {
         let limits =
             Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
-        GpuOptions { time_limit: Duration::from_secs(120), barriers: true, limits }
+        GpuOptions { time_limit: Duration::from_secs(120), barriers: true, closing: Duration::from_secs(10), limits }
     }
 }
 
@@ -90,7 +93,8 @@ impl Gpu {
         };
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
-        let submissions = Submissions::new(&handle, adapter.queue_family, timestamps, options.time_limit)?;
+        let submissions =
+            Submissions::new(&handle, adapter.queue_family, timestamps, options.time_limit, options.closing)?;
         let pipelines = Pipelines::new(&handle)?;
         // The longest page that is within the limits in every array, but long enough to start at allowed offsets.
         let page_len =
@@ -127,8 +131,8 @@ impl Gpu {
     /// both as in its list.
     ///
     /// # Errors
-    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::Limit`] if an array cannot be bound, and others if the
-    /// device fails, or failed before.
+    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array cannot
+    /// be bound, and others if the device fails, or failed before.
     pub fn dispatch(
         &self,
         kernel: Kernel,
@@ -161,6 +165,11 @@ impl Gpu {
                         let piece = Piece { first, count: per_piece.min(elements.end - first) };
                         let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
                         let stage = vk::ShaderStageFlags::COMPUTE;
+                        // Pieces write elements of their own, but nobody sees that who looks at whole arrays, as the
+                        // validation layers do. Pieces are large: waiting between them costs nothing.
+                        if dispatches > 0 && gpu.barriers {
+                            barrier(device, commands);
+                        }
                         device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
                         device.cmd_dispatch(commands, piece.count.div_ceil(WORKGROUP), 1, 1);
                         dispatches += 1;
@@ -288,24 +297,42 @@ impl Gpu {
         if arrays.len() != listed.len() {
             return refuse(format!("{} arrays instead of {}", arrays.len(), listed.len()));
         }
+        let (range, allocation) = (self.handle.limits.buffer_range, self.handle.limits.allocation);
+        // What makes pages as short as they are.
+        let (page_limit, most_page_bytes) = match range <= allocation {
+            true => ("maxStorageBufferRange", range),
+            false => ("maxMemoryAllocationSize", allocation),
+        };
         for (array, bound) in listed.iter().zip(arrays) {
+            bound.0.check_owner(&self.handle)?;
             let (len, stride) = (bound.0.len, bound.0.stride);
-            if array.stride % stride != 0 {
+            // Pages are counted in elements: there they must be the kernel's own.
+            let fits = match array.layout {
+                Layout::Whole => array.stride % stride == 0,
+                Layout::Pages => array.stride == stride,
+            };
+            if !fits {
                 return refuse(format!("{} of {stride} bytes an element instead of {}", array.name, array.stride));
             }
             let limit = |limit, needed, available| {
-                let what = format!("array {} of kernel {}", array.name, kernel.name());
+                let pages = if array.layout == Layout::Pages { "a page of " } else { "" };
+                let what = format!("{pages}array {} of kernel {}", array.name, kernel.name());
                 Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available })
             };
-            let (bytes, range) = ((len * stride) as u64, self.handle.limits.buffer_range);
+            let bytes = (len * stride) as u64;
+            let page_bytes = (len.min(1 << self.page_shift) * stride) as u64;
             match array.layout {
                 Layout::Whole if bytes > range => return limit("maxStorageBufferRange", bytes, range),
                 Layout::Whole if bound.0.chunks.len() > 1 => {
-                    return limit("maxMemoryAllocationSize", bytes, self.handle.limits.allocation);
+                    return limit("maxMemoryAllocationSize", bytes, allocation);
+                }
+                // Pages have a least length, for their offsets.
+                Layout::Pages if page_bytes > most_page_bytes => {
+                    return limit(page_limit, page_bytes, most_page_bytes);
                 }
                 Layout::Pages if len > MOST_PAGES << self.page_shift => {
-                    let most = ((MOST_PAGES << self.page_shift) * stride) as u64;
-                    return limit("maxStorageBufferRange of four pages", bytes, most);
+                    let page_len = len.div_ceil(MOST_PAGES).next_power_of_two() as u64;
+                    return limit(page_limit, page_len * WIDEST_PAGED, most_page_bytes);
                 }
                 _ => {}
             }

@@ -81,10 +81,15 @@ impl Handle {
         })
     }
 
+    /// Whether so many more bytes may be used.
+    pub(crate) fn has_room(&self, bytes: u64) -> bool {
+        self.used.load(Ordering::Relaxed).saturating_add(bytes) <= self.limits.memory
+    }
+
     /// A buffer of this many bytes.
     pub(crate) fn memory(self: &Arc<Self>, bytes: u64, location: MemoryLocation) -> Result<Memory, VulkanError> {
         let out_of_memory = || self.out_of_memory(bytes);
-        if self.used.load(Ordering::Relaxed).saturating_add(bytes) > self.limits.memory {
+        if !self.has_room(bytes) {
             return Err(out_of_memory());
         }
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
@@ -125,7 +130,7 @@ impl Handle {
         self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn out_of_memory(&self, asked: u64) -> VulkanError {
+    pub(crate) fn out_of_memory(&self, asked: u64) -> VulkanError {
         let total = self.limits.memory;
         let mut available = total.saturating_sub(self.used.load(Ordering::Relaxed));
         if self.adapter.has_memory_budget {
@@ -198,6 +203,11 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
+    /// The device that it is memory of.
+    pub(crate) fn owner(&self) -> &Handle {
+        &self.handle
+    }
+
     /// What the host sees of it, if it is in a place that the host sees.
     pub(crate) fn mapped(&mut self) -> Option<&mut [u8]> {
         self.allocation.as_mut().and_then(Allocation::mapped_slice_mut)

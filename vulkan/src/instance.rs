@@ -4,6 +4,7 @@ use crate::adapter::Adapter;
 use crate::error::{VulkanError, failed};
 use crate::messages::Messages;
 use ash::{ext, khr, vk};
+use std::env;
 use std::ffi::CStr;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -139,11 +140,18 @@ fn create(entry: &ash::Entry, options: &InstanceOptions, messages: &Messages) ->
     let info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions).flags(flags);
     // SAFETY: everything that `info` points to lives until the call returns.
     unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
-        vk::Result::ERROR_INCOMPATIBLE_DRIVER => VulkanError::NoDevice {
-            detail: "no driver is installed; Debian's software driver is the package mesa-vulkan-drivers".to_owned(),
-        },
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => VulkanError::NoDevice { detail: no_driver() },
         result => VulkanError::Call { call: "vkCreateInstance", result },
     })
+}
+
+/// Why there is none. The loader does not say which files it could not use; these variables tell it where to look.
+fn no_driver() -> String {
+    let told = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|name| Some((name, env::var_os(name)?)));
+    match told {
+        Some((name, files)) => format!("no driver can be loaded; {name} is {}", files.display()),
+        None => "no driver is installed; Debian's software driver is the package mesa-vulkan-drivers".to_owned(),
+    }
 }
 
 /// What the validation layer brings with it.

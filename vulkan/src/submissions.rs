@@ -15,9 +15,6 @@ use std::time::Duration;
 /// How many submissions are on their way at once.
 const MOST_IN_FLIGHT: usize = 8;
 
-/// How long a device is waited for, at the least, before it is given up when it is closed.
-const LAST_WAIT: Duration = Duration::from_secs(10);
-
 /// What a submission did, for whoever counts.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Done {
@@ -42,6 +39,8 @@ pub(crate) struct Submissions {
     free: Vec<Submission>,
     running: VecDeque<Submission>,
     time_limit: Duration,
+    /// The least time limit when the device is closed.
+    closing: Duration,
     /// Nanoseconds of a timestamp's unit; `None` without timestamps.
     tick: Option<f32>,
     /// Bits of a timestamp that mean something.
@@ -55,6 +54,7 @@ impl Submissions {
         queue_family: u32,
         timestamps: Option<(f32, u32)>,
         time_limit: Duration,
+        closing: Duration,
     ) -> Result<Submissions, VulkanError> {
         let info = vk::CommandPoolCreateInfo::default()
             .queue_family_index(queue_family)
@@ -67,6 +67,7 @@ impl Submissions {
             free: Vec::new(),
             running: VecDeque::new(),
             time_limit,
+            closing,
             tick: timestamps.map(|(period, _)| period),
             tick_mask: timestamps.map_or(0, |(_, bits)| u64::MAX >> (64 - bits.clamp(1, 64))),
             handle: handle.clone(),
@@ -96,6 +97,11 @@ impl Submissions {
 
     /// Takes back a submission whose recording failed.
     pub(crate) fn discard(&mut self, mut submission: Submission) {
+        let no_flags = vk::DescriptorPoolResetFlags::empty();
+        // A set that was allocated before the failure would leave no room for the next one. By the letter this call cannot
+        // fail; if it does, the next allocation says so.
+        // SAFETY: the submission is not on its way.
+        let _ = unsafe { self.handle.device.reset_descriptor_pool(submission.descriptors, no_flags) };
         submission.held.clear();
         submission.kernel = None;
         self.free.push(submission);
@@ -261,7 +267,7 @@ impl Submissions {
 impl Drop for Submissions {
     fn drop(&mut self) {
         // One that ran out of time may still run: it gets a little longer, then it is left alone with all that it uses.
-        self.time_limit = self.time_limit.max(LAST_WAIT);
+        self.time_limit = self.time_limit.max(self.closing);
         while !self.running.is_empty() {
             match self.wait_for_oldest(&mut |_| ()) {
                 Ok(()) | Err(VulkanError::Validation { .. }) => {}

@@ -63,8 +63,9 @@ impl Gpu {
     /// The values of an array, when everything that was dispatched before is done.
     ///
     /// # Errors
-    /// If the device fails, or failed before.
+    /// If the device fails, or failed before; [`VulkanError::OtherDevice`].
     pub fn download<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
+        buffer.array.check_owner(&self.handle)?;
         let mut values = vec![T::zeroed(); buffer.len()];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
         self.with_state(|gpu, state| {
@@ -104,23 +105,46 @@ impl Gpu {
 
     /// Memory for an array: one buffer, or one a page where no allocation is large enough.
     fn array<T: Pod>(&self, len: usize) -> Result<Buffer<T>, VulkanError> {
+        const { assert!(size_of::<T>() > 0, "elements without bytes cannot be counted on a device") };
         let stride = size_of::<T>();
-        let affordable = usize::try_from(self.handle.limits.allocation).unwrap_or(usize::MAX) / stride;
-        let chunk_len = if len <= affordable { len.max(1) } else { 1 << self.page_shift };
-        let chunks = (0..len.max(1)).step_by(chunk_len).map(|first| {
-            let bytes = (chunk_len.min(len.max(1) - first) * stride) as u64;
-            match self.handle.memory(bytes, MemoryLocation::GpuOnly) {
-                // What was let go while submissions that use it were on their way is free when they are done.
-                Err(VulkanError::OutOfMemory { .. }) => {
-                    self.wait()?;
-                    self.handle.memory(bytes, MemoryLocation::GpuOnly)
-                }
-                memory => memory,
+        let available = self.handle.limits.allocation;
+        let affordable = usize::try_from(available & !3).unwrap_or(usize::MAX) / stride;
+        if affordable == 0 {
+            let (what, needed) =
+                (format!("an array of {stride} bytes an element"), (stride as u64).next_multiple_of(4));
+            let limit = "maxMemoryAllocationSize";
+            return Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available });
+        }
+        // Pages are short enough for elements that kernels bind in pages; wider ones are never bound so.
+        let chunk_len = if len <= affordable { len.max(1) } else { affordable.min(1 << self.page_shift) };
+        let chunks = match self.chunks(len, chunk_len, stride) {
+            // What was let go while submissions that use it were on their way is free when they are done.
+            Err(VulkanError::OutOfMemory { .. }) => {
+                self.wait()?;
+                self.chunks(len, chunk_len, stride)?
             }
-        });
-        let chunks = chunks.collect::<Result<_, _>>()?;
+            chunks => chunks?,
+        };
         let (read_in, written_in) = (Stretch::default(), Stretch::default());
         Ok(Buffer::new(Array { chunks, chunk_len, len, stride, read_in, written_in }))
+    }
+
+    /// Memory for `len` elements, but at least one, `chunk_len` in each piece. All of it or none: what cannot be had as a
+    /// whole is told before the first piece is taken.
+    fn chunks(&self, len: usize, chunk_len: usize, stride: usize) -> Result<Vec<Memory>, VulkanError> {
+        // Fills take multiples of four bytes only.
+        let bytes = |count: usize| (count as u64).saturating_mul(stride as u64).checked_next_multiple_of(4);
+        let bytes = |count: usize| bytes(count).unwrap_or(u64::MAX);
+        let len = len.max(1);
+        if !self.handle.has_room(bytes(len)) {
+            return Err(self.handle.out_of_memory(bytes(len)));
+        }
+        let chunk = |first: usize| self.handle.memory(bytes(chunk_len.min(len - first)), MemoryLocation::GpuOnly);
+        (0..len).step_by(chunk_len).map(chunk).collect::<Result<_, _>>().map_err(|error| match error {
+            // The pieces before it are given back: the array as a whole is what there is no room for.
+            VulkanError::OutOfMemory { .. } => self.handle.out_of_memory(bytes(len)),
+            error => error,
+        })
     }
 
     fn staging_bytes(&self) -> usize {

@@ -12,7 +12,8 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse_vulkan::{Adapter, Missing, version};
 
 #[derive(Args)]
-#[command(after_help = "The column `device` is what --device takes. Exit code 0, also where there is no Vulkan.")]
+#[command(after_help = "Example:\n  viewfuse devices\n\n\
+    The column `device` is what --device takes. Exit code 0, also where there is no Vulkan.")]
 pub(crate) struct Arguments {
     /// Print JSON instead of a table
     #[arg(long)]

@@ -1,0 +1,124 @@
+//! `viewfuse devices`, the option `--device`, and `check` of all devices. What is there is asked of the library: on a
+//! machine without Vulkan it is the CPU alone.
+
+use super::{BINARY, done};
+use serde_json::{Value, json};
+use viewfuse::device::choice::vulkan_devices;
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
+use viewfuse_tests::scenes::Folder;
+use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_vulkan::{Adapter, Missing};
+
+/// Every Vulkan device, or why there is none.
+fn adapters() -> (Vec<Adapter>, Option<String>) {
+    match vulkan_devices() {
+        Ok((_, adapters)) => (adapters, None),
+        Err(error) => (Vec::new(), Some(error.to_string())),
+    }
+}
+
+#[test]
+fn devices_lists_what_is_there() {
+    let folder = Folder::new();
+    let (adapters, problem) = adapters();
+    let printed = done(folder.path(), "devices");
+    let row = |start: &str, name: &str| {
+        let is_it = |line: &&str| line.split_whitespace().next() == Some(start) && line.contains(name);
+        assert_eq!(printed.lines().filter(is_it).count(), 1, "{start} {name}:\n{printed}");
+    };
+    row("cpu", "threads");
+    for adapter in &adapters {
+        row(&format!("vulkan:{}", adapter.index), &adapter.name);
+        for missing in &adapter.missing {
+            assert!(printed.contains(&missing.to_string()), "{printed}");
+        }
+    }
+    assert!(problem.is_none_or(|problem| printed.contains(&problem)), "{printed}");
+    assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
+}
+
+#[test]
+fn devices_as_json() {
+    let (adapters, problem) = adapters();
+    let report: Value = serde_json::from_str(&done(Folder::new().path(), "devices --json")).expect("JSON");
+    assert!(report["cpu"].as_str().is_some_and(|cpu| cpu.starts_with("cpu (")), "{report}");
+    assert_eq!(report["vulkan_problem"], json!(problem));
+    let listed = report["vulkan"].as_array().expect("a list");
+    assert_eq!(listed.len(), adapters.len());
+    for (device, adapter) in listed.iter().zip(&adapters) {
+        assert_eq!(device["device"], format!("vulkan:{}", adapter.index));
+        assert_eq!((&device["name"], &device["driver"]), (&json!(adapter.name), &json!(adapter.driver)));
+        assert_eq!(device["missing"], json!(adapter.missing.iter().map(Missing::to_string).collect::<Vec<_>>()));
+        assert_eq!(device["buffer_range_bytes"], json!(adapter.limits.buffer_range));
+    }
+}
+
+#[test]
+fn devices_that_are_not_there_are_refused() {
+    let scene = toy();
+    let render = |device: &str| format!("render toy --targets 20 --size 16x16 -o out --device {device}");
+    for device in ["nonsense", "gpu", "vulkan:", "vulkan0", "cpu:1", "VULKAN"] {
+        let parts = [device, "auto, cpu, vulkan, vulkan:NUMBER, vulkan:NAME", "viewfuse devices"];
+        assert_wrong_arguments(BINARY, scene.path(), &render(device), &parts);
+    }
+    assert_wrong_arguments(
+        BINARY,
+        scene.path(),
+        &format!("{} --time-limit 0", render("cpu")),
+        &["from 0.001 to 86400"],
+    );
+    let (adapters, problem) = adapters();
+    for (device, wanted) in [("vulkan:99", "99"), ("vulkan:nonsense", "nonsense")] {
+        // Without any, that is what is said.
+        let mut parts = vec![problem.as_deref().unwrap_or(wanted)];
+        parts.extend(adapters.iter().map(|adapter| adapter.name.as_str()));
+        assert_refused(BINARY, scene.path(), &render(device), &parts);
+    }
+}
+
+#[test]
+fn the_device_is_in_the_record() {
+    let scene = toy();
+    let (adapters, _) = adapters();
+    let usable = adapters.iter().find(|adapter| adapter.missing.is_empty());
+    let expected = usable.map(|adapter| (format!("vulkan:{}", adapter.index), format!("vulkan ({})", adapter.name)));
+    for (device, name) in [("cpu".to_owned(), "cpu (".to_owned())].into_iter().chain(expected) {
+        let arguments = format!("render toy --targets 20 --views 3 --size 16x16 --device {device} -o out");
+        let printed = done(scene.path(), &arguments);
+        assert!(printed.contains("device: asked for"), "{printed}");
+        let text = std::fs::read(scene.path().join("out/run.json")).expect("a run record");
+        let record: Value = serde_json::from_slice(&text).expect("JSON");
+        assert!(record["device"].as_str().is_some_and(|device| device.starts_with(&name)), "{record}");
+        assert_eq!(record["device_reason"], "asked for");
+        // Devices that count say what their kernels took.
+        let kernels = record["kernels"].as_array().map_or(0, Vec::len);
+        assert_eq!(kernels > 0, device != "cpu", "{record}");
+    }
+}
+
+#[test]
+fn check_has_every_kernel_on_every_device() {
+    let report: Value = serde_json::from_str(&done(Folder::new().path(), "check --seeds 1 --json")).expect("JSON");
+    let devices = report["devices"].as_array().expect("a list");
+    let names: Vec<&str> = devices.iter().filter_map(|device| device["device"].as_str()).collect();
+    let (adapters, _) = adapters();
+    let usable = adapters.iter().filter(|adapter| adapter.missing.is_empty());
+    let expected: Vec<String> = usable.map(|adapter| format!("vulkan ({})", adapter.name)).collect();
+    assert!(names[0].starts_with("cpu (") && names[1..] == expected, "{names:?} instead of the CPU and {expected:?}");
+    for device in devices {
+        let kernels = device["kernels"].as_array().expect("a list");
+        let names: Vec<&str> = kernels.iter().filter_map(|kernel| kernel["kernel"].as_str()).collect();
+        assert_eq!(names, Kernel::ALL.map(Kernel::name));
+        let is_cpu = device["device"].as_str().is_some_and(|name| name.starts_with("cpu"));
+        for kernel in kernels {
+            assert!(
+                kernel["breach"].is_null() && kernel["absolute"].as_f64().is_some_and(|most| most > 0.0),
+                "{kernel}"
+            );
+            assert_eq!(kernel["versus_cpu"].is_null(), is_cpu, "{kernel}");
+        }
+        let picture = &device["picture"];
+        assert!(picture["breach"].is_null() && picture["versus_cpu"].is_null() == is_cpu, "{picture}");
+        assert!(is_cpu || picture["versus_cpu"]["worst"].as_u64().is_some_and(|worst| worst <= 1), "{picture}");
+    }
+}

@@ -1,0 +1,153 @@
+//! Arguments that are not a kernel's own, devices that lack something or are not there.
+
+use crate::candidate::{Candidate, Test, assert_works};
+use bytemuck::bytes_of;
+use libtest_mimic::Failed;
+use viewfuse_core::fuse::FuseBlock;
+use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Limits, Missing, VulkanError};
+
+pub(crate) const TESTS: &[Test] = &[
+    Test::new("wrong_arguments_are_refused", wrong_arguments_are_refused),
+    Test::new("narrower_elements_in_pages_are_refused", narrower_elements_in_pages_are_refused),
+    Test::new("arrays_of_another_device_are_refused", arrays_of_another_device_are_refused),
+    Test::new("nothing_to_do_is_done", nothing_to_do_is_done),
+    Test::new("a_device_that_lacks_something_is_not_opened", a_device_that_lacks_something_is_not_opened),
+    Test::new("devices_are_chosen_by_number_and_name", devices_are_chosen_by_number_and_name),
+];
+
+const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3 };
+
+fn detail(outcome: Result<(), VulkanError>) -> Result<String, Failed> {
+    match outcome {
+        Err(VulkanError::Arguments { kernel: "fuse_views" | "hull_entry", detail }) => Ok(detail),
+        other => Err(format!("{other:?}").into()),
+    }
+}
+
+fn wrong_arguments_are_refused(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    let (weights, latents) = (gpu.upload(&[0.25_f32, 0.75])?, gpu.upload(&[1.0_f32, 2.0, 3.0, 5.0, 6.0, 7.0])?);
+    let fused = gpu.zeros::<f32>(3)?;
+    let right = [weights.bind(), latents.bind(), fused.bind()];
+    let parameters = bytes_of(&BLOCK);
+    let run = |parameters: &[u8], arrays: &[_]| gpu.dispatch(Kernel::FuseViews, parameters, 0..3, arrays);
+
+    assert_eq!(detail(run(&parameters[1..], &right))?, "7 bytes of parameters instead of 8");
+    assert_eq!(detail(run(&[0; 16], &right))?, "16 bytes of parameters instead of 8");
+    assert_eq!(detail(run(&[], &right))?, "0 bytes of parameters instead of 8");
+    assert_eq!(detail(run(parameters, &right[1..]))?, "2 arrays instead of 3");
+    assert_eq!(detail(run(parameters, &[right[0]; 4]))?, "4 arrays instead of 3");
+    assert_eq!(detail(run(parameters, &[]))?, "0 arrays instead of 3");
+    let wide = gpu.zeros::<[f32; 4]>(3)?;
+    assert_eq!(
+        detail(run(parameters, &[right[0], wide.bind(), right[2]]))?,
+        "latents of 16 bytes an element instead of 4"
+    );
+    // None of them ran; the right ones do.
+    assert_eq!(gpu.tally(Kernel::FuseViews).dispatches, 0);
+    run(parameters, &right)?;
+    assert_eq!(gpu.download(&fused)?, [4.0, 5.0, 6.0]);
+    assert_eq!(gpu.tally(Kernel::FuseViews).dispatches, 1);
+    Ok(())
+}
+
+/// Flat numbers may be bound where a kernel wants rows of them, but not in pages, which are counted in elements.
+fn narrower_elements_in_pages_are_refused(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    let listed = Kernel::HullEntry.arrays();
+    let [object, views] = [listed[0].stride, listed[1].stride].map(|stride| gpu.zeros::<u32>(stride / 4));
+    let (texels, entries) = (gpu.zeros::<u32>(4)?, gpu.zeros::<u32>(1)?);
+    let arrays = [object?, views?, texels, entries];
+    let outcome = gpu.dispatch(Kernel::HullEntry, &[0; 4], 0..1, &arrays.each_ref().map(|array| array.bind()));
+    assert_eq!(detail(outcome)?, "texels of 4 bytes an element instead of 16");
+    Ok(())
+}
+
+fn arrays_of_another_device_are_refused(candidate: &Candidate) -> Result<(), Failed> {
+    let (gpu, other) = (candidate.gpu(&GpuOptions::default())?, candidate.gpu(&GpuOptions::default())?);
+    let [own, foreign] = [gpu.zeros::<f32>(6)?, other.zeros::<f32>(6)?];
+    let (downloaded, arrays) = (gpu.download(&foreign), [own.bind(), foreign.bind(), own.bind()]);
+    let dispatched = gpu.dispatch(Kernel::FuseViews, bytes_of(&BLOCK), 0..3, &arrays);
+    for outcome in [downloaded.map(|_| ()), dispatched] {
+        let is_refused = matches!(&outcome, Err(VulkanError::OtherDevice { owner, .. }) if *owner == other.name());
+        assert!(is_refused, "{outcome:?}");
+    }
+    assert_works(&gpu)?;
+    assert_works(&other)?;
+    Ok(())
+}
+
+fn nothing_to_do_is_done(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    let nothing = gpu.upload::<f32>(&[])?;
+    let arrays = [nothing.bind(); 3];
+    // No element; one element of arrays that have none.
+    for elements in [0..0, 7..7, 0..1] {
+        gpu.dispatch(Kernel::FuseViews, bytes_of(&FuseBlock { view_count: 0, stride: 0 }), elements, &arrays)?;
+    }
+    assert!(gpu.download(&nothing)?.is_empty());
+    assert_eq!(gpu.tally(Kernel::FuseViews).dispatches, 1);
+    // Limits of nothing are those of one workgroup.
+    let limits = Limits { workgroup_count: 0, ..GpuOptions::default().limits };
+    assert_works(&candidate.gpu(&GpuOptions { limits, ..GpuOptions::default() })?)?;
+    Ok(())
+}
+
+fn named(candidate: &Candidate, index: usize, name: &str) -> Adapter {
+    let mut adapter = candidate.adapter.clone();
+    (adapter.index, adapter.name) = (index, name.to_owned());
+    adapter
+}
+
+fn lacking(candidate: &Candidate) -> Adapter {
+    let missing = vec![
+        Missing::Feature("vulkanMemoryModel"),
+        Missing::Limit { name: "maxPushConstantsSize", needed: 112, found: 64 },
+        Missing::ComputeQueue,
+    ];
+    let mut adapter = candidate.adapter.clone();
+    adapter.missing = missing;
+    adapter
+}
+
+fn a_device_that_lacks_something_is_not_opened(candidate: &Candidate) -> Result<(), Failed> {
+    let lacking = lacking(candidate);
+    let expected = VulkanError::Missing { device: lacking.name.clone(), missing: lacking.missing.clone() };
+    let opened = Gpu::open(&candidate.instance, &lacking, &GpuOptions::default()).err();
+    assert_eq!(opened.as_ref(), Some(&expected));
+    let text = expected.to_string();
+    for part in ["the feature vulkanMemoryModel", "maxPushConstantsSize of 112 (it has 64)", "a queue that computes"] {
+        assert!(text.contains(part) && text.contains(&lacking.name), "{text}");
+    }
+    // Asked for, it is an error; otherwise the next one is taken.
+    let able = named(candidate, 1, "able");
+    let both = [lacking, able];
+    assert_eq!(Adapter::choose(&both, "0").err(), Some(expected.clone()));
+    assert_eq!(Adapter::choose(&both[..1], "").err(), Some(expected));
+    assert_eq!(Adapter::choose(&both, "")?.index, 1);
+    Ok(())
+}
+
+fn devices_are_chosen_by_number_and_name(candidate: &Candidate) -> Result<(), Failed> {
+    let adapters =
+        [named(candidate, 0, "Voodoo 3 (AGP)"), named(candidate, 1, "Parhelia 512"), named(candidate, 2, "Voodoo 5")];
+    for (wanted, index) in
+        [("0", 0), ("2", 2), ("voodoo 5", 2), ("VOODOO", 0), ("hel", 1), ("512 ", usize::MAX), ("", 0)]
+    {
+        match Adapter::choose(&adapters, wanted) {
+            Ok(chosen) => assert_eq!(chosen.index, index, "{wanted}"),
+            Err(VulkanError::NoDevice { detail }) if index == usize::MAX => {
+                assert!(adapters.iter().all(|adapter| detail.contains(&adapter.name)), "{detail}");
+            }
+            Err(error) => return Err(format!("{wanted}: {error}").into()),
+        }
+    }
+    for wanted in ["3", "-1", "nonsense"] {
+        assert!(
+            matches!(Adapter::choose(&adapters, wanted), Err(VulkanError::NoDevice { detail }) if detail.contains(wanted))
+        );
+    }
+    assert!(matches!(Adapter::choose(&[], ""), Err(VulkanError::NoDevice { .. })));
+    Ok(())
+}

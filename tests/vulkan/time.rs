@@ -1,0 +1,84 @@
+//! A kernel that takes too long.
+
+use crate::candidate::{Candidate, Test, assert_works};
+use crate::child;
+use bytemuck::bytes_of;
+use libtest_mimic::Failed;
+use std::time::{Duration, Instant};
+use viewfuse_core::fuse::FuseBlock;
+use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_vulkan::{Gpu, GpuOptions, VulkanError};
+
+pub(crate) const TESTS: &[Test] = &[
+    Test::new("a_time_limit_expires", a_time_limit_expires),
+    Test::new("a_device_that_works_on_is_left_alone", a_device_that_works_on_is_left_alone),
+];
+
+const LIMIT: Duration = Duration::from_millis(5);
+/// Elements of the long kernel.
+const COUNT: u32 = 1 << 12;
+
+/// Sends a kernel on its way that takes as long as one likes: it adds the same number again and again.
+pub(crate) fn add_again(gpu: &Gpu, times: u32) -> Result<(), VulkanError> {
+    let [weights, latents, fused] =
+        [gpu.zeros::<f32>(times as usize)?, gpu.zeros(COUNT as usize)?, gpu.zeros(COUNT as usize)?];
+    // What was asked for before has the time limit as well.
+    gpu.wait()?;
+    let arrays = [weights.bind(), latents.bind(), fused.bind()];
+    gpu.dispatch(Kernel::FuseViews, bytes_of(&FuseBlock { view_count: times, stride: 0 }), 0..COUNT, &arrays)
+}
+
+/// So many additions as take at least this long.
+pub(crate) fn times_that_take(gpu: &Gpu, time: Duration) -> Result<u32, VulkanError> {
+    let mut times = 1 << 10;
+    loop {
+        let start = Instant::now();
+        add_again(gpu, times)?;
+        gpu.wait()?;
+        if start.elapsed() >= time || times >= 1 << 27 {
+            return Ok(times);
+        }
+        times *= 2;
+    }
+}
+
+fn a_time_limit_expires(candidate: &Candidate) -> Result<(), Failed> {
+    let times = times_that_take(&candidate.gpu(&GpuOptions::default())?, 50 * LIMIT)?;
+    // On a busy machine anything may take longer than the limit: then it is not the kernel that is told.
+    for _ in 0..10 {
+        if expires_in_the_kernel(candidate, times)? {
+            return Ok(());
+        }
+    }
+    Err("it was never the kernel that took too long".into())
+}
+
+fn expires_in_the_kernel(candidate: &Candidate, times: u32) -> Result<bool, Failed> {
+    let gpu = candidate.gpu(&GpuOptions { time_limit: LIMIT, ..GpuOptions::default() })?;
+    let kept = gpu.zeros::<f32>(4)?;
+    let outcome = add_again(&gpu, times).and_then(|()| gpu.wait());
+    let Err(error) = outcome else { return Err("it was in time".into()) };
+    let VulkanError::TimeLimit { device, work, limit } = &error else { return Err(format!("{error}").into()) };
+    assert_eq!((device.as_str(), *limit), (gpu.name(), LIMIT));
+    assert!(error.to_string().ends_with(&format!("{work} did not end within 0.005 s")), "{error}");
+    // From now on nothing that it holds can be trusted.
+    assert_eq!(gpu.wait().err().as_ref(), Some(&error));
+    assert_eq!(gpu.upload(&[1.0_f32]).err().as_ref(), Some(&error));
+    assert_eq!(gpu.zeros::<f32>(1).err().as_ref(), Some(&error));
+    assert_eq!(gpu.download(&kept).err().as_ref(), Some(&error));
+    assert_eq!(add_again(&gpu, 1).err().as_ref(), Some(&error));
+    // Closing waits for the kernel, but not for ever; then the device can be opened anew.
+    let start = Instant::now();
+    drop(gpu);
+    drop(kept);
+    assert!(start.elapsed() < GpuOptions::default().closing, "{:?}", start.elapsed());
+    assert_works(&candidate.gpu(&GpuOptions::default())?)?;
+    Ok(work == "kernel fuse_views")
+}
+
+/// In a process of its own, which must end well and soon.
+fn a_device_that_works_on_is_left_alone(candidate: &Candidate) -> Result<(), Failed> {
+    let outcome = child::outcome(child::this_program()?, child::LEFT_ALONE, &candidate.adapter.name)?;
+    assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""), "{}", outcome.stdout);
+    Ok(())
+}

@@ -1,0 +1,66 @@
+//! Arrays there and back.
+
+use crate::candidate::{Candidate, Test};
+use bytemuck::Pod;
+use libtest_mimic::Failed;
+use std::fmt::Debug;
+use viewfuse_vulkan::{Gpu, GpuOptions, Limits, VulkanError};
+
+pub(crate) const TESTS: &[Test] = &[
+    Test::new("arrays_of_any_length_come_back", arrays_of_any_length_come_back),
+    Test::new("arrays_larger_than_a_transfer_come_back", arrays_larger_than_a_transfer_come_back),
+    Test::new("arrays_in_pieces_come_back", arrays_in_pieces_come_back),
+];
+
+/// Numbers without a pattern that a shifted or repeated stretch would share.
+fn number(index: usize) -> u64 {
+    (index as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+fn come_back<T: Pod + PartialEq + Debug>(gpu: &Gpu, length: usize, value: fn(u64) -> T) -> Result<(), VulkanError> {
+    let values: Vec<T> = (0..length).map(|index| value(number(index))).collect();
+    let buffer = gpu.upload(&values)?;
+    assert_eq!((buffer.len(), buffer.is_empty()), (length, length == 0));
+    assert!(gpu.download(&buffer)? == values, "{length} elements of {} bytes", size_of::<T>());
+    drop(buffer);
+    // The memory that was just given back is not zero.
+    let zeros = gpu.download(&gpu.zeros::<T>(length)?)?;
+    assert!(zeros.len() == length && zeros.iter().all(|zero| *zero == T::zeroed()), "{length}: {zeros:?}");
+    Ok(())
+}
+
+/// Of every width, to elements that are wider than any that lie in pages.
+fn of_every_width(gpu: &Gpu, length: usize) -> Result<(), VulkanError> {
+    come_back::<u8>(gpu, length, |number| (number >> 56) as u8)?;
+    come_back::<u16>(gpu, length, |number| (number >> 48) as u16)?;
+    come_back::<u32>(gpu, length, |number| (number >> 32) as u32)?;
+    come_back::<[u32; 3]>(gpu, length, |number| [number as u32, (number >> 32) as u32, 3])?;
+    come_back::<[u64; 2]>(gpu, length, |number| [number, !number])?;
+    come_back::<[u64; 6]>(gpu, length, |number| [number, 1, !number, 2, number << 1, 3])
+}
+
+fn arrays_of_any_length_come_back(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    for length in [0, 1, 2, 3, 5, 7, 63, 64, 65, 1001] {
+        of_every_width(&gpu, length)?;
+    }
+    Ok(())
+}
+
+fn arrays_larger_than_a_transfer_come_back(candidate: &Candidate) -> Result<(), Failed> {
+    let gpu = candidate.gpu(&GpuOptions::default())?;
+    // Transfers take 16 MiB at once; the second length is no multiple of anything.
+    come_back::<u32>(&gpu, 9_000_001, |number| (number >> 32) as u32)?;
+    come_back::<[u32; 3]>(&gpu, 2_800_001, |number| [number as u32, (number >> 32) as u32, 3])?;
+    Ok(())
+}
+
+fn arrays_in_pieces_come_back(candidate: &Candidate) -> Result<(), Failed> {
+    for allocation in [1 << 12, 5000] {
+        let limits = Limits { allocation, ..GpuOptions::default().limits };
+        let gpu = candidate.gpu(&GpuOptions { limits, ..GpuOptions::default() })?;
+        of_every_width(&gpu, 1)?;
+        of_every_width(&gpu, 10_001)?;
+    }
+    Ok(())
+}
