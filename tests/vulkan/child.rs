@@ -1,8 +1,6 @@
 //! Work that needs a process of its own, done by this program started again: the validation layers may want another C
 //! library, and a device that is left alone must let its process end.
 
-use crate::limits::all_lowered;
-use crate::picture::Rendering;
 use crate::time::{add_again, times_that_take};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
@@ -11,9 +9,6 @@ use std::process::{Command, ExitCode};
 use std::time::Duration;
 use std::{env, fs};
 use viewfuse::device::choice::vulkan_devices;
-use viewfuse::device::vulkan::Vulkan;
-use viewfuse::field::FieldError;
-use viewfuse::render::RenderError;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_tests::command::Outcome;
 use viewfuse_vulkan::kernel::{Kernel, WORKGROUP};
@@ -25,8 +20,6 @@ pub(crate) const WITH_BARRIERS: &str = "with_barriers";
 pub(crate) const WITHOUT_BARRIERS: &str = "without_barriers";
 /// A dispatch of more workgroups than the device allows.
 pub(crate) const TOO_MANY_WORKGROUPS: &str = "too_many_workgroups";
-/// A picture in pages, bands and pieces.
-pub(crate) const LOWERED_LIMITS: &str = "lowered_limits";
 /// A kernel that still runs when its device is given up.
 pub(crate) const LEFT_ALONE: &str = "left_alone";
 
@@ -70,13 +63,6 @@ fn do_work(work: &str, instance: &std::sync::Arc<Instance>, adapter: &Adapter) -
             let mut boastful = adapter.clone();
             boastful.limits.workgroup_count += 1;
             many_workgroups(&Gpu::open(instance, &boastful, &usual)?, boastful.limits.workgroup_count)?;
-        }
-        LOWERED_LIMITS => {
-            let options = GpuOptions { limits: all_lowered(), ..usual };
-            match Rendering::on_vulkan(&Vulkan::open(instance, adapter, &options)?) {
-                Err(RenderError::Field(FieldError::Device(error))) => return Err(error.into()),
-                outcome => outcome?,
-            };
         }
         LEFT_ALONE => {
             let times = times_that_take(&Gpu::open(instance, adapter, &usual)?, Duration::from_millis(500))?;

@@ -29,12 +29,12 @@ const WORKGROUP_COUNT: u32 = 8;
 /// Kernels whose work is cut into bands of rows.
 const IN_BANDS: [Kernel; 4] = [Kernel::MatchCost, Kernel::SumRow, Kernel::MeanColumn, Kernel::PickDepth];
 
-pub(crate) fn own() -> Limits {
+fn own() -> Limits {
     GpuOptions::default().limits
 }
 
 /// All that a picture stands.
-pub(crate) fn all_lowered() -> Limits {
+fn all_lowered() -> Limits {
     Limits { buffer_range: BYTES, allocation: BYTES, workgroup_count: WORKGROUP_COUNT, ..own() }
 }
 
