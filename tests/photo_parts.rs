@@ -128,3 +128,22 @@ fn hull_entry_ends_at_any_focal_length() {
     let pixel = views[0].width * views[0].height / 2;
     assert_eq!(hull_entry(object, views, &texels[..], 0, pixel), NO_SURFACE);
 }
+
+/// Cameras a million units away, where depths are an eighth apart, with such a lens that steps are shorter.
+#[test]
+fn hull_entry_ends_at_any_distance() {
+    let mut world = World::new(1);
+    for view in &mut world.views {
+        let back = 5.0e5;
+        for axis in [&mut view.pose.right, &mut view.pose.down, &mut view.pose.forward] {
+            axis[3] *= back;
+        }
+        view.intrinsics[0] = (50.0 * view.intrinsics[0] * back).min(1.0e9);
+        view.intrinsics[1] = (50.0 * view.intrinsics[1] * back).min(1.0e9);
+    }
+    world.texels.iter_mut().for_each(|texel| texel[3] = 0.15);
+    let World { object, views, texels, .. } = &world;
+    for pixel in 0..views[0].width * views[0].height {
+        assert_eq!(hull_entry(object, views, &texels[..], 0, pixel), NO_SURFACE);
+    }
+}

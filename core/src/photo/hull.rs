@@ -15,8 +15,8 @@ pub const SWEPT_ALPHA: f32 = 0.3;
 pub const ENTRY_ALPHA: f32 = 0.6 * SWEPT_ALPHA;
 /// Step of the search for the entry, in footprints.
 pub const ENTRY_STEP: f32 = 2.0;
-/// Most steps of that search. Only a view of a sliver of the object, at an enormous focal length, asks for more: its steps are
-/// longer, and never so short that adding one changes nothing.
+/// Most steps of that search. Only a view of a sliver of the object, at an enormous focal length, asks for more: its steps
+/// are longer.
 pub const MOST_ENTRY_STEPS: f32 = 8192.0;
 
 /// Premultiplied colour and alpha that a view shows at an image coordinate.
@@ -86,6 +86,10 @@ pub fn hull_entry(
     while depth < leave {
         if hull_alpha(object, views, texels, origin + direction * depth, ENTRY_ALPHA) > 0.0 {
             return depth;
+        }
+        // So far away that a step is less than a rounding of the depth: nothing can be found there.
+        if !(depth + step > depth) {
+            break;
         }
         depth += step;
     }
