@@ -243,7 +243,7 @@ fn what_the_calls_take(firmware: &Firmware) -> Result<(), Failed> {
     assert!(default.instructions <= MOST_INSTRUCTIONS && default.stack <= MOST_STACK, "{default:?}");
     assert!(default.instructions > 100, "nothing was computed: {default:?}");
     assert!(without_attention[0].bytes() <= MOST_BYTES);
-    the_readme_says_so(&rows)
+    the_readme_says_so(&rows, emulator.compiles_the_library())
 }
 
 /// The rows of the table from the calls of the two profiles.
@@ -266,15 +266,22 @@ fn markdown((title, numbers): &Row) -> String {
     numbers.iter().fold(format!("| {title} |"), |line, number| format!("{line} {number} |"))
 }
 
-/// The README's rows are rows of the table, to a fifth: another compiler gives a few instructions more or less.
-fn the_readme_says_so(rows: &[Row]) -> Result<(), Failed> {
+/// Which of a row's numbers is the code for size.
+const CODE_FOR_SIZE: usize = 2;
+
+/// The README's rows are rows of the table, to a fifth: another compiler gives a few instructions more or less. The code is
+/// as small as they say only where Rust's library is compiled for size as well.
+fn the_readme_says_so(rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
     let readme = std::fs::read_to_string(repository().join("README.md"))?;
     let mut found = 0;
     for (title, numbers) in rows {
         let Some(line) = readme.lines().find(|line| line.starts_with(&format!("| {title} |"))) else { continue };
         let said: Vec<u64> = line.split('|').filter_map(|cell| cell.trim().parse().ok()).collect();
-        let close = |(said, measured): (&u64, &u64)| said.abs_diff(*measured) <= measured / 5;
-        assert!(said.len() == numbers.len() && said.iter().zip(numbers).all(close), "{line}: {numbers:?}");
+        let close = |(place, (said, measured)): (usize, (&u64, &u64))| {
+            said.abs_diff(*measured) <= measured / 5 || (place == CODE_FOR_SIZE && !library_is_small)
+        };
+        let all_close = said.iter().zip(numbers).enumerate().all(close);
+        assert!(said.len() == numbers.len() && all_close, "{line}: {numbers:?}");
         found += 1;
     }
     assert!(found >= 4, "{found} rows");

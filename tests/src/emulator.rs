@@ -52,6 +52,12 @@ impl Emulator {
         Ok(Emulator { library, folder: folder.join("firmware") })
     }
 
+    /// Whether Rust's library is compiled along with the programs, and for size where they are. One that came compiled is
+    /// for speed.
+    pub fn compiles_the_library(&self) -> bool {
+        !matches!(self.library, Library::Installed)
+    }
+
     /// Builds all programs with a profile and returns the folder that they are in.
     ///
     /// # Errors
