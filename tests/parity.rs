@@ -197,7 +197,14 @@ fn a_faulty_device_fails_the_check() -> Result<(), Failed> {
         .kernels
         .iter()
         .all(|report| report.kernel == "fuse_views" || report.versus_cpu.is_some_and(|versus| versus.equal == 1.0));
-    let report = Report { viewfuse: "", seed_count: 1, sizes: Vec::new(), devices: vec![checked] };
+    let report = Report {
+        viewfuse: "",
+        seed_count: 1,
+        sizes: Vec::new(),
+        devices: vec![checked],
+        failures: Vec::new(),
+        notes: Vec::new(),
+    };
     if breaches != ["fuse_views"] || !others_equal || report.exit_code() != 1 {
         return Err(format!("reported: {breaches:?}, exit code {}", report.exit_code()).into());
     }

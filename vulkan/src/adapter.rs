@@ -57,6 +57,7 @@ pub struct Limits {
 #[derive(Clone, Debug)]
 pub struct Adapter {
     pub(crate) raw: vk::PhysicalDevice,
+    pub(crate) instance_number: u64,
     /// Its number in the list of [`Instance::adapters`].
     pub index: usize,
     /// What its driver calls it.
@@ -121,6 +122,7 @@ impl Adapter {
         let has_model = memory_model(instance, raw, properties.api_version, has(khr::vulkan_memory_model::NAME));
         Adapter {
             raw,
+            instance_number: instance.number,
             index: 0,
             name: text(properties.device_name_as_c_str()),
             kind: match properties.device_type {
@@ -156,20 +158,16 @@ impl Adapter {
         }
     }
 
-    /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text, the
-    /// first that lacks nothing.
+    /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text, any. Of
+    /// several the first that lacks nothing. A number that no device has may still be part of a name ("4090").
     ///
     /// # Errors
     /// [`VulkanError::NoDevice`] if none is meant, [`VulkanError::Missing`] if the one that is meant cannot be used.
     pub fn choose<'a>(adapters: &'a [Adapter], wanted: &str) -> Result<&'a Adapter, VulkanError> {
         let lower = wanted.to_lowercase();
-        let found = match wanted.parse::<usize>() {
-            Ok(index) => adapters.get(index),
-            Err(_) if wanted.is_empty() => {
-                adapters.iter().find(|adapter| adapter.missing.is_empty()).or(adapters.first())
-            }
-            Err(_) => adapters.iter().find(|adapter| adapter.name.to_lowercase().contains(&lower)),
-        };
+        let numbered = wanted.parse::<usize>().ok().and_then(|index| adapters.get(index));
+        let named = || adapters.iter().filter(|adapter| adapter.name.to_lowercase().contains(&lower));
+        let found = numbered.or_else(|| named().find(|adapter| adapter.missing.is_empty()).or(named().next()));
         let Some(adapter) = found else {
             let there: Vec<String> = adapters.iter().map(|a| format!("{}: {}", a.index, a.name)).collect();
             let detail = format!("none is called '{wanted}'; there are {}", there.join(", "));

@@ -80,6 +80,10 @@ impl Gpu {
     /// # Errors
     /// [`VulkanError::Missing`] if it cannot do the work, and others if Vulkan fails.
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Gpu, VulkanError> {
+        if adapter.instance_number != instance.number {
+            let detail = format!("{} was found by another instance of Vulkan", adapter.name);
+            return Err(VulkanError::NoDevice { detail });
+        }
         if !adapter.missing.is_empty() {
             let (device, missing) = (adapter.name.clone(), adapter.missing.clone());
             return Err(VulkanError::Missing { device, missing });
@@ -140,10 +144,10 @@ impl Gpu {
         elements: Range<u32>,
         arrays: &[Bound<'_>],
     ) -> Result<(), VulkanError> {
-        self.check_arguments(kernel, parameters, arrays)?;
         if elements.is_empty() {
             return Ok(());
         }
+        self.check_arguments(kernel, parameters, arrays)?;
         let listed = kernel.arrays().iter().zip(arrays);
         let page_len = 1_usize << self.page_shift;
         let needs_pages = listed.clone().any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
@@ -213,6 +217,7 @@ impl Gpu {
         }
         let outcome = work(self, state).and_then(|value| self.handle.check_messages().map(|()| value));
         if let Err(error) = &outcome {
+            // A lack of memory for an array is known before anything is recorded.
             use VulkanError::{Call, DeviceLost, TimeLimit, Validation};
             if matches!(error, Call { .. } | DeviceLost { .. } | TimeLimit { .. } | Validation { .. }) {
                 state.failed = Some(error.clone());
@@ -320,6 +325,14 @@ impl Gpu {
                 Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available })
             };
             let bytes = (len * stride) as u64;
+            // Some arrays are read as one struct, without looking at their length.
+            if array.layout == Layout::Whole && bytes < array.stride as u64 {
+                return refuse(format!("{} has {bytes} bytes, less than one element", array.name));
+            }
+            let shared = arrays.iter().filter(|other| Arc::ptr_eq(other.0, bound.0)).count() > 1;
+            if shared && array.access == Access::Write {
+                return refuse(format!("{} is written, and bound a second time", array.name));
+            }
             let page_bytes = (len.min(1 << self.page_shift) * stride) as u64;
             match array.layout {
                 Layout::Whole if bytes > range => return limit("maxStorageBufferRange", bytes, range),

@@ -150,11 +150,11 @@ impl Handle {
         VulkanError::OutOfMemory { device, asked, available, total }
     }
 
-    /// A failed call as an error; what means a lost device or no memory says so.
+    /// A failed call as an error; a lost device says so. After any of them what the device holds cannot be trusted, also
+    /// for lack of memory: of commands that were recorded and never ran others may have been told.
     pub(crate) fn failure(&self, call: &'static str, result: vk::Result) -> VulkanError {
         match result {
             vk::Result::ERROR_DEVICE_LOST => VulkanError::DeviceLost { device: self.name.clone(), call },
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => self.out_of_memory(0),
             result => failed(call)(result),
         }
     }

@@ -8,6 +8,7 @@ use std::env;
 use std::ffi::CStr;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -26,7 +27,11 @@ pub struct Instance {
     pub(crate) raw: ash::Instance,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Messages,
+    /// No other instance of this process has it: handles of dropped ones come back.
+    pub(crate) number: u64,
 }
+
+static INSTANCES: AtomicU64 = AtomicU64::new(0);
 
 impl Instance {
     /// Loads the loader and the drivers that it finds.
@@ -52,7 +57,13 @@ impl Instance {
         }
         let messages = Messages::default();
         let raw = create(&entry, options, &messages)?;
-        let mut instance = Instance { raw, messenger: None, messages, _entry: entry };
+        let mut instance = Instance {
+            raw,
+            messenger: None,
+            messages,
+            number: INSTANCES.fetch_add(1, Ordering::Relaxed),
+            _entry: entry,
+        };
         if options.validation {
             let functions = ext::debug_utils::Instance::new(&instance._entry, &instance.raw);
             // SAFETY: the extension is enabled; the messages outlive the messenger.

@@ -10,7 +10,7 @@ use crate::kernel::Kernel;
 use ash::vk;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How many submissions are on their way at once.
 const MOST_IN_FLIGHT: usize = 8;
@@ -39,8 +39,10 @@ pub(crate) struct Submissions {
     free: Vec<Submission>,
     running: VecDeque<Submission>,
     time_limit: Duration,
-    /// The least time limit when the device is closed.
+    /// How long, at the least, what is on its way is waited for when the device is closed.
     closing: Duration,
+    /// One did not end in time.
+    is_late: bool,
     /// Nanoseconds of a timestamp's unit; `None` without timestamps.
     tick: Option<f32>,
     /// Bits of a timestamp that mean something.
@@ -68,6 +70,7 @@ impl Submissions {
             running: VecDeque::new(),
             time_limit,
             closing,
+            is_late: false,
             tick: timestamps.map(|(period, _)| period),
             tick_mask: timestamps.map_or(0, |(_, bits)| u64::MAX >> (64 - bits.clamp(1, 64))),
             handle: handle.clone(),
@@ -145,6 +148,7 @@ impl Submissions {
         let Handle { device, .. } = &*self.handle;
         // SAFETY: the fence belongs to a submission that is on its way.
         let waited = unsafe { device.wait_for_fences(&[oldest.fence], true, nanoseconds) };
+        self.is_late |= waited == Err(vk::Result::TIMEOUT);
         waited.map_err(|result| match result {
             vk::Result::TIMEOUT => VulkanError::TimeLimit {
                 device: self.handle.name.clone(),
@@ -190,8 +194,9 @@ impl Submissions {
             // SAFETY: the commands are being recorded; the pool has two queries.
             unsafe {
                 device.cmd_reset_query_pool(submission.commands, submission.queries, 0, 2);
-                let top = vk::PipelineStageFlags::TOP_OF_PIPE;
-                device.cmd_write_timestamp(submission.commands, top, submission.queries, 0);
+                // When all that came before is done: a kernel that waits takes no time.
+                let before = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
+                device.cmd_write_timestamp(submission.commands, before, submission.queries, 0);
             }
         }
     }
@@ -267,8 +272,10 @@ impl Submissions {
 impl Drop for Submissions {
     fn drop(&mut self) {
         // One that ran out of time may still run: it gets a little longer, then it is left alone with all that it uses.
-        self.time_limit = self.time_limit.max(self.closing);
+        let patience = if self.is_late { self.closing } else { self.time_limit.max(self.closing) };
+        let deadline = Instant::now() + patience;
         while !self.running.is_empty() {
+            self.time_limit = deadline.saturating_duration_since(Instant::now());
             match self.wait_for_oldest(&mut |_| ()) {
                 Ok(()) | Err(VulkanError::Validation { .. }) => {}
                 Err(_) => {

@@ -24,11 +24,8 @@ impl Gpu {
         self.with_state(|gpu, state| {
             for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
-                let Some(staging) = &mut state.upload else { return Ok(()) };
-                let from = staging.buffer;
-                if let Some(mapped) = staging.mapped() {
-                    mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
-                }
+                let (from, mapped) = gpu.mapped(&mut state.upload)?;
+                mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
                 let copy = [vk::BufferCopy::default().dst_offset(offset).size(range.len() as u64)];
                 let to = memory.buffer;
                 gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
@@ -71,7 +68,7 @@ impl Gpu {
         self.with_state(|gpu, state| {
             for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
-                let Some(to) = state.download.as_ref().map(|staging| staging.buffer) else { return Ok(()) };
+                let (to, _) = gpu.mapped(&mut state.download)?;
                 let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
                 let from = memory.buffer;
                 gpu.record(state, &[(&buffer.array, Access::Read)], |device, submission, _| {
@@ -94,9 +91,8 @@ impl Gpu {
                     Ok(())
                 })?;
                 state.wait()?;
-                if let Some(mapped) = state.download.as_mut().and_then(Memory::mapped) {
-                    bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
-                }
+                let (_, mapped) = gpu.mapped(&mut state.download)?;
+                bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
                 Ok(())
             })
         })?;
@@ -108,7 +104,12 @@ impl Gpu {
         const { assert!(size_of::<T>() > 0, "elements without bytes cannot be counted on a device") };
         let stride = size_of::<T>();
         let available = self.handle.limits.allocation;
-        let affordable = usize::try_from(available & !3).unwrap_or(usize::MAX) / stride;
+        // An element goes through staging as a whole.
+        let affordable = if stride > self.staging_bytes() {
+            0
+        } else {
+            usize::try_from(available & !3).unwrap_or(usize::MAX) / stride
+        };
         if affordable == 0 {
             let (what, needed) =
                 (format!("an array of {stride} bytes an element"), (stride as u64).next_multiple_of(4));
@@ -149,6 +150,15 @@ impl Gpu {
 
     fn staging_bytes(&self) -> usize {
         STAGING.min(self.handle.limits.allocation) as usize
+    }
+
+    /// The staging buffer and what the host sees of it.
+    fn mapped<'a>(&self, staging: &'a mut Option<Memory>) -> Result<(vk::Buffer, &'a mut [u8]), VulkanError> {
+        let mapped = staging.as_mut().and_then(|memory| Some((memory.buffer, memory.mapped()?)));
+        mapped.ok_or_else(|| VulkanError::Memory {
+            device: self.handle.name.clone(),
+            detail: "memory for transfers is not seen by the host".to_owned(),
+        })
     }
 
     fn staging(&self, staging: &mut Option<Memory>, location: MemoryLocation) -> Result<(), VulkanError> {

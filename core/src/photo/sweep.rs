@@ -147,13 +147,16 @@ impl SweptPixel {
     }
 
     /// The first plane that may lie inside the hull, and one behind the last: all others are [`OUTSIDE`]. Half a plane more
-    /// at either end, so that no rounding matters.
+    /// at either end, and as many as the roundings of a depth are worth, so that none matters.
     #[inline]
     pub fn planes(&self, object: &ObjectBlock, sweep: &SweepBlock) -> (u32, u32) {
         let most = sweep.plane_count as f32;
-        let first = (self.entry - sweep.near) / sweep.plane_step - 1.5;
-        let end = (self.entry + SWEPT_BEHIND_ENTRY * object.radius - sweep.near) / sweep.plane_step + 1.0;
-        (clamp(first, 0.0, most) as u32, clamp(end, 0.0, most) as u32)
+        let margin = 0.5 + 4.0e-7 * (sweep.near / sweep.plane_step + most);
+        let first = (self.entry - sweep.near) / sweep.plane_step - 1.0 - margin;
+        let end = (self.entry + SWEPT_BEHIND_ENTRY * object.radius - sweep.near) / sweep.plane_step + 0.5 + margin;
+        // Planes without a distance give no number: then all of them.
+        let end = if end < most { max(end, 0.0) } else { most };
+        (clamp(first, 0.0, most) as u32, end as u32)
     }
 
     /// How badly the other views' colours match the pixel's at the depth of a plane: a mean of absolute differences,

@@ -124,7 +124,7 @@ pub fn measure(actual: &[f32], expected: &[Option<Bounded>], limits: Limits) -> 
                 agreement.largest_bound = agreement.largest_bound.max(expected.error);
                 expected
             }
-            None if actual.is_nan() => Bounded::ZERO,
+            None if !actual.is_finite() => Bounded::ZERO,
             None => continue,
         };
         let difference = difference(actual, expected.value);

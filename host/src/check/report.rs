@@ -137,12 +137,18 @@ pub struct Report {
     pub sizes: Vec<u32>,
     /// In the order in which they were checked.
     pub devices: Vec<DeviceReport>,
+    /// Devices that failed, and how.
+    pub failures: Vec<String>,
+    /// Devices that were not checked, and why.
+    pub notes: Vec<String>,
 }
 
 impl Report {
-    /// Whether something was checked and nothing breaches its tolerance.
+    /// Whether something was checked, no device failed, and nothing breaches its tolerance.
     pub fn passes(&self) -> bool {
-        !self.devices.is_empty() && self.devices.iter().all(|device| device.breaches().is_empty())
+        self.failures.is_empty()
+            && !self.devices.is_empty()
+            && self.devices.iter().all(|device| device.breaches().is_empty())
     }
 
     /// What a command returns that ends with this report.

@@ -19,7 +19,7 @@ use viewfuse_vulkan::{GpuOptions, VulkanError};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse check\n  viewfuse check --device cpu --seeds 16 --json\n\n\
-    Exit code 1 if a tolerance is exceeded.")]
+    Exit code 1 if a tolerance is exceeded or a device fails.")]
 pub(crate) struct Arguments {
     /// Check this device: cpu, vulkan, vulkan:NUMBER or vulkan:NAME; may be given several times [default: all]
     #[arg(long, value_name = "DEVICE")]
@@ -35,18 +35,26 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The devices that were asked for, or all: the CPU, and every Vulkan device that can do the work.
-fn devices(asked: &[DeviceChoice]) -> Result<Vec<AnyDevice>, VulkanError> {
+/// The devices that were asked for, or all: the CPU, and every Vulkan device that can do the work. What is not there or
+/// cannot be opened is told in the report.
+fn devices(asked: &[DeviceChoice], report: &mut Report) -> Result<Vec<AnyDevice>, VulkanError> {
     let options = GpuOptions::default();
     if !asked.is_empty() {
         return asked.iter().map(|choice| Ok(choice::open(choice, &options)?.device)).collect();
     }
     let mut devices = vec![AnyDevice::Cpu(Cpu)];
-    // A machine without Vulkan has a CPU to check.
-    if let Ok((instance, adapters)) = vulkan_devices() {
-        for adapter in adapters.iter().filter(|adapter| adapter.missing.is_empty()) {
-            devices.push(AnyDevice::Vulkan(Box::new(Vulkan::open(&instance, adapter, &options)?)));
+    match vulkan_devices() {
+        Ok((instance, adapters)) => {
+            for adapter in &adapters {
+                match Vulkan::open(&instance, adapter, &options) {
+                    Ok(device) => devices.push(AnyDevice::Vulkan(Box::new(device))),
+                    Err(error @ VulkanError::Missing { .. }) => report.notes.push(format!("not checked: {error}")),
+                    Err(error) => report.failures.push(error.to_string()),
+                }
+            }
         }
+        // A machine without Vulkan has a CPU to check.
+        Err(error) => report.notes.push(format!("only the CPU was checked: {error}")),
     }
     Ok(devices)
 }
@@ -59,12 +67,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         seed_count: arguments.seeds,
         sizes: SIZES.to_vec(),
         devices: Vec::new(),
+        failures: Vec::new(),
+        notes: Vec::new(),
     };
-    for device in devices(&arguments.device)? {
-        report.devices.push(match &device {
-            AnyDevice::Cpu(cpu) => check(cpu, Role::Reference, arguments.seeds, &picture, &progress)?,
-            AnyDevice::Vulkan(vulkan) => check(vulkan.as_ref(), Role::Other, arguments.seeds, &picture, &progress)?,
-        });
+    for device in devices(&arguments.device, &mut report)? {
+        let checked = match &device {
+            AnyDevice::Cpu(cpu) => check(cpu, Role::Reference, arguments.seeds, &picture, &progress),
+            AnyDevice::Vulkan(vulkan) => check(vulkan.as_ref(), Role::Other, arguments.seeds, &picture, &progress),
+        };
+        match checked {
+            Ok(checked) => report.devices.push(checked),
+            Err(error @ CheckError::Interrupted(_)) => return Err(error.into()),
+            // One device that fails is no reason to lose what is known of the others.
+            Err(error) => report.failures.push(format!("{}: {:#}", name_of(&device), anyhow::Error::from(error))),
+        }
     }
     drop(progress);
     if arguments.json {
@@ -72,8 +88,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else {
         report.devices.iter().try_for_each(print_device)?;
         print_reasons(&report)?;
+        report.notes.iter().try_for_each(say)?;
+        report.failures.iter().try_for_each(|failure| say(format_args!("FAILED: {failure}")))?;
     }
     Ok(ExitCode::from(report.exit_code()))
+}
+
+fn name_of(device: &AnyDevice) -> String {
+    match device {
+        AnyDevice::Cpu(cpu) => cpu.name(),
+        AnyDevice::Vulkan(vulkan) => vulkan.name(),
+    }
 }
 
 fn check<D: Device>(

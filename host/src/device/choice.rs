@@ -93,7 +93,7 @@ pub fn open(choice: &DeviceChoice, options: &GpuOptions) -> Result<Chosen, Vulka
 
 /// The first graphics processor that can do the work and its name, or why there is none.
 fn automatic(options: &GpuOptions) -> Result<(Vulkan, String), String> {
-    let (instance, adapters) = vulkan_devices().map_err(|error| error.to_string())?;
+    let (instance, adapters) = vulkan_devices().map_err(|error| format!("the CPU, because there is {error}"))?;
     let mut reasons = Vec::new();
     for adapter in &adapters {
         if !adapter.kind.is_gpu() {
@@ -105,7 +105,7 @@ fn automatic(options: &GpuOptions) -> Result<(Vulkan, String), String> {
             Err(error) => reasons.push(error.to_string()),
         }
     }
-    Err(reasons.join("; "))
+    Err(format!("the CPU, because {}", reasons.join(" and ")))
 }
 
 /// Vulkan with its devices, the ones to prefer first. Two environment variables are heeded: `VIEWFUSE_VULKAN_LOADER`, the

@@ -31,8 +31,8 @@ pub enum March {}
 impl Case for March {
     const KERNEL: Kernel = Kernel::March;
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
-    const REASON: &'static str = "depths in footprints are good to 1e-4, times the slope 1 / (4 SURFACE_WIDTH) of the \
-        surface; colours as a look-up over an alpha of at least 0.02; a step of 8 bits at most";
+    const REASON: &'static str = "running error analysis from the image coordinates to the sum along the ray; numbers whose \
+        bound is larger than a step of 8 bits are undecided";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[
         ("object", |inputs| inputs.world.spoil_box()),
         ("views", |inputs| inputs.world.spoil_focal()),

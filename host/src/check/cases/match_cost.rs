@@ -52,8 +52,7 @@ impl Case for MatchCost {
     }
 
     fn element_count(inputs: &Inputs) -> usize {
-        let SweepBlock { row_count, width, plane_count, .. } = inputs.sweep;
-        (row_count * width * plane_count) as usize
+        (inputs.sweep.row_count * inputs.sweep.width) as usize
     }
 
     fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {

@@ -42,8 +42,8 @@ pub enum PickDepth {}
 impl Case for PickDepth {
     const KERNEL: Kernel = Kernel::PickDepth;
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = "costs are good to 1e-7, and the parabola divides them by curvatures that are mostly above \
-        1e-3: 1e-4 of a plane's distance";
+    const REASON: &'static str = "running error analysis of costs, of the parabola through the least three and its quotient; \
+        undecided where two planes cost the same to within it";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[
         ("object", |inputs| inputs.world.object.radius *= 1.01),
         ("means", |inputs| {
