@@ -29,7 +29,8 @@ fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let scene = toy();
     let folder = scene.path();
-    let printed = done(folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 --device cpu -o out/deeper");
+    let printed =
+        done(folder, "render toy --targets 20 --size 64x64 --seed 7 --leave-out 0 --device cpu -o out/deeper");
     assert!(
         printed.contains("out/deeper/000020.png  PSNR ") && printed.contains("1 view from 23 sources"),
         "{printed}"
