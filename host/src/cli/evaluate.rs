@@ -76,7 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         AnyDevice::Cpu(cpu) => cpu.name(),
         AnyDevice::Vulkan(vulkan) => vulkan.name(),
     };
-    say(format_args!("device: {name} ({reason})"))?;
+    say(format_args!("device: {name}, {reason}"))?;
     if let Some(path) = &arguments.output {
         write_whole(path, &csv_of(&all)?)?;
         say(format_args!("{}", path.display()))?;

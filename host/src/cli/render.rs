@@ -155,7 +155,7 @@ impl Run<'_> {
             let (name, share) = (largest.kernel, 100.0 * largest.share);
             say(format_args!("kernels took {seconds:.2} s, {share:.0} % of it {name}; all in run.json"))?;
         }
-        say(format_args!("device: {}", self.device_reason))?;
+        say(format_args!("device: {}, {}", record.device, self.device_reason))?;
         Ok(())
     }
 

@@ -63,7 +63,7 @@ pub enum AnyDevice {
 pub struct Chosen {
     /// The device.
     pub device: AnyDevice,
-    /// Why, in a sentence.
+    /// Why, in words that follow its name.
     pub reason: String,
 }
 
@@ -82,18 +82,18 @@ pub fn open(choice: &DeviceChoice, options: &GpuOptions) -> Result<Chosen, Vulka
             Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "asked for".to_owned() })
         }
         DeviceChoice::Auto => Ok(match automatic(options) {
-            Ok((device, name)) => Chosen {
+            Ok(device) => Chosen {
                 device: AnyDevice::Vulkan(Box::new(device)),
-                reason: format!("{name} is a graphics processor that can do the work"),
+                reason: "a graphics processor that can do the work".to_owned(),
             },
             Err(reason) => cpu(reason),
         }),
     }
 }
 
-/// The first graphics processor that can do the work and its name, or why there is none.
-fn automatic(options: &GpuOptions) -> Result<(Vulkan, String), String> {
-    let (instance, adapters) = vulkan_devices().map_err(|error| format!("the CPU, because there is {error}"))?;
+/// The first graphics processor that can do the work, or why there is none.
+fn automatic(options: &GpuOptions) -> Result<Vulkan, String> {
+    let (instance, adapters) = vulkan_devices().map_err(|error| format!("because there is {error}"))?;
     let mut reasons = Vec::new();
     for adapter in &adapters {
         if !adapter.kind.is_gpu() {
@@ -101,11 +101,11 @@ fn automatic(options: &GpuOptions) -> Result<(Vulkan, String), String> {
             continue;
         }
         match Vulkan::open(&instance, adapter, options) {
-            Ok(device) => return Ok((device, adapter.name.clone())),
+            Ok(device) => return Ok(device),
             Err(error) => reasons.push(error.to_string()),
         }
     }
-    Err(format!("the CPU, because {}", reasons.join(" and ")))
+    Err(format!("because {}", reasons.join(" and ")))
 }
 
 /// Vulkan with its devices, the ones to prefer first. Two environment variables are heeded: `VIEWFUSE_VULKAN_LOADER`, the

@@ -61,7 +61,7 @@ impl Case for MatchCost {
             scene: world.load(device)?,
             entries: device.upload(&world.entries)?,
             pair_weights: device.upload(&world.pair_weights)?,
-            costs: device.zeros(Self::element_count(inputs))?,
+            costs: device.zeros(Self::element_count(inputs) * inputs.sweep.plane_count as usize)?,
         })
     }
 
