@@ -1,6 +1,6 @@
 //! A device before it is opened: what it is, and whether it can do the work.
 
-use crate::error::{Missing, VulkanError};
+use crate::error::{Missing, VulkanError, failed};
 use crate::instance::Instance;
 use crate::kernel::{Kernel, WORKGROUP};
 use ash::{ext, khr, vk};
@@ -49,7 +49,7 @@ pub struct Limits {
     pub allocation: u64,
     /// Most workgroups of a dispatch (`maxComputeWorkGroupCount[0]`).
     pub workgroup_count: u32,
-    /// Bytes of memory that may be used.
+    /// Bytes of memory that may be used, those for transfers included.
     pub memory: u64,
 }
 
@@ -80,6 +80,25 @@ pub struct Adapter {
     pub(crate) offset_alignment: u64,
     pub(crate) extensions: Vec<&'static std::ffi::CStr>,
     pub(crate) has_memory_budget: bool,
+}
+
+impl Instance {
+    /// Every device, the ones to prefer first: discrete, integrated, virtual, other, software; among equals the one with
+    /// more memory, then in the order of the loader.
+    ///
+    /// # Errors
+    /// [`VulkanError::NoDevice`] if there is none.
+    pub fn adapters(&self) -> Result<Vec<Adapter>, VulkanError> {
+        // SAFETY: no requirements.
+        let devices = unsafe { self.raw.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
+        if devices.is_empty() {
+            return Err(VulkanError::NoDevice { detail: "the drivers that are installed have no device".to_owned() });
+        }
+        let mut adapters: Vec<Adapter> = devices.into_iter().map(|raw| Adapter::new(self, raw)).collect();
+        adapters.sort_by_key(|adapter| (adapter.kind, std::cmp::Reverse(adapter.memory)));
+        adapters.iter_mut().enumerate().for_each(|(index, adapter)| adapter.index = index);
+        Ok(adapters)
+    }
 }
 
 impl Adapter {

@@ -11,7 +11,7 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Bytes that are taken from the device at once, for many buffers.
+/// Bytes that are taken from the device at once, for many buffers; less than any device must be able to give.
 const BLOCK: u64 = 64 << 20;
 
 /// Everything that buffers and submissions share. Dropped last.
@@ -51,14 +51,13 @@ impl Handle {
             })?;
         // SAFETY: one queue of this family was created.
         let queue = unsafe { device.get_device_queue(adapter.queue_family, 0) };
-        let block = BLOCK.min(limits.allocation).max(1 << 16);
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: device.clone(),
             physical_device: adapter.raw,
             debug_settings: AllocatorDebugSettings::default(),
             buffer_device_address: false,
-            allocation_sizes: AllocationSizes::new(block, block),
+            allocation_sizes: AllocationSizes::new(BLOCK, BLOCK),
         });
         let allocator = match allocator {
             Ok(allocator) => allocator,

@@ -1,6 +1,5 @@
 //! The loader, its drivers, and the validation layers.
 
-use crate::adapter::Adapter;
 use crate::error::{VulkanError, failed};
 use crate::messages::Messages;
 use ash::{ext, khr, vk};
@@ -72,23 +71,6 @@ impl Instance {
             instance.messenger = Some((functions, messenger));
         }
         Ok(Arc::new(instance))
-    }
-
-    /// Every device, the ones to prefer first: discrete, integrated, virtual, other, software; among equals the one with
-    /// more memory, then in the order of the loader.
-    ///
-    /// # Errors
-    /// [`VulkanError::NoDevice`] if there is none.
-    pub fn adapters(&self) -> Result<Vec<Adapter>, VulkanError> {
-        // SAFETY: no requirements.
-        let devices = unsafe { self.raw.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
-        if devices.is_empty() {
-            return Err(VulkanError::NoDevice { detail: "the drivers that are installed have no device".to_owned() });
-        }
-        let mut adapters: Vec<Adapter> = devices.into_iter().map(|raw| Adapter::new(self, raw)).collect();
-        adapters.sort_by_key(|adapter| (adapter.kind, std::cmp::Reverse(adapter.memory)));
-        adapters.iter_mut().enumerate().for_each(|(index, adapter)| adapter.index = index);
-        Ok(adapters)
     }
 
     /// What the validation layers said.

@@ -1,7 +1,7 @@
 //! The C face of viewfuse-core: fixed-size entry points for firmware, as a static library with a generated header.
 //!
 //! Everything here unpacks pointers, checks what came through them, calls core and stores the result. Inputs are read
-//! through raw pointers and copied before anything is written, so that a caller's overlapping arrays are no aliasing.
+//! through raw pointers, so that a caller's overlapping arrays are no aliasing; each function says what overlap does.
 //!
 //! No unwinding leaves: core has no reachable panic, and `extern "C"` would turn one into an abort.
 #![cfg_attr(target_os = "none", no_std)]

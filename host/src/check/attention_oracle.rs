@@ -53,7 +53,8 @@ fn relu(values: Vec<Bounded>) -> Vec<Bounded> {
 /// Products are summed with their rounding errors and compared with the largest, so that what is rounded is small.
 pub fn attend(query: &[f32], keys: &[f32]) -> Vec<Bounded> {
     let scale = 1.0 / (EMBEDDING as f64).sqrt();
-    // Sums with their errors leave errors of second order: of 128 products, each of 128 partial sums.
+    // Sums with their errors leave errors of second order: of 128 products, each of 128 partial sums. That takes a device
+    // that rounds additions and products to the nearest number.
     let second_order = (EMBEDDING * EMBEDDING) as f64 * ROUNDING * ROUNDING;
     let product = |key: &[f32]| {
         let terms = || query.iter().zip(key).map(|(q, k)| f64::from(*q) * f64::from(*k));

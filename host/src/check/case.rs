@@ -2,9 +2,6 @@
 
 use super::agreement::Limits;
 use super::bounded::Bounded;
-use super::cases::{
-    attend, composite, embed_pose, fuse_views, hull_entry, march, match_cost, pick_depth, weigh, window,
-};
 use crate::device::Device;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -77,21 +74,4 @@ pub trait Visitor {
 
     /// Does it.
     fn visit<C: Case>(self) -> Self::Output;
-}
-
-/// Does something with the case of a kernel. There is no `_` here: a kernel without a case does not compile.
-pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
-    match kernel {
-        Kernel::Weigh => visitor.visit::<weigh::Weigh>(),
-        Kernel::EmbedPose => visitor.visit::<embed_pose::EmbedPose>(),
-        Kernel::Attend => visitor.visit::<attend::Attend>(),
-        Kernel::FuseViews => visitor.visit::<fuse_views::FuseViews>(),
-        Kernel::Composite => visitor.visit::<composite::Composite>(),
-        Kernel::HullEntry => visitor.visit::<hull_entry::HullEntry>(),
-        Kernel::MatchCost => visitor.visit::<match_cost::MatchCost>(),
-        Kernel::SumRow => visitor.visit::<window::SumRow>(),
-        Kernel::MeanColumn => visitor.visit::<window::MeanColumn>(),
-        Kernel::PickDepth => visitor.visit::<pick_depth::PickDepth>(),
-        Kernel::March => visitor.visit::<march::March>(),
-    }
 }

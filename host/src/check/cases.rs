@@ -1,4 +1,4 @@
-//! The cases, one for each kernel.
+//! The cases, one for each kernel, and the way from a kernel to its case.
 
 pub mod attend;
 pub mod composite;
@@ -11,14 +11,22 @@ pub mod pick_depth;
 pub mod weigh;
 pub mod window;
 
-use super::poses::Random;
+use super::case::Visitor;
+use viewfuse_vulkan::kernel::Kernel;
 
-/// The random numbers of a seed and a size, for one kernel.
-fn random(kernel: u32, seed: u64, size: u32) -> Random {
-    Random::new((seed as u32).wrapping_mul(0x9e37_79b9) ^ (size << 8) ^ kernel)
-}
-
-/// As `f32`, so many.
-fn numbers(count: usize, mut next: impl FnMut() -> f64) -> Vec<f32> {
-    (0..count).map(|_| next() as f32).collect()
+/// Does something with the case of a kernel. There is no `_` here: a kernel without a case does not compile.
+pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
+    match kernel {
+        Kernel::Weigh => visitor.visit::<weigh::Weigh>(),
+        Kernel::EmbedPose => visitor.visit::<embed_pose::EmbedPose>(),
+        Kernel::Attend => visitor.visit::<attend::Attend>(),
+        Kernel::FuseViews => visitor.visit::<fuse_views::FuseViews>(),
+        Kernel::Composite => visitor.visit::<composite::Composite>(),
+        Kernel::HullEntry => visitor.visit::<hull_entry::HullEntry>(),
+        Kernel::MatchCost => visitor.visit::<match_cost::MatchCost>(),
+        Kernel::SumRow => visitor.visit::<window::SumRow>(),
+        Kernel::MeanColumn => visitor.visit::<window::MeanColumn>(),
+        Kernel::PickDepth => visitor.visit::<pick_depth::PickDepth>(),
+        Kernel::March => visitor.visit::<march::March>(),
+    }
 }

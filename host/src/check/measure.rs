@@ -2,7 +2,8 @@
 
 use super::agreement::{Agreement, measure, versus};
 use super::bounded::Bounded;
-use super::case::{Case, SIZES, Visitor, visit};
+use super::case::{Case, SIZES, Visitor};
+use super::cases::visit;
 use super::report::{CheckError, DeviceReport, KernelReport};
 use crate::device::Device;
 use crate::device::cpu::Cpu;

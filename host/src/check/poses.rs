@@ -116,3 +116,13 @@ pub fn ring(count: usize, radius: f64, height: f64, roll: f64) -> Vec<Pose> {
         })
         .collect()
 }
+
+/// The random numbers of a seed and a size, for one kernel.
+pub(crate) fn random(kernel: u32, seed: u64, size: u32) -> Random {
+    Random::new((seed as u32).wrapping_mul(0x9e37_79b9) ^ (size << 8) ^ kernel)
+}
+
+/// As `f32`, so many.
+pub(crate) fn numbers(count: usize, mut next: impl FnMut() -> f64) -> Vec<f32> {
+    (0..count).map(|_| next() as f32).collect()
+}

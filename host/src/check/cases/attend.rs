@@ -1,10 +1,10 @@
 //! [`Kernel::Attend`]: softmax of products of random embeddings, from nearly equal weights to one that has all.
 
-use super::{numbers, random};
 use crate::check::agreement::Limits;
 use crate::check::attention_oracle::attend;
 use crate::check::bounded::Bounded;
 use crate::check::case::{Case, Spoiler};
+use crate::check::poses::{numbers, random};
 use crate::device::Device;
 use rayon::prelude::*;
 use viewfuse_core::attention::EMBEDDING;

@@ -1,11 +1,10 @@
 //! [`Kernel::Composite`]: rays from 1 to 128 samples through mist, through smoke and into walls; some samples hold nothing.
 
-use super::{numbers, random};
 use crate::check::agreement::Limits;
 use crate::check::bounded::Bounded;
 use crate::check::case::{Case, Spoiler};
 use crate::check::light_oracle::composite;
-use crate::check::poses::Random;
+use crate::check::poses::{Random, numbers, random};
 use crate::device::{Device, Pixels};
 use rayon::prelude::*;
 use viewfuse_core::composite::CompositeBlock;

@@ -1,10 +1,10 @@
 //! [`Kernel::EmbedPose`]: the paper's embedding with parameters by formula.
 
-use super::random;
 use crate::check::agreement::Limits;
 use crate::check::attention_oracle::embed;
 use crate::check::bounded::Bounded;
 use crate::check::case::{Case, Spoiler};
+use crate::check::poses::random;
 use crate::device::Device;
 use crate::formula;
 use rayon::prelude::*;

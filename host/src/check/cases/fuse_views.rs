@@ -1,11 +1,11 @@
 //! [`Kernel::FuseViews`]: sums over 1 to 32 views, also where the next view's latents lie further on than there are
 //! elements.
 
-use super::{numbers, random};
 use crate::check::agreement::Limits;
 use crate::check::bounded::Bounded;
 use crate::check::case::{Case, Spoiler};
 use crate::check::light_oracle::fuse_element;
+use crate::check::poses::{numbers, random};
 use crate::device::Device;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_vulkan::kernel::Kernel;

@@ -1,11 +1,10 @@
 //! [`Kernel::Weigh`]: every scheme, from 1 to 32 sources, cameras anywhere.
 
-use super::random;
 use crate::check::agreement::Limits;
 use crate::check::bounded::Bounded;
 use crate::check::case::{Case, Spoiler};
 use crate::check::oracle::{Arithmetic, FORMULAS, Formula};
-use crate::check::poses::{Random, looking_at_origin, ring};
+use crate::check::poses::{Random, looking_at_origin, random, ring};
 use crate::device::Device;
 use rayon::prelude::*;
 use viewfuse_core::pose::{Pose, PoseBlock};
