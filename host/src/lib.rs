@@ -11,7 +11,7 @@
 //! formula, attention, weighting pose -> weight, by name: Weighting
 //! few_shot                      which views are sources, which cameras are targets: FewShot
 //! photographs                   sources at working size without their background: SourceImages
-//! device                        where kernels run: Device, the CPU
+//! device                        where kernels run: Device, the CPU, Vulkan devices, which one
 //! field                         photographs -> picture: Field, the field that needs no weights file
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
