@@ -56,5 +56,5 @@ fn what_is_not_there_is_refused() {
     assert_wrong_arguments(BINARY, folder.path(), "check --seeds 0", &["0"]);
     assert_refused(BINARY, folder.path(), "check --scene nowhere", &["picture of nowhere", "no such file"]);
     let help = run(BINARY, folder.path(), "check --help").stdout;
-    assert!(help.contains("Exit code 1 if a tolerance is exceeded."), "{help}");
+    assert!(help.contains("Exit code 1 if a tolerance is exceeded or a device fails."), "{help}");
 }

@@ -9,7 +9,7 @@ use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Limits, Missing, VulkanError};
 
 pub(crate) const TESTS: &[Test] = &[
     Test::new("wrong_arguments_are_refused", wrong_arguments_are_refused),
-    Test::new("narrower_elements_in_pages_are_refused", narrower_elements_in_pages_are_refused),
+    Test::new("arrays_of_other_elements_are_refused", arrays_of_other_elements_are_refused),
     Test::new("arrays_of_another_device_are_refused", arrays_of_another_device_are_refused),
     Test::new("nothing_to_do_is_done", nothing_to_do_is_done),
     Test::new("a_device_that_lacks_something_is_not_opened", a_device_that_lacks_something_is_not_opened),
@@ -37,6 +37,8 @@ fn wrong_arguments_are_refused(candidate: &Candidate) -> Result<(), Failed> {
     assert_eq!(detail(run(&[0; 16], &right))?, "16 bytes of parameters instead of 8");
     assert_eq!(detail(run(&[], &right))?, "0 bytes of parameters instead of 8");
     assert_eq!(detail(run(parameters, &right[1..]))?, "2 arrays instead of 3");
+    let twice = [weights.bind(), fused.bind(), fused.bind()];
+    assert_eq!(detail(run(parameters, &twice))?, "fused is written, and bound a second time");
     assert_eq!(detail(run(parameters, &[right[0]; 4]))?, "4 arrays instead of 3");
     assert_eq!(detail(run(parameters, &[]))?, "0 arrays instead of 3");
     let wide = gpu.zeros::<[f32; 4]>(3)?;
@@ -53,7 +55,7 @@ fn wrong_arguments_are_refused(candidate: &Candidate) -> Result<(), Failed> {
 }
 
 /// Flat numbers may be bound where a kernel wants rows of them, but not in pages, which are counted in elements.
-fn narrower_elements_in_pages_are_refused(candidate: &Candidate) -> Result<(), Failed> {
+fn arrays_of_other_elements_are_refused(candidate: &Candidate) -> Result<(), Failed> {
     let gpu = candidate.gpu(&GpuOptions::default())?;
     let listed = Kernel::HullEntry.arrays();
     let [object, views] = [listed[0].stride, listed[1].stride].map(|stride| gpu.zeros::<u32>(stride / 4));
@@ -61,6 +63,11 @@ fn narrower_elements_in_pages_are_refused(candidate: &Candidate) -> Result<(), F
     let arrays = [object?, views?, texels, entries];
     let outcome = gpu.dispatch(Kernel::HullEntry, &[0; 4], 0..1, &arrays.each_ref().map(|array| array.bind()));
     assert_eq!(detail(outcome)?, "texels of 4 bytes an element instead of 16");
+    // A struct that is read without looking at its length.
+    let short = gpu.zeros::<u32>(1)?;
+    let arrays = [short.bind(), arrays[1].bind(), arrays[2].bind(), arrays[3].bind()];
+    let outcome = gpu.dispatch(Kernel::HullEntry, &[0; 4], 0..1, &arrays);
+    assert_eq!(detail(outcome)?, "object has 4 bytes instead of 48");
     Ok(())
 }
 
@@ -80,8 +87,8 @@ fn arrays_of_another_device_are_refused(candidate: &Candidate) -> Result<(), Fai
 
 fn nothing_to_do_is_done(candidate: &Candidate) -> Result<(), Failed> {
     let gpu = candidate.gpu(&GpuOptions::default())?;
-    let nothing = gpu.upload::<f32>(&[])?;
-    let arrays = [nothing.bind(); 3];
+    let (nothing, written) = (gpu.upload::<f32>(&[])?, gpu.zeros::<f32>(0)?);
+    let arrays = [nothing.bind(), nothing.bind(), written.bind()];
     // No element; one element of arrays that have none.
     for elements in [0..0, 7..7, 0..1] {
         gpu.dispatch(Kernel::FuseViews, bytes_of(&FuseBlock { view_count: 0, stride: 0 }), elements, &arrays)?;
@@ -133,7 +140,7 @@ fn devices_are_chosen_by_number_and_name(candidate: &Candidate) -> Result<(), Fa
     let adapters =
         [named(candidate, 0, "Voodoo 3 (AGP)"), named(candidate, 1, "Parhelia 512"), named(candidate, 2, "Voodoo 5")];
     for (wanted, index) in
-        [("0", 0), ("2", 2), ("voodoo 5", 2), ("VOODOO", 0), ("hel", 1), ("512 ", usize::MAX), ("", 0)]
+        [("0", 0), ("2", 2), ("voodoo 5", 2), ("VOODOO", 0), ("hel", 1), ("512", 1), ("512 ", usize::MAX), ("", 0)]
     {
         match Adapter::choose(&adapters, wanted) {
             Ok(chosen) => assert_eq!(chosen.index, index, "{wanted}"),
@@ -143,7 +150,7 @@ fn devices_are_chosen_by_number_and_name(candidate: &Candidate) -> Result<(), Fa
             Err(error) => return Err(format!("{wanted}: {error}").into()),
         }
     }
-    for wanted in ["3", "-1", "nonsense"] {
+    for wanted in ["7", "-1", "nonsense"] {
         assert!(
             matches!(Adapter::choose(&adapters, wanted), Err(VulkanError::NoDevice { detail }) if detail.contains(wanted))
         );

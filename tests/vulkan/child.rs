@@ -93,9 +93,10 @@ fn dependent_kernels(gpu: &Gpu) -> Result<(), VulkanError> {
 /// A dispatch whose elements do not exist: every invocation ends at once.
 fn many_workgroups(gpu: &Gpu, workgroup_count: u32) -> Result<(), VulkanError> {
     let nothing = gpu.zeros::<f32>(0)?;
+    let written = gpu.zeros::<f32>(0)?;
     let block = FuseBlock { view_count: 0, stride: 0 };
     let elements = 0..workgroup_count.saturating_mul(WORKGROUP);
-    gpu.dispatch(Kernel::FuseViews, bytes_of(&block), elements, &[nothing.bind(); 3])?;
+    gpu.dispatch(Kernel::FuseViews, bytes_of(&block), elements, &[nothing.bind(), nothing.bind(), written.bind()])?;
     gpu.wait()
 }
 

@@ -103,9 +103,10 @@ fn what_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result<(), Faile
     ] {
         let gpu = candidate.gpu(&under(limits))?;
         let (few, many) = (gpu.upload(&[1.0_f32; 256])?, gpu.upload(&[1.0_f32; 257])?);
+        let fused = gpu.zeros::<f32>(256)?;
         let block = FuseBlock { view_count: 1, stride: 0 };
         let run = |array: &viewfuse_vulkan::Buffer<f32>| {
-            gpu.dispatch(Kernel::FuseViews, bytes_of(&block), 0..256, &[few.bind(), array.bind(), few.bind()])
+            gpu.dispatch(Kernel::FuseViews, bytes_of(&block), 0..256, &[few.bind(), array.bind(), fused.bind()])
         };
         assert_eq!(refused(run(&many), name, 1024)?, "array latents of kernel fuse_views");
         run(&few)?;

@@ -325,9 +325,8 @@ impl Gpu {
                 Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available })
             };
             let bytes = (len * stride) as u64;
-            // Some arrays are read as one struct, without looking at their length.
-            if array.layout == Layout::Whole && bytes < array.stride as u64 {
-                return refuse(format!("{} has {bytes} bytes, less than one element", array.name));
+            if bytes < array.least_bytes as u64 {
+                return refuse(format!("{} has {bytes} bytes instead of {}", array.name, array.least_bytes));
             }
             let shared = arrays.iter().filter(|other| Arc::ptr_eq(other.0, bound.0)).count() > 1;
             if shared && array.access == Access::Write {

@@ -10,7 +10,7 @@
 //! the scene lies on first pages: choosing pages is then left out of the pipeline.
 
 use bytemuck::{Pod, Zeroable};
-use viewfuse_core::attention::EMBEDDING;
+use viewfuse_core::attention::{EMBEDDING, FourierEmbedding};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
@@ -90,15 +90,22 @@ pub struct Array {
     pub layout: Layout,
     /// Bytes of an element.
     pub stride: usize,
+    /// Bytes that the kernel reads without looking at the length; 0 where it looks.
+    pub least_bytes: usize,
 }
 
 impl Array {
     const fn read<T>(name: &'static str) -> Array {
-        Array { name, access: Access::Read, layout: Layout::Whole, stride: size_of::<T>() }
+        Array { name, access: Access::Read, layout: Layout::Whole, stride: size_of::<T>(), least_bytes: 0 }
+    }
+
+    /// One struct `S` that is made of `T`s.
+    const fn one<S, T>(name: &'static str) -> Array {
+        Array { least_bytes: size_of::<S>(), ..Array::read::<T>(name) }
     }
 
     const fn write<T>(name: &'static str) -> Array {
-        Array { name, access: Access::Write, layout: Layout::Whole, stride: size_of::<T>() }
+        Array { access: Access::Write, ..Array::read::<T>(name) }
     }
 
     const fn in_pages(self) -> Array {
@@ -152,7 +159,7 @@ impl Kernel {
 
     /// What it binds, in the order of the bindings.
     pub const fn arrays(self) -> &'static [Array] {
-        const OBJECT: Array = Array::read::<ObjectBlock>("object");
+        const OBJECT: Array = Array::one::<ObjectBlock, ObjectBlock>("object");
         const VIEWS: Array = Array::read::<CameraBlock>("views");
         const TEXELS: Array = Array::read::<Texel>("texels").in_pages();
         const ENTRIES: Array = Array::read::<f32>("entries").in_pages();
@@ -166,11 +173,10 @@ impl Kernel {
                     ]
                 }
             }
-            // The parameters are one struct of `f32`s: viewfuse_core::attention::FourierEmbedding.
             Kernel::EmbedPose => {
                 const {
                     &[
-                        Array::read::<f32>("embedding"),
+                        Array::one::<FourierEmbedding, f32>("embedding"),
                         Array::read::<PoseBlock>("poses"),
                         Array::write::<[f32; EMBEDDING]>("embedded"),
                     ]
