@@ -185,13 +185,14 @@ pub fn cross_attention<const S: usize>(
     target: &Pose,
 ) -> Weights<S> {
     let query = embedding.embed(target);
-    let mut products = Products::<S>::NONE;
+    let count = sources.count();
+    let (mut sums, mut rests) = ([0.0; S], [0.0; S]);
     let mut view = 0;
-    while view < sources.count() {
-        products.add(&query, &embedding.embed(sources.pose(view)));
+    while view < count {
+        (sums[view as usize], rests[view as usize]) = product(&query, &embedding.embed(sources.pose(view)));
         view += 1;
     }
-    products.softmax()
+    softmax_of_products(&sums, &rests, count)
 }
 
 /// The same from embeddings that were computed before: of one pose as `queries[0..EMBEDDING]`, of `count` sources as
@@ -202,73 +203,58 @@ pub fn attend<const S: usize>(
     count: u32,
 ) -> Weights<S> {
     const { assert!(S > 0) };
-    let mut products = Products::<S>::NONE;
+    let count = count.clamp(1, S as u32);
+    let (mut sums, mut rests) = ([0.0; S], [0.0; S]);
     let mut view = 0;
-    while view < count.clamp(1, S as u32) {
-        products.add(queries, &StartingAt { all: keys, first: view as usize * EMBEDDING });
+    while view < count as usize {
+        (sums[view], rests[view]) = product(queries, &StartingAt { all: keys, first: view * EMBEDDING });
         view += 1;
     }
-    products.softmax()
+    softmax_of_products(&sums, &rests, count)
 }
 
-/// Scalar products of a query with keys, as rounded sums and what rounding took from them: an error of a logit is a
-/// relative error of its weight, and 128 roundings of sums of 50 would cost 1e-5.
-struct Products<const S: usize> {
-    sums: [f32; S],
-    rests: [f32; S],
-    count: u32,
+/// The scalar product of a query with a key, and what rounding took from it: an error of a logit is a relative error of
+/// its weight, and 128 roundings of sums of 50 would cost 1e-5. The sum runs in order.
+#[inline]
+fn product(query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized)) -> (f32, f32) {
+    let (mut sum, mut rest) = (0.0, 0.0);
+    let mut feature = 0;
+    while feature < EMBEDDING {
+        let (product, lost) = two_product(query.fetch(feature), key.fetch(feature));
+        let (total, carry) = two_sum(sum, product);
+        sum = total;
+        rest += carry + lost;
+        feature += 1;
+    }
+    // Where products overflow there is no rest.
+    (sum, if abs(rest) <= f32::MAX { rest } else { 0.0 })
 }
 
-impl<const S: usize> Products<S> {
-    const NONE: Products<S> = Products { sums: [0.0; S], rests: [0.0; S], count: 0 };
-
-    /// Takes the next key; at most `S` are taken. The sum runs in order.
-    #[inline]
-    fn add(&mut self, query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized)) {
-        let (mut sum, mut rest) = (0.0, 0.0);
-        let mut feature = 0;
-        while feature < EMBEDDING {
-            let (product, lost) = two_product(query.fetch(feature), key.fetch(feature));
-            let (total, carry) = two_sum(sum, product);
-            sum = total;
-            rest += carry + lost;
-            feature += 1;
+/// `softmax(products / sqrt(A))`. Differences from the largest are taken before anything is rounded again.
+#[inline]
+fn softmax_of_products<const S: usize>(sums: &[f32; S], rests: &[f32; S], count: u32) -> Weights<S> {
+    // 1 / sqrt(128) = sqrt(2) / 16
+    const SCALE: f32 = core::f32::consts::SQRT_2 / 16.0;
+    const { assert!(EMBEDDING == 128) };
+    let views = (count as usize).min(S);
+    let (mut largest, mut largest_rest) = (f32::NEG_INFINITY, 0.0);
+    let mut view = 0;
+    while view < views {
+        if sums[view] > largest {
+            largest = sums[view];
+            largest_rest = rests[view];
         }
-        let view = self.count as usize;
-        if view < S {
-            self.sums[view] = sum;
-            // Where products overflow there is no rest.
-            self.rests[view] = if abs(rest) <= f32::MAX { rest } else { 0.0 };
-            self.count += 1;
-        }
+        view += 1;
     }
-
-    /// `softmax(products / sqrt(A))`. Differences from the largest are taken before anything is rounded again.
-    #[inline]
-    fn softmax(&self) -> Weights<S> {
-        // 1 / sqrt(128) = sqrt(2) / 16
-        const SCALE: f32 = core::f32::consts::SQRT_2 / 16.0;
-        const { assert!(EMBEDDING == 128) };
-        let count = (self.count as usize).min(S);
-        let (mut largest, mut largest_rest) = (f32::NEG_INFINITY, 0.0);
-        let mut view = 0;
-        while view < count {
-            if self.sums[view] > largest {
-                largest = self.sums[view];
-                largest_rest = self.rests[view];
-            }
-            view += 1;
-        }
-        let mut logits = [0.0; S];
-        view = 0;
-        while view < count {
-            // Equality first: infinity minus infinity is NaN.
-            let apart = if self.sums[view] == largest { 0.0 } else { self.sums[view] - largest };
-            logits[view] = (apart + (self.rests[view] - largest_rest)) * SCALE;
-            view += 1;
-        }
-        Weights::from_logits(&logits, self.count)
+    let mut logits = [0.0; S];
+    view = 0;
+    while view < views {
+        // Equality first: infinity minus infinity is NaN.
+        let apart = if sums[view] == largest { 0.0 } else { sums[view] - largest };
+        logits[view] = (apart + (rests[view] - largest_rest)) * SCALE;
+        view += 1;
     }
+    Weights::from_logits(&logits, count)
 }
 
 /// The published cross attention without parameters: softmax of the dot products of the pose features themselves. Raw
