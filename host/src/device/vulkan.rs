@@ -11,12 +11,11 @@ use viewfuse_core::photo::sweep::SweepBlock;
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::weighting::WeighBlock;
 use viewfuse_vulkan::kernel::Kernel;
-use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Messages, Tally, VulkanError};
+use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
 /// A Vulkan device. Calls return when their work is on its way; only a download waits for it.
 pub struct Vulkan {
     gpu: Gpu,
-    messages: Messages,
 }
 
 /// Elements that keep a graphics processor busy.
@@ -28,17 +27,12 @@ impl Vulkan {
     /// # Errors
     /// [`VulkanError`].
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Vulkan, VulkanError> {
-        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)?, messages: instance.messages().clone() })
+        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)? })
     }
 
     /// What a kernel did, up to the last download.
     pub fn tally(&self, kernel: Kernel) -> Tally {
         self.gpu.tally(kernel)
-    }
-
-    /// What the validation layers said.
-    pub fn messages(&self) -> &Messages {
-        &self.messages
     }
 }
 
