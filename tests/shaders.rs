@@ -100,7 +100,7 @@ fn attention_is_core_s() {
 #[test]
 fn light_is_core_s() {
     let (weights, latents) = (numbers(6, 5), numbers(7, 5 * 90));
-    let block = FuseBlock { view_count: 5, stride: 90 };
+    let block = FuseBlock { view_count: 5, stride: 90, ..FuseBlock::default() };
     let mut fused = vec![UNTOUCHED; 90];
     dispatch(block, 90, |id, push| light::fuse_views(id, push, &weights, &latents, &mut fused));
     let expected: Vec<f32> = (0..90).map(|at| fuse_element(&weights[..], &latents[at..], &block)).collect();

@@ -1,9 +1,14 @@
 //! Where along a ray to look: depth samples.
 //!
 //! Depths are distances along the ray in world units. NeRF's two kinds: stratified (one jittered sample in each of `N`
-//! equal parts of the interval) and importance samples by inverting the distribution that a first pass found.
+//! equal parts of the interval) and importance samples by inverting the distribution that a first pass found; and
+//! PixelNeRF's third: samples around the depth that the first pass found.
 
 use crate::math::clamp;
+use crate::pages::Fetch;
+use crate::random::{normal, uniform_from, uniform_pair};
+use crate::rays::TargetRay;
+use bytemuck::{Pod, Zeroable};
 
 /// The sample in part `part` of `count` equal parts of `[near, far]`, at the fraction `jitter` in `[0, 1]` of its part
 /// (0.5: the middle). The result never leaves `[near, far]`; `count` 0 is taken as 1.
@@ -24,27 +29,150 @@ pub const PROBABILITY_FLOOR: f32 = 1.0e-5;
 #[inline]
 pub fn inverse_cdf<const N: usize>(near: f32, far: f32, weights: &[f32; N], u: f32) -> f32 {
     const { assert!(N > 0) };
+    let (part, inside) = part_at(weights, N, u);
+    stratified_depth(near, far, part as u32, N as u32, inside)
+}
+
+/// The part, of `count` parts of these weights, in which their distribution reaches `u`, and the share of the part below.
+#[inline]
+fn part_at(weights: &(impl Fetch<f32> + ?Sized), count: usize, u: f32) -> (usize, f32) {
     let mut total = 0.0;
     let mut part = 0;
-    while part < N {
-        total += mass_of(weights[part]);
+    while part < count {
+        total += mass_of(weights.fetch(part));
         part += 1;
     }
     let wanted = clamp(u, 0.0, 1.0) * total;
     let mut below = 0.0;
     part = 0;
-    let mut mass = mass_of(weights[0]);
-    while part + 1 < N && below + mass <= wanted {
+    let mut mass = mass_of(weights.fetch(0));
+    while part + 1 < count && below + mass <= wanted {
         below += mass;
         part += 1;
-        mass = mass_of(weights[part]);
+        mass = mass_of(weights.fetch(part));
     }
-    let inside = clamp((wanted - below) / mass, 0.0, 1.0);
-    stratified_depth(near, far, part as u32, N as u32, inside)
+    (part, clamp((wanted - below) / mass, 0.0, 1.0))
 }
 
 /// Probability of a part before normalising; bounded, so that sums stay finite.
 #[inline]
 fn mass_of(weight: f32) -> f32 {
     clamp(weight, 0.0, 1.0e30) + PROBABILITY_FLOOR
+}
+
+/// A dispatch of [`coarse_depth`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct CoarseBlock {
+    /// Low and high word of the seed.
+    pub seed: [u32; 2],
+    /// Samples on each ray.
+    pub sample_count: u32,
+    /// How far samples stray from the middle of their part: 0 not at all, 1 all over it.
+    pub jitter: f32,
+}
+
+/// Depth of sample number `sample` on the ray of a pixel: one in each of `sample_count` equal parts.
+#[inline]
+pub fn coarse_depth(ray: &TargetRay, pixel: u32, sample: u32, block: &CoarseBlock) -> f32 {
+    let inside = 0.5 + block.jitter * (uniform_from(block.seed, pixel, sample) - 0.5);
+    stratified_depth(ray.near, ray.far, sample, block.sample_count, inside)
+}
+
+/// A dispatch of [`draw_chance`] or [`fine_depth`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct FineBlock {
+    /// Low and high word of the seed.
+    pub seed: [u32; 2],
+    /// Samples on each ray of the first pass: equal parts.
+    pub coarse_count: u32,
+    /// Samples placed by the weights of the first pass.
+    pub importance_count: u32,
+    /// Samples placed around the depth of the first pass.
+    pub depth_count: u32,
+    /// Standard deviation of those, world units.
+    pub depth_deviation: f32,
+    /// 1: around the sum of weights times depths, as published, which is too near where a ray is not opaque; 0: around
+    /// their mean.
+    pub depth_times_opacity: u32,
+}
+
+impl FineBlock {
+    /// Samples that the second pass adds on each ray.
+    #[inline]
+    pub fn fine_count(&self) -> u32 {
+        self.importance_count + self.depth_count
+    }
+}
+
+/// The random numbers that place fine sample `index` of a pixel's ray: for importance samples where in the distribution
+/// (one in each of as many equal parts as there are samples) and where in the part that it hits, in `[0, 1)`; for depth
+/// samples a normal number and 0.
+#[inline]
+pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
+    let counter = block.coarse_count + index;
+    if index < block.importance_count {
+        let [first, second] = uniform_pair(block.seed, pixel, counter);
+        [(index as f32 + first) / block.importance_count as f32, second]
+    } else {
+        [normal(block.seed, pixel, counter), 0.0]
+    }
+}
+
+/// Depth of fine sample `index` on a ray, limited to its part that is looked at. Importance samples first: anywhere in the
+/// coarse part (as the second random number says) in which the distribution of `seen[part]` (weight, transmittance)
+/// reaches the first. Then depth samples: normally distributed around `depth`, the mean depth of the first pass on a ray
+/// of this `opacity`.
+#[inline]
+pub fn fine_depth(
+    seen: &(impl Fetch<[f32; 2]> + ?Sized),
+    ray: &TargetRay,
+    depth: f32,
+    opacity: f32,
+    chance: [f32; 2],
+    index: u32,
+    block: &FineBlock,
+) -> f32 {
+    if index < block.importance_count {
+        let (part, _) = part_at(&FirstOf(seen), block.coarse_count as usize, chance[0]);
+        return stratified_depth(ray.near, ray.far, part as u32, block.coarse_count, chance[1]);
+    }
+    let centre = if block.depth_times_opacity != 0 { depth * opacity } else { depth };
+    clamp(centre + chance[0] * block.depth_deviation, ray.near, ray.far)
+}
+
+/// The first numbers of pairs.
+struct FirstOf<'a, F: ?Sized>(&'a F);
+
+impl<F: Fetch<[f32; 2]> + ?Sized> Fetch<f32> for FirstOf<'_, F> {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> f32 {
+        self.0.fetch(index)[0]
+    }
+}
+
+/// Depth number `index` of a ray's coarse and fine depths behind one another, and its place when all are sorted. Equal
+/// depths keep their order. A depth that is NaN has no place of its own.
+#[inline]
+pub fn merged_depth(
+    coarse: &(impl Fetch<f32> + ?Sized),
+    fine: &(impl Fetch<f32> + ?Sized),
+    coarse_count: u32,
+    fine_count: u32,
+    index: u32,
+) -> (f32, u32) {
+    let at = |index: u32| {
+        if index < coarse_count { coarse.fetch(index as usize) } else { fine.fetch((index - coarse_count) as usize) }
+    };
+    let own = at(index);
+    let (mut place, mut other) = (0, 0);
+    while other < coarse_count + fine_count {
+        let depth = at(other);
+        if depth < own || (depth == own && other < index) {
+            place += 1;
+        }
+        other += 1;
+    }
+    (own, place)
 }

@@ -27,10 +27,22 @@ pub struct FuseBlock {
     pub view_count: u32,
     /// From an element to the next view's.
     pub stride: u32,
+    /// Elements that share their weights: the channels of a point. 0 counts as 1.
+    pub channel_count: u32,
+    /// From a point's weights to the next point's; 0 if all points have the same.
+    pub weight_stride: u32,
 }
 
-/// One channel of [`fuse_views`] from flat buffers: the weighted sum of the elements `latents[view * stride]` over
-/// the views.
+impl FuseBlock {
+    /// Where the weights of an element's views start.
+    #[inline]
+    pub fn first_weight(&self, element: usize) -> usize {
+        element / self.channel_count.max(1) as usize * self.weight_stride as usize
+    }
+}
+
+/// One channel of [`fuse_views`] from flat buffers that start at the element: the weighted sum of the elements
+/// `latents[view * stride]` over the views, with the weights `weights[view]` (see [`FuseBlock::first_weight`]).
 #[inline]
 pub fn fuse_element(
     weights: &(impl Fetch<f32> + ?Sized),

@@ -12,10 +12,14 @@
 //! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
 //! weighting         pose -> weight, by formula                    Scheme, weigh
 //! attention         pose -> weight, by (learned) attention        CrossAttention, PoseSelfAttention, ...
-//! random, depths    where along a ray to look                     uniform, stratified_depth, inverse_cdf
+//! random            numbers for (seed, pixel, sample)             uniform, normal
+//! rays, depths      where along which ray to look                 TargetRay, RayPoint, stratified_depth, inverse_cdf
 //! lookup            what a view shows there                       bilinear, trilinear
 //! fuse              the views' latents become one                 fuse_views, fuse_visible
 //! composite         samples along a ray become a pixel            Compositor<C>
+//! wanted            which samples can be left out                 is_wanted
+//! network           layers                                        product, convolve, resample
+//! pixelnerf         a point in, radiance out                      embedded_value, gathered_value, radiance
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
 //! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
@@ -34,12 +38,16 @@ pub mod fuse;
 pub mod lookup;
 pub mod math;
 pub mod metrics;
+pub mod network;
 pub mod pages;
 pub mod photo;
+pub mod pixelnerf;
 pub mod pose;
 pub mod random;
+pub mod rays;
 pub mod schedule;
 pub mod sources;
+pub mod wanted;
 pub mod weighting;
 pub mod weights;
 

@@ -4,6 +4,9 @@
 //! only 32-bit additions, rotations and exclusive-ors, which every GPU and microcontroller has. The key is the run's
 //! seed, the counter says which number it is: `(pixel, sample)`.
 
+use crate::math::{ln, sin_cos, sqrt};
+use core::f32::consts::TAU;
+
 /// Two random words for a key and a counter (Threefry-2x32-20).
 #[inline]
 pub fn threefry_2x32(key: [u32; 2], counter: [u32; 2]) -> [u32; 2] {
@@ -49,6 +52,26 @@ pub fn uniform(seed: u64, pixel: u32, sample: u32) -> f32 {
 /// As [`uniform`], from the seed's low and high word: not every GPU has 64-bit integers.
 #[inline]
 pub fn uniform_from(seed: [u32; 2], pixel: u32, sample: u32) -> f32 {
+    uniform_pair(seed, pixel, sample)[0]
+}
+
+/// Two independent numbers as [`uniform_from`] gives one, the first of them the same.
+#[inline]
+pub fn uniform_pair(seed: [u32; 2], pixel: u32, sample: u32) -> [f32; 2] {
     let words = threefry_2x32(seed, [pixel, sample]);
-    (words[0] >> 8) as f32 * (1.0 / 16_777_216.0)
+    [fraction(words[0]), fraction(words[1])]
+}
+
+/// A number of mean 0 and variance 1, normally distributed (Box and Muller 1958); its magnitude is at most 5.8.
+#[inline]
+pub fn normal(seed: [u32; 2], pixel: u32, sample: u32) -> f32 {
+    let [u, v] = uniform_pair(seed, pixel, sample);
+    // In (0, 1], so that the logarithm is finite.
+    let (_, cosine) = sin_cos(TAU * v);
+    sqrt(-2.0 * ln(1.0 - u)) * cosine
+}
+
+#[inline(always)]
+fn fraction(word: u32) -> f32 {
+    (word >> 8) as f32 * (1.0 / 16_777_216.0)
 }

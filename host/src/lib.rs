@@ -11,6 +11,7 @@
 //! formula, attention, weighting pose -> weight, by name: Weighting
 //! few_shot                      which views are sources, which cameras are targets: FewShot
 //! photographs                   sources at working size without their background: SourceImages
+//! checkpoint                    files of network parameters: Checkpoint
 //! device                        where kernels run: Device, the CPU, Vulkan devices, which one
 //! field                         photographs -> picture: Field, the field that needs no weights file
 //! render                        the way of the data from scene to picture, in one function
@@ -25,6 +26,7 @@
 pub mod attention;
 pub mod canvas;
 pub mod check;
+pub mod checkpoint;
 pub mod device;
 pub mod evaluate;
 pub mod few_shot;

@@ -3,7 +3,10 @@
 use std::convert::Infallible;
 use std::ops::Range;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{Device, Element, KernelTime, PhotoScene, Pixels};
+use viewfuse::device::{
+    Element, KernelTime, Layer, LightKernels, Memory, NetworkKernels, PhotoKernels, PhotoScene, Pixels, PointKernels,
+    RayKernels, Rays, WeightingKernels,
+};
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::photo::march::MarchBlock;
@@ -46,7 +49,7 @@ fn with_pixels(pixels: &mut Pixels<Faulty>, run: impl FnOnce(&mut Pixels<Cpu>) -
     (pixels.colours, pixels.depths) = (on_cpu.colours, on_cpu.depths);
 }
 
-impl Device for Faulty {
+impl Memory for Faulty {
     type Buffer<T: Element> = Vec<T>;
     type Error = Infallible;
 
@@ -81,7 +84,9 @@ impl Device for Faulty {
     fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, Infallible> {
         Cpu.download(buffer)
     }
+}
 
+impl WeightingKernels for Faulty {
     fn weigh(
         &self,
         block: &WeighBlock,
@@ -116,15 +121,18 @@ impl Device for Faulty {
         self.spoil(Kernel::Attend, weights);
         Ok(())
     }
+}
 
+impl LightKernels for Faulty {
     fn fuse_views(
         &self,
         block: &FuseBlock,
+        element_count: u32,
         weights: &Vec<f32>,
         latents: &Vec<f32>,
         fused: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        Cpu.fuse_views(block, weights, latents, fused)?;
+        Cpu.fuse_views(block, element_count, weights, latents, fused)?;
         self.spoil(Kernel::FuseViews, fused);
         Ok(())
     }
@@ -140,7 +148,9 @@ impl Device for Faulty {
         self.spoil(Kernel::Composite, pixels.colours.as_flattened_mut());
         Ok(())
     }
+}
 
+impl PhotoKernels for Faulty {
     fn hull_entry(&self, scene: &PhotoScene<Self>, view: u32, entries: &mut Vec<f32>) -> Result<(), Infallible> {
         Cpu.hull_entry(&on_cpu(scene), view, entries)?;
         self.spoil(Kernel::HullEntry, entries);

@@ -16,7 +16,7 @@ pub(crate) const TESTS: &[Test] = &[
     Test::new("devices_are_chosen_by_number_and_name", devices_are_chosen_by_number_and_name),
 ];
 
-const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3 };
+const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3, channel_count: 1, weight_stride: 0 };
 
 fn detail(outcome: Result<(), VulkanError>) -> Result<String, Failed> {
     match outcome {
@@ -91,7 +91,7 @@ fn nothing_to_do_is_done(candidate: &Candidate) -> Result<(), Failed> {
     let arrays = [nothing.bind(), nothing.bind(), written.bind()];
     // No element; one element of arrays that have none.
     for elements in [0..0, 7..7, 0..1] {
-        gpu.dispatch(Kernel::FuseViews, bytes_of(&FuseBlock { view_count: 0, stride: 0 }), elements, &arrays)?;
+        gpu.dispatch(Kernel::FuseViews, bytes_of(&FuseBlock::default()), elements, &arrays)?;
     }
     assert!(gpu.download(&nothing)?.is_empty());
     assert_eq!(gpu.tally(Kernel::FuseViews).dispatches, 1);

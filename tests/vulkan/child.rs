@@ -84,7 +84,7 @@ fn dependent_kernels(gpu: &Gpu) -> Result<(), VulkanError> {
     let [first, second, third] = [gpu.zeros::<f32>(4096)?, gpu.zeros(4096)?, gpu.zeros(4096)?];
     gpu.wait()?;
     for [from, to] in [[&first, &second], [&second, &third]] {
-        let block = FuseBlock { view_count: 1, stride: 4096 };
+        let block = FuseBlock { view_count: 1, stride: 4096, ..FuseBlock::default() };
         gpu.dispatch(Kernel::FuseViews, bytes_of(&block), 0..4096, &[weight.bind(), from.bind(), to.bind()])?;
     }
     gpu.wait()
@@ -94,7 +94,7 @@ fn dependent_kernels(gpu: &Gpu) -> Result<(), VulkanError> {
 fn many_workgroups(gpu: &Gpu, workgroup_count: u32) -> Result<(), VulkanError> {
     let nothing = gpu.zeros::<f32>(0)?;
     let written = gpu.zeros::<f32>(0)?;
-    let block = FuseBlock { view_count: 0, stride: 0 };
+    let block = FuseBlock::default();
     let elements = 0..workgroup_count.saturating_mul(WORKGROUP);
     gpu.dispatch(Kernel::FuseViews, bytes_of(&block), elements, &[nothing.bind(), nothing.bind(), written.bind()])?;
     gpu.wait()

@@ -104,7 +104,7 @@ fn what_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result<(), Faile
         let gpu = candidate.gpu(&under(limits))?;
         let (few, many) = (gpu.upload(&[1.0_f32; 256])?, gpu.upload(&[1.0_f32; 257])?);
         let fused = gpu.zeros::<f32>(256)?;
-        let block = FuseBlock { view_count: 1, stride: 0 };
+        let block = FuseBlock { view_count: 1, ..FuseBlock::default() };
         let run = |array: &viewfuse_vulkan::Buffer<f32>| {
             gpu.dispatch(Kernel::FuseViews, bytes_of(&block), 0..256, &[few.bind(), array.bind(), fused.bind()])
         };

@@ -25,7 +25,12 @@ pub(crate) fn add_again(gpu: &Gpu, times: u32) -> Result<(), VulkanError> {
     // What was asked for before has the time limit as well.
     gpu.wait()?;
     let arrays = [weights.bind(), latents.bind(), fused.bind()];
-    gpu.dispatch(Kernel::FuseViews, bytes_of(&FuseBlock { view_count: times, stride: 0 }), 0..COUNT, &arrays)
+    gpu.dispatch(
+        Kernel::FuseViews,
+        bytes_of(&FuseBlock { view_count: times, ..FuseBlock::default() }),
+        0..COUNT,
+        &arrays,
+    )
 }
 
 /// So many additions as take at least this long.

@@ -13,16 +13,31 @@ use bytemuck::{Pod, Zeroable};
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::composite::CompositeBlock;
+use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::fuse::FuseBlock;
+use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
 use viewfuse_core::pages::MOST_PAGES;
 use viewfuse_core::photo::ObjectBlock;
 use viewfuse_core::photo::march::MarchBlock;
 use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::pose::PoseBlock;
+use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay};
+use viewfuse_core::wanted::WantedBlock;
 use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock};
 
 /// Invocations of a workgroup, along its only axis.
 pub const WORKGROUP: u32 = 64;
+
+/// Rows and columns of the outputs that a workgroup of a product computes together, each invocation 8 times 8 of them.
+pub const TILE: u32 = 64;
+
+/// Elements of a product with so many outputs: whole tiles.
+pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
+    row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
+}
 
 /// The elements of one dispatch: large work is cut into several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
@@ -43,10 +58,42 @@ pub enum Kernel {
     EmbedPose,
     /// Weights of the sources for targets, by attention. An element is a target.
     Attend,
+    /// Rays of a target's pixels. An element is a ray.
+    CastRays,
+    /// Evenly spread depths on rays. An element is a sample.
+    CoarseDepths,
+    /// Points of samples. An element is a point.
+    PlacePoints,
+    /// Features of points in the axes of views. An element is a feature of a point in a view.
+    EmbedPoints,
+    /// Weights of views at points. An element is a view of a point.
+    VisibleWeights,
+    /// Latents where points appear in a view. An element is a channel of a point.
+    GatherLatents,
+    /// Convolutions of an image. An element is an 8x8 part of a tile of [`TILE`] pixels and channels.
+    Convolve,
+    /// Largest numbers of windows. An element is a channel of an output pixel.
+    MaxPool,
+    /// Enlarged images. An element is an input channel of an output pixel.
+    Upsample,
+    /// Matrix products. An element is an 8x8 part of a tile of [`TILE`] rows and columns.
+    Product,
     /// Weighted sums over views. An element is a channel of a point.
     FuseViews,
+    /// Colour and optical depth of points. An element is a point.
+    Radiance,
     /// Rays from their samples. An element is a ray.
     Composite,
+    /// Weights of samples on rays. An element is a ray.
+    WeighSamples,
+    /// Random numbers for fine samples. An element is a fine sample.
+    DrawChances,
+    /// Depths where a first pass saw something. An element is a fine sample.
+    FineDepths,
+    /// Depths of two passes in order. An element is a sample of either.
+    MergeDepths,
+    /// Which samples to look at. An element is a sample.
+    WantedSamples,
     /// Where a source pixel's ray enters the hull. An element is a pixel of the view.
     HullEntry,
     /// How badly other views match, at all planes. An element is a pixel of the band.
@@ -126,12 +173,28 @@ type WeightRow = [f32; MOST_WEIGHED];
 
 impl Kernel {
     /// Every kernel, in the order of the data.
-    pub const ALL: [Kernel; 11] = [
+    pub const ALL: [Kernel; 27] = [
         Kernel::Weigh,
         Kernel::EmbedPose,
         Kernel::Attend,
+        Kernel::CastRays,
+        Kernel::CoarseDepths,
+        Kernel::PlacePoints,
+        Kernel::EmbedPoints,
+        Kernel::VisibleWeights,
+        Kernel::GatherLatents,
+        Kernel::Convolve,
+        Kernel::MaxPool,
+        Kernel::Upsample,
+        Kernel::Product,
         Kernel::FuseViews,
+        Kernel::Radiance,
         Kernel::Composite,
+        Kernel::WeighSamples,
+        Kernel::DrawChances,
+        Kernel::FineDepths,
+        Kernel::MergeDepths,
+        Kernel::WantedSamples,
         Kernel::HullEntry,
         Kernel::MatchCost,
         Kernel::SumRow,
@@ -146,8 +209,24 @@ impl Kernel {
             Kernel::Weigh => "weigh",
             Kernel::EmbedPose => "embed_pose",
             Kernel::Attend => "attend",
+            Kernel::CastRays => "cast_rays",
+            Kernel::CoarseDepths => "coarse_depths",
+            Kernel::PlacePoints => "place_points",
+            Kernel::EmbedPoints => "embed_points",
+            Kernel::VisibleWeights => "visible_weights",
+            Kernel::GatherLatents => "gather_latents",
+            Kernel::Convolve => "convolve",
+            Kernel::MaxPool => "max_pool",
+            Kernel::Upsample => "upsample",
+            Kernel::Product => "product",
             Kernel::FuseViews => "fuse_views",
+            Kernel::Radiance => "radiance",
             Kernel::Composite => "composite",
+            Kernel::WeighSamples => "weigh_samples",
+            Kernel::DrawChances => "draw_chances",
+            Kernel::FineDepths => "fine_depths",
+            Kernel::MergeDepths => "merge_depths",
+            Kernel::WantedSamples => "wanted_samples",
             Kernel::HullEntry => "hull_entry",
             Kernel::MatchCost => "match_cost",
             Kernel::SumRow => "sum_row",
@@ -163,6 +242,15 @@ impl Kernel {
         const VIEWS: Array = Array::read::<CameraBlock>("views");
         const TEXELS: Array = Array::read::<Texel>("texels").in_pages();
         const ENTRIES: Array = Array::read::<f32>("entries").in_pages();
+        const PIXELS: Array = Array::read::<u32>("pixels");
+        const RAYS: Array = Array::read::<TargetRay>("rays");
+        const POINTS: Array = Array::read::<RayPoint>("points");
+        const SEEN: Array = Array::read::<[f32; 2]>("seen");
+        const INPUTS: Array = Array::read::<f32>("inputs");
+        const WEIGHTS: Array = Array::read::<f32>("weights");
+        const BIAS: Array = Array::read::<f32>("bias");
+        const ADDEND: Array = Array::read::<f32>("addend");
+        const OUTPUTS: Array = Array::write::<f32>("outputs");
         match self {
             Kernel::Weigh => {
                 const {
@@ -185,9 +273,33 @@ impl Kernel {
             Kernel::Attend => {
                 const { &[Array::read::<f32>("queries"), Array::read::<f32>("keys"), Array::write::<WeightRow>("weights")] }
             }
+            Kernel::CastRays => const { &[PIXELS, Array::write::<TargetRay>("rays")] },
+            Kernel::CoarseDepths => const { &[RAYS, PIXELS, Array::write::<f32>("depths")] },
+            Kernel::PlacePoints => {
+                const {
+                    &[
+                        Array::read::<u32>("samples"),
+                        RAYS,
+                        Array::read::<f32>("depths"),
+                        Array::write::<RayPoint>("points"),
+                    ]
+                }
+            }
+            Kernel::EmbedPoints => const { &[VIEWS, POINTS, Array::write::<f32>("embedded")] },
+            Kernel::VisibleWeights => {
+                const { &[VIEWS, Array::read::<f32>("weights"), POINTS, Array::write::<f32>("visible")] }
+            }
+            Kernel::GatherLatents => {
+                const { &[VIEWS, POINTS, Array::read::<f32>("grid"), ADDEND, Array::write::<f32>("gathered")] }
+            }
+            Kernel::Convolve => const { &[INPUTS, WEIGHTS, BIAS, ADDEND, OUTPUTS] },
+            Kernel::MaxPool => const { &[INPUTS, OUTPUTS] },
+            Kernel::Upsample => const { &[INPUTS, OUTPUTS] },
+            Kernel::Product => const { &[INPUTS, WEIGHTS, BIAS, ADDEND, OUTPUTS] },
             Kernel::FuseViews => {
                 const { &[Array::read::<f32>("weights"), Array::read::<f32>("latents"), Array::write::<f32>("fused")] }
             }
+            Kernel::Radiance => const { &[Array::read::<f32>("raw"), POINTS, Array::write::<Texel>("samples")] },
             Kernel::Composite => {
                 const {
                     &[
@@ -197,6 +309,26 @@ impl Kernel {
                         Array::write::<f32>("depths"),
                     ]
                 }
+            }
+            Kernel::WeighSamples => const { &[Array::read::<Texel>("samples"), Array::write::<[f32; 2]>("seen")] },
+            Kernel::DrawChances => const { &[PIXELS, Array::write::<[f32; 2]>("chances")] },
+            Kernel::FineDepths => {
+                const {
+                    &[
+                        SEEN,
+                        RAYS,
+                        Array::read::<Texel>("colours"),
+                        Array::read::<f32>("pixel_depths"),
+                        Array::read::<[f32; 2]>("chances"),
+                        Array::write::<f32>("depths"),
+                    ]
+                }
+            }
+            Kernel::MergeDepths => {
+                const { &[Array::read::<f32>("coarse"), Array::read::<f32>("fine"), Array::write::<f32>("merged")] }
+            }
+            Kernel::WantedSamples => {
+                const { &[SEEN, RAYS, PIXELS, Array::read::<f32>("depths"), Array::write::<u32>("wanted")] }
             }
             Kernel::HullEntry => const { &[OBJECT, VIEWS, TEXELS, Array::write::<f32>("entries").in_pages()] },
             Kernel::MatchCost => {
@@ -239,9 +371,23 @@ impl Kernel {
     pub const fn parameter_bytes(self) -> usize {
         match self {
             Kernel::Weigh => size_of::<WeighBlock>(),
-            Kernel::EmbedPose => 0,
+            Kernel::EmbedPose | Kernel::Radiance => 0,
             // How many sources there are.
             Kernel::Attend => size_of::<u32>(),
+            Kernel::CastRays => size_of::<CastBlock>(),
+            Kernel::CoarseDepths => size_of::<CoarseBlock>(),
+            Kernel::EmbedPoints => size_of::<EmbedBlock>(),
+            Kernel::GatherLatents => size_of::<GatherBlock>(),
+            Kernel::Convolve => size_of::<ConvolveBlock>(),
+            Kernel::MaxPool => size_of::<PoolBlock>(),
+            Kernel::Upsample => size_of::<UpsampleBlock>(),
+            Kernel::Product => size_of::<ProductBlock>(),
+            // Samples on a ray.
+            Kernel::PlacePoints | Kernel::WeighSamples => size_of::<u32>(),
+            // How many views there are.
+            Kernel::VisibleWeights => size_of::<u32>(),
+            Kernel::DrawChances | Kernel::FineDepths | Kernel::MergeDepths => size_of::<FineBlock>(),
+            Kernel::WantedSamples => size_of::<WantedBlock>(),
             Kernel::FuseViews => size_of::<FuseBlock>(),
             Kernel::Composite => size_of::<CompositeBlock>(),
             // Which view.

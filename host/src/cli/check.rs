@@ -10,7 +10,7 @@ use viewfuse::check::measure::{DEFAULT_SEED_COUNT, Role};
 use viewfuse::check::picture::Picture;
 use viewfuse::check::report::{PictureVersusCpu, VersusCpu};
 use viewfuse::check::{CheckError, DeviceReport, KernelReport, PictureReport, Report, check_device};
-use viewfuse::device::Device;
+use viewfuse::device::{Device, Memory};
 use viewfuse::device::choice::{self, AnyDevice, DeviceChoice, vulkan_devices};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;

@@ -6,7 +6,7 @@ use clap::Args;
 use comfy_table::CellAlignment;
 use serde_json::json;
 use std::process::ExitCode;
-use viewfuse::device::Device;
+use viewfuse::device::Memory;
 use viewfuse::device::choice::vulkan_devices;
 use viewfuse::device::cpu::Cpu;
 use viewfuse_vulkan::{Adapter, Missing, version};

@@ -6,7 +6,7 @@ use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse::device::Device;
+use viewfuse::device::Memory;
 use viewfuse::device::choice::{AnyDevice, Chosen};
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
 use viewfuse::field::photo::PhotoField;

@@ -41,7 +41,7 @@ impl Case for FuseViews {
             let weights = numbers(view_count, || random.unit());
             let sum: f32 = weights.iter().sum();
             Job {
-                block: FuseBlock { view_count: view_count as u32, stride },
+                block: FuseBlock { view_count: view_count as u32, stride, ..FuseBlock::default() },
                 element_count: size as usize,
                 weights: weights.iter().map(|weight| weight / sum).collect(),
                 latents: numbers(stride as usize * view_count, || random.normal()),
@@ -62,9 +62,9 @@ impl Case for FuseViews {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter()
-            .zip(loaded)
-            .try_for_each(|(job, (weights, latents, fused))| device.fuse_views(&job.block, weights, latents, fused))
+        jobs.iter().zip(loaded).try_for_each(|(job, (weights, latents, fused))| {
+            device.fuse_views(&job.block, job.element_count as u32, weights, latents, fused)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

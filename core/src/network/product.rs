@@ -1,0 +1,55 @@
+//! Matrix product with bias, addend and rectified input or output: a layer of a network for many points at once.
+
+use crate::math::max;
+use crate::pages::Fetch;
+use bytemuck::{Pod, Zeroable};
+
+/// A dispatch of [`product_element`], as plain data. The yes-or-no fields are 0 or 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct ProductBlock {
+    /// Rows of inputs and outputs.
+    pub row_count: u32,
+    /// Columns of the inputs, rows of the weights.
+    pub inner_count: u32,
+    /// Columns of weights and outputs.
+    pub column_count: u32,
+    /// Negative inputs count as 0.
+    pub relu_inputs: u32,
+    /// Negative outputs become 0.
+    pub relu_outputs: u32,
+    /// Whether there is an addend.
+    pub has_addend: u32,
+}
+
+/// Output number `element` of `inputs[row][inner]` times `weights[inner][column]` plus `bias[column]` plus
+/// `addend[row][column]`: bias and addend first, then the products in the order of the inner index.
+#[inline]
+pub fn product_element(
+    inputs: &(impl Fetch<f32> + ?Sized),
+    weights: &(impl Fetch<f32> + ?Sized),
+    bias: &(impl Fetch<f32> + ?Sized),
+    addend: &(impl Fetch<f32> + ?Sized),
+    block: &ProductBlock,
+    element: usize,
+) -> f32 {
+    let (inner_count, column_count) = (block.inner_count as usize, block.column_count as usize);
+    let (row, column) = (element / column_count, element % column_count);
+    let mut sum = bias.fetch(column);
+    if block.has_addend != 0 {
+        sum += addend.fetch(element);
+    }
+    let mut inner = 0;
+    while inner < inner_count {
+        let input = rectified(inputs.fetch(row * inner_count + inner), block.relu_inputs);
+        sum += input * weights.fetch(inner * column_count + column);
+        inner += 1;
+    }
+    rectified(sum, block.relu_outputs)
+}
+
+/// `x`, or 0 instead of a negative one (or NaN) if `relu` is not 0.
+#[inline]
+pub fn rectified(x: f32, relu: u32) -> f32 {
+    if relu != 0 { max(x, 0.0) } else { x }
+}

@@ -1,0 +1,86 @@
+//! Rays of a target and the points on them.
+
+use crate::camera::CameraBlock;
+use crate::math::{max, norm3};
+use crate::pages::Fetch;
+use bytemuck::{Pod, Zeroable};
+
+/// A ray of a target with the part of it that is looked at, as plain data. World coordinates; `near` and `far` are
+/// distances from the origin, `far` at least `near`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TargetRay {
+    /// Where it starts.
+    pub origin: [f32; 3],
+    /// Where looking begins.
+    pub near: f32,
+    /// Unit vector along it.
+    pub direction: [f32; 3],
+    /// Where looking ends.
+    pub far: f32,
+}
+
+/// A dispatch of [`cast_ray`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct CastBlock {
+    /// The target.
+    pub camera: CameraBlock,
+    /// See [`TargetRay::near`].
+    pub near: f32,
+    /// See [`TargetRay::far`].
+    pub far: f32,
+    /// Where in a pixel its centre is: 0.5 in this crate's convention, 0 in published PixelNeRF's, whose rays go through
+    /// the pixels' upper left corners.
+    pub pixel_centre: f32,
+}
+
+/// The ray through a pixel (flat, row-major).
+#[inline]
+pub fn cast_ray(block: &CastBlock, pixel: u32) -> TargetRay {
+    let camera = &block.camera;
+    let (column, row) = (pixel % camera.width, pixel / camera.width);
+    let towards = camera.towards(column as f32 + block.pixel_centre, row as f32 + block.pixel_centre);
+    let length = norm3(towards.x, towards.y, towards.z);
+    TargetRay {
+        origin: camera.centre_world().to_array(),
+        near: block.near,
+        direction: [towards.x / length, towards.y / length, towards.z / length],
+        far: block.far,
+    }
+}
+
+/// A point on a ray that a field is asked about, as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RayPoint {
+    /// World coordinates.
+    pub position: [f32; 3],
+    /// Length of ray that it stands for: up to the next sample, at the last one up to `far`.
+    pub length: f32,
+    /// Unit vector along its ray.
+    pub direction: [f32; 3],
+    /// Which sample it is, flat in `[ray][sample]`.
+    pub sample: u32,
+}
+
+/// The point of sample number `sample` of `depths[ray][sample]`, which increase along each ray of `sample_count`.
+#[inline]
+pub fn place_point(
+    rays: &(impl Fetch<TargetRay> + ?Sized),
+    depths: &(impl Fetch<f32> + ?Sized),
+    sample_count: u32,
+    sample: u32,
+) -> RayPoint {
+    let ray = rays.fetch((sample / sample_count) as usize);
+    let depth = depths.fetch(sample as usize);
+    let is_last = sample % sample_count + 1 == sample_count;
+    let behind = if is_last { ray.far } else { depths.fetch(sample as usize + 1) };
+    let [x, y, z] = ray.direction;
+    RayPoint {
+        position: [ray.origin[0] + x * depth, ray.origin[1] + y * depth, ray.origin[2] + z * depth],
+        length: max(behind - depth, 0.0),
+        direction: ray.direction,
+        sample,
+    }
+}

@@ -1,0 +1,97 @@
+//! Which samples of a ray are worth asking a network about, by what was seen before: on the same ray by a coarser pass,
+//! or on rays nearby.
+//!
+//! What was seen of a ray is a row `[part]` of weight and transmittance in front of it, over equal parts of the ray.
+
+use crate::math::{clamp, exp};
+use crate::pages::Fetch;
+use crate::rays::TargetRay;
+use bytemuck::{Pod, Zeroable};
+
+/// Weight of a sample, and the transmittance in front of it, as `[weight, transmittance]`; then the optical depth up to
+/// and including it. Same arithmetic as [`crate::composite::Compositor::add`].
+#[inline]
+pub fn weigh_sample(optical_depth_before: f32, optical_depth: f32) -> ([f32; 2], f32) {
+    let before = exp(-optical_depth_before);
+    if !(optical_depth > 0.0) {
+        return ([0.0, before], optical_depth_before);
+    }
+    let sum = optical_depth_before + optical_depth;
+    ([before - exp(-sum), before], sum)
+}
+
+/// A dispatch of [`is_wanted`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct WantedBlock {
+    /// Samples on each ray.
+    pub sample_count: u32,
+    /// Parts of each ray that was seen before.
+    pub part_count: u32,
+    /// Samples are wanted where a sample in the same part or a neighbouring one stopped at least this share of the light
+    /// that reached it. 0: everywhere.
+    pub least_share: f32,
+    /// Samples are wanted up to one part behind where the transmittance falls to this. Negative: everywhere.
+    pub settled: f32,
+    /// Samples are wanted on rays of at least this opacity. 0: on all.
+    pub least_opacity: f32,
+    /// Pixels from one ray that was seen before to the next, in both directions; 0 if every ray was seen itself.
+    pub step: u32,
+    /// How many rays were seen before in a row of the picture.
+    pub seen_columns: u32,
+    /// In how many rows.
+    pub seen_rows: u32,
+    /// Width of the picture.
+    pub width: u32,
+}
+
+/// Whether a sample at `depth` on `ray`, which is number `index` of the rays at hand and belongs to pixel `pixel`, is
+/// wanted: if the ray itself (`step` 0), or one of the four seen before around it, says so by `seen[ray][part]`.
+#[inline]
+pub fn is_wanted(
+    seen: &(impl Fetch<[f32; 2]> + ?Sized),
+    ray: &TargetRay,
+    depth: f32,
+    index: u32,
+    pixel: u32,
+    block: &WantedBlock,
+) -> bool {
+    let last_part = block.part_count - 1;
+    let share = (depth - ray.near) / (ray.far - ray.near);
+    let part = clamp(share * block.part_count as f32, 0.0, last_part as f32) as u32;
+    let (first, last) = (part.saturating_sub(1), (part + 1).min(last_part));
+    if block.step == 0 {
+        return says_so(seen, index, first, last, block);
+    }
+    let (column, row) = (pixel % block.width / block.step, pixel / block.width / block.step);
+    let mut corner = 0;
+    while corner < 4 {
+        let column = (column + corner % 2).min(block.seen_columns - 1);
+        let row = (row + corner / 2).min(block.seen_rows - 1);
+        if says_so(seen, row * block.seen_columns + column, first, last, block) {
+            return true;
+        }
+        corner += 1;
+    }
+    false
+}
+
+#[inline]
+fn says_so(seen: &(impl Fetch<[f32; 2]> + ?Sized), ray: u32, first: u32, last: u32, block: &WantedBlock) -> bool {
+    let row = (ray * block.part_count) as usize;
+    let [end_weight, end_transmittance] = seen.fetch(row + block.part_count as usize - 1);
+    let opacity = 1.0 - (end_transmittance - end_weight);
+    let reaches = seen.fetch(row + first as usize)[1] > block.settled;
+    if !(opacity >= block.least_opacity) || !reaches {
+        return false;
+    }
+    let mut part = first;
+    while part <= last {
+        let [weight, transmittance] = seen.fetch(row + part as usize);
+        if weight >= block.least_share * transmittance {
+            return true;
+        }
+        part += 1;
+    }
+    false
+}
