@@ -7,7 +7,7 @@ use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-use viewfuse::device::{Device, Memory};
+use viewfuse::device::Device;
 use viewfuse::device::choice::{AnyDevice, Chosen};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::few_shot::FewShot;
