@@ -209,7 +209,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options)?;
         let mut times = StageTimes::default();
-        let images = timed(&mut times.photographs, || album.sources(sources, side, options.background))?;
+        let images =
+            timed(&mut times.photographs, || album.sources(sources, field.source_side(side), options.background))?;
         if let Some(warning) = &images.warning {
             progress.warn(&format!("{}: {warning}", scene.path.display()));
         }
