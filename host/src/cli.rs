@@ -4,6 +4,7 @@ mod check;
 mod devices;
 mod evaluate;
 mod inspect;
+mod model;
 mod options;
 mod render;
 mod table;

@@ -2,6 +2,7 @@
 
 use crate::device::KernelTime;
 use crate::few_shot::FewShot;
+use crate::field::LeftOut;
 use crate::render::{Frame, RenderOptions, StageTimes};
 use crate::scene::Scene;
 use serde::Serialize;
@@ -20,6 +21,12 @@ pub struct RunRecord {
     pub device_reason: String,
     /// The field.
     pub field: &'static str,
+    /// Where its network's parameters come from; null for the field that needs none.
+    pub model: Option<String>,
+    /// Whether leaving out was forbidden altogether.
+    pub exact: bool,
+    /// What the field left out, in all frames together.
+    pub left_out: Vec<LeftOut>,
     /// The weighting scheme.
     pub weighting: String,
     /// Seed of every random number. The weight-free field draws none.

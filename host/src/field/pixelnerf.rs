@@ -28,7 +28,8 @@ use encoder::{Image, Size, ViewLatents, encode};
 use network::{Network, Views, Workspace};
 use parameters::{HostLayer, Parameters};
 use pass::{Asked, MOST_RAYS, Renderer};
-use std::cell::{OnceCell, RefCell};
+use std::cell::OnceCell;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
 
@@ -43,7 +44,7 @@ pub struct PixelNerf {
     architecture: Architecture,
     parameters: Parameters<HostLayer>,
     options: PixelNerfOptions,
-    counts: RefCell<Counts>,
+    counts: Mutex<Counts>,
 }
 
 /// What was done and what was left out so far.
@@ -75,7 +76,7 @@ impl PixelNerf {
     pub fn new(checkpoint: &Checkpoint, options: PixelNerfOptions) -> Result<PixelNerf, CheckpointError> {
         let architecture = Architecture::of(checkpoint)?;
         let parameters = Parameters::read(checkpoint, &architecture)?;
-        Ok(PixelNerf { architecture, parameters, options, counts: RefCell::default() })
+        Ok(PixelNerf { architecture, parameters, options, counts: Mutex::default() })
     }
 
     /// Its sizes.
@@ -85,7 +86,7 @@ impl PixelNerf {
 
     /// The same network with other settings; what was counted is forgotten.
     pub fn with_options(self, options: PixelNerfOptions) -> PixelNerf {
-        PixelNerf { options, counts: RefCell::default(), ..self }
+        PixelNerf { options, counts: Mutex::default(), ..self }
     }
 
     fn encode_view<D: Device>(&self, device: &D, prepared: &Prepared<D>, view: usize) -> Result<(), D::Error> {
@@ -95,7 +96,7 @@ impl PixelNerf {
         let maps = self.options.omissions.latent_layers;
         let latents = encode(device, &self.architecture, &prepared.parameters, &prepared.images[view], maps)?;
         if prepared.latents[view].set(latents).is_ok() {
-            self.counts.borrow_mut().encoded_views += 1;
+            self.counts().encoded_views += 1;
         }
         Ok(())
     }
@@ -139,7 +140,7 @@ impl<D: Device> Field<D> for PixelNerf {
         let distance = Rig::of(&cameras).distance;
         let images =
             sources.images.iter().map(|image| upload_image(device, image)).collect::<Result<_, _>>().map_err(failed)?;
-        self.counts.borrow_mut().views += cameras.len() as u64;
+        self.counts().views += cameras.len() as u64;
         Ok(Prepared {
             parameters: self.parameters.load(device).map_err(failed)?,
             images,
@@ -240,7 +241,7 @@ impl<D: Device> Field<D> for PixelNerf {
     }
 
     fn left_out(&self) -> Vec<LeftOut> {
-        let Counts { views, encoded_views, latent_rows, mapped_rows, passes: [coarse, fine] } = *self.counts.borrow();
+        let Counts { views, encoded_views, latent_rows, mapped_rows, passes: [coarse, fine] } = *self.counts();
         let Omissions { unused_views, latent_layers, empty_space, empty_rays, empty_parts, hidden_samples } =
             self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
@@ -267,8 +268,12 @@ impl<D: Device> Field<D> for PixelNerf {
 }
 
 impl PixelNerf {
+    fn counts(&self) -> MutexGuard<'_, Counts> {
+        self.counts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn count(&self, view_count: u64, asked: &[Asked; 2]) {
-        let mut counts = self.counts.borrow_mut();
+        let mut counts = self.counts();
         let rows = view_count * self.architecture.injected_count as u64 * (asked[0].asked + asked[1].asked);
         counts.latent_rows += rows;
         if self.options.omissions.latent_layers {
