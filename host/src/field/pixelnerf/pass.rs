@@ -138,7 +138,8 @@ impl<D: Device> Renderer<'_, D> {
                 sample_count: block.sample_count,
                 part_count: block.sample_count,
                 least_share: LEAST_SHARE,
-                settled: if self.omissions.hidden_samples { self.settled } else { -1.0 },
+                // What is hidden on the probes' rays is not on a ray that passes beside their surfaces.
+                settled: -1.0,
                 least_opacity: 0.0,
                 step: self.omissions.empty_space,
                 seen_columns: seen.columns,
