@@ -14,6 +14,9 @@ pub const ROUNDING: f64 = 2.0 / 16_777_216.0;
 /// is one rounding more.
 pub const DIVISION: f64 = 3.0 * ROUNDING;
 
+/// Absolute error of our sine and cosine for arguments up to 8192.
+const SINE_ERROR: f64 = 9.0e-8;
+
 /// A value and a bound on the error of its `f32` counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounded {
@@ -82,6 +85,30 @@ impl Bounded {
     pub fn exp(self) -> Bounded {
         let value = self.value.exp();
         Bounded { value, error: value * self.error.exp_m1() + 2.0 * ROUNDING * value + 2.0e-38 }
+    }
+
+    /// The natural logarithm of a positive number; the function under test is off by at most 2 ULP.
+    pub fn ln(self) -> Bounded {
+        let value = self.value.ln();
+        Bounded { value, error: -(-self.error / self.value).ln_1p() + 2.0 * ROUNDING * value.abs() }
+    }
+
+    /// The square root; a device may take it as the reciprocal of a reciprocal root, 4.5 ULP together.
+    pub fn square_root(self) -> Bounded {
+        let value = self.value.sqrt();
+        let least = (self.value - self.error).max(0.0).sqrt();
+        let brought = if self.error > 0.0 { self.error / (value + least) } else { 0.0 };
+        Bounded { value, error: brought + 4.5 * ROUNDING * value }
+    }
+
+    /// The sine of at most 8192 rad. It is nowhere steeper than 1.
+    pub fn sine(self) -> Bounded {
+        Bounded { value: self.value.sin(), error: self.error + SINE_ERROR }
+    }
+
+    /// The cosine of at most 8192 rad.
+    pub fn cosine(self) -> Bounded {
+        Bounded { value: self.value.cos(), error: self.error + SINE_ERROR }
     }
 }
 
