@@ -5,7 +5,7 @@
 //! test may take its operations in another order. A division counts as what Vulkan allows it: a bound made here holds on
 //! every device, not only on those that divide correctly. A comparison that the errors leave open has no answer.
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Twice the unit roundoff of `f32`, relative.
 pub const ROUNDING: f64 = 2.0 / 16_777_216.0;
@@ -121,6 +121,13 @@ impl From<f32> for Bounded {
 impl From<u32> for Bounded {
     fn from(value: u32) -> Bounded {
         Bounded { value: f64::from(value), error: 0.0 }
+    }
+}
+
+impl Neg for Bounded {
+    type Output = Bounded;
+    fn neg(self) -> Bounded {
+        Bounded { value: -self.value, ..self }
     }
 }
 

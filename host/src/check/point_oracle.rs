@@ -15,7 +15,7 @@ const SATURATED: f32 = 88.7;
 /// A vector in a view's axes: right, up, backward.
 fn in_view_axes(view: &CameraBlock, vector: Vector) -> Vector {
     let [right, down, forward] = axes(view).map(|axis| dot(axis, vector));
-    [right, Bounded::ZERO - down, Bounded::ZERO - forward]
+    [right, -down, -forward]
 }
 
 /// The features of a point in a view.
@@ -83,7 +83,7 @@ pub fn gather(view: &CameraBlock, grid: &[f32], at: &RayPoint, block: &GatherBlo
 /// Red, green, blue and optical depth of a network's outputs.
 pub fn radiance(raw: &[f32], length: f32) -> [Bounded; 4] {
     let colour = |raw: f32| {
-        let exponential = (Bounded::ZERO - raw.into()).lesser(SATURATED.into()).exp();
+        let exponential = (-Bounded::from(raw)).lesser(SATURATED.into()).exp();
         let colour = Bounded::ONE / (Bounded::ONE + exponential);
         // What a device may flush to 0, and divide as it likes.
         Bounded { error: colour.error + f64::from(f32::MIN_POSITIVE), ..colour }

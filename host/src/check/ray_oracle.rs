@@ -45,8 +45,7 @@ pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [Bounded; 2] {
     if index < block.importance_count {
         return [(Bounded::from(index) + pair[0]) / Bounded::from(block.importance_count), pair[1]];
     }
-    let minus_two = Bounded::ZERO - Bounded::from(2.0);
-    let radius = (minus_two * (Bounded::ONE - pair[0]).ln()).square_root();
+    let radius = (-Bounded::from(2.0) * (Bounded::ONE - pair[0]).ln()).square_root();
     let turn = Bounded { value: TAU, error: (TAU - f64::from(std::f32::consts::TAU)).abs() };
     [radius * (turn * pair[1]).cosine(), Bounded::ZERO]
 }
@@ -118,7 +117,7 @@ pub fn weigh_samples(samples: &[[f32; 4]]) -> Vec<[Bounded; 2]> {
 
 /// How much passes an optical depth.
 fn passing(optical_depth: Bounded) -> Bounded {
-    if optical_depth == Bounded::ZERO { Bounded::ONE } else { (Bounded::ZERO - optical_depth).exp() }
+    if optical_depth == Bounded::ZERO { Bounded::ONE } else { (-optical_depth).exp() }
 }
 
 /// Whether a sample is wanted; `None` where rounding decides. `seen[ray][part]` is weight and transmittance.
