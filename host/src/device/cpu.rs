@@ -4,6 +4,7 @@ mod light;
 mod network;
 mod photo;
 mod points;
+mod product;
 mod rays;
 mod weighting;
 

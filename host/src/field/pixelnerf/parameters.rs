@@ -144,7 +144,7 @@ impl PointNetwork<HostLayer> {
             injections: (0..architecture.injected_count)
                 .map(|block| linear(format!("lin_z.{block}"), latent_channels))
                 .collect::<Result<_, _>>()?,
-            blocks: (0..architecture.block_count).map(pair).collect::<Result<_, _>>()?,
+            blocks: (0..architecture.block_count).map(pair).collect::<Result<_, CheckpointError>>()?,
             exit: linear("lin_out".to_owned(), width)?,
         })
     }
