@@ -5,7 +5,7 @@ use crate::device::kernels::light::{LightKernels, Pixels};
 use rayon::prelude::*;
 use std::convert::Infallible;
 use viewfuse_core::composite::{CompositeBlock, composite_samples};
-use viewfuse_core::fuse::{FuseBlock, fuse_element};
+use viewfuse_core::fuse::FuseBlock;
 
 impl LightKernels for Cpu {
     fn fuse_views(
@@ -16,12 +16,16 @@ impl LightKernels for Cpu {
         latents: &Vec<f32>,
         fused: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        // A point's channels together: they have the same weights.
+        // A point's channels together: they have the same weights. Sums in the order of `fuse_element`.
         let channels = block.channel_count.max(1) as usize;
         fused[..element_count as usize].par_chunks_mut(channels).enumerate().for_each(|(point, fused)| {
-            let weights = &weights[block.first_weight(point * channels)..];
-            for (channel, fused) in fused.iter_mut().enumerate() {
-                *fused = fuse_element(weights, &latents[point * channels + channel..], block);
+            let weights = &weights[block.first_weight(point * channels)..][..block.view_count as usize];
+            fused.fill(0.0);
+            for (view, weight) in weights.iter().enumerate() {
+                let latents = &latents[view * block.stride as usize + point * channels..];
+                for (fused, latent) in fused.iter_mut().zip(latents) {
+                    *fused += weight * latent;
+                }
             }
         });
         Ok(())

@@ -2,6 +2,7 @@
 
 use super::Cpu;
 use crate::device::kernels::points::PointKernels;
+use pulp::Arch;
 use rayon::prelude::*;
 use std::convert::Infallible;
 use viewfuse_core::camera::CameraBlock;
@@ -65,18 +66,15 @@ impl PointKernels for Cpu {
         let gathered = &mut gathered[first..first + point_count * channels];
         gathered.par_chunks_mut(channels).enumerate().for_each(|(point, gathered)| {
             let place = GridPlace::of(&views[block.view as usize], &points[point], block);
-            // As `GridPlace::value`, for all channels together.
-            let [upper_left, upper_right, lower_left, lower_right] =
-                place.nodes.map(|node| &grid[node..node + channels]);
-            for channel in 0..channels {
-                let upper = upper_left[channel] + (upper_right[channel] - upper_left[channel]) * place.share_x;
-                let lower = lower_left[channel] + (lower_right[channel] - lower_left[channel]) * place.share_x;
-                gathered[channel] = upper + (lower - upper) * place.share_y;
-            }
-            if let Some(addend) = addend {
-                let addend = &addend[first + point * channels..][..channels];
-                gathered.iter_mut().zip(addend).for_each(|(value, addend)| *value += addend);
-            }
+            let nodes = place.nodes.map(|node| &grid[node..node + channels]);
+            // As wide as the machine can.
+            Arch::new().dispatch(|| {
+                look_up(&place, nodes, gathered);
+                if let Some(addend) = addend {
+                    let addend = &addend[first + point * channels..];
+                    gathered.iter_mut().zip(addend).for_each(|(value, addend)| *value += addend);
+                }
+            });
         });
         Ok(())
     }
@@ -92,5 +90,18 @@ impl PointKernels for Cpu {
             samples[point.sample as usize] = radiance(raw, point);
         }
         Ok(())
+    }
+}
+
+/// [`GridPlace::value`] for all channels together, from the four nodes.
+#[inline(always)]
+fn look_up(place: &GridPlace, nodes: [&[f32]; 4], values: &mut [f32]) {
+    let [upper_left, upper_right, lower_left, lower_right] = nodes;
+    let upper = upper_left.iter().zip(upper_right);
+    let lower = lower_left.iter().zip(lower_right);
+    for (value, ((a, b), (c, d))) in values.iter_mut().zip(upper.zip(lower)) {
+        let upper = a + (b - a) * place.share_x;
+        let lower = c + (d - c) * place.share_x;
+        *value = upper + (lower - upper) * place.share_y;
     }
 }
