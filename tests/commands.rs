@@ -8,6 +8,8 @@ mod devices;
 mod inspect;
 #[path = "commands/interrupt.rs"]
 mod interrupt;
+#[path = "commands/memory.rs"]
+mod memory;
 #[path = "commands/render.rs"]
 mod render;
 #[path = "commands/tables.rs"]

@@ -16,9 +16,9 @@ use viewfuse_core::network::product::ProductBlock;
 
 const ROUNDS: usize = 60;
 /// Sums that are computed side by side: enough that none waits for its own last step (latency 4, two a cycle).
-const SUMS: usize = 16;
+const SUMS: usize = 12;
 
-/// Multiplies and adds this many times for each of [`SUMS`] vectors; says how many operations that were on each lane.
+/// Multiplies and adds this many times for each of [`SUMS`] vectors.
 type Loop = fn(u32) -> f32;
 
 /// The loop of the widest instructions that this machine has, their name and how many lanes they have.
@@ -51,7 +51,8 @@ macro_rules! fused_loop {
         #[target_feature(enable = $features)]
         pub(super) fn $name(steps: u32) -> f32 {
             let (factor, summand) = ($splat(black_box(0.9)), $splat(black_box(0.1)));
-            let mut sums = [$splat(black_box(0.5)); SUMS];
+            // Different ones, or one would do for all.
+            let mut sums: [_; SUMS] = std::array::from_fn(|sum| $splat(sum as f32));
             for _ in 0..steps {
                 for sum in &mut sums {
                     *sum = $multiply_add(*sum, factor, summand);
