@@ -5,6 +5,7 @@ mod convert;
 mod devices;
 mod evaluate;
 mod inspect;
+mod model;
 mod options;
 mod render;
 mod table;
