@@ -88,10 +88,10 @@ pub enum CheckpointError {
     },
     /// A file that was to be made cannot be.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(WriteError),
     /// The work was stopped.
     #[error(transparent)]
-    Interrupted(#[from] crate::interrupt::Interrupted),
+    Interrupted(crate::interrupt::Interrupted),
 }
 
 /// What can be wrong with the content of a file, before it is said which file.
