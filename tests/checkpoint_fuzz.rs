@@ -12,13 +12,13 @@ use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetens
 static MEMORY: PeakAlloc = PeakAlloc;
 
 /// Files that are tried.
-const ROUNDS: u64 = 8_000;
+const ROUNDS: u64 = 20_000;
 /// No file here takes longer, however busy the machine is.
 const LONGEST: Duration = Duration::from_secs(5);
 /// Tensors of files that ask for more are not read here.
 const LARGEST_READ: u64 = 64 << 20;
 /// What opening may take: so many bytes for each of the file, and something for every file.
-const PER_BYTE: usize = 300;
+const PER_BYTE: usize = 160;
 const ALWAYS: usize = 256 << 10;
 
 /// Random numbers: SplitMix64.
@@ -46,6 +46,8 @@ struct Tally {
 
 /// Opens a file and reads it, counting time and memory.
 fn attempt(path: &Path, bytes: &[u8], tally: &mut Tally) {
+    // A new file each time: writing over an old one waits for the disk.
+    std::fs::remove_file(path).expect("the last file");
     std::fs::write(path, bytes).expect("a file");
     let before = MEMORY.current_usage();
     let peak = || MEMORY.peak_usage().saturating_sub(before);

@@ -70,7 +70,10 @@ fn no_state_dict() {
     assert_refused(&wrapped(elsewhere), &["holds no tensors where they are looked for", "(it has 'weights', 'epoch')"]);
     assert_refused(&wrapped(Pickle::new().raw(b"]")), &["holds no table of named tensors"]);
     let whole = Pickle::new().global("nets", "Net").raw(b")\x81}(").text("training").raw(b"\x88ub");
-    assert_refused(&wrapped(whole), &["holds a whole nets.Net, not its tensors", "model.state_dict()"]);
+    assert_refused(
+        &wrapped(whole),
+        &["holds an object (nets.Net), not a table of named tensors", "model.state_dict()"],
+    );
     let both = Pickle::new().raw(b"}(").text("model").state_dict(&claims).text("a").tensor(&claims[0]).raw(b"u");
     assert_refused(&wrapped(both), &["tensors at its top and also under 'model'"]);
     let twice = [claims[0].clone(), claims[0].clone()];

@@ -24,7 +24,7 @@ fn nothing_is_executed() {
         assert_refused(&archive(&pickle, &[]), &["holds no tensors"]);
         // As the whole.
         let pickle = Pickle::new().global(module, name).text(&touch).raw(b"\x85R").end();
-        assert_refused(&archive(&pickle, &[]), &["holds a whole", function]);
+        assert_refused(&archive(&pickle, &[]), &["holds an object", function]);
     }
     assert!(!trace.exists());
 }

@@ -80,7 +80,7 @@ fn nothing_is_left_of_what_cannot_be_written() {
         Checkpoint::in_memory("it", [(tensor, values.to_vec())], BTreeMap::new())
     };
     let large = one(&[3], &[1.0, -65520.0, 65520.0]);
-    assert_not_written(&large, Precision::Half, "it: tensor 'a': element 1 is -65520, which f16 cannot hold");
+    assert_not_written(&large, Precision::Half, "it: tensor 'a': element 1 is -65520.0, which f16 cannot hold");
     assert_not_written(&one(&[2], &[0.0, f32::NAN]), Precision::Kept, "tensor 'a': element 1 is NaN");
     assert_not_written(&one(&[3], &[0.0, 1.0]), Precision::Kept, "tensor 'a' has 2 values, not those of its shape");
     let mut claims = pair();

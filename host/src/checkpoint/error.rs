@@ -73,7 +73,7 @@ pub enum CheckpointError {
         tensor: String,
     },
     /// A value that is no number, infinite, or beyond what the type that is asked for holds.
-    #[error("{}: tensor '{tensor}': element {index} is {value}, {problem}", path.display())]
+    #[error("{}: tensor '{tensor}': element {index} is {value:?}, {problem}", path.display())]
     Value {
         /// The file.
         path: PathBuf,
