@@ -14,15 +14,21 @@ fn training() -> Folder {
     folder
 }
 
+/// What the command prints, its words separated by single blanks.
+#[track_caller]
+fn words(folder: &Path, arguments: &str) -> String {
+    done(folder, arguments).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 #[test]
 fn a_training_checkpoint() {
     let folder = training();
-    let printed = done(folder.path(), "convert training.pth new/out.safetensors");
+    let printed = words(folder.path(), "convert training.pth new/out.safetensors");
     for part in [
-        "0.weight               float32   [2, 1, 3, 3]      72",
-        "kept       epoch = 12",
-        "read       training.pth (PyTorch, before 1.6; under 'state_dict')",
-        "written    new/out.safetensors: 20 tensors, ",
+        "0.weight float32 [2, 1, 3, 3] 72",
+        "kept epoch = 12",
+        "read training.pth (PyTorch, before 1.6; under 'state_dict')",
+        "written new/out.safetensors: 20 tensors, ",
     ] {
         assert!(printed.contains(part), "no {part:?} in:\n{printed}");
     }
@@ -34,9 +40,9 @@ fn a_training_checkpoint() {
 #[test]
 fn in_half_precision() {
     let folder = training();
-    let printed = done(folder.path(), "convert training.pth out.safetensors --half");
-    assert!(printed.contains("0.weight               float16   [2, 1, 3, 3]      36"), "{printed}");
-    assert!(printed.contains("rounding   0.00e0 of the value at most"), "all values are exact: {printed}");
+    let printed = words(folder.path(), "convert training.pth out.safetensors --half");
+    assert!(printed.contains("0.weight float16 [2, 1, 3, 3] 36"), "{printed}");
+    assert!(printed.contains("rounding 0.00e0 of the value at most"), "all values are exact: {printed}");
 }
 
 #[test]
