@@ -26,6 +26,7 @@ pub mod points;
 pub mod rays;
 pub mod sweep;
 mod tile;
+mod unchecked;
 pub mod weighting;
 
 /// Which elements a dispatch has: its invocation `i` works on element `first + i`, if `i < count`. The same bytes as

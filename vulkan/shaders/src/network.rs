@@ -1,11 +1,13 @@
 //! Layers of networks.
 
 use crate::Push;
-use crate::tile::{Left, Right, Shape, Shared, multiply};
+use crate::tile::{Shape, Shared, multiply};
+use crate::unchecked::{OrZero, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_core::network::product::{ProductBlock, first_of_sum, input_value, rectified};
+use viewfuse_core::pages::Fetch;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 
 /// A part of a tile of pixels and output channels: invocation `first + id.x`.
@@ -19,22 +21,24 @@ pub fn convolve(
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
-    #[spirv(workgroup)] left: &mut Left,
-    #[spirv(workgroup)] right: &mut Right,
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
 ) {
     let block = &push.parameters;
     let channels = block.out_channels;
+    let (inputs, weights, bias, addend) = (OrZero(inputs), OrZero(weights), OrZero(bias), OrZero(addend));
     multiply(
         push.piece.first + id.x,
         Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
-        Shared { left, right },
-        move |pixel, inner| patch_value(inputs, block, pixel, inner),
-        move |inner, channel| weights[(inner * channels + channel) as usize],
-        move |pixel, channel| {
+        rows,
+        columns,
+        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
+        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
+        move |pixel, channel, sum| {
             let element = (pixel * channels + channel) as usize;
-            first_of_sum(bias, addend, block.has_addend, element, channel as usize)
+            let first = first_of_sum(&bias, &addend, block.has_addend, element, channel as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
         },
-        move |pixel, channel, sum| outputs[(pixel * channels + channel) as usize] = rectified(sum, block.relu_outputs),
     );
 }
 
@@ -80,21 +84,23 @@ pub fn product(
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
-    #[spirv(workgroup)] left: &mut Left,
-    #[spirv(workgroup)] right: &mut Right,
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
 ) {
     let block = &push.parameters;
-    let columns = block.column_count;
+    let column_count = block.column_count;
+    let (inputs, weights, bias, addend) = (OrZero(inputs), OrZero(weights), OrZero(bias), OrZero(addend));
     multiply(
         push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count: columns },
-        Shared { left, right },
-        move |row, inner| input_value(inputs, block, row as usize, inner as usize),
-        move |inner, column| weights[(inner * columns + column) as usize],
-        move |row, column| {
-            let element = (row * columns + column) as usize;
-            first_of_sum(bias, addend, block.has_addend, element, column as usize)
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        columns,
+        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |row, column, sum| {
+            let element = (row * column_count + column) as usize;
+            let first = first_of_sum(&bias, &addend, block.has_addend, element, column as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
         },
-        move |row, column, sum| outputs[(row * columns + column) as usize] = rectified(sum, block.relu_outputs),
     );
 }

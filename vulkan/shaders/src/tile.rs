@@ -3,25 +3,20 @@
 //! The workgroup walks along the inner index in steps: it fetches the rows of the left matrix and the columns of the right
 //! one that it needs into its own memory, each number once, and adds up the products from there.
 
-use spirv_std::arch::control_barrier;
+use spirv_std::arch::{IndexUnchecked, control_barrier};
+use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
-use viewfuse_core::network::tile::{SIDE, Sums, TILE};
+use viewfuse_core::network::tile::{Sums, TILE};
 
 /// Inner indices of a step.
-pub(crate) const STEP: u32 = 16;
-/// From a row of the left matrix to the next: odd, so that rows lie in different banks of the workgroup's memory.
-const LEFT_STRIDE: u32 = STEP + 1;
+const STEP: u32 = 16;
+/// Fours of a tile's rows or columns.
+const FOURS: u32 = TILE / 4;
+/// Fours from an inner index to the next: odd, so that they begin in different banks of the workgroup's memory.
+const STRIDE: u32 = FOURS + 1;
 
-/// A step of the left matrix, `[row][inner]`.
-pub(crate) type Left = [f32; (TILE * LEFT_STRIDE) as usize];
-/// A step of the right matrix, `[inner][column]`.
-pub(crate) type Right = [f32; (STEP * TILE) as usize];
-
-/// The memory of a workgroup.
-pub(crate) struct Shared<'a> {
-    pub(crate) left: &'a mut Left,
-    pub(crate) right: &'a mut Right,
-}
+/// A step of either matrix, `[inner][row or column]` in fours.
+pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
 
 /// How large the matrices are.
 #[derive(Clone, Copy)]
@@ -34,59 +29,59 @@ pub(crate) struct Shape {
     pub(crate) column_count: u32,
 }
 
-/// Computes the part of the outputs that belongs to an invocation: every sum begins with `first(row, column)`, and ends up
-/// in `store(row, column, sum)`. All invocations of a workgroup take part, whether they have outputs or not.
+/// Computes the part of the outputs that belongs to an invocation: hands them out as `store(row, column, sum)`. All
+/// invocations of a workgroup take part, whether they have outputs or not, and nothing here may panic.
 #[inline(always)]
 pub(crate) fn multiply(
     invocation: u32,
     shape: Shape,
-    shared: Shared,
+    rows: &mut Shared,
+    columns: &mut Shared,
     left: impl Fn(u32, u32) -> f32,
     right: impl Fn(u32, u32) -> f32,
-    first: impl Fn(u32, u32) -> f32,
     mut store: impl FnMut(u32, u32, f32),
 ) {
     let Shape { row_count, inner_count, column_count } = shape;
-    let side = SIDE as u32;
     let (tile, own) = (invocation / TILE, invocation % TILE);
     let tile_columns = column_count.div_ceil(TILE);
     let (first_row, first_column) = (tile / tile_columns * TILE, tile % tile_columns * TILE);
-    let (own_row, own_column) = (own / side, own % side);
-    let (row, column) = (first_row + own_row, first_column + own_column);
-    let exists = |row: u32, column: u32| row < row_count && column < column_count;
-    let at = |index: usize| index as u32 * side;
-    let mut sums = Sums::starting_with(|i, j| {
-        let (row, column) = (row + at(i), column + at(j));
-        if exists(row, column) { first(row, column) } else { 0.0 }
-    });
+    let (own_row, own_column) = (own / 8, own % 8);
+    let left = move |row: u32, inner: u32| if row < row_count && inner < inner_count { left(row, inner) } else { 0.0 };
+    let right =
+        move |inner: u32, column: u32| if column < column_count && inner < inner_count { right(inner, column) } else { 0.0 };
+    let mut sums = Sums::ZERO;
     let mut start = 0;
     while start < inner_count {
         let mut index = own;
-        while index < TILE * STEP {
-            let (row, inner) = (index / STEP, index % STEP);
-            let is_there = first_row + row < row_count && start + inner < inner_count;
-            shared.left[(row * LEFT_STRIDE + inner) as usize] =
-                if is_there { left(first_row + row, start + inner) } else { 0.0 };
-            let (inner, column) = (index / TILE, index % TILE);
-            let is_there = first_column + column < column_count && start + inner < inner_count;
-            shared.right[index as usize] = if is_there { right(start + inner, first_column + column) } else { 0.0 };
+        while index < STEP * FOURS {
+            let (four, inner) = (index / STEP, index % STEP);
+            let (row, at) = (first_row + 4 * four, start + inner);
+            let value = Vec4::new(left(row, at), left(row + 1, at), left(row + 2, at), left(row + 3, at));
+            unsafe { *rows.index_unchecked_mut((inner * STRIDE + four) as usize) = value };
+            let (four, inner) = (index % FOURS, index / FOURS);
+            let (column, at) = (first_column + 4 * four, start + inner);
+            let value = Vec4::new(right(at, column), right(at, column + 1), right(at, column + 2), right(at, column + 3));
+            unsafe { *columns.index_unchecked_mut((inner * STRIDE + four) as usize) = value };
             index += TILE;
         }
         wait_for_all();
         let mut inner = 0;
         while inner < STEP {
+            let four = move |shared: &Shared, own: u32, index: u32| unsafe {
+                *shared.index_unchecked((inner * STRIDE + Sums::place(own, index) / 4) as usize)
+            };
             sums.add(
-                |i| shared.left[((own_row + at(i)) * LEFT_STRIDE + inner) as usize],
-                |j| shared.right[(inner * TILE + own_column + at(j)) as usize],
+                [four(rows, own_row, 0), four(rows, own_row, 1)],
+                [four(columns, own_column, 0), four(columns, own_column, 1)],
             );
             inner += 1;
         }
         wait_for_all();
         start += STEP;
     }
-    sums.hand_out(|i, j, sum| {
-        let (row, column) = (row + at(i), column + at(j));
-        if exists(row, column) {
+    sums.hand_out(own_row, own_column, move |row, column, sum| {
+        let (row, column) = (first_row + row, first_column + column);
+        if row < row_count && column < column_count {
             store(row, column, sum);
         }
     });
