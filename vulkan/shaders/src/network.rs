@@ -2,13 +2,13 @@
 
 use crate::Push;
 use crate::tile::{Shape, Shared, multiply};
-use crate::unchecked::{OrZero, store};
+use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::network::convolve::{ConvolveBlock, patch_value};
 use viewfuse_core::network::product::{ProductBlock, first_of_sum, input_value, rectified};
-use viewfuse_core::pages::Fetch;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_core::pages::Fetch;
 
 /// A part of a tile of pixels and output channels: invocation `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "convolve"))]
@@ -26,7 +26,7 @@ pub fn convolve(
 ) {
     let block = &push.parameters;
     let channels = block.out_channels;
-    let (inputs, weights, bias, addend) = (OrZero(inputs), OrZero(weights), OrZero(bias), OrZero(addend));
+    let (inputs, weights, bias, addend) = (Endless(inputs), Endless(weights), Endless(bias), Endless(addend));
     multiply(
         push.piece.first + id.x,
         Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
@@ -89,7 +89,7 @@ pub fn product(
 ) {
     let block = &push.parameters;
     let column_count = block.column_count;
-    let (inputs, weights, bias, addend) = (OrZero(inputs), OrZero(weights), OrZero(bias), OrZero(addend));
+    let (inputs, weights, bias, addend) = (Endless(inputs), Endless(weights), Endless(bias), Endless(addend));
     multiply(
         push.piece.first + id.x,
         Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },

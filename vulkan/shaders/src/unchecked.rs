@@ -4,19 +4,15 @@
 use spirv_std::arch::IndexUnchecked;
 use viewfuse_core::pages::Fetch;
 
-/// An array whose missing elements are 0.
+/// An array with at least one element; beyond its end there is the last one again.
 #[derive(Clone, Copy)]
-pub(crate) struct OrZero<'a>(pub(crate) &'a [f32]);
+pub(crate) struct Endless<'a>(pub(crate) &'a [f32]);
 
-impl Fetch<f32> for OrZero<'_> {
+impl Fetch<f32> for Endless<'_> {
     #[inline(always)]
     fn fetch(&self, index: usize) -> f32 {
-        if index < self.0.len() {
-            // SAFETY: just looked.
-            unsafe { *self.0.index_unchecked(index) }
-        } else {
-            0.0
-        }
+        // SAFETY: the list of kernels demands an element of the arrays that kernels read so.
+        unsafe { *self.0.index_unchecked(index.min(self.0.len() - 1)) }
     }
 }
 
