@@ -1,7 +1,7 @@
 //! The compiled kernels are what the list of kernels says; and the checker that says so rejects what is not.
 
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{Capability, Decoration, ExecutionMode, Op};
+use rspirv::spirv::{Capability, Decoration, ExecutionMode, Op, StorageClass};
 use std::path::Path;
 use std::sync::LazyLock;
 use viewfuse_shader_compiler::refine::{read, refine};
@@ -235,7 +235,8 @@ fn for_each(module: &mut Module, operation: Op, change: impl FnMut(&mut Instruct
 fn memory_that_is_not_shared_is_seen() {
     for operation in [Op::Load, Op::Store] {
         let is_mark = |operand: &Operand| matches!(operand, Operand::MemoryAccess(_));
-        let said = breaches_with(|module| for_each(module, operation, |access| access.operands.retain(|o| !is_mark(o))));
+        let said =
+            breaches_with(|module| for_each(module, operation, |access| access.operands.retain(|o| !is_mark(o))));
         assert_eq!(said.len(), 2, "{said:?}");
         assert!(said.iter().all(|said| said.contains("accesses to shared memory are private")), "{said:?}");
     }
@@ -259,13 +260,18 @@ fn a_barrier_that_shows_nothing_is_seen() {
 #[test]
 fn more_memory_than_every_device_has_is_seen() {
     let said = breaches_with(|module| {
-        let is_tile = |kind: &&mut Instruction| kind.class.opcode == Op::TypeArray;
-        let lengths: Vec<_> = module.types_global_values.iter_mut().filter(is_tile).collect();
-        let longest = Operand::LiteralBit32(1 << 20);
-        let tile = lengths.iter().map(|kind| kind.operands[1].clone()).next_back().expect("an array");
-        drop(lengths);
-        let length = module.types_global_values.iter_mut().find(|value| value.result_id == tile.id_ref_any());
-        length.expect("its length").operands[0] = longest;
+        let kinds = &mut module.types_global_values;
+        let operands_of = |kinds: &[Instruction], id: Option<u32>| {
+            let found = kinds.iter().find(|kind| kind.result_id.is_some() && kind.result_id == id);
+            found.map(|kind| kind.operands.clone()).expect("what it is")
+        };
+        let shared = Operand::StorageClass(StorageClass::Workgroup);
+        let is_shared = |kind: &&Instruction| kind.class.opcode == Op::Variable && kind.operands[0] == shared;
+        let variable = kinds.iter().find(is_shared).expect("memory of a workgroup");
+        let pointer = operands_of(kinds, variable.result_type);
+        let length = operands_of(kinds, pointer[1].id_ref_any())[1].id_ref_any();
+        let length = kinds.iter_mut().find(|kind| kind.result_id == length).expect("its length");
+        length.operands[0] = Operand::LiteralBit32(1 << 20);
     });
     assert!(said.iter().any(|said| said.contains("bytes of a workgroup's memory")), "{said:?}");
 }

@@ -10,10 +10,10 @@ use viewfuse::check::measure::{DEFAULT_SEED_COUNT, Role};
 use viewfuse::check::picture::Picture;
 use viewfuse::check::report::{PictureVersusCpu, VersusCpu};
 use viewfuse::check::{CheckError, DeviceReport, KernelReport, PictureReport, Report, check_device};
-use viewfuse::device::{Device, Memory};
 use viewfuse::device::choice::{self, AnyDevice, DeviceChoice, vulkan_devices};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
+use viewfuse::device::{Device, Memory};
 use viewfuse::progress::Progress;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
