@@ -60,7 +60,7 @@ pub fn is_wanted(
     let last_part = block.part_count - 1;
     let share = (depth - ray.near) / (ray.far - ray.near);
     let part = clamp(share * block.part_count as f32, 0.0, last_part as f32) as u32;
-    let (first, last) = (part.saturating_sub(1), (part + 1).min(last_part));
+    let (first, last) = (part.max(1) - 1, (part + 1).min(last_part));
     if block.step == 0 {
         return says_so(seen, index, first, last, block);
     }
