@@ -1,9 +1,11 @@
 //! The command line: what each command takes. What each does is in its own file.
 
 mod check;
+mod convert;
 mod devices;
 mod evaluate;
 mod inspect;
+mod model;
 mod options;
 mod render;
 mod table;
@@ -42,6 +44,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Compare weighting schemes on views that are left out of the sources.
     Evaluate(evaluate::Arguments),
+    /// Write a checkpoint as safetensors.
+    Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
@@ -59,6 +63,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

@@ -4,6 +4,7 @@
 //! about it than this trait; the weight-free field ([`photo`]) is the first, networks are further ones.
 
 pub mod photo;
+pub mod pixelnerf;
 
 use crate::device::Device;
 use crate::interrupt::Interrupted;
@@ -39,6 +40,21 @@ pub struct Rendered {
     pub height: u32,
 }
 
+/// Something that a field leaves out because a scene does not need it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct LeftOut {
+    /// What.
+    pub what: &'static str,
+    /// Whether it was allowed to.
+    pub switch: bool,
+    /// How much of it was left out.
+    pub left_out: u64,
+    /// Of how much in all.
+    pub of: u64,
+    /// What that can cost.
+    pub cost: &'static str,
+}
+
 /// A field on a device.
 pub trait Field<D: Device> {
     /// What depends on the photographs alone: shared by every weighting and every target.
@@ -51,6 +67,22 @@ pub trait Field<D: Device> {
 
     /// The least number of sources it can work with.
     fn least_sources(&self) -> usize;
+
+    /// Longest side of the sources that it wants for pictures of this longest side.
+    fn source_side(&self, picture_side: u32) -> u32 {
+        picture_side
+    }
+
+    /// What it left out so far.
+    fn left_out(&self) -> Vec<LeftOut> {
+        Vec::new()
+    }
+
+    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures; `None`
+    /// for fields that cannot tell.
+    fn memory_estimate(&self, _device: &D, _source_sizes: &[[u32; 2]]) -> Option<u64> {
+        None
+    }
 
     /// Takes the photographs to the device.
     ///

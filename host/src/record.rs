@@ -2,7 +2,8 @@
 
 use crate::device::KernelTime;
 use crate::few_shot::FewShot;
-use crate::render::{Frame, RenderOptions, StageTimes};
+use crate::field::LeftOut;
+use crate::render::{Frame, RenderOptions, StageCosts};
 use crate::scene::Scene;
 use serde::Serialize;
 use std::time::Duration;
@@ -20,6 +21,12 @@ pub struct RunRecord {
     pub device_reason: String,
     /// The field.
     pub field: &'static str,
+    /// Where its network's parameters come from; null for the field that needs none.
+    pub model: Option<String>,
+    /// Whether leaving out was forbidden altogether.
+    pub exact: bool,
+    /// What the field left out, in all frames together.
+    pub left_out: Vec<LeftOut>,
     /// The weighting scheme.
     pub weighting: String,
     /// Seed of every random number. The weight-free field draws none.
@@ -36,6 +43,8 @@ pub struct RunRecord {
     pub warnings: Vec<String>,
     /// Names of the source views.
     pub sources: Vec<String>,
+    /// What it was estimated to take of memory beside photographs and pictures, in bytes; null for fields that cannot tell.
+    pub memory_estimate: Option<u64>,
     /// Times of what all frames share.
     pub times: TimesRecord,
     /// What each kernel took, for devices that tell.
@@ -154,7 +163,7 @@ pub fn source_names(scene: &Scene, job: &FewShot) -> Vec<String> {
 }
 
 /// The times that frames share, with those that the caller measured.
-pub fn times_record(open: Duration, stages: StageTimes, frames: Duration, total: Duration) -> TimesRecord {
+pub fn times_record(open: Duration, stages: StageCosts, frames: Duration, total: Duration) -> TimesRecord {
     TimesRecord {
         open: open.as_secs_f64(),
         photographs: stages.photographs.as_secs_f64(),

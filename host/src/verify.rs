@@ -5,8 +5,10 @@
 
 mod attention;
 mod metrics;
+mod pixelnerf;
 mod weighting;
 
+use crate::device::Device;
 use safetensors::SafeTensors;
 use std::path::{Path, PathBuf};
 
@@ -134,18 +136,23 @@ impl Report {
     }
 }
 
-/// Compares this build with a file.
+/// Compares this build with a file; what has kernels is computed on a device.
 ///
 /// # Errors
 /// [`VerifyError`] if the file cannot be compared at all. A tolerance that is exceeded is no error but part of the
 /// report.
-pub fn verify(path: &Path) -> Result<Report, VerifyError> {
+pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError> {
     let bytes = std::fs::read(path).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;
     let report = match SafeTensors::deserialize(&bytes) {
         Ok(tensors) => {
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };
+            // The header was read once already.
+            let width = SafeTensors::read_metadata(&bytes)
+                .ok()
+                .and_then(|(_, metadata)| metadata.metadata().as_ref()?.get("width").cloned());
             let mut covered = attention::verify(path, &tensors, &mut report)?;
             covered.extend(metrics::verify(path, &tensors, &mut report)?);
+            covered.extend(pixelnerf::verify(path, &tensors, width.as_deref(), device, &mut report)?);
             let mut rest: Vec<&str> =
                 tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
             rest.sort_unstable();

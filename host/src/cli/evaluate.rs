@@ -1,17 +1,20 @@
 //! `viewfuse evaluate`.
 
+use super::model::{AnyField, ModelOptions};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::table::table;
 use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse::device::Memory;
 use viewfuse::device::choice::{AnyDevice, Chosen};
+use viewfuse::device::{Device, Memory};
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
-use viewfuse::field::photo::PhotoField;
+use viewfuse::few_shot::Selection;
+use viewfuse::field::Field;
 use viewfuse::files::{check_writable, write_whole};
 use viewfuse::progress::Progress;
+use viewfuse::render::RenderOptions;
 use viewfuse::scene::Scene;
 use viewfuse::weighting::{SCHEME_NAMES, Weighting};
 
@@ -34,6 +37,11 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    model: ModelOptions,
+    /// Seed of every random number (the field that needs no network draws none)
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
     device: DeviceOptions,
     /// Write every single score to this CSV file
     #[arg(short, long, value_name = "FILE")]
@@ -47,22 +55,25 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     };
     let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
-    let options = arguments.picture.to_render_options();
+    let options = arguments.picture.to_render_options(arguments.model.exact);
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
+    let field = arguments.model.open(arguments.seed)?;
     let Chosen { device, reason } = arguments.device.open()?;
     let mut all: Vec<(String, Score)> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
     let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in arguments.scenes.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
-        let field = PhotoField::default();
         let scores = on_threads(arguments.picture.threads, || -> anyhow::Result<Vec<Score>> {
-            Ok(match &device {
-                AnyDevice::Cpu(cpu) => evaluate(scene, &selection, &weightings, cpu, &field, &options, &progress)?,
-                AnyDevice::Vulkan(vulkan) => {
-                    evaluate(scene, &selection, &weightings, vulkan.as_ref(), &field, &options, &progress)?
+            let job = Job { scene, selection: &selection, weightings: &weightings, options: &options };
+            match (&device, &field) {
+                (AnyDevice::Cpu(cpu), AnyField::Photo(field)) => job.run(cpu, field, &progress),
+                (AnyDevice::Cpu(cpu), AnyField::PixelNerf(field)) => job.run(cpu, field.as_ref(), &progress),
+                (AnyDevice::Vulkan(vulkan), AnyField::Photo(field)) => job.run(vulkan.as_ref(), field, &progress),
+                (AnyDevice::Vulkan(vulkan), AnyField::PixelNerf(field)) => {
+                    job.run(vulkan.as_ref(), field.as_ref(), &progress)
                 }
-            })
+            }
         })??;
         drop(progress);
         print_table(&path.display().to_string(), &means(&scores))?;
@@ -82,6 +93,21 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         say(format_args!("{}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is evaluated of a scene.
+struct Job<'a> {
+    scene: &'a Scene,
+    selection: &'a Selection,
+    weightings: &'a [Weighting],
+    options: &'a RenderOptions,
+}
+
+impl Job<'_> {
+    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F, progress: &Progress) -> anyhow::Result<Vec<Score>> {
+        let Job { scene, selection, weightings, options } = self;
+        Ok(evaluate(scene, selection, weightings, device, field, options, progress)?)
+    }
 }
 
 /// Means over the targets; the best value of each column is marked.

@@ -29,8 +29,10 @@ pub(crate) struct PictureOptions {
 }
 
 impl PictureOptions {
-    pub(crate) fn to_render_options(&self) -> RenderOptions {
-        RenderOptions { size: self.size, background: self.background, leave_out: self.leave_out, settled: self.settled }
+    /// With `exact`, nothing is left out.
+    pub(crate) fn to_render_options(&self, exact: bool) -> RenderOptions {
+        let (leave_out, settled) = if exact { (0.0, 0.0) } else { (self.leave_out, self.settled) };
+        RenderOptions { size: self.size, background: self.background, leave_out, settled }
     }
 }
 

@@ -1,5 +1,6 @@
 //! `viewfuse render`.
 
+use super::model::{AnyField, ModelOptions};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions, parse_count};
 use super::{on_threads, say};
 use clap::Args;
@@ -9,10 +10,8 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use viewfuse::device::Device;
 use viewfuse::device::choice::{AnyDevice, Chosen};
-use viewfuse::device::cpu::Cpu;
 use viewfuse::few_shot::FewShot;
 use viewfuse::field::Field;
-use viewfuse::field::photo::PhotoField;
 use viewfuse::files::{check_writable, remove_if_there, write_png, write_whole};
 use viewfuse::photographs::{SourceImages, to_rgb8};
 use viewfuse::progress::Progress;
@@ -48,8 +47,10 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    model: ModelOptions,
+    #[command(flatten)]
     device: DeviceOptions,
-    /// Seed of every random number (the weight-free field draws none)
+    /// Seed of every random number (the field that needs no network draws none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Folder for the results; made if missing
@@ -62,17 +63,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting: Weighting = arguments.weights.parse()?;
     let scene = Scene::open(&arguments.scene)?;
     let open_time = start.elapsed();
-    let field = PhotoField::default();
+    let field = arguments.model.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.orbit);
-    let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&field))?;
-    let options = arguments.picture.to_render_options();
+    let job = selection.resolve(&scene, field.least_sources())?;
+    let options = arguments.picture.to_render_options(arguments.model.exact);
     check_writable(&arguments.output.join("run.json"))?;
     let Chosen { device, reason } = arguments.device.open()?;
     let (scene, job, weighting, options) = (&scene, &job, &weighting, &options);
     let run = Run { arguments, scene, job, weighting, options, device_reason: reason, start, open_time };
-    on_threads(arguments.picture.threads, || match &device {
-        AnyDevice::Cpu(cpu) => run.render(cpu, &field),
-        AnyDevice::Vulkan(vulkan) => run.render(vulkan.as_ref(), &field),
+    on_threads(arguments.picture.threads, || match (&device, &field) {
+        (AnyDevice::Cpu(cpu), AnyField::Photo(field)) => run.render(cpu, field),
+        (AnyDevice::Cpu(cpu), AnyField::PixelNerf(field)) => run.render(cpu, field.as_ref()),
+        (AnyDevice::Vulkan(vulkan), AnyField::Photo(field)) => run.render(vulkan.as_ref(), field),
+        (AnyDevice::Vulkan(vulkan), AnyField::PixelNerf(field)) => run.render(vulkan.as_ref(), field.as_ref()),
     })??;
     Ok(ExitCode::SUCCESS)
 }
@@ -125,6 +128,9 @@ impl Run<'_> {
             device: device.name(),
             device_reason: self.device_reason.clone(),
             field: field.name(),
+            model: self.arguments.model.label(),
+            exact: self.arguments.model.exact,
+            left_out: field.left_out(),
             weighting: self.weighting.to_string(),
             seed: self.arguments.seed,
             size,
@@ -133,6 +139,7 @@ impl Run<'_> {
             settled: self.options.settled,
             warnings: warning.into_iter().collect(),
             sources: names,
+            memory_estimate: stages.memory_estimate,
             times: times_record(self.open_time, stages, frame_time, self.start.elapsed()),
             kernels: kernel_records(&device.kernel_times()),
             frames,

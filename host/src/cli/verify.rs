@@ -1,25 +1,34 @@
 //! `viewfuse verify`.
 
+use super::options::DeviceOptions;
 use super::say;
 use super::table::table;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use viewfuse::device::choice::{AnyDevice, Chosen};
 use viewfuse::verify::{Measure, Report, verify};
 
 #[derive(Args)]
 #[command(after_help = "Example:\n  viewfuse verify fixtures/weighting.json fixtures/metrics.safetensors\n\n\
     Exit code 1 if a tolerance is exceeded.")]
 pub(crate) struct Arguments {
-    /// Files of reference values: weighting.json, metrics.safetensors, genvs_srn.safetensors (its attention weights)
+    /// Files of reference values: weighting.json, metrics.safetensors, pixelnerf_srn.safetensors, genvs_srn.safetensors (its
+    /// attention weights)
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    #[command(flatten)]
+    device: DeviceOptions,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let Chosen { device, .. } = arguments.device.open()?;
     let mut all_pass = true;
     for path in &arguments.files {
-        let report = verify(path)?;
+        let report = match &device {
+            AnyDevice::Cpu(cpu) => verify(path, cpu)?,
+            AnyDevice::Vulkan(vulkan) => verify(path, vulkan.as_ref())?,
+        };
         print_report(&report)?;
         all_pass &= report.passes();
     }
