@@ -6,6 +6,7 @@ mod evaluate;
 mod inspect;
 mod model;
 mod options;
+mod pareto;
 mod render;
 mod table;
 mod verify;
@@ -43,6 +44,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Compare weighting schemes on views that are left out of the sources.
     Evaluate(evaluate::Arguments),
+    /// Measure error against run time over what can be left out, on each device.
+    Pareto(pareto::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
@@ -60,6 +63,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Pareto(arguments) => pareto::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

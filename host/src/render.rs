@@ -11,6 +11,7 @@ use crate::scene::{Scene, SceneError, View};
 use crate::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
 use crate::weighting::Weighting;
 use image::RgbImage;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::metrics::{psnr, ssim};
@@ -112,7 +113,7 @@ pub struct StageTimes {
     pub photographs: Duration,
     /// Taking the photographs to the device and finding the object.
     pub prepare: Duration,
-    /// Encoding the sources.
+    /// Encoding the sources, as far as it does not wait for the frames that need them ([`Frame::encode`]).
     pub encode: Duration,
 }
 
@@ -125,6 +126,8 @@ pub struct Frame {
     pub weights: SourceWeights,
     /// What was left out, and the weights that were used.
     pub omission: Omission<MOST_SOURCES>,
+    /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major.
+    pub colours: Vec<[f32; 4]>,
     /// The picture.
     pub picture: RgbImage,
     /// Depth along the principal axis in world units; 0 where nothing is met. Row-major.
@@ -133,6 +136,8 @@ pub struct Frame {
     pub truth: Option<Truth>,
     /// Time for this frame alone.
     pub time: Duration,
+    /// The part of it that encoded sources which no frame before it used.
+    pub encode: Duration,
 }
 
 /// A photograph at the target, and how the prediction compares.
@@ -185,7 +190,7 @@ pub struct Stage<'a, D: Device, F: Field<D>> {
     side: u32,
     sources: SourcePoses,
     /// The sources at working size.
-    pub images: SourceImages,
+    pub images: Arc<SourceImages>,
     prepared: F::Prepared,
     /// How long the stages took so far.
     pub times: StageTimes,
@@ -205,15 +210,38 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         options: &'a RenderOptions,
         progress: &Progress,
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+        let side = working_side(scene, options)?;
+        let mut photographs = Duration::ZERO;
+        let images = timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background))?;
+        if let Some(warning) = &images.warning {
+            progress.warn(&format!("{}: {warning}", scene.path.display()));
+        }
+        let images = Arc::new(images);
+        let mut stage = Stage::of_images(scene, album, sources, images, device, field, options, progress)?;
+        stage.times.photographs = photographs;
+        Ok(stage)
+    }
+
+    /// The same with photographs that are prepared already: those of these sources, at the size that the field wants and
+    /// over the options' background.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn of_images(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        images: Arc<SourceImages>,
+        device: &'a D,
+        field: &'a F,
+        options: &'a RenderOptions,
+        progress: &Progress,
+    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options)?;
         let mut times = StageTimes::default();
-        let images =
-            timed(&mut times.photographs, || album.sources(sources, field.source_side(side), options.background))?;
-        if let Some(warning) = &images.warning {
-            progress.warn(&format!("{}: {warning}", scene.path.display()));
-        }
         let prepared =
             timed(&mut times.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
                 FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
@@ -248,6 +276,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
         let camera = self.at_working_size(&target.camera)?;
+        let mut encode = Duration::ZERO;
+        timed(&mut encode, || self.field.encode_used(self.device, &self.prepared, latents, &omission.weights))?;
         let rendered = self.field.render(
             self.device,
             &self.prepared,
@@ -264,7 +294,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
             Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
             None => None,
         };
-        Ok(Frame { target: target.clone(), weights, omission, picture, depths, truth, time })
+        Ok(Frame { target: target.clone(), weights, omission, colours, picture, depths, truth, time, encode })
     }
 
     /// A view's photograph at a size, over the run's background.
