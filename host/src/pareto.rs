@@ -66,6 +66,17 @@ pub struct Measured {
     pub points: Vec<Point>,
     /// The first setting's pictures, `[target][pixel]` of red, green, blue and opacity, not rounded.
     pub exact: Vec<Vec<[f32; 4]>>,
+    /// Width and height of the first target's pictures; zeros without settings.
+    pub size: [u32; 2],
+}
+
+impl Measured {
+    /// How the exact pictures differ from those of another device.
+    pub fn exact_versus(&self, other: &Measured) -> Difference {
+        let mut difference = Difference::default();
+        self.exact.iter().zip(&other.exact).for_each(|(own, others)| difference.add(own, others));
+        difference
+    }
 }
 
 /// What is rendered.
@@ -102,11 +113,13 @@ impl Subject<'_> {
         let mut without_truth = self.job.targets.clone();
         without_truth.iter_mut().for_each(|target| target.truth = None);
         let mut exact: Vec<Vec<[f32; 4]>> = Vec::new();
+        let mut size = [0; 2];
         let mut firsts: Vec<First> = Vec::new();
         for (setting, images) in settings.iter().zip(&images) {
             let Round { frames, .. } = self.round(device, setting, images, &self.job.targets, progress)?;
             if exact.is_empty() {
                 exact = frames.iter().map(|frame| frame.colours.clone()).collect();
+                size = frames.first().map_or(size, |frame| frame.picture.dimensions().into());
             }
             firsts.push(First::of(&frames, &exact, setting.field.left_out()));
         }
@@ -120,7 +133,7 @@ impl Subject<'_> {
         }
         let points = settings.iter().zip(firsts).zip(&times);
         let points = points.map(|((setting, first), times)| first.point(&setting.words, times)).collect();
-        Ok(Measured { points, exact })
+        Ok(Measured { points, exact, size })
     }
 
     /// The sources for each setting; those of one size are prepared once.

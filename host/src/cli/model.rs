@@ -127,6 +127,14 @@ pub(crate) struct ModelOptions {
 }
 
 impl AnyField {
+    /// What the run record calls it.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            AnyField::Photo(field) => Field::<Cpu>::name(field),
+            AnyField::PixelNerf(field) => Field::<Cpu>::name(field.as_ref()),
+        }
+    }
+
     /// The least number of sources it can work with.
     pub(crate) fn least_sources(&self) -> usize {
         match self {

@@ -136,12 +136,7 @@ impl Style {
 }
 
 /// A line of the key whose right end is at `end`; returns the space that it takes.
-fn key(
-    area: &Area<'_>,
-    style: Style,
-    [x, y]: [i32; 2],
-    name: &str,
-) -> Result<Space, Failure> {
+fn key(area: &Area<'_>, style: Style, [x, y]: [i32; 2], name: &str) -> Result<Space, Failure> {
     style.mark(area, [x, y])?;
     text(area, name, [x - 14, y], KEY_SIZE, HPos::Right, BLACK)?;
     let words = Space::of_text([0, 0], name, KEY_SIZE);

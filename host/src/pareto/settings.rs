@@ -47,13 +47,12 @@ pub fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting<P
         field: field.with_options(PixelNerfOptions { sampling, omissions }),
         options: RenderOptions { leave_out, settled, ..options.clone() },
     };
-    let all = |words: &str, sampling| {
-        setting(words, sampling, Omissions::default(), options.leave_out, options.settled)
-    };
+    let all =
+        |words: &str, sampling| setting(words, sampling, Omissions::default(), options.leave_out, options.settled);
     let mut settings = vec![setting(EXACT, full, NONE, 0.0, 0.0)];
-    settings.extend(ALONE.map(|(words, omissions, leave_out, settled)| {
-        setting(words, full, omissions, leave_out, settled)
-    }));
+    settings.extend(
+        ALONE.map(|(words, omissions, leave_out, settled)| setting(words, full, omissions, leave_out, settled)),
+    );
     settings.push(all(ALL, full));
     settings.extend(SAMPLES.map(|[first, second]| {
         let share = |count: u32, eighths: u32| (count * eighths).div_ceil(8);
@@ -97,8 +96,7 @@ pub fn of_photo(field: &PhotoField, options: &RenderOptions) -> Vec<Setting<Phot
     settings.extend(SOURCES.map(|(words, share)| setting(&format!("sources {words}"), share, 0.0, 0.0)));
     let RenderOptions { leave_out, settled, .. } = *options;
     settings.push(setting(ALL, 1.0, leave_out, settled));
-    settings.extend(SOURCES.map(|(words, share)| {
-        setting(&format!("{ALL}, sources {words}"), share, leave_out, settled)
-    }));
+    settings
+        .extend(SOURCES.map(|(words, share)| setting(&format!("{ALL}, sources {words}"), share, leave_out, settled)));
     settings
 }
