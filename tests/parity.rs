@@ -99,6 +99,13 @@ fn seed_count(kernel: Kernel) -> u64 {
         Kernel::Attend | Kernel::FuseViews | Kernel::Composite => 8,
         Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth | Kernel::HullEntry | Kernel::MatchCost => 4,
         Kernel::EmbedPose | Kernel::March => 3,
+        // As many as give every shape every combination of addend and rectification.
+        Kernel::Product | Kernel::Convolve => 8,
+        Kernel::CastRays | Kernel::CoarseDepths | Kernel::PlacePoints | Kernel::EmbedPoints => 4,
+        Kernel::VisibleWeights | Kernel::GatherLatents | Kernel::Radiance => 8,
+        Kernel::MaxPool | Kernel::Upsample => 4,
+        Kernel::WeighSamples | Kernel::DrawChances | Kernel::MergeDepths => 4,
+        Kernel::FineDepths | Kernel::WantedSamples => 8,
     }
 }
 
@@ -171,7 +178,14 @@ fn every_input_has_a_control() -> Result<(), Failed> {
             // Which view, how many sources, the shape of a band: whole numbers, or none at all.
             Kernel::EmbedPose | Kernel::Attend | Kernel::FuseViews | Kernel::HullEntry => false,
             Kernel::SumRow | Kernel::MeanColumn => false,
+            Kernel::PlacePoints | Kernel::VisibleWeights | Kernel::Convolve | Kernel::MaxPool | Kernel::Upsample => {
+                false
+            }
+            Kernel::Product | Kernel::Radiance | Kernel::WeighSamples | Kernel::DrawChances => false,
+            Kernel::MergeDepths => false,
             Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
+            Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
+            Kernel::FineDepths | Kernel::WantedSamples => true,
         };
         if controls.contains(&"parameters") != has_numbers {
             return Err(format!("{}: parameters", kernel.name()).into());

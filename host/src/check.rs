@@ -7,10 +7,11 @@
 //!
 //! ```text
 //! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
-//! poses, world                  inputs for a seed
-//! oracle, photo_oracle,         what must come out
-//!   attention_oracle,
-//!   light_oracle
+//! poses, world, sights           inputs for a seed
+//! oracle, attention_oracle,     what must come out
+//!   camera_oracle, photo_oracle,
+//!   ray_oracle, light_oracle,
+//!   network_oracle, point_oracle
 //! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
 //! report, measure               a device's kernels, checked
 //! picture                       a whole picture against the CPU's
@@ -19,16 +20,21 @@
 pub mod agreement;
 pub mod attention_oracle;
 pub mod bounded;
+pub mod camera_oracle;
 pub mod case;
 pub mod cases;
 pub mod compare;
 pub mod light_oracle;
 pub mod measure;
+pub mod network_oracle;
 pub mod oracle;
 pub mod photo_oracle;
 pub mod picture;
+pub mod point_oracle;
 pub mod poses;
+pub mod ray_oracle;
 pub mod report;
+pub mod sights;
 pub mod world;
 
 pub use measure::{check_device, check_kernel};

@@ -1,23 +1,46 @@
 //! Files of network parameters: named tensors.
 //!
 //! Opening a file reads what it says about its tensors, not the tensors: names and shapes are checked against an
-//! architecture before anything large is allocated.
+//! architecture before anything large is allocated. Read are safetensors and what PyTorch's `torch.save` writes of a
+//! `state_dict`, in its zip archives and in its older format; which of them it is, the content decides. No code in a
+//! file is ever executed: see [`pickle`].
+//!
+//! A `state_dict` is looked for at the top of the file and under [`PLACES`]; a `module.` in front of every name, from
+//! training on several GPUs, is taken off.
+//!
+//! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of what the file says about its
+//! tensors; reading takes what [`Checkpoint::byte_estimate`] says, which is known before and limited by
+//! [`LARGEST_TENSOR_BYTES`] and [`LARGEST_TOTAL_BYTES`].
 
+mod archive;
+mod check;
+mod element;
+mod error;
+pub mod input;
+mod kind;
+mod legacy;
+pub mod pickle;
+mod place;
+mod safe;
+mod state_dict;
+mod write;
+
+pub use element::Element;
+pub use error::CheckpointError;
+pub use kind::Kind;
+pub use place::{LARGEST_TENSOR_BYTES, LARGEST_TOTAL_BYTES};
+pub use state_dict::PLACES;
+pub use write::{Precision, Written};
+
+use error::{Problem, shortened};
+use place::{CHUNK_BYTES, Place, Places, element_count};
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-/// Why a checkpoint cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    /// Tensors are not those of the architecture.
-    #[error("{}: {detail}", path.display())]
-    Tensors {
-        /// The file.
-        path: PathBuf,
-        /// Which are missing, unexpected, or of another shape.
-        detail: String,
-    },
-}
+/// Memory that opening a file takes at most, in bytes.
+pub const OPENING_BYTES: u64 = 2 * pickle::PICKLE_BYTES;
 
 /// A tensor that an architecture has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,12 +55,63 @@ pub struct TensorShape {
 #[derive(Debug)]
 pub struct Checkpoint {
     path: PathBuf,
+    origin: String,
     shapes: BTreeMap<String, Vec<usize>>,
     metadata: BTreeMap<String, String>,
-    values: BTreeMap<String, Vec<f32>>,
+    content: Content,
+}
+
+/// Where the values are.
+#[derive(Debug)]
+enum Content {
+    /// Here.
+    Memory(BTreeMap<String, Vec<f32>>),
+    /// In the file, which readers use one after another: they move its cursor.
+    File(Mutex<File>, Places),
 }
 
 impl Checkpoint {
+    /// Opens a file: reads the names, shapes and places of its tensors.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if it cannot be read, is no checkpoint, is damaged, or claims tensors that are absurdly
+    /// large or lie outside the file.
+    pub fn open(path: &Path) -> Result<Checkpoint, CheckpointError> {
+        let opened = || -> Result<Checkpoint, Problem> {
+            let file = File::open(path)?;
+            let facts = file.metadata()?;
+            if !facts.is_file() {
+                return Err(Problem::NoCheckpoint("not a file".to_owned()));
+            }
+            let kind = Kind::of(&file)?;
+            let mut origin = kind.name().to_owned();
+            let (places, metadata) = match kind {
+                Kind::Safetensors => safe::open(&file, facts.len())?,
+                Kind::TorchZip | Kind::TorchLegacy => {
+                    let open = if kind == Kind::TorchZip { archive::open } else { legacy::open };
+                    let (found, places) = open(&file, facts.len())?;
+                    origin.extend(found.place.map(|place| format!("; under '{place}'")));
+                    if !found.prefix.is_empty() {
+                        origin.push_str(&format!("; without the '{}' in front of every name", found.prefix));
+                    }
+                    (places, found.settings)
+                }
+            };
+            let total = places.values().map(|place| 4 * u128::from(place.count())).sum();
+            if total > LARGEST_TOTAL_BYTES.into() {
+                return Err(Problem::TooLarge {
+                    what: format!("all its {} tensors", places.len()),
+                    bytes: total,
+                    limit: LARGEST_TOTAL_BYTES,
+                });
+            }
+            let shapes = places.iter().map(|(name, place)| (name.clone(), place.shape.clone())).collect();
+            let content = Content::File(Mutex::new(file), places);
+            Ok(Checkpoint { path: path.to_path_buf(), origin, shapes, metadata, content })
+        };
+        opened().map_err(|problem| problem.of(path))
+    }
+
     /// A checkpoint that was computed, not read. `label` takes the place of its path in messages.
     pub fn in_memory(
         label: &str,
@@ -49,7 +123,8 @@ impl Checkpoint {
             shapes.insert(name.clone(), shape);
             values.insert(name, numbers);
         }
-        Checkpoint { path: PathBuf::from(label), shapes, metadata, values }
+        let origin = "computed".to_owned();
+        Checkpoint { path: PathBuf::from(label), origin, shapes, metadata, content: Content::Memory(values) }
     }
 
     /// The file, for messages.
@@ -57,33 +132,131 @@ impl Checkpoint {
         &self.path
     }
 
+    /// What kind of file it is, and where in it the tensors were, for messages.
+    pub fn origin(&self) -> &str {
+        &self.origin
+    }
+
     /// Names and shapes of its tensors.
     pub fn shapes(&self) -> &BTreeMap<String, Vec<usize>> {
         &self.shapes
     }
 
-    /// What else the file says.
+    /// The type in which it holds the elements of a tensor.
+    pub fn element(&self, name: &str) -> Option<Element> {
+        match &self.content {
+            Content::Memory(values) => values.get(name).map(|_| Element::F32),
+            Content::File(_, places) => places.get(name).map(|place| place.element),
+        }
+    }
+
+    /// What else the file says: of safetensors its metadata, of PyTorch's files the numbers and short texts that stand
+    /// beside the `state_dict`.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
+    }
+
+    /// Memory that reading these tensors and keeping all of them takes, in bytes: 4 for every element, and what reading
+    /// the most demanding of them needs beside. Names that it does not have take nothing.
+    pub fn byte_estimate<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> u64 {
+        let (mut kept, mut working) = (0, 0);
+        for name in names {
+            let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
+            kept += 4 * count;
+            if let Content::File(_, places) = &self.content {
+                working = working.max(places.get(name).map_or(0, Place::working_bytes));
+            }
+        }
+        kept + working
     }
 
     /// Checks that it has exactly these tensors, and perhaps others that `optional` accepts.
     ///
     /// # Errors
-    /// [`CheckpointError::Tensors`] with all that are missing, unexpected, or of another shape.
+    /// [`CheckpointError::Tensors`] with those that are missing, unexpected, or of another shape.
     pub fn check(&self, expected: &[TensorShape], optional: impl Fn(&str) -> bool) -> Result<(), CheckpointError> {
-        let _ = (expected, optional);
-        Ok(())
+        match check::compare(&self.shapes, expected, optional) {
+            None => Ok(()),
+            Some(detail) => Err(CheckpointError::Tensors { path: self.path.clone(), detail }),
+        }
     }
 
-    /// The values of a tensor, flat and row-major, all of them finite.
+    /// The values of a tensor, flat and row-major, all of them finite. Integers beyond 2^24 are rounded.
     ///
     /// # Errors
-    /// [`CheckpointError`] if there is none of that name, if it cannot be read, or if it holds a NaN or an infinity.
+    /// [`CheckpointError`] if there is none of that name, if it cannot be read, or if it holds a NaN, an infinity, or
+    /// a number beyond `f32`.
     pub fn tensor(&self, name: &str) -> Result<Vec<f32>, CheckpointError> {
-        self.values
-            .get(name)
-            .cloned()
-            .ok_or_else(|| CheckpointError::Tensors { path: self.path.clone(), detail: format!("no tensor {name}") })
+        let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
+        let mut values = Vec::new();
+        values.try_reserve_exact(count as usize).map_err(|_| CheckpointError::Content {
+            path: self.path.clone(),
+            what: format!("tensor '{}' takes {} bytes, which this machine does not have", shortened(name), 4 * count),
+        })?;
+        self.read(name, |element, bytes| {
+            for value in element.values(bytes) {
+                let number = value as f32;
+                if !number.is_finite() {
+                    return Err(self.not_finite(name, values.len() as u64, value));
+                }
+                values.push(number);
+            }
+            Ok(())
+        })?;
+        Ok(values)
+    }
+
+    /// Hands out a tensor's elements as it holds them, row-major, in pieces of whole elements.
+    fn read(
+        &self,
+        name: &str,
+        mut take: impl FnMut(Element, &[u8]) -> Result<(), CheckpointError>,
+    ) -> Result<(), CheckpointError> {
+        let none = || CheckpointError::NoTensor { path: self.path.clone(), tensor: shortened(name) };
+        match &self.content {
+            Content::Memory(values) => {
+                let values = values.get(name).ok_or_else(none)?;
+                if self.shapes.get(name).and_then(|shape| element_count(shape)) != Some(values.len() as u64) {
+                    return Err(CheckpointError::Content {
+                        path: self.path.clone(),
+                        what: format!(
+                            "tensor '{}' has {} values, not those of its shape",
+                            shortened(name),
+                            values.len()
+                        ),
+                    });
+                }
+                values.chunks(CHUNK_BYTES / 4).try_for_each(|chunk| {
+                    let bytes: Vec<u8> = chunk.iter().flat_map(|value| value.to_le_bytes()).collect();
+                    take(Element::F32, &bytes)
+                })
+            }
+            Content::File(file, places) => {
+                let place = places.get(name).ok_or_else(none)?;
+                let file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                let read = place.read(&file, |bytes| take(place.element, bytes).map_err(ReadError::Checkpoint));
+                read.map_err(|error| match error {
+                    ReadError::Checkpoint(error) => error,
+                    ReadError::Problem(problem) => problem.of(&self.path),
+                })
+            }
+        }
+    }
+
+    fn not_finite(&self, name: &str, index: u64, value: f64) -> CheckpointError {
+        let problem = if value.is_finite() { "which f32 cannot hold" } else { "not a finite number" };
+        CheckpointError::Value { path: self.path.clone(), tensor: shortened(name), index, value, problem }
+    }
+}
+
+/// What can end the reading of a tensor: the file, or who takes its pieces.
+enum ReadError {
+    Problem(Problem),
+    Checkpoint(CheckpointError),
+}
+
+impl From<Problem> for ReadError {
+    fn from(problem: Problem) -> ReadError {
+        ReadError::Problem(problem)
     }
 }

@@ -1,6 +1,7 @@
 //! The command line: what each command takes. What each does is in its own file.
 
 mod check;
+mod convert;
 mod devices;
 mod evaluate;
 mod inspect;
@@ -46,6 +47,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Measure error against run time over what can be left out, on each device.
     Pareto(pareto::Arguments),
+    /// Write a checkpoint as safetensors.
+    Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
@@ -64,6 +67,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Pareto(arguments) => pareto::run(&arguments),
+        Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

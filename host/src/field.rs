@@ -78,6 +78,12 @@ pub trait Field<D: Device> {
         Vec::new()
     }
 
+    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures; `None`
+    /// for fields that cannot tell.
+    fn memory_estimate(&self, _device: &D, _source_sizes: &[[u32; 2]]) -> Option<u64> {
+        None
+    }
+
     /// Takes the photographs to the device.
     ///
     /// # Errors

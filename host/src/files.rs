@@ -2,6 +2,7 @@
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
 
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -24,32 +25,67 @@ pub enum WriteError {
     },
 }
 
+/// A file that is written piece by piece and appears when it is finished. Dropped before, it leaves nothing behind.
+#[derive(Debug)]
+pub struct WholeFile {
+    path: PathBuf,
+    writer: BufWriter<NamedTempFile>,
+}
+
+impl WholeFile {
+    /// Begins a file. Until it is finished it is a temporary one beside `path`. Missing folders are made.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn create(path: &Path) -> Result<WholeFile, WriteError> {
+        let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
+        let folder = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".viewfuse-");
+        // The default is readable by the owner only, which is wrong for a result.
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            builder.permissions(std::fs::Permissions::from_mode(0o644));
+        }
+        let writer = BufWriter::new(builder.tempfile_in(folder).map_err(failed)?);
+        Ok(WholeFile { path: path.to_path_buf(), writer })
+    }
+
+    /// Adds bytes.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`].
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
+        self.writer.write_all(bytes).map_err(|cause| WriteError::Io { path: self.path.clone(), cause })
+    }
+
+    /// Makes it appear, in place of what may have been there.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`]; nothing is left behind then.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let WholeFile { path, writer } = self;
+        let finished = writer
+            .into_inner()
+            .map_err(|error| error.into_error())
+            .and_then(|file| file.persist(&path).map_err(|error| error.error));
+        finished.map(drop).map_err(|cause| WriteError::Io { path, cause })
+    }
+}
+
 /// Writes `bytes` to a temporary file beside `path` and renames it into place. Missing folders are made.
 ///
 /// # Errors
 /// [`WriteError::Io`]; nothing is left behind then.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
-    let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    std::fs::create_dir_all(folder).map_err(failed)?;
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".viewfuse-");
-    // The default is readable by the owner only, which is wrong for a result.
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o644));
-    }
-    let mut file = builder.tempfile_in(folder).map_err(failed)?;
-    {
-        let mut writer = BufWriter::new(file.as_file_mut());
-        writer.write_all(bytes).and_then(|()| writer.flush()).map_err(failed)?;
-    }
-    file.persist(path).map_err(|error| failed(error.error))?;
-    Ok(())
+    let mut file = WholeFile::create(path)?;
+    file.write(bytes)?;
+    file.finish()
 }
 
 /// Checks, before long work, that a file can appear at `path`: it is no folder, and the nearest folder above it that

@@ -178,7 +178,7 @@ impl Subject<'_> {
             frames.push(stage.frame(self.weighting, &latents, target, &quiet)?);
             progress.step();
         }
-        Ok(Round { encode: stage.times.encode, frames })
+        Ok(Round { encode: stage.costs.encode, frames })
     }
 }
 

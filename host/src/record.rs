@@ -3,7 +3,7 @@
 use crate::device::KernelTime;
 use crate::few_shot::FewShot;
 use crate::field::LeftOut;
-use crate::render::{Frame, RenderOptions, StageTimes};
+use crate::render::{Frame, RenderOptions, StageCosts};
 use crate::scene::Scene;
 use serde::Serialize;
 use std::time::Duration;
@@ -43,6 +43,8 @@ pub struct RunRecord {
     pub warnings: Vec<String>,
     /// Names of the source views.
     pub sources: Vec<String>,
+    /// What it was estimated to take of memory beside photographs and pictures, in bytes; null for fields that cannot tell.
+    pub memory_estimate: Option<u64>,
     /// Times of what all frames share.
     pub times: TimesRecord,
     /// What each kernel took, for devices that tell.
@@ -164,7 +166,7 @@ pub fn source_names(scene: &Scene, job: &FewShot) -> Vec<String> {
 }
 
 /// The times that frames share, with those that the caller measured.
-pub fn times_record(open: Duration, stages: StageTimes, frames: Duration, total: Duration) -> TimesRecord {
+pub fn times_record(open: Duration, stages: StageCosts, frames: Duration, total: Duration) -> TimesRecord {
     TimesRecord {
         open: open.as_secs_f64(),
         photographs: stages.photographs.as_secs_f64(),

@@ -4,7 +4,8 @@ use crate::device::Device;
 use crate::few_shot::{FewShot, Target};
 use crate::field::{Field, FieldError, Rendered};
 use crate::photographs::{
-    Album, BackgroundChoice, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8,
+    Album, BackgroundChoice, PhotographsError, SourceImage, SourceImages, longest_side, reduced_size, scaled_size,
+    to_rgb8,
 };
 use crate::progress::Progress;
 use crate::scene::{Scene, SceneError, View};
@@ -106,15 +107,17 @@ impl Default for RenderOptions {
     }
 }
 
-/// How long each stage took. Stages that several frames share are counted once, in their run.
+/// What the stages took. Those that several frames share are counted once, in their run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StageTimes {
+pub struct StageCosts {
     /// Decoding photographs, taking out backgrounds, resampling.
     pub photographs: Duration,
     /// Taking the photographs to the device and finding the object.
     pub prepare: Duration,
     /// Encoding the sources, as far as it does not wait for the frames that need them ([`Frame::encode`]).
     pub encode: Duration,
+    /// What the run was estimated to take of memory, in bytes; see [`Field::memory_estimate`].
+    pub memory_estimate: Option<u64>,
 }
 
 /// One target's picture with all that led to it.
@@ -192,8 +195,8 @@ pub struct Stage<'a, D: Device, F: Field<D>> {
     /// The sources at working size.
     pub images: Arc<SourceImages>,
     prepared: F::Prepared,
-    /// How long the stages took so far.
-    pub times: StageTimes,
+    /// What the stages took so far.
+    pub costs: StageCosts,
 }
 
 impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
@@ -218,7 +221,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         }
         let images = Arc::new(images);
         let mut stage = Stage::of_images(scene, album, sources, images, device, field, options, progress)?;
-        stage.times.photographs = photographs;
+        stage.costs.photographs = photographs;
         Ok(stage)
     }
 
@@ -241,13 +244,16 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options)?;
-        let mut times = StageTimes::default();
+        let mut costs = StageCosts::default();
+        let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
+        let sizes: Vec<[u32; 2]> = images.images.iter().map(size).collect();
+        costs.memory_estimate = field.memory_estimate(device, &sizes);
         let prepared =
-            timed(&mut times.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
+            timed(&mut costs.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
                 FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
                 error => error.into(),
             })?;
-        Ok(Stage { scene, album, device, field, options, side, sources: source_poses, images, prepared, times })
+        Ok(Stage { scene, album, device, field, options, side, sources: source_poses, images, prepared, costs })
     }
 
     /// Encodes the sources under a weighting: each source as a target of the others.
@@ -257,7 +263,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     pub fn encode(&mut self, weighting: &Weighting, progress: &Progress) -> Result<F::Latents, RenderError<D::Error>> {
         let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
         let (field, device, prepared) = (self.field, self.device, &self.prepared);
-        let latents = timed(&mut self.times.encode, || field.encode(device, prepared, &relevance, progress))?;
+        let latents = timed(&mut self.costs.encode, || field.encode(device, prepared, &relevance, progress))?;
         Ok(latents)
     }
 
@@ -367,7 +373,7 @@ pub fn render<D: Device, F: Field<D>, X: From<RenderError<D::Error>>>(
     options: &RenderOptions,
     progress: &Progress,
     mut deliver: impl FnMut(&SourceImages, Frame) -> Result<(), X>,
-) -> Result<StageTimes, X> {
+) -> Result<StageCosts, X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
     let album = Album::open(scene, shown, progress).map_err(RenderError::from)?;
@@ -377,7 +383,7 @@ pub fn render<D: Device, F: Field<D>, X: From<RenderError<D::Error>>>(
         let frame = stage.frame(weighting, &latents, target, progress)?;
         deliver(&stage.images, frame)?;
     }
-    Ok(stage.times)
+    Ok(stage.costs)
 }
 
 /// Runs a piece of work and adds its time.

@@ -146,9 +146,13 @@ pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError>
     let report = match SafeTensors::deserialize(&bytes) {
         Ok(tensors) => {
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };
+            // The header was read once already.
+            let width = SafeTensors::read_metadata(&bytes)
+                .ok()
+                .and_then(|(_, metadata)| metadata.metadata().as_ref()?.get("width").cloned());
             let mut covered = attention::verify(path, &tensors, &mut report)?;
             covered.extend(metrics::verify(path, &tensors, &mut report)?);
-            covered.extend(pixelnerf::verify(path, &tensors, device, &mut report)?);
+            covered.extend(pixelnerf::verify(path, &tensors, width.as_deref(), device, &mut report)?);
             let mut rest: Vec<&str> =
                 tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
             rest.sort_unstable();

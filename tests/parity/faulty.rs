@@ -1,12 +1,16 @@
 //! A device that computes on the CPU and gets one kernel wrong.
 
+#[path = "faulty/network.rs"]
+mod network;
+#[path = "faulty/points.rs"]
+mod points;
+#[path = "faulty/rays.rs"]
+mod rays;
+
 use std::convert::Infallible;
 use std::ops::Range;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{
-    Element, KernelTime, Layer, LightKernels, Memory, NetworkKernels, PhotoKernels, PhotoScene, Pixels, PointKernels,
-    RayKernels, Rays, WeightingKernels,
-};
+use viewfuse::device::{Element, KernelTime, LightKernels, Memory, PhotoKernels, PhotoScene, Pixels, WeightingKernels};
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::photo::march::MarchBlock;
@@ -39,6 +43,11 @@ fn on_cpu(scene: &PhotoScene<Faulty>) -> PhotoScene<Cpu> {
         footprints: scene.footprints.clone(),
         texels: scene.texels.clone(),
     }
+}
+
+/// The same pixels for the CPU.
+fn on_cpu_pixels(pixels: &Pixels<Faulty>) -> Pixels<Cpu> {
+    Pixels { colours: pixels.colours.clone(), depths: pixels.depths.clone() }
 }
 
 /// Runs something on the CPU's kind of pixels.

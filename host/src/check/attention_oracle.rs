@@ -5,9 +5,6 @@ use super::bounded::{Bounded, DIVISION, ROUNDING};
 use viewfuse_core::attention::{EMBEDDING, FREQUENCY_COUNT, FREQUENCY_FACTOR, FourierEmbedding, Linear};
 use viewfuse_core::pose::PoseBlock;
 
-/// Absolute error of our sine and cosine for arguments up to 8192.
-const SINE_ERROR: f64 = 9.0e-8;
-
 /// What the exponential has lost of a weight, and what a device may flush to 0.
 const NEGLIGIBLE: f64 = 4.0e-38;
 
@@ -25,12 +22,8 @@ fn features(pose: &PoseBlock) -> Vec<Bounded> {
     let mut features = centre.to_vec();
     for k in 0..FREQUENCY_COUNT {
         let angles = centre.map(|c| Bounded::from(FREQUENCY_FACTOR * (1 << k) as f32) * c);
-        // Neither function is steeper than 1.
-        let of = |function: fn(f64) -> f64| {
-            angles.map(|angle| Bounded { value: function(angle.value), error: angle.error + SINE_ERROR })
-        };
-        features.extend(of(f64::sin));
-        features.extend(of(f64::cos));
+        features.extend(angles.map(Bounded::sine));
+        features.extend(angles.map(Bounded::cosine));
     }
     features.extend([0, 1, 2].map(|axis| Bounded::from(-pose.forward[axis])));
     features

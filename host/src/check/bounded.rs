@@ -5,7 +5,7 @@
 //! test may take its operations in another order. A division counts as what Vulkan allows it: a bound made here holds on
 //! every device, not only on those that divide correctly. A comparison that the errors leave open has no answer.
 
-use std::ops::{Add, Div, Mul, Sub};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Twice the unit roundoff of `f32`, relative.
 pub const ROUNDING: f64 = 2.0 / 16_777_216.0;
@@ -13,6 +13,9 @@ pub const ROUNDING: f64 = 2.0 / 16_777_216.0;
 /// The error of a division, relative: Vulkan allows 2.5 ULP, and a device may multiply with the rounded reciprocal, which
 /// is one rounding more.
 pub const DIVISION: f64 = 3.0 * ROUNDING;
+
+/// Absolute error of our sine and cosine for arguments up to 8192.
+const SINE_ERROR: f64 = 9.0e-8;
 
 /// A value and a bound on the error of its `f32` counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +86,30 @@ impl Bounded {
         let value = self.value.exp();
         Bounded { value, error: value * self.error.exp_m1() + 2.0 * ROUNDING * value + 2.0e-38 }
     }
+
+    /// The natural logarithm of a positive number; the function under test is off by at most 2 ULP.
+    pub fn ln(self) -> Bounded {
+        let value = self.value.ln();
+        Bounded { value, error: -(-self.error / self.value).ln_1p() + 2.0 * ROUNDING * value.abs() }
+    }
+
+    /// The square root; a device may take it as the reciprocal of a reciprocal root, 4.5 ULP together.
+    pub fn square_root(self) -> Bounded {
+        let value = self.value.sqrt();
+        let least = (self.value - self.error).max(0.0).sqrt();
+        let brought = if self.error > 0.0 { self.error / (value + least) } else { 0.0 };
+        Bounded { value, error: brought + 4.5 * ROUNDING * value }
+    }
+
+    /// The sine of at most 8192 rad. It is nowhere steeper than 1.
+    pub fn sine(self) -> Bounded {
+        Bounded { value: self.value.sin(), error: self.error + SINE_ERROR }
+    }
+
+    /// The cosine of at most 8192 rad.
+    pub fn cosine(self) -> Bounded {
+        Bounded { value: self.value.cos(), error: self.error + SINE_ERROR }
+    }
 }
 
 impl From<f32> for Bounded {
@@ -94,6 +121,13 @@ impl From<f32> for Bounded {
 impl From<u32> for Bounded {
     fn from(value: u32) -> Bounded {
         Bounded { value: f64::from(value), error: 0.0 }
+    }
+}
+
+impl Neg for Bounded {
+    type Output = Bounded;
+    fn neg(self) -> Bounded {
+        Bounded { value: -self.value, ..self }
     }
 }
 

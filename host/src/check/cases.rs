@@ -2,12 +2,20 @@
 
 pub mod attend;
 pub mod composite;
+pub mod depths;
 pub mod embed_pose;
+pub mod fine_depths;
 pub mod fuse_views;
+pub mod gather_latents;
 pub mod hull_entry;
+pub mod layers;
 pub mod march;
 pub mod match_cost;
 pub mod pick_depth;
+pub mod points;
+pub mod rays;
+pub mod resample;
+pub mod seen;
 pub mod weigh;
 pub mod window;
 
@@ -20,15 +28,29 @@ pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
         Kernel::Weigh => visitor.visit::<weigh::Weigh>(),
         Kernel::EmbedPose => visitor.visit::<embed_pose::EmbedPose>(),
         Kernel::Attend => visitor.visit::<attend::Attend>(),
+        Kernel::CastRays => visitor.visit::<rays::CastRays>(),
+        Kernel::CoarseDepths => visitor.visit::<depths::CoarseDepths>(),
+        Kernel::PlacePoints => visitor.visit::<rays::PlacePoints>(),
+        Kernel::EmbedPoints => visitor.visit::<points::EmbedPoints>(),
+        Kernel::VisibleWeights => visitor.visit::<points::VisibleWeights>(),
+        Kernel::GatherLatents => visitor.visit::<gather_latents::GatherLatents>(),
+        Kernel::Convolve => visitor.visit::<layers::Convolve>(),
+        Kernel::MaxPool => visitor.visit::<resample::MaxPool>(),
+        Kernel::Upsample => visitor.visit::<resample::Upsample>(),
+        Kernel::Product => visitor.visit::<layers::Product>(),
         Kernel::FuseViews => visitor.visit::<fuse_views::FuseViews>(),
+        Kernel::Radiance => visitor.visit::<points::Radiance>(),
         Kernel::Composite => visitor.visit::<composite::Composite>(),
+        Kernel::WeighSamples => visitor.visit::<seen::WeighSamples>(),
+        Kernel::DrawChances => visitor.visit::<depths::DrawChances>(),
+        Kernel::FineDepths => visitor.visit::<fine_depths::FineDepths>(),
+        Kernel::MergeDepths => visitor.visit::<fine_depths::MergeDepths>(),
+        Kernel::WantedSamples => visitor.visit::<seen::WantedSamples>(),
         Kernel::HullEntry => visitor.visit::<hull_entry::HullEntry>(),
         Kernel::MatchCost => visitor.visit::<match_cost::MatchCost>(),
         Kernel::SumRow => visitor.visit::<window::SumRow>(),
         Kernel::MeanColumn => visitor.visit::<window::MeanColumn>(),
         Kernel::PickDepth => visitor.visit::<pick_depth::PickDepth>(),
         Kernel::March => visitor.visit::<march::March>(),
-        // Until their cases are written.
-        _ => unreachable!(),
     }
 }

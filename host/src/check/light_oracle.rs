@@ -7,6 +7,8 @@ use viewfuse_core::fuse::FuseBlock;
 /// The weighted sum of an element over the views.
 pub fn fuse_element(weights: &[f32], latents: &[f32], block: &FuseBlock, element: usize) -> Bounded {
     let latents = latents[element..].iter().step_by(block.stride as usize);
+    let point = element / block.channel_count.max(1) as usize;
+    let weights = &weights[point * block.weight_stride as usize..];
     let terms = weights[..block.view_count as usize].iter().zip(latents);
     terms.fold(Bounded::ZERO, |sum, (weight, latent)| sum + Bounded::from(*weight) * Bounded::from(*latent))
 }

@@ -10,6 +10,7 @@ pub use shade::{Colour, Pixel, depth_at, march, sample};
 pub use sweep::{match_cost, mean_column, pick_depth, sum_row};
 
 use crate::check::bounded::{Bounded, ROUNDING};
+use crate::check::camera_oracle::{Seen, Vector, along, bilinear, centre, project, tents, towards};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::hull::{ENTRY_ALPHA, ENTRY_STEP, LEAST_ALPHA};
 use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
@@ -17,26 +18,9 @@ use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
 /// What nothing is seen at; the same number in both precisions.
 pub const NOWHERE: Bounded = Bounded { value: NO_SURFACE as f64, error: 0.0 };
 
-/// A point or a direction.
-pub type Vector = [Bounded; 3];
-
-/// A point known exactly.
-pub fn point(coordinates: [f32; 3]) -> Vector {
-    coordinates.map(Bounded::from)
-}
-
 /// Visibility at `b` widths behind a surface: `(1 - b^2 / 4)^4`, 0 from two widths on.
 fn bell(b: Bounded) -> Bounded {
     (Bounded::ONE - b.squared() / Bounded::from(4.0)).greater(Bounded::ZERO).squared().squared()
-}
-
-fn dot(a: Vector, b: Vector) -> Bounded {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-/// `origin + direction * t`.
-fn along(origin: Vector, direction: Vector, t: Bounded) -> Vector {
-    [0, 1, 2].map(|axis| origin[axis] + direction[axis] * t)
 }
 
 /// The views and the object that kernels look at.
@@ -50,86 +34,13 @@ pub struct Scene<'a> {
     pub texels: &'a [[f32; 4]],
 }
 
-fn centre(camera: &CameraBlock) -> Vector {
-    point([camera.pose.right[3], camera.pose.down[3], camera.pose.forward[3]])
-}
-
-fn axes(camera: &CameraBlock) -> [Vector; 3] {
-    [camera.pose.right, camera.pose.down, camera.pose.forward].map(|axis| point([axis[0], axis[1], axis[2]]))
-}
-
-/// World direction through an image coordinate, 1 along the principal axis.
-fn towards(camera: &CameraBlock, at: [f32; 2]) -> Vector {
-    let [focal_x, focal_y, middle_x, middle_y] = camera.intrinsics.map(Bounded::from);
-    let across = (Bounded::from(at[0]) - middle_x) / focal_x;
-    let below = (Bounded::from(at[1]) - middle_y) / focal_y;
-    let [right, down, forward] = axes(camera);
-    [0, 1, 2].map(|axis| right[axis] * across + down[axis] * below + forward[axis])
-}
-
-/// Image coordinates and depth of a point.
-#[derive(Clone, Copy, Debug)]
-struct Seen {
-    x: Bounded,
-    y: Bounded,
-    depth: Bounded,
-    /// Whether the point is in front of the camera and inside its image.
-    in_image: Option<bool>,
-}
-
-fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
-    let origin = centre(camera);
-    let offset = [0, 1, 2].map(|axis| point_world[axis] - origin[axis]);
-    let [right, down, forward] = axes(camera);
-    let depth = dot(forward, offset);
-    let [focal_x, focal_y, middle_x, middle_y] = camera.intrinsics.map(Bounded::from);
-    // In homogeneous coordinates: the intrinsics first, then one division.
-    let x = (focal_x * dot(right, offset) + middle_x * depth) / depth;
-    let y = (focal_y * dot(down, offset) + middle_y * depth) / depth;
-    let answers = [
-        Bounded::ZERO.below(depth),
-        x.below(Bounded::ZERO).map(|out| !out),
-        y.below(Bounded::ZERO).map(|out| !out),
-        Bounded::from(camera.width).below(x).map(|out| !out),
-        Bounded::from(camera.height).below(y).map(|out| !out),
-    ];
-    let in_image = if answers.contains(&Some(false)) {
-        Some(false)
-    } else if answers.contains(&None) {
-        None
-    } else {
-        Some(true)
-    };
-    Seen { x, y, depth, in_image }
-}
-
-/// Nodes of a grid that a coordinate may touch, each with its tent's height; and the error of those heights.
-fn tents(coordinate: Bounded, count: u32) -> (Vec<(usize, f64)>, f64) {
-    let last = f64::from(count - 1);
-    let position = (coordinate.value - 0.5).clamp(0.0, last);
-    let error = coordinate.error + ROUNDING * (position + 1.0);
-    let low = (coordinate.value - 0.5 - error).clamp(0.0, last).floor();
-    let high = (coordinate.value - 0.5 + error).clamp(0.0, last).ceil();
-    let tent = |node: usize| (node, (1.0 - (position - node as f64).abs()).max(0.0));
-    ((low as usize..=high as usize).map(tent).collect(), error)
-}
-
-/// Bilinear look-up of premultiplied RGBA. An error of the coordinates costs as much as the image changes over it.
+/// Bilinear look-up of premultiplied RGBA.
 fn look_up(camera: &CameraBlock, texels: &[[f32; 4]], x: Bounded, y: Bounded) -> [Bounded; 4] {
-    let ((columns, error_x), (rows, error_y)) = (tents(x, camera.width), tents(y, camera.height));
     std::array::from_fn(|channel| {
-        let (mut value, mut least, mut greatest) = (0.0, f64::MAX, f64::MIN);
-        for (row, height) in &rows {
-            for (column, width) in &columns {
-                let at = camera.first_texel as usize + row * camera.width as usize + column;
-                let node = f64::from(texels[at][channel]);
-                value += width * height * node;
-                least = node.min(least);
-                greatest = node.max(greatest);
-            }
-        }
-        let error = (error_x + error_y) * (greatest - least) + 4.0 * ROUNDING * least.abs().max(greatest.abs());
-        Bounded { value, error }
+        let node = |row: usize, column: usize| {
+            texels[camera.first_texel as usize + row * camera.width as usize + column][channel]
+        };
+        bilinear(node, &tents(x, camera.width), &tents(y, camera.height))
     })
 }
 

@@ -66,7 +66,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting: Weighting = arguments.weights.parse()?;
     let scene = Scene::open(&arguments.scene)?;
-    let field = arguments.network.open(arguments.seed, Omissions::default())?;
+    let field = arguments.network.open(arguments.seed, Omissions::ALL)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.least_sources())?;
     let options = arguments.picture.to_render_options(false);

@@ -139,6 +139,7 @@ impl Run<'_> {
             settled: self.options.settled,
             warnings: warning.into_iter().collect(),
             sources: names,
+            memory_estimate: stages.memory_estimate,
             times: times_record(self.open_time, stages, frame_time, self.start.elapsed()),
             kernels: kernel_records(&device.kernel_times()),
             frames,

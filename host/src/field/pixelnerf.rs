@@ -7,6 +7,7 @@
 mod architecture;
 mod encoder;
 pub mod made;
+mod memory;
 mod network;
 mod options;
 mod parameters;
@@ -144,6 +145,10 @@ impl<D: Device> Field<D> for PixelNerf {
 
     fn source_side(&self, _picture_side: u32) -> u32 {
         SOURCE_SIDE
+    }
+
+    fn memory_estimate(&self, device: &D, source_sizes: &[[u32; 2]]) -> Option<u64> {
+        Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
 
     fn prepare(

@@ -16,23 +16,33 @@ const HIDDEN: Omissions = Omissions { hidden_samples: true, ..NONE };
 
 /// PixelNeRF: each of these alone, with everything else as exact. Words, what is left out, `--leave-out`, `--settled`.
 #[rustfmt::skip]
-const ALONE: [(&str, Omissions, f32, f32); 16] = [
+const ALONE: [(&str, Omissions, f32, f32); 14] = [
     ("unused views",    VIEWS,                                     0.0,  0.0),
     ("leave out 0.01",  VIEWS,                                     0.01, 0.0),
     ("leave out 0.05",  VIEWS,                                     0.05, 0.0),
     ("leave out 0.1",   VIEWS,                                     0.1,  0.0),
-    ("leave out 0.2",   VIEWS,                                     0.2,  0.0),
     ("latent layers",   Omissions { latent_layers: true, ..NONE }, 0.0,  0.0),
     ("empty space, 2",  Omissions { empty_space: 2, ..NONE },      0.0,  0.0),
     ("empty space, 4",  Omissions { empty_space: 4, ..NONE },      0.0,  0.0),
     ("empty space, 8",  Omissions { empty_space: 8, ..NONE },      0.0,  0.0),
     ("empty rays",      Omissions { empty_rays: true, ..NONE },    0.0,  0.0),
     ("empty parts",     Omissions { empty_parts: true, ..NONE },   0.0,  0.0),
-    ("hidden, 0",       HIDDEN,                                    0.0,  0.0),
     ("hidden, 1/256",   HIDDEN,                                    0.0,  1.0 / 256.0),
     ("hidden, 1/64",    HIDDEN,                                    0.0,  1.0 / 64.0),
     ("hidden, 1/16",    HIDDEN,                                    0.0,  1.0 / 16.0),
     ("hidden, 1/4",     HIDDEN,                                    0.0,  1.0 / 4.0),
+];
+
+/// PixelNeRF: all but each of these, because what is harmless alone may not be so together. Words as `--compute` takes
+/// them.
+#[rustfmt::skip]
+const ALL_BUT: [(&str, Omissions); 6] = [
+    ("views",  Omissions { unused_views: false, ..Omissions::ALL }),
+    ("layers", Omissions { latent_layers: false, ..Omissions::ALL }),
+    ("space",  Omissions { empty_space: 0, ..Omissions::ALL }),
+    ("rays",   Omissions { empty_rays: false, ..Omissions::ALL }),
+    ("parts",  Omissions { empty_parts: false, ..Omissions::ALL }),
+    ("hidden", Omissions { hidden_samples: false, ..Omissions::ALL }),
 ];
 
 /// PixelNeRF: with all left out, so many eighths of the exact picture's samples in the first and in the second pass.
@@ -54,6 +64,11 @@ pub fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting<P
         ALONE.map(|(words, omissions, leave_out, settled)| setting(words, full, omissions, leave_out, settled)),
     );
     settings.push(all(ALL, full));
+    settings.extend(ALL_BUT.map(|(words, omissions)| {
+        // Without `views` there is nothing to leave out of the weights either.
+        let leave_out = if omissions.unused_views { options.leave_out } else { 0.0 };
+        setting(&format!("{ALL} but {words}"), full, omissions, leave_out, options.settled)
+    }));
     settings.extend(SAMPLES.map(|[first, second]| {
         let share = |count: u32, eighths: u32| (count * eighths).div_ceil(8);
         let sampling = Sampling {

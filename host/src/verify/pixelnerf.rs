@@ -1,4 +1,5 @@
-//! The official PixelNeRF at full size, parameters by formula: latents, points, rays.
+//! PixelNeRF with parameters by formula: latents, points, rays. The official network at full size, or, where the file's
+//! metadata say `width`, the small member of the family of that width.
 
 use super::{Measure, Quantity, Report, VerifyError};
 use crate::device::Device;
@@ -24,6 +25,7 @@ const PASSES: [(Pass, &str); 2] = [(Pass::Coarse, "coarse"), (Pass::Fine, "fine"
 pub(super) fn verify<D: Device>(
     path: &Path,
     tensors: &SafeTensors<'_>,
+    width: Option<&str>,
     device: &D,
     report: &mut Report,
 ) -> Result<Vec<String>, VerifyError> {
@@ -31,7 +33,12 @@ pub(super) fn verify<D: Device>(
         return Ok(Vec::new());
     }
     let file = File { path, tensors };
-    let checkpoint = made::by_formula(&Architecture::published());
+    let architecture = match width.map(str::parse) {
+        None => Architecture::published(),
+        Some(Ok(width @ 1..=4096)) => Architecture::small(width),
+        Some(_) => return Err(file.wrong("metadata", "'width' is no whole number from 1 to 4096")),
+    };
+    let checkpoint = made::by_formula(&architecture);
     let failed =
         |message: String| VerifyError::Content { path: path.to_path_buf(), place: "pixelnerf".to_owned(), message };
     let options = |omissions| PixelNerfOptions { omissions, ..PixelNerfOptions::default() };
@@ -197,7 +204,7 @@ impl Comparison<'_> {
         let expected = self.file.floats("latent_value")?;
         let latents = reference.latents().map_err(|error| self.failed(error))?;
         let view_len = latents.len() / sources.images.len();
-        let channels = Architecture::published().latent_channels();
+        let channels = reference.architecture().latent_channels();
         let pixels = view_len / channels;
         let mut ours = Vec::with_capacity(expected.len());
         for bytes in indices.data().as_chunks::<8>().0 {

@@ -1,5 +1,5 @@
 //! [`Kernel::FuseViews`]: sums over 1 to 32 views, also where the next view's latents lie further on than there are
-//! elements.
+//! elements, with the same weights everywhere or each point's own.
 
 use crate::check::agreement::Limits;
 use crate::check::bounded::Bounded;
@@ -36,18 +36,31 @@ impl Case for FuseViews {
 
     fn inputs(seed: u64, size: u32) -> Vec<Job> {
         let random = &mut random(3, seed, size);
-        let job = |view_count: usize| {
+        // Views, channels of a point, whether points have their own weights and how far these are apart beyond need.
+        let job = |(view_count, channel_count, own): (usize, u32, Option<usize>)| {
             let stride = size + random.below(3) as u32;
-            let weights = numbers(view_count, || random.unit());
-            let sum: f32 = weights.iter().sum();
+            let point_count = size.div_ceil(channel_count.max(1)) as usize;
+            let weight_stride = own.map_or(0, |beyond| view_count + beyond);
+            let mut weights = numbers(view_count.max(point_count * weight_stride), || random.unit());
+            for weights in weights.chunks_mut(weight_stride.max(view_count)) {
+                let sum: f32 = weights[..view_count].iter().sum();
+                weights.iter_mut().for_each(|weight| *weight /= sum);
+            }
             Job {
-                block: FuseBlock { view_count: view_count as u32, stride, ..FuseBlock::default() },
+                block: FuseBlock {
+                    view_count: view_count as u32,
+                    stride,
+                    channel_count,
+                    weight_stride: weight_stride as u32,
+                },
                 element_count: size as usize,
-                weights: weights.iter().map(|weight| weight / sum).collect(),
+                weights,
                 latents: numbers(stride as usize * view_count, || random.normal()),
             }
         };
-        [1, 2, 3, 8, 15, 32].map(job).to_vec()
+        let shared = [1, 2, 3, 8, 15, 32].map(|view_count| (view_count, 0, None));
+        let own = [(1, 1, Some(0)), (3, 64, Some(0)), (2, 7, Some(3)), (32, 5, Some(0)), (4, 512, None)];
+        shared.into_iter().chain(own).map(job).collect()
     }
 
     fn element_count(jobs: &Vec<Job>) -> usize {

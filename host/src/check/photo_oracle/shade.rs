@@ -16,13 +16,14 @@ const EMPTY: Colour = (Bounded::ZERO, [Bounded::ZERO; 3]);
 
 /// Depth of a map at an image coordinate; [`NOWHERE`] where nothing is seen.
 pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, jump: Bounded) -> Option<Bounded> {
-    let ((columns, error_x), (rows, error_y)) = (tents(x, camera.width), tents(y, camera.height));
-    let error = error_x + error_y;
+    let (columns, rows) = (tents(x, camera.width), tents(y, camera.height));
+    let error = columns.error + rows.error;
     let at = |row: usize, column: usize| camera.first_texel as usize + row * camera.width as usize + column;
     let nodes: Vec<(Bounded, f32)> = rows
+        .nodes
         .iter()
         .flat_map(|(row, height)| {
-            columns.iter().map(move |(column, width)| (width * height, depths[at(*row, *column)]))
+            columns.nodes.iter().map(move |(column, width)| (width * height, depths[at(*row, *column)]))
         })
         .map(|(value, depth)| (Bounded { value, error }, depth))
         .collect();

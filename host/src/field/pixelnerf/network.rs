@@ -53,10 +53,7 @@ impl<D: Device> Workspace<D> {
         maps: bool,
     ) -> Result<Workspace<D>, D::Error> {
         let Architecture { width, .. } = *architecture;
-        let widest = width.max(if maps { 0 } else { architecture.latent_channels() });
-        let busy = LEAST_ACTIVATIONS.max(device.busy_elements().saturating_mul(OUTPUTS_AN_INVOCATION));
-        let rows = (busy / widest).min(device.most_elements::<f32>() / widest);
-        let points = (rows / view_count).clamp(1, most_points.max(1));
+        let points = points_at_once(device, architecture, view_count, most_points, maps);
         let rows = points * view_count;
         Ok(Workspace {
             point_count: points as u32,
@@ -70,13 +67,33 @@ impl<D: Device> Workspace<D> {
             raw: device.zeros(points * 4)?,
         })
     }
+}
 
-    /// What all buffers take.
-    pub(super) fn bytes(architecture: &Architecture, view_count: usize, points: usize, maps: bool) -> usize {
-        let latents = if maps { 0 } else { architecture.latent_channels() };
-        let row = architecture.embedded_len() + latents + 3 * architecture.width + 1;
-        points * (view_count * row * size_of::<f32>() + size_of::<RayPoint>() + 4 * size_of::<f32>())
-    }
+/// How many points [`Workspace::new`] makes room for.
+fn points_at_once<D: Device>(
+    device: &D,
+    architecture: &Architecture,
+    view_count: usize,
+    most_points: usize,
+    maps: bool,
+) -> usize {
+    let widest = architecture.width.max(if maps { 0 } else { architecture.latent_channels() });
+    let busy = LEAST_ACTIVATIONS.max(device.busy_elements().saturating_mul(OUTPUTS_AN_INVOCATION));
+    let rows = (busy / widest).min(device.most_elements::<f32>() / widest);
+    (rows / view_count.max(1)).clamp(1, most_points.max(1))
+}
+
+/// Bytes of a [`Workspace`].
+pub(super) fn workspace_bytes<D: Device>(
+    device: &D,
+    architecture: &Architecture,
+    view_count: usize,
+    maps: bool,
+) -> usize {
+    let points = points_at_once(device, architecture, view_count, usize::MAX, maps);
+    let latents = if maps { 0 } else { architecture.latent_channels() };
+    let row = architecture.embedded_len() + latents + 3 * architecture.width + 1;
+    points * (view_count * row * size_of::<f32>() + size_of::<RayPoint>() + 4 * size_of::<f32>())
 }
 
 /// A network on a device, with what it needs to be asked.

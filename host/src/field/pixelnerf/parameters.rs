@@ -136,7 +136,7 @@ impl PointNetwork<HostLayer> {
         let prefix = pass.prefix();
         let (width, latent_channels) = (architecture.width, architecture.latent_channels());
         let linear = |name: String, inner| linear(checkpoint, &format!("{prefix}.{name}"), inner);
-        let pair = |block| {
+        let pair = |block| -> Result<_, CheckpointError> {
             Ok([linear(format!("blocks.{block}.fc_0"), width)?, linear(format!("blocks.{block}.fc_1"), width)?])
         };
         Ok(PointNetwork {

@@ -10,8 +10,17 @@ use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::rays::CastBlock;
 use viewfuse_core::wanted::WantedBlock;
 
-/// Most rays at a time. Their samples take 600 bytes a ray and sample count of 16; activations are counted apart.
+/// Most rays at a time.
 pub(super) const MOST_RAYS: usize = 4096;
+
+/// Bytes that a ray takes on its way through both passes.
+pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
+    // Depth, colour with optical depth, mark and place in the list, of both passes' samples; weights and transmittances
+    // of the first's; random numbers and depth of the second's.
+    let sample = size_of::<f32>() + size_of::<[f32; 4]>() + 3 * size_of::<u32>();
+    let (coarse, fine) = (coarse_count as usize, fine_count as usize);
+    (2 * coarse + fine) * sample + (coarse + fine) * size_of::<[f32; 2]>() + fine * size_of::<f32>() + 64
+}
 
 /// How many samples a pass had, and how many of them the network was asked about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -138,7 +147,8 @@ impl<D: Device> Renderer<'_, D> {
                 sample_count: block.sample_count,
                 part_count: block.sample_count,
                 least_share: LEAST_SHARE,
-                settled: if self.omissions.hidden_samples { self.settled } else { -1.0 },
+                // What is hidden on the probes' rays is not on a ray that passes beside their surfaces.
+                settled: -1.0,
                 least_opacity: 0.0,
                 step: self.omissions.empty_space,
                 seen_columns: seen.columns,

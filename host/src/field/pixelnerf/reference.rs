@@ -2,7 +2,7 @@
 
 use super::encoder::encode;
 use super::network::{Views, Workspace};
-use super::{Pass, PixelNerf, Prepared, SOURCE_SIDE};
+use super::{Architecture, Pass, PixelNerf, Prepared};
 use crate::device::{Device, Pixels, Rays};
 use crate::field::{Field, FieldError};
 use crate::photographs::SourceImages;
@@ -37,6 +37,11 @@ impl<'a, D: Device> Reference<'a, D> {
     pub fn new(field: &'a PixelNerf, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError<D::Error>> {
         let prepared = field.prepare(device, sources, &Progress::hidden())?;
         Ok(Reference { field, device, prepared })
+    }
+
+    /// The network's sizes.
+    pub fn architecture(&self) -> &Architecture {
+        &self.field.architecture
     }
 
     /// `[view][row][column][channel]`: the latents of all views.
@@ -153,5 +158,3 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok(Rays { count, pixels: self.device.upload(&pixels)?, rays: self.device.upload(rays)? })
     }
 }
-
-const _: () = assert!(SOURCE_SIDE == 128, "reference values are of images of this size");

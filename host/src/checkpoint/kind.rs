@@ -1,0 +1,74 @@
+//! What a file is, by its first bytes, whatever its name.
+
+use super::error::Problem;
+use std::fs::File;
+use std::io::{Read, Seek};
+
+/// The kinds of checkpoints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Safetensors.
+    Safetensors,
+    /// What `torch.save` has written since PyTorch 1.6.
+    TorchZip,
+    /// What it wrote before.
+    TorchLegacy,
+}
+
+/// As much as the header of a tar archive takes.
+const LOOK: u64 = 512;
+/// Where such a header names itself, and how.
+const TAR: (usize, &[u8]) = (257, b"ustar");
+
+impl Kind {
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Safetensors => "safetensors",
+            Kind::TorchZip => "PyTorch, zip",
+            Kind::TorchLegacy => "PyTorch, before 1.6",
+        }
+    }
+
+    /// Looks at a file.
+    pub(super) fn of(mut file: &File) -> Result<Kind, Problem> {
+        let mut start = Vec::new();
+        file.rewind()?;
+        file.take(LOOK).read_to_end(&mut start)?;
+        if start.starts_with(b"PK\x03\x04") || start.starts_with(b"PK\x05\x06") {
+            return Ok(Kind::TorchZip);
+        }
+        // The length of a header can begin like a pickle: the brace behind it decides.
+        if start.get(8) == Some(&b'{') {
+            return Ok(Kind::Safetensors);
+        }
+        if start.first() == Some(&0x80) {
+            return Ok(Kind::TorchLegacy);
+        }
+        Err(Problem::NoCheckpoint(match () {
+            () if start.is_empty() => "the file is empty; was the download complete?".to_owned(),
+            () if start.starts_with(b"version https://git-lfs") => {
+                "a pointer of git-lfs to the file; fetch the file itself with `git lfs pull`".to_owned()
+            }
+            () if looks_like_a_page(&start) => {
+                "a web page; open the address in a browser and download the file by hand".to_owned()
+            }
+            () if start.get(TAR.0..).is_some_and(|rest| rest.starts_with(TAR.1)) => {
+                "a tar archive: unpack it, or, if PyTorch before 0.1.10 wrote it, load it in PyTorch and save it again"
+                    .to_owned()
+            }
+            () if start.iter().all(|&byte| byte >= b' ' || byte.is_ascii_whitespace()) => "a text".to_owned(),
+            () => format!(
+                "neither safetensors nor a file of torch.save; it begins with the bytes {}",
+                start.iter().take(8).map(|byte| format!("{byte:02x}")).collect::<Vec<_>>().join(" ")
+            ),
+        }))
+    }
+}
+
+fn looks_like_a_page(start: &[u8]) -> bool {
+    let text = start.trim_ascii_start();
+    ["<!doctype", "<html", "<?xml"]
+        .iter()
+        .any(|tag| text.get(..tag.len()).is_some_and(|beginning| beginning.eq_ignore_ascii_case(tag.as_bytes())))
+}

@@ -1,0 +1,162 @@
+//! Where a tensor's elements stand in a file, and reading them from there.
+
+use super::element::Element;
+use super::error::Problem;
+use super::state_dict::{Claim, Storage};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+
+/// Memory that one tensor may take as `f32`, in bytes.
+pub const LARGEST_TENSOR_BYTES: u64 = 4 << 30;
+/// Memory that all tensors of a file may take as `f32`, in bytes.
+pub const LARGEST_TOTAL_BYTES: u64 = 16 << 30;
+/// Bytes that are read at once.
+pub(super) const CHUNK_BYTES: usize = 1 << 16;
+
+/// The tensors of a file by name.
+pub(super) type Places = BTreeMap<String, Place>;
+
+/// A tensor in a file: every element lies inside it.
+#[derive(Clone, Debug)]
+pub(super) struct Place {
+    /// The type of its elements.
+    pub(super) element: Element,
+    /// Offset in the file of its first.
+    pub(super) start: u64,
+    /// Its shape.
+    pub(super) shape: Vec<usize>,
+    /// Steps along each axis, in elements; `None` for row-major order without gaps.
+    pub(super) strides: Option<Vec<usize>>,
+    /// Elements from its first to behind its last, those between that are not its own included.
+    pub(super) extent: u64,
+}
+
+/// The number of elements of a shape, if it is a number that can be.
+pub(super) fn element_count(shape: &[usize]) -> Option<u64> {
+    // An axis of length 0 does not make the others sensible.
+    let most = shape.iter().try_fold(1u64, |product, &length| product.checked_mul(length.max(1) as u64))?;
+    Some(if shape.contains(&0) { 0 } else { most })
+}
+
+/// Checks that a tensor of this shape is not absurdly large.
+pub(super) fn check_size(name: &str, shape: &[usize]) -> Result<u64, Problem> {
+    let what = || format!("tensor '{name}' of shape {shape:?}");
+    let count = element_count(shape).ok_or_else(|| Problem::TooLarge {
+        what: what(),
+        bytes: shape.iter().fold(4u128, |product, &length| product.saturating_mul(length as u128)),
+        limit: LARGEST_TENSOR_BYTES,
+    })?;
+    let bytes = 4 * u128::from(count);
+    if bytes > LARGEST_TENSOR_BYTES.into() {
+        return Err(Problem::TooLarge { what: what(), bytes, limit: LARGEST_TENSOR_BYTES });
+    }
+    Ok(count)
+}
+
+impl Place {
+    /// The place of a tensor whose storage takes the bytes from `start`, of which there are `available`. `name` is for
+    /// messages.
+    pub(super) fn of(
+        name: &str,
+        claim: &Claim,
+        storage: Storage<'_>,
+        start: u64,
+        available: u64,
+    ) -> Result<Place, Problem> {
+        let count = check_size(name, &claim.shape)?;
+        let wrong = |what: String| Problem::Content(format!("tensor '{name}': {what}"));
+        let key = super::error::shortened(storage.key);
+        let stored = storage.count.checked_mul(storage.element_size()).filter(|&bytes| bytes <= available);
+        let stored = stored.ok_or_else(|| {
+            wrong(format!(
+                "storage '{key}' is to hold {} elements of {} bytes, but there are {available} bytes; the file is cut \
+                 off or damaged",
+                storage.count,
+                storage.element_size()
+            ))
+        })?;
+        let steps = claim.shape.iter().zip(&claim.strides);
+        let last = steps.clone().try_fold(0u64, |last, (&length, &stride)| {
+            (length as u64).saturating_sub(1).checked_mul(stride as u64)?.checked_add(last)
+        });
+        let size = claim.element.size() as u64;
+        let extent = if count == 0 { Some(0) } else { last.and_then(|last| last.checked_add(1)) };
+        let end = extent.and_then(|extent| extent.checked_add(claim.first)?.checked_mul(size));
+        let (Some(extent), Some(_)) = (extent, end.filter(|&end| end <= stored)) else {
+            return Err(wrong(format!(
+                "shape {:?} with strides {:?} from element {} reaches beyond storage '{key}' of {stored} bytes; the \
+                 file is damaged",
+                claim.shape, claim.strides, claim.first
+            )));
+        };
+        let mut expected = 1;
+        let contiguous = steps.rev().all(|(&length, &stride)| {
+            let fits = length <= 1 || stride == expected;
+            expected *= length.max(1);
+            fits
+        });
+        Ok(Place {
+            element: claim.element,
+            start: start + claim.first * size,
+            shape: claim.shape.clone(),
+            strides: (count > 0 && !contiguous).then(|| claim.strides.clone()),
+            extent,
+        })
+    }
+
+    /// Its number of elements.
+    pub(super) fn count(&self) -> u64 {
+        element_count(&self.shape).unwrap_or(0)
+    }
+
+    /// Memory that reading it takes beside the result, in bytes.
+    pub(super) fn working_bytes(&self) -> u64 {
+        let window = self.strides.as_ref().map_or(0, |_| self.extent * self.element.size() as u64);
+        window + CHUNK_BYTES as u64
+    }
+
+    /// Hands its elements out as bytes, row-major, whole elements in each piece.
+    pub(super) fn read<E: From<Problem>>(
+        &self,
+        mut file: &File,
+        mut take: impl FnMut(&[u8]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let failed = |cause: std::io::Error| E::from(Problem::from(cause));
+        let size = self.element.size();
+        file.seek(SeekFrom::Start(self.start)).map_err(failed)?;
+        let Some(strides) = &self.strides else {
+            let mut left = self.count() * size as u64;
+            let mut chunk = vec![0; CHUNK_BYTES.min(left as usize)];
+            while left > 0 {
+                let piece = &mut chunk[..CHUNK_BYTES.min(left as usize)];
+                file.read_exact(piece).map_err(failed)?;
+                take(piece)?;
+                left -= piece.len() as u64;
+            }
+            return Ok(());
+        };
+        let mut window = vec![0; self.extent as usize * size];
+        file.read_exact(&mut window).map_err(failed)?;
+        let mut chunk = Vec::with_capacity(CHUNK_BYTES);
+        let mut index = vec![0; self.shape.len()];
+        let mut at = 0;
+        for _ in 0..self.count() {
+            chunk.extend_from_slice(&window[at * size..(at + 1) * size]);
+            if chunk.len() == CHUNK_BYTES {
+                take(&chunk)?;
+                chunk.clear();
+            }
+            for axis in (0..index.len()).rev() {
+                index[axis] += 1;
+                at += strides[axis];
+                if index[axis] < self.shape[axis] {
+                    break;
+                }
+                at -= index[axis] * strides[axis];
+                index[axis] = 0;
+            }
+        }
+        take(&chunk)
+    }
+}

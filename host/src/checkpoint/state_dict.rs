@@ -1,0 +1,273 @@
+//! The `state_dict` in a pickle of PyTorch: which tensors there are, and where each stands in which storage.
+//!
+//! Only a few names have a meaning here: `collections.OrderedDict`, the functions of `torch._utils` that put a tensor
+//! or a parameter together, `torch.Size`, and the classes of storages. Everything else (optimizers, schedulers, a
+//! class of somebody's own, `os.system`) may stand in the file and means nothing.
+
+use super::element::Element;
+use super::error::shortened;
+use super::pickle::{Id, Object, Pickle, Value};
+use std::collections::{BTreeMap, HashSet};
+
+/// Keys under which training scripts put the `state_dict`, in the order in which they are tried.
+pub const PLACES: [&str; 5] = ["state_dict", "model", "model_state_dict", "net", "ema"];
+/// What `DataParallel` puts before every name.
+const PARALLEL_PREFIX: &str = "module.";
+/// Tensors that a checkpoint may have.
+pub(super) const MOST_TENSORS: usize = 50_000;
+/// PyTorch's own limit.
+pub(super) const MOST_AXES: usize = 64;
+/// Settings beside the tensors that are kept, and how long each may be.
+const MOST_SETTINGS: usize = 64;
+const LONGEST_SETTING: usize = 1024;
+
+/// What a file's pickle says about its tensors.
+#[derive(Debug)]
+pub(super) struct StateDict {
+    /// The key under which it stood, if it was not the whole.
+    pub(super) place: Option<&'static str>,
+    /// What was taken from the front of every name.
+    pub(super) prefix: &'static str,
+    /// The tensors by name.
+    pub(super) claims: BTreeMap<String, Claim>,
+    /// Numbers and short texts that stood beside it.
+    pub(super) settings: BTreeMap<String, String>,
+}
+
+/// What a tensor is, as far as the pickle says. Nothing of it is checked against the file yet.
+#[derive(Debug)]
+pub(super) struct Claim {
+    /// The identity of its storage: see [`storage`].
+    pub(super) storage: Id,
+    /// The type of its elements.
+    pub(super) element: Element,
+    /// Its first element in the storage.
+    pub(super) first: u64,
+    /// Its shape.
+    pub(super) shape: Vec<usize>,
+    /// How many elements of the storage lie between neighbours along each axis.
+    pub(super) strides: Vec<usize>,
+}
+
+/// What a pickle says of a storage.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Storage<'a> {
+    /// Its key among the storages.
+    pub(super) key: &'a str,
+    /// The type of its elements; bytes if it has none.
+    pub(super) element: Option<Element>,
+    /// How many it holds.
+    pub(super) count: u64,
+}
+
+impl Storage<'_> {
+    /// Bytes of one element.
+    pub(super) fn element_size(&self) -> u64 {
+        self.element.map_or(1, |element| element.size() as u64)
+    }
+}
+
+/// Finds the `state_dict`.
+///
+/// # Errors
+/// What is wrong: with which key or tensor, and how.
+pub(super) fn find(pickle: &Pickle) -> Result<StateDict, String> {
+    let root = entries(pickle, pickle.root()).ok_or_else(|| match pickle.object(pickle.root()) {
+        Some(object) => format!("holds a whole {}, not its tensors; {RESAVE}", class_of(pickle, object)),
+        None => format!("holds no table of named tensors; {RESAVE}"),
+    })?;
+    let at_root = root.iter().any(|&(_, value)| is_tensor(pickle, value));
+    let inner = PLACES.iter().find_map(|&place| {
+        // Python takes the last of several values of one key.
+        let (_, value) = root.iter().rev().find(|&&(key, _)| pickle.text(key) == Some(place))?;
+        let inner = entries(pickle, *value)?;
+        inner.iter().any(|&(_, value)| is_tensor(pickle, value)).then_some((place, inner))
+    });
+    let (place, table) = match (at_root, inner) {
+        (true, Some((place, _))) => {
+            return Err(format!(
+                "holds tensors at its top and also under '{place}', so it is not clear which are meant; {RESAVE}"
+            ));
+        }
+        (true, None) => (None, root.clone()),
+        (false, Some((place, inner))) => (Some(place), inner),
+        (false, None) => return Err(format!("holds no tensors where they are looked for; {}", keys_of(pickle, &root))),
+    };
+    let mut claims = BTreeMap::new();
+    for (key, value) in table {
+        let Some(claim) = claim(pickle, value, key)? else { continue };
+        let name = pickle.text(key).ok_or("holds a tensor under a key that is no text")?;
+        if name.is_empty() {
+            return Err("holds a tensor without a name".to_owned());
+        }
+        if claims.insert(name.to_owned(), claim).is_some() {
+            return Err(format!("holds two tensors called '{}'", shortened(name)));
+        }
+        if claims.len() > MOST_TENSORS {
+            return Err(format!("holds more than {MOST_TENSORS} tensors, which no network here has"));
+        }
+    }
+    let mut prefix = "";
+    if claims.keys().all(|name| name.len() > PARALLEL_PREFIX.len() && name.starts_with(PARALLEL_PREFIX)) {
+        prefix = PARALLEL_PREFIX;
+        claims = claims.into_iter().map(|(name, claim)| (name[prefix.len()..].to_owned(), claim)).collect();
+    }
+    Ok(StateDict { place, prefix, claims, settings: settings(pickle, &root) })
+}
+
+const RESAVE: &str = "in PyTorch, save model.state_dict() and use that file";
+
+/// The storages that a pickle names anywhere, those of optimizers included.
+///
+/// # Errors
+/// As [`storage`].
+pub(super) fn storages(pickle: &Pickle) -> Result<Vec<Storage<'_>>, String> {
+    let persistent = pickle.values().iter().filter_map(|value| match value {
+        Value::Persistent(identity) => Some(*identity),
+        _ => None,
+    });
+    persistent.map(|identity| storage(pickle, identity)).collect()
+}
+
+/// What the identity of a storage says: `('storage', class, key, device, element count)`.
+///
+/// # Errors
+/// What about it is not understood.
+pub(super) fn storage(pickle: &Pickle, identity: Id) -> Result<Storage<'_>, String> {
+    let unknown = || "refers to something stored outside its description that is no storage of tensors".to_owned();
+    let fields = pickle.sequence(identity).ok_or_else(unknown)?;
+    let [tag, class, key, _device, count, view @ ..] = fields else { return Err(unknown()) };
+    if pickle.text(*tag) != Some("storage") {
+        return Err(unknown());
+    }
+    let (_, class) = pickle.global(*class).ok_or_else(unknown)?;
+    let key = pickle.text(*key).ok_or_else(unknown)?;
+    let element = Element::of_storage(class);
+    if element.is_none() && class != "UntypedStorage" {
+        return Err(format!("storage '{}' is of a kind that is not read: torch.{}", shortened(key), shortened(class)));
+    }
+    if view.iter().any(|&view| !matches!(pickle.value(view), Value::None)) {
+        return Err(format!("storage '{}' is part of another, as before PyTorch 0.4; {RESAVE}", shortened(key)));
+    }
+    let count = pickle.integer(*count).and_then(|count| u64::try_from(count).ok());
+    let count = count.ok_or_else(|| format!("storage '{}' has no sensible length", shortened(key)))?;
+    Ok(Storage { key, element, count })
+}
+
+/// The pairs of a `dict`, of an `OrderedDict`, or of a class of somebody's own that is filled like one.
+fn entries(pickle: &Pickle, id: Id) -> Option<Vec<(Id, Id)>> {
+    if let Value::Dict(pairs) = pickle.value(id) {
+        return Some(pairs.clone());
+    }
+    let object = pickle.object(id)?;
+    let ordered = pickle.global(object.callable) == Some(("collections", "OrderedDict"));
+    if !ordered {
+        return (!object.items.is_empty()).then(|| object.items.clone());
+    }
+    // Python 2 gives the pairs with the call, Python 3 sets them afterwards.
+    let given = pickle.sequence(object.arguments).and_then(|arguments| pickle.sequence(*arguments.first()?));
+    let pairs = given.unwrap_or_default().iter().filter_map(|&pair| match pickle.sequence(pair)? {
+        &[key, value] => Some((key, value)),
+        _ => None,
+    });
+    Some(pairs.chain(object.items.iter().copied()).collect())
+}
+
+/// The call that puts a tensor together, behind one that makes it a parameter.
+fn tensor_call(pickle: &Pickle, id: Id) -> Option<(&Object, &str)> {
+    let call = |id: Id| {
+        let object = pickle.object(id)?;
+        let (module, name) = pickle.global(object.callable)?;
+        (module == "torch._utils" && name.starts_with("_rebuild_")).then_some((object, name))
+    };
+    match call(id)? {
+        (parameter, "_rebuild_parameter" | "_rebuild_parameter_with_state") => {
+            call(*pickle.sequence(parameter.arguments)?.first()?)
+        }
+        tensor => Some(tensor),
+    }
+}
+
+fn is_tensor(pickle: &Pickle, id: Id) -> bool {
+    tensor_call(pickle, id).is_some()
+}
+
+fn claim(pickle: &Pickle, id: Id, key: Id) -> Result<Option<Claim>, String> {
+    let Some((object, function)) = tensor_call(pickle, id) else { return Ok(None) };
+    let name = shortened(pickle.text(key).unwrap_or("?"));
+    let wrong = |what: &str| format!("tensor '{name}': {what}");
+    if !matches!(function, "_rebuild_tensor" | "_rebuild_tensor_v2" | "_rebuild_tensor_v3") {
+        return Err(wrong(&format!("is of a kind that is not read (torch._utils.{})", shortened(function))));
+    }
+    let malformed = || wrong("is not described as PyTorch does; the file is damaged");
+    let [from, first, shape, strides, more @ ..] = pickle.sequence(object.arguments).ok_or_else(malformed)? else {
+        return Err(malformed());
+    };
+    let Value::Persistent(identity) = *pickle.value(*from) else {
+        return Err(wrong("has no storage; the file is damaged, or it is no file of torch.save"));
+    };
+    let stored = storage(pickle, identity).map_err(|what| wrong(&what))?;
+    let element = match (function, more) {
+        ("_rebuild_tensor_v3", [_, _, element, ..]) => {
+            let (_, element) = pickle.global(*element).ok_or_else(malformed)?;
+            Element::of_torch(element).ok_or_else(|| wrong(&format!("torch.{} is not read", shortened(element))))?
+        }
+        _ => stored.element.ok_or_else(malformed)?,
+    };
+    if stored.element.is_some_and(|of_storage| of_storage != element) {
+        return Err(malformed());
+    }
+    let first = pickle.integer(*first).and_then(|first| u64::try_from(first).ok()).ok_or_else(malformed)?;
+    let shape = axes(pickle, *shape).ok_or_else(malformed)?;
+    let strides = axes(pickle, *strides).ok_or_else(malformed)?;
+    if shape.len() != strides.len() {
+        return Err(malformed());
+    }
+    Ok(Some(Claim { storage: identity, element, first, shape, strides }))
+}
+
+/// A tuple of numbers, or a `torch.Size` of one.
+fn axes(pickle: &Pickle, id: Id) -> Option<Vec<usize>> {
+    let numbers = match pickle.object(id) {
+        Some(object) if pickle.global(object.callable) == Some(("torch", "Size")) => {
+            pickle.sequence(*pickle.sequence(object.arguments)?.first()?)?
+        }
+        _ => pickle.sequence(id)?,
+    };
+    if numbers.len() > MOST_AXES {
+        return None;
+    }
+    numbers.iter().map(|&number| usize::try_from(pickle.integer(number)?).ok()).collect()
+}
+
+/// Numbers and short texts beside the tensors: epochs, losses, the name of an experiment.
+fn settings(pickle: &Pickle, root: &[(Id, Id)]) -> BTreeMap<String, String> {
+    let setting = |&(key, value): &(Id, Id)| {
+        let key = pickle.text(key).filter(|key| key.len() <= LONGEST_SETTING)?;
+        let value = match pickle.value(value) {
+            Value::Bool(value) => value.to_string(),
+            Value::Int(value) => value.to_string(),
+            Value::Float(value) => value.to_string(),
+            Value::Text(_) => pickle.text(value).filter(|text| text.len() <= LONGEST_SETTING)?.to_owned(),
+            _ => return None,
+        };
+        Some((key.to_owned(), value))
+    };
+    root.iter().filter_map(setting).take(MOST_SETTINGS).collect()
+}
+
+fn class_of(pickle: &Pickle, object: &Object) -> String {
+    // Classes of somebody's own are made through helpers whose first argument is the class.
+    let first = pickle.sequence(object.arguments).and_then(|arguments| arguments.first());
+    let helper = pickle.global(object.callable);
+    let class = first.and_then(|&first| pickle.global(first)).filter(|_| helper.is_some()).or(helper);
+    class.map_or("object".to_owned(), |(module, name)| format!("{}.{}", shortened(module), shortened(name)))
+}
+
+fn keys_of(pickle: &Pickle, root: &[(Id, Id)]) -> String {
+    let mut seen = HashSet::new();
+    let keys = root.iter().filter_map(|&(key, _)| pickle.text(key)).filter(|key| seen.insert(*key)).take(8);
+    let keys: Vec<String> = keys.map(|key| format!("'{}'", shortened(key))).collect();
+    let looked = format!("at its top and under {}", PLACES.map(|place| format!("'{place}'")).join(", "));
+    if keys.is_empty() { looked } else { format!("{looked} (it has {})", keys.join(", ")) }
+}

@@ -1,0 +1,57 @@
+//! `viewfuse convert`.
+
+use super::say;
+use super::table::table;
+use anyhow::ensure;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse::checkpoint::{Checkpoint, Precision};
+use viewfuse::files::check_writable;
+
+#[derive(Args)]
+#[command(after_help = "Example:\n  viewfuse convert pixel_nerf_latest pixelnerf.safetensors --half\n\n\
+    Read are safetensors and what torch.save writes of a state_dict, new and old. Nothing in a file is executed.")]
+pub(crate) struct Arguments {
+    /// The checkpoint
+    input: PathBuf,
+    /// Where to write it, as safetensors
+    #[arg(value_name = "OUT.safetensors")]
+    output: PathBuf,
+    /// Round floating point numbers to 16 bits
+    #[arg(long)]
+    half: bool,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let output = &arguments.output;
+    ensure!(
+        output.extension().is_some_and(|extension| extension == "safetensors"),
+        "{}: only safetensors are written; give a name that ends in .safetensors",
+        output.display()
+    );
+    check_writable(output)?;
+    let checkpoint = Checkpoint::open(&arguments.input)?;
+    let precision = if arguments.half { Precision::Half } else { Precision::Kept };
+    let written = checkpoint.write_safetensors(output, precision)?;
+    let mut rows = table(["tensor", "type", "shape", "bytes"].map(str::to_owned));
+    for (name, element, shape, bytes) in &written.tensors {
+        rows.add_row([name.clone(), element.name().to_owned(), format!("{shape:?}"), bytes.to_string()]);
+    }
+    say(rows)?;
+    for (key, value) in checkpoint.metadata() {
+        say(format_args!("kept       {key} = {value}"))?;
+    }
+    say(format_args!("read       {} ({})", checkpoint.path().display(), checkpoint.origin()))?;
+    say(format_args!("written    {}: {} tensors, {} bytes", output.display(), written.tensors.len(), written.bytes))?;
+    if arguments.half {
+        say(format_args!("rounding   {:.2e} of the value at most", written.relative_error))?;
+        if written.tiny_count > 0 {
+            say(format_args!(
+                "           {} values below 6.1e-5 are changed by {:.1e} at most",
+                written.tiny_count, written.tiny_error
+            ))?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
