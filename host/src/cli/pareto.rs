@@ -29,10 +29,11 @@ use viewfuse_vulkan::GpuOptions;
 #[command(after_help = "Examples:\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, all together, and fewer samples, on every device\n  \
     viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the field that needs no network, on the CPU\n\n\
-    Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared\n\
-    with its pictures before rounding. Times are medians; a round goes through all settings, but what else a shared\n\
-    machine does still shows in them. A * marks settings that are the best for their time: none is as fast and as near.\n\
-    Exit code 1 if a device fails.")]
+    Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared \
+    with its pictures before rounding. The setting `all` leaves out what --leave-out and --settled say and every omission \
+    of the network. Times are medians over rounds through all settings; what else a shared machine does still shows in \
+    them. A * marks settings that are the best for their time: no other is at once as fast and as near. Exit code 1 if a \
+    device fails.")]
 pub(crate) struct Arguments {
     /// The scene's folder, or its transforms.json or *_par.txt
     scene: PathBuf,
@@ -44,7 +45,6 @@ pub(crate) struct Arguments {
     /// Weighting scheme, as for render
     #[arg(long, value_name = "SCHEME", default_value = "error:alpha=1")]
     weights: String,
-    /// What --leave-out and --settled say is what the setting `all` leaves out
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -95,17 +95,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     };
     let mut first: Option<Measured> = None;
     for device in devices {
-        let measured = on_threads(arguments.picture.threads, || (device.name(), sweep.on(&device, &field)))?;
+        let (name, measured) = on_threads(arguments.picture.threads, || (device.name(), sweep.on(&device, &field)))?;
         let measured = match measured {
-            (name, Ok(measured)) => (name, measured),
+            Ok(measured) => measured,
             // One device that fails is no reason to lose what is known of the others.
-            (name, Err(Failure::Device(failure))) => {
+            Err(Failure::Device(failure)) => {
                 record.failures.push(format!("{name}: {failure}"));
                 continue;
             }
-            (_, Err(Failure::Other(error))) => return Err(error),
+            Err(Failure::Other(error)) => return Err(error),
         };
-        let (name, measured) = measured;
         let versus_first = first.as_ref().map(|first| measured.exact_versus(first));
         record.size = measured.size;
         record.devices.push(DeviceRecord::of(name, &measured.points, versus_first));
@@ -115,9 +114,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
     let title = title(&record);
     if !record.devices.is_empty() {
-        write_whole(&csv, &csv_of(&record)?)?;
-        write_whole(&svg, plot::svg(&title, &record.devices)?.as_bytes())?;
-        write_whole(&json, &serde_json::to_vec_pretty(&record)?)?;
+        // All are made before the first is written, the record of it all last.
+        let plot = plot::svg(&title, &record.devices)?;
+        let (table, whole) = (csv_of(&record)?, serde_json::to_vec_pretty(&record)?);
+        write_whole(&csv, &table)?;
+        write_whole(&svg, plot.as_bytes())?;
+        write_whole(&json, &whole)?;
     }
     say(format_args!("{title}\n"))?;
     record.devices.iter().try_for_each(print_device)?;

@@ -1,6 +1,7 @@
 //! The outcome of a sweep for other programs: JSON with all that led to it, and a CSV table of the points.
 
 use super::Point;
+use super::difference::Difference;
 use super::front::{best_points, fastest_of_same_look, fastest_without_loss, loss};
 use crate::field::LeftOut;
 use serde::Serialize;
@@ -61,8 +62,8 @@ pub struct DifferenceRecord {
     pub largest: Option<f64>,
 }
 
-impl From<super::difference::Difference> for DifferenceRecord {
-    fn from(difference: super::difference::Difference) -> DifferenceRecord {
+impl From<Difference> for DifferenceRecord {
+    fn from(difference: Difference) -> DifferenceRecord {
         DifferenceRecord {
             root_mean_square: finite(difference.root_mean_square()),
             psnr: finite(difference.psnr()),
@@ -104,7 +105,7 @@ fn finite(value: f64) -> Option<f64> {
 
 impl DeviceRecord {
     /// The record of a device's points, the exact one first.
-    pub fn of(device: String, points: &[Point], exact_versus_first: Option<super::difference::Difference>) -> Self {
+    pub fn of(device: String, points: &[Point], exact_versus_first: Option<Difference>) -> Self {
         let exact_seconds = points.first().map_or(f64::NAN, |exact| exact.seconds);
         let record = |(point, best): (&Point, bool)| PointRecord {
             setting: point.setting.clone(),
