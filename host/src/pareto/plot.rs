@@ -105,6 +105,9 @@ fn draw(picture: &mut String, title: &str, devices: &[DeviceRecord]) -> Result<(
             if label.is_far(at, RING) {
                 area.draw(&PathElement::new([(at[0], at[1]), label.nearest(at)], style.colour.mix(0.4)))?;
             }
+            // Lines stay readable as lines, words as words.
+            let Space { left, right, top, bottom } = label;
+            area.draw(&Rectangle::new([(left, top), (right, bottom)], WHITE.mix(0.8).filled()))?;
             text(&area, words, label.middle(), LABEL_SIZE, HPos::Center, style.colour)?;
         }
     }
