@@ -2,6 +2,8 @@
 
 #[path = "commands/check.rs"]
 mod check;
+#[path = "commands/convert.rs"]
+mod convert;
 #[path = "commands/devices.rs"]
 mod devices;
 #[path = "commands/inspect.rs"]

@@ -71,7 +71,7 @@ impl Model {
             None => Architecture::published(),
         };
         Ok(match self {
-            Model::File(path) => anyhow::bail!("{}: reading checkpoints comes next", path.display()),
+            Model::File(path) => Checkpoint::open(path)?,
             Model::Formula(width) => made::by_formula(&sizes(width)),
             Model::Body(width) => made::body(&sizes(width)),
         })

@@ -136,8 +136,10 @@ impl PointNetwork<HostLayer> {
         let prefix = pass.prefix();
         let (width, latent_channels) = (architecture.width, architecture.latent_channels());
         let linear = |name: String, inner| linear(checkpoint, &format!("{prefix}.{name}"), inner);
-        let pair = |block| -> Result<_, CheckpointError> {
-            Ok([linear(format!("blocks.{block}.fc_0"), width)?, linear(format!("blocks.{block}.fc_1"), width)?])
+        let pair = |block| {
+            let layers =
+                [linear(format!("blocks.{block}.fc_0"), width)?, linear(format!("blocks.{block}.fc_1"), width)?];
+            Ok::<_, CheckpointError>(layers)
         };
         Ok(PointNetwork {
             entry: linear("lin_in".to_owned(), architecture.embedded_len())?,
