@@ -1,7 +1,7 @@
 //! The compiled kernels are what the list of kernels says; and the checker that says so rejects what is not.
 
 use rspirv::dr::{Instruction, Module, Operand};
-use rspirv::spirv::{Capability, Decoration, ExecutionMode, Op};
+use rspirv::spirv::{Capability, Decoration, ExecutionMode, Op, StorageClass};
 use std::path::Path;
 use std::sync::LazyLock;
 use viewfuse_shader_compiler::refine::{read, refine};
@@ -118,7 +118,8 @@ fn a_missing_or_moved_binding_is_seen() {
         let set = module.annotations.iter_mut().find(|annotation| annotation.operands.get(1) == Some(&set));
         set.expect("a set").operands[2] = Operand::LiteralBit32(1);
     });
-    assert_one(&said, "of set Some(1)");
+    // Kernels share variables that are declared alike.
+    assert!(!said.is_empty() && said.iter().all(|said| said.contains("of set Some(1)")), "{said:?}");
 }
 
 #[test]
@@ -221,6 +222,58 @@ fn a_function_of_the_device_is_seen() {
         call.operands[1] = Operand::LiteralExtInstInteger(27);
     });
     assert_one(&said, "the device's function");
+}
+
+/// A change to the instructions of one operation, in all functions.
+fn for_each(module: &mut Module, operation: Op, change: impl FnMut(&mut Instruction)) {
+    let blocks = module.functions.iter_mut().flat_map(|function| &mut function.blocks);
+    let instructions = blocks.flat_map(|block| &mut block.instructions);
+    instructions.filter(|instruction| instruction.class.opcode == operation).for_each(change);
+}
+
+#[test]
+fn memory_that_is_not_shared_is_seen() {
+    for operation in [Op::Load, Op::Store] {
+        let is_mark = |operand: &Operand| matches!(operand, Operand::MemoryAccess(_));
+        let said =
+            breaches_with(|module| for_each(module, operation, |access| access.operands.retain(|o| !is_mark(o))));
+        assert_eq!(said.len(), 2, "{said:?}");
+        assert!(said.iter().all(|said| said.contains("accesses to shared memory are private")), "{said:?}");
+    }
+}
+
+#[test]
+fn a_barrier_that_shows_nothing_is_seen() {
+    let said = breaches_with(|module| {
+        // The scope, 2, is no set of semantics.
+        for_each(module, Op::ControlBarrier, |barrier| barrier.operands[2] = barrier.operands[0].clone());
+    });
+    assert!(!said.is_empty() && said.iter().all(|said| said.contains("a barrier of [2, 2, 2]")), "{said:?}");
+    let said = breaches_with(|module| {
+        for block in module.functions.iter_mut().flat_map(|function| &mut function.blocks) {
+            block.instructions.retain(|instruction| instruction.class.opcode != Op::ControlBarrier);
+        }
+    });
+    assert_eq!(said, ["convolve: 0 barriers", "product: 0 barriers"]);
+}
+
+#[test]
+fn more_memory_than_every_device_has_is_seen() {
+    let said = breaches_with(|module| {
+        let kinds = &mut module.types_global_values;
+        let operands_of = |kinds: &[Instruction], id: Option<u32>| {
+            let found = kinds.iter().find(|kind| kind.result_id.is_some() && kind.result_id == id);
+            found.map(|kind| kind.operands.clone()).expect("what it is")
+        };
+        let shared = Operand::StorageClass(StorageClass::Workgroup);
+        let is_shared = |kind: &&Instruction| kind.class.opcode == Op::Variable && kind.operands[0] == shared;
+        let variable = kinds.iter().find(is_shared).expect("memory of a workgroup");
+        let pointer = operands_of(kinds, variable.result_type);
+        let length = operands_of(kinds, pointer[1].id_ref_any())[1].id_ref_any();
+        let length = kinds.iter_mut().find(|kind| kind.result_id == length).expect("its length");
+        length.operands[0] = Operand::LiteralBit32(1 << 20);
+    });
+    assert!(said.iter().any(|said| said.contains("bytes of a workgroup's memory")), "{said:?}");
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
 fn pictures_do_not_depend_on_the_bands() {
     let sources = lorry_views(48);
     let with_values = |most_band_values| {
-        let run = Run { field: PhotoField { most_band_values }, ..Run::default() };
+        let run = Run { field: PhotoField { most_band_values, ..PhotoField::default() }, ..Run::default() };
         run.picture(&sources, &target(48)).expect("a picture")
     };
     let whole = with_values(16 << 20);

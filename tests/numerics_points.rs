@@ -136,8 +136,8 @@ fn gathering_is_a_look_up_where_the_point_appears() {
             let seen = views[0].project(Vec3::from_array(point.position));
             let (x, y) = ((seen.x - pixel_centre) * 0.5 + 0.5, (seen.y - pixel_centre) * 0.5 + 0.5);
             let expected = if seen.in_front { bilinear(&nodes[..], 4, 5, x, y) } else { nodes[0] };
-            for channel in 0..3 {
-                assert_eq!(gathered_value(&views, &[point], grid, &[0.0; 0], &block, channel), expected[channel]);
+            for (channel, expected) in expected.into_iter().enumerate() {
+                assert_eq!(gathered_value(&views, &[point], grid, &[0.0; 0], &block, channel), expected);
             }
         }
         let added = GatherBlock { has_addend: 1, ..block };

@@ -301,6 +301,10 @@ fn without_thresholds_everything_is_wanted() {
     for nothing in [0.0, f32::NAN, f32::INFINITY] {
         assert_eq!(wanted_parts(&weighed([nothing; 8]), &EVERYTHING), [true; 8]);
     }
+    // An exponential that a device rounds otherwise may leave less than nothing.
+    for seen in [[[-1.0e-9, 0.5]; 8], [[-1.0e-7, 1.0]; 8], [[f32::NAN, 0.5]; 8]] {
+        assert_eq!(wanted_parts(&seen, &EVERYTHING), [true; 8]);
+    }
     // Wherever the sample is said to be.
     let seen = weighed([0.1; 8]);
     for depth in [-9.0, 1.0, 3.0, 9.0, f32::NAN, f32::INFINITY] {

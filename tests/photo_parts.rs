@@ -6,8 +6,8 @@
 
 use viewfuse::check::agreement::{Disagreement, Limits, measure};
 use viewfuse::check::bounded::Bounded;
-use viewfuse::check::photo_oracle as oracle;
 use viewfuse::check::world::{Numbers, World};
+use viewfuse::check::{camera_oracle, photo_oracle as oracle};
 use viewfuse_core::photo::NO_SURFACE;
 use viewfuse_core::photo::hull::{hull_alpha, hull_entry};
 use viewfuse_core::photo::shade::{JUMP, depth_at, sample};
@@ -68,7 +68,7 @@ fn hull_alpha_agrees() {
         for point in expected.points(2000) {
             for least in [0.02, 0.3] {
                 let found = hull_alpha(&actual.object, &actual.views, &actual.texels[..], point, least);
-                results.push(found, oracle::hull_alpha(&expected.scene(), oracle::point(point.into()), least));
+                results.push(found, oracle::hull_alpha(&expected.scene(), camera_oracle::point(point.into()), least));
             }
         }
     };
@@ -103,7 +103,7 @@ fn sample_agrees() {
             let World { object, views, footprints, texels, depths, weights, .. } = actual;
             let found = sample(object, views, footprints, &texels[..], &depths[..], weights, point);
             let World { footprints, depths, weights, .. } = expected;
-            let place = oracle::point(point.into());
+            let place = camera_oracle::point(point.into());
             let wanted = oracle::sample(&expected.scene(), footprints, depths, weights, place);
             results.push(found.occupancy, wanted.map(|sample| sample.0));
             (0..3).for_each(|c| results.push(found.colour[c], wanted.map(|sample| sample.1[c])));

@@ -10,6 +10,8 @@ mod arguments;
 mod candidate;
 #[path = "vulkan/child.rs"]
 mod child;
+#[path = "vulkan/layers.rs"]
+mod layers;
 #[path = "vulkan/limits.rs"]
 mod limits;
 #[path = "vulkan/loader.rs"]
@@ -50,7 +52,7 @@ fn main() -> ExitCode {
     let mut trials = vec![Trial::test("so_many_drivers_as_required", move || enough_drivers(&drivers))];
     trials.extend(loader::TESTS.iter().map(|(name, test)| Trial::test(*name, test)));
     let tests: Vec<Test> =
-        [arguments::TESTS, transfers::TESTS, memory::TESTS, time::TESTS, picture::TESTS, limits::TESTS]
+        [arguments::TESTS, transfers::TESTS, memory::TESTS, time::TESTS, layers::TESTS, picture::TESTS, limits::TESTS]
             .concat()
             .into_iter()
             .chain(validation::tests())

@@ -107,8 +107,8 @@ impl FineBlock {
 }
 
 /// The random numbers that place fine sample `index` of a pixel's ray: for importance samples where in the distribution
-/// (one in each of as many equal parts as there are samples) and where in the part that it hits, in `[0, 1)`; for depth
-/// samples a normal number and 0.
+/// (one in each of as many equal parts as there are samples, in `[0, 1]`: the sum may round up) and where in the part that
+/// it hits, in `[0, 1)`; for depth samples a normal number and 0.
 #[inline]
 pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
     let counter = block.coarse_count + index;
@@ -123,7 +123,7 @@ pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
 /// Depth of fine sample `index` on a ray, limited to its part that is looked at. Importance samples first: anywhere in the
 /// coarse part (as the second random number says) in which the distribution of `seen[part]` (weight, transmittance)
 /// reaches the first. Then depth samples: normally distributed around `depth`, the mean depth of the first pass on a ray
-/// of this `opacity`.
+/// of this `opacity`. Where that is NaN they lie at `near`.
 #[inline]
 pub fn fine_depth(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),

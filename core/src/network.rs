@@ -9,3 +9,4 @@
 pub mod convolve;
 pub mod product;
 pub mod resample;
+pub mod tile;

@@ -196,8 +196,8 @@ pub fn gathered_value(
     if block.has_addend != 0 { addend.fetch(element) + value } else { value }
 }
 
-/// What the network's four outputs `raw[channel]` say of a point: red, green, blue in `[0, 1]` (logistic function), and
-/// optical depth: density (rectified; NaN counts as 0) times the length that the point stands for.
+/// What the network's four outputs `raw[channel]` say of a point: red, green, blue in `[0, 1]` (logistic function, 1 for
+/// NaN), and optical depth: density (rectified; NaN counts as 0) times the length that the point stands for.
 #[inline]
 pub fn radiance(raw: &(impl Fetch<f32> + ?Sized), point: &RayPoint) -> [f32; 4] {
     let colour = |channel: usize| 1.0 / (1.0 + exp(-raw.fetch(channel)));

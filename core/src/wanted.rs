@@ -3,7 +3,7 @@
 //!
 //! What was seen of a ray is a row `[part]` of weight and transmittance in front of it, over equal parts of the ray.
 
-use crate::math::{clamp, exp};
+use crate::math::{clamp, exp, max};
 use crate::pages::Fetch;
 use crate::rays::TargetRay;
 use bytemuck::{Pod, Zeroable};
@@ -26,7 +26,7 @@ pub fn weigh_sample(optical_depth_before: f32, optical_depth: f32) -> ([f32; 2],
 pub struct WantedBlock {
     /// Samples on each ray.
     pub sample_count: u32,
-    /// Parts of each ray that was seen before.
+    /// Parts of each ray that was seen before, at least 1.
     pub part_count: u32,
     /// Samples are wanted where a sample in the same part or a neighbouring one stopped at least this share of the light
     /// that reached it. 0: everywhere.
@@ -46,7 +46,8 @@ pub struct WantedBlock {
 }
 
 /// Whether a sample at `depth` on `ray`, which is number `index` of the rays at hand and belongs to pixel `pixel`, is
-/// wanted: if the ray itself (`step` 0), or one of the four seen before around it, says so by `seen[ray][part]`.
+/// wanted: if the ray itself (`step` 0), or one of the four seen before around it, says so by `seen[ray][part]`. A depth
+/// outside the ray's part counts as the nearer end, NaN as `near`.
 #[inline]
 pub fn is_wanted(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),
@@ -59,7 +60,7 @@ pub fn is_wanted(
     let last_part = block.part_count - 1;
     let share = (depth - ray.near) / (ray.far - ray.near);
     let part = clamp(share * block.part_count as f32, 0.0, last_part as f32) as u32;
-    let (first, last) = (part.saturating_sub(1), (part + 1).min(last_part));
+    let (first, last) = (part.max(1) - 1, (part + 1).min(last_part));
     if block.step == 0 {
         return says_so(seen, index, first, last, block);
     }
@@ -80,7 +81,8 @@ pub fn is_wanted(
 fn says_so(seen: &(impl Fetch<[f32; 2]> + ?Sized), ray: u32, first: u32, last: u32, block: &WantedBlock) -> bool {
     let row = (ray * block.part_count) as usize;
     let [end_weight, end_transmittance] = seen.fetch(row + block.part_count as usize - 1);
-    let opacity = 1.0 - (end_transmittance - end_weight);
+    // What rounding leaves below 0 counts as 0 here and below, or a threshold of 0 would leave something out.
+    let opacity = max(1.0 - (end_transmittance - end_weight), 0.0);
     let reaches = seen.fetch(row + first as usize)[1] > block.settled;
     if !(opacity >= block.least_opacity) || !reaches {
         return false;
@@ -88,7 +90,7 @@ fn says_so(seen: &(impl Fetch<[f32; 2]> + ?Sized), ray: u32, first: u32, last: u
     let mut part = first;
     while part <= last {
         let [weight, transmittance] = seen.fetch(row + part as usize);
-        if weight >= block.least_share * transmittance {
+        if max(weight, 0.0) >= block.least_share * transmittance {
             return true;
         }
         part += 1;

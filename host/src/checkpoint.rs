@@ -159,15 +159,15 @@ impl Checkpoint {
     /// Memory that reading these tensors and keeping all of them takes, in bytes: 4 for every element, and what reading
     /// the most demanding of them needs beside. Names that it does not have take nothing.
     pub fn byte_estimate<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> u64 {
-        let (mut kept, mut working) = (0, 0);
+        let (mut kept, mut working) = (0u64, 0);
         for name in names {
             let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
-            kept += 4 * count;
+            kept = kept.saturating_add(count.saturating_mul(4));
             if let Content::File(_, places) = &self.content {
                 working = working.max(places.get(name).map_or(0, Place::working_bytes));
             }
         }
-        kept + working
+        kept.saturating_add(working)
     }
 
     /// Checks that it has exactly these tensors, and perhaps others that `optional` accepts.

@@ -7,6 +7,7 @@ mod evaluate;
 mod inspect;
 mod model;
 mod options;
+mod pareto;
 mod render;
 mod table;
 mod verify;
@@ -44,6 +45,8 @@ enum Command {
     Inspect(inspect::Arguments),
     /// Compare weighting schemes on views that are left out of the sources.
     Evaluate(evaluate::Arguments),
+    /// Measure error against run time over what can be left out, on each device.
+    Pareto(pareto::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
@@ -63,6 +66,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Pareto(arguments) => pareto::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

@@ -107,6 +107,22 @@ pub trait Field<D: Device> {
         progress: &Progress,
     ) -> Result<Self::Latents, FieldError<D::Error>>;
 
+    /// Encodes what a target with these weights of the sources needs and no target before it needed, so that the time can
+    /// be told apart from rendering, which does the same first. Nothing is left to do for a field that encodes all sources
+    /// at once.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn encode_used(
+        &self,
+        _device: &D,
+        _prepared: &Self::Prepared,
+        _latents: &Self::Latents,
+        _weights: &SourceWeights,
+    ) -> Result<(), FieldError<D::Error>> {
+        Ok(())
+    }
+
     /// Renders a target with the sources' weights for it. `settled` is the transmittance at which a ray may end early:
     /// no channel changes by more than that.
     ///

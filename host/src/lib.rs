@@ -17,6 +17,7 @@
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
 //! evaluate, inspect, verify     the other jobs
+//! pareto                        error against run time
 //! check                         how closely devices agree with the mathematics
 //! ```
 //!
@@ -35,6 +36,7 @@ pub mod files;
 pub mod formula;
 pub mod inspect;
 pub mod interrupt;
+pub mod pareto;
 pub mod photographs;
 pub mod progress;
 pub mod record;

@@ -129,6 +129,8 @@ pub struct FrameRecord {
     pub depth_step: f32,
     /// Time for this frame alone.
     pub seconds: f64,
+    /// The part of it that encoded sources which no frame before it used.
+    pub encode_seconds: f64,
 }
 
 impl FrameRecord {
@@ -153,6 +155,7 @@ impl FrameRecord {
             ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
             depth_step: depth_step(&frame.depths),
             seconds: frame.time.as_secs_f64(),
+            encode_seconds: frame.encode.as_secs_f64(),
         }
     }
 }

@@ -12,6 +12,7 @@ use crate::scene::{Scene, SceneError, View};
 use crate::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
 use crate::weighting::Weighting;
 use image::RgbImage;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::metrics::{psnr, ssim};
@@ -113,7 +114,7 @@ pub struct StageCosts {
     pub photographs: Duration,
     /// Taking the photographs to the device and finding the object.
     pub prepare: Duration,
-    /// Encoding the sources.
+    /// Encoding the sources, as far as it does not wait for the frames that need them ([`Frame::encode`]).
     pub encode: Duration,
     /// What the run was estimated to take of memory, in bytes; see [`Field::memory_estimate`].
     pub memory_estimate: Option<u64>,
@@ -128,6 +129,8 @@ pub struct Frame {
     pub weights: SourceWeights,
     /// What was left out, and the weights that were used.
     pub omission: Omission<MOST_SOURCES>,
+    /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major.
+    pub colours: Vec<[f32; 4]>,
     /// The picture.
     pub picture: RgbImage,
     /// Depth along the principal axis in world units; 0 where nothing is met. Row-major.
@@ -136,6 +139,8 @@ pub struct Frame {
     pub truth: Option<Truth>,
     /// Time for this frame alone.
     pub time: Duration,
+    /// The part of it that encoded sources which no frame before it used.
+    pub encode: Duration,
 }
 
 /// A photograph at the target, and how the prediction compares.
@@ -188,7 +193,7 @@ pub struct Stage<'a, D: Device, F: Field<D>> {
     side: u32,
     sources: SourcePoses,
     /// The sources at working size.
-    pub images: SourceImages,
+    pub images: Arc<SourceImages>,
     prepared: F::Prepared,
     /// What the stages took so far.
     pub costs: StageCosts,
@@ -208,15 +213,38 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         options: &'a RenderOptions,
         progress: &Progress,
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+        let side = working_side(scene, options)?;
+        let mut photographs = Duration::ZERO;
+        let images = timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background))?;
+        if let Some(warning) = &images.warning {
+            progress.warn(&format!("{}: {warning}", scene.path.display()));
+        }
+        let images = Arc::new(images);
+        let mut stage = Stage::of_images(scene, album, sources, images, device, field, options, progress)?;
+        stage.costs.photographs = photographs;
+        Ok(stage)
+    }
+
+    /// The same with photographs that are prepared already: those of these sources, at the size that the field wants and
+    /// over the options' background.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn of_images(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        images: Arc<SourceImages>,
+        device: &'a D,
+        field: &'a F,
+        options: &'a RenderOptions,
+        progress: &Progress,
+    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options)?;
         let mut costs = StageCosts::default();
-        let images =
-            timed(&mut costs.photographs, || album.sources(sources, field.source_side(side), options.background))?;
-        if let Some(warning) = &images.warning {
-            progress.warn(&format!("{}: {warning}", scene.path.display()));
-        }
         let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
         let sizes: Vec<[u32; 2]> = images.images.iter().map(size).collect();
         costs.memory_estimate = field.memory_estimate(device, &sizes);
@@ -254,6 +282,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
         let camera = self.at_working_size(&target.camera)?;
+        let mut encode = Duration::ZERO;
+        timed(&mut encode, || self.field.encode_used(self.device, &self.prepared, latents, &omission.weights))?;
         let rendered = self.field.render(
             self.device,
             &self.prepared,
@@ -270,7 +300,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
             Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
             None => None,
         };
-        Ok(Frame { target: target.clone(), weights, omission, picture, depths, truth, time })
+        Ok(Frame { target: target.clone(), weights, omission, colours, picture, depths, truth, time, encode })
     }
 
     /// A view's photograph at a size, over the run's background.

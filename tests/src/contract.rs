@@ -3,14 +3,21 @@
 use crate::module::{Content, Declarations, id_of, instructions};
 use rspirv::dr::{Function, Module, Operand};
 use rspirv::spirv::{
-    AddressingModel, Capability, Decoration, ExecutionMode, ExecutionModel, MemoryModel, Op, StorageClass, Word,
+    AddressingModel, Capability, Decoration, ExecutionMode, ExecutionModel, MemoryAccess, MemoryModel, MemorySemantics,
+    Op, Scope, StorageClass, Word,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use viewfuse_core::attention::FourierEmbedding;
-use viewfuse_vulkan::kernel::{Access, Array, Kernel, Layout, WORKGROUP};
+use viewfuse_vulkan::kernel::{Access, Array, Kernel, Layout, SHARED_BYTES, WORKGROUP};
 
 /// `Sqrt` of `GLSL.std.450`: the only function that is the device's.
 const SQUARE_ROOT: u32 = 31;
+
+/// What a barrier has to say: what was written is there, and is seen.
+const SHARING: MemorySemantics = MemorySemantics::ACQUIRE_RELEASE
+    .union(MemorySemantics::WORKGROUP_MEMORY)
+    .union(MemorySemantics::MAKE_AVAILABLE)
+    .union(MemorySemantics::MAKE_VISIBLE);
 
 /// Every breach as a sentence, none if the module is what [`Kernel::ALL`] says.
 pub fn breaches(module: &Module) -> Vec<String> {
@@ -108,10 +115,11 @@ impl Breaches<'_> {
             used.iter().copied().filter(|id| self.declarations.storage_class(*id) == Some(class)).collect()
         };
         let buffers = of_class(StorageClass::StorageBuffer);
+        let shared = of_class(StorageClass::Workgroup);
         let pushed: Vec<Content> =
             of_class(StorageClass::PushConstant).iter().map(|push| self.declarations.content(*push)).collect();
         let specialised = used.iter().any(|id| self.declarations.is_decorated(*id, Decoration::SpecId));
-        let foreign = [StorageClass::Uniform, StorageClass::UniformConstant, StorageClass::Workgroup]
+        let foreign = [StorageClass::Uniform, StorageClass::UniformConstant]
             .into_iter()
             .find(|class| !of_class(*class).is_empty());
         self.unless(foreign.is_none(), || format!("{name}: uses {foreign:?}"));
@@ -123,6 +131,7 @@ impl Breaches<'_> {
         });
         self.look_at_buffers(kernel, &buffers);
         self.look_at_accesses(name, &functions);
+        self.look_at_sharing(kernel, &shared, &functions);
     }
 
     fn look_at_buffers(&mut self, kernel: Kernel, buffers: &[Word]) {
@@ -179,6 +188,39 @@ impl Breaches<'_> {
             };
             self.unless(holds, || format!("{name}: {operation:?} on binding {binding:?}, read only: {is_read_only}"));
         }
+    }
+
+    /// Tiles are computed in memory that the workgroup really shares; other kernels have none, and wait for nobody.
+    fn look_at_sharing(&mut self, kernel: Kernel, shared: &[Word], functions: &[&Function]) {
+        let name = kernel.name();
+        let bytes: usize = shared.iter().map(|variable| self.declarations.variable_bytes(*variable)).sum();
+        self.unless((bytes > 0) == kernel.is_tiled() && bytes <= SHARED_BYTES, || {
+            format!("{name}: {bytes} bytes of a workgroup's memory")
+        });
+        let (mut private, mut barriers) = (0, 0);
+        for instruction in functions.iter().flat_map(|function| instructions(function)) {
+            match instruction.class.opcode {
+                Op::Load | Op::Store => {
+                    let is_shared = self.declarations.is_pointer_to(id_of(instruction, 0), StorageClass::Workgroup);
+                    let marked = |operand: &Operand| {
+                        matches!(operand, Operand::MemoryAccess(access)
+                            if access.contains(MemoryAccess::NON_PRIVATE_POINTER))
+                    };
+                    private += usize::from(is_shared && !instruction.operands.iter().any(marked));
+                }
+                Op::ControlBarrier => {
+                    barriers += 1;
+                    let said = [0, 1, 2].map(|operand| self.declarations.constant(id_of(instruction, operand)));
+                    let workgroup = Scope::Workgroup as u32;
+                    self.unless(said == [workgroup, workgroup, SHARING.bits()], || {
+                        format!("{name}: a barrier of {said:?}")
+                    });
+                }
+                _ => {}
+            }
+        }
+        self.unless(private == 0, || format!("{name}: {private} accesses to shared memory are private"));
+        self.unless((barriers > 0) == kernel.is_tiled(), || format!("{name}: {barriers} barriers"));
     }
 
     fn look_at_arithmetic(&mut self, module: &Module) {

@@ -2,6 +2,7 @@
 //! cannot slip through and the evaluations in `f64` are the program's own, in `viewfuse::check`.
 #![forbid(unsafe_code)]
 
+pub mod checkpoints;
 pub mod command;
 pub mod contract;
 pub mod emulator;

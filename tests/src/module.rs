@@ -85,6 +85,12 @@ impl<'a> Declarations<'a> {
         }
     }
 
+    /// Whether something is a pointer into this storage class.
+    pub fn is_pointer_to(&self, id: Word, class: StorageClass) -> bool {
+        let kind = self.definition(id).result_type.map(|kind| self.definition(kind));
+        kind.is_some_and(|kind| kind.operands.first() == Some(&Operand::StorageClass(class)))
+    }
+
     /// Whether a number is decorated so.
     pub fn is_decorated(&self, id: Word, decoration: Decoration) -> bool {
         self.decorations(id, decoration).next().is_some()
@@ -117,6 +123,22 @@ impl<'a> Declarations<'a> {
             return Content::Elements { stride: stride.expect("a stride") as usize };
         }
         Content::Fixed { bytes: self.bytes(block) }
+    }
+
+    /// Bytes of a variable that has no layout of its own: nobody but the module sees it.
+    pub fn variable_bytes(&self, variable: Word) -> usize {
+        let pointer = self.definition(self.definition(variable).result_type.expect("a variable's type"));
+        self.packed_bytes(self.definition(id_of(pointer, 1)))
+    }
+
+    fn packed_bytes(&self, of: &Instruction) -> usize {
+        let inner = || self.packed_bytes(self.definition(id_of(of, 0)));
+        match of.class.opcode {
+            Op::TypeInt | Op::TypeFloat => of.operands[0].unwrap_literal_bit32() as usize / 8,
+            Op::TypeVector => of.operands[1].unwrap_literal_bit32() as usize * inner(),
+            Op::TypeArray => self.constant(id_of(of, 1)) as usize * inner(),
+            other => panic!("{other:?} is not known here"),
+        }
     }
 
     /// Bytes from the first of a type to its last.

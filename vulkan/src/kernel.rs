@@ -32,7 +32,10 @@ use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock};
 pub const WORKGROUP: u32 = 64;
 
 /// Rows and columns of the outputs that a workgroup of a product computes together, each invocation 8 times 8 of them.
-pub const TILE: u32 = 64;
+pub use viewfuse_core::network::tile::TILE;
+
+/// Bytes of memory that every device has for a workgroup.
+pub const SHARED_BYTES: usize = 16 << 10;
 
 /// Elements of a product with so many outputs: whole tiles.
 pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
@@ -155,6 +158,10 @@ impl Array {
         Array { access: Access::Write, ..Array::read::<T>(name) }
     }
 
+    const fn not_empty(self) -> Array {
+        Array { least_bytes: self.stride, ..self }
+    }
+
     const fn in_pages(self) -> Array {
         Array { layout: Layout::Pages, ..self }
     }
@@ -246,10 +253,10 @@ impl Kernel {
         const RAYS: Array = Array::read::<TargetRay>("rays");
         const POINTS: Array = Array::read::<RayPoint>("points");
         const SEEN: Array = Array::read::<[f32; 2]>("seen");
-        const INPUTS: Array = Array::read::<f32>("inputs");
-        const WEIGHTS: Array = Array::read::<f32>("weights");
-        const BIAS: Array = Array::read::<f32>("bias");
-        const ADDEND: Array = Array::read::<f32>("addend");
+        const INPUTS: Array = Array::read::<f32>("inputs").not_empty();
+        const WEIGHTS: Array = Array::read::<f32>("weights").not_empty();
+        const BIAS: Array = Array::read::<f32>("bias").not_empty();
+        const ADDEND: Array = Array::read::<f32>("addend").not_empty();
         const OUTPUTS: Array = Array::write::<f32>("outputs");
         match self {
             Kernel::Weigh => {
@@ -411,6 +418,11 @@ impl Kernel {
             index += 1;
         }
         count
+    }
+
+    /// Whether its workgroups compute tiles together: only those have memory of their own, and barriers.
+    pub const fn is_tiled(self) -> bool {
+        matches!(self, Kernel::Convolve | Kernel::Product)
     }
 
     /// Whether it binds pages, and so has the specialisation constant 0.

@@ -49,7 +49,7 @@ unsafe fn fuse(
         }
         view += 1;
     }
-    let block = FuseBlock { view_count, stride: channel_count };
+    let block = FuseBlock { view_count, stride: channel_count, ..FuseBlock::default() };
     let mut channel = 0;
     while channel < channels {
         fused.store(channel, fuse_element(&weights, &StartingAt { all: &latents, first: channel }, &block));

@@ -3,7 +3,7 @@
 //! It is the matrix product of the image's patches, `[output pixel][row of the window][column of the window][channel]`,
 //! with the weights; [`patch_value`] is that matrix, which devices read without storing it.
 
-use super::product::rectified;
+use super::product::{first_of_sum, rectified};
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
@@ -79,10 +79,7 @@ pub fn convolve_element(
 ) -> f32 {
     let out_channels = block.out_channels as usize;
     let (pixel, channel) = (element / out_channels, element % out_channels);
-    let mut sum = bias.fetch(channel);
-    if block.has_addend != 0 {
-        sum += addend.fetch(element);
-    }
+    let mut sum = first_of_sum(bias, addend, block.has_addend, element, channel);
     let mut inner = 0;
     while inner < block.patch_len() {
         let weight = weights.fetch(inner as usize * out_channels + channel);

@@ -35,17 +35,32 @@ pub fn product_element(
 ) -> f32 {
     let (inner_count, column_count) = (block.inner_count as usize, block.column_count as usize);
     let (row, column) = (element / column_count, element % column_count);
-    let mut sum = bias.fetch(column);
-    if block.has_addend != 0 {
-        sum += addend.fetch(element);
-    }
+    let mut sum = first_of_sum(bias, addend, block.has_addend, element, column);
     let mut inner = 0;
     while inner < inner_count {
-        let input = rectified(inputs.fetch(row * inner_count + inner), block.relu_inputs);
-        sum += input * weights.fetch(inner * column_count + column);
+        sum += input_value(inputs, block, row, inner) * weights.fetch(inner * column_count + column);
         inner += 1;
     }
     rectified(sum, block.relu_outputs)
+}
+
+/// Number `inner` of a row of the inputs, as it counts.
+#[inline]
+pub fn input_value(inputs: &(impl Fetch<f32> + ?Sized), block: &ProductBlock, row: usize, inner: usize) -> f32 {
+    rectified(inputs.fetch(row * block.inner_count as usize + inner), block.relu_inputs)
+}
+
+/// What the sum for output number `element` begins with: `bias[column]` plus `addend[element]`, if there is an addend.
+#[inline]
+pub fn first_of_sum(
+    bias: &(impl Fetch<f32> + ?Sized),
+    addend: &(impl Fetch<f32> + ?Sized),
+    has_addend: u32,
+    element: usize,
+    column: usize,
+) -> f32 {
+    let first = bias.fetch(column);
+    if has_addend != 0 { first + addend.fetch(element) } else { first }
 }
 
 /// `x`, or 0 instead of a negative one (or NaN) if `relu` is not 0.

@@ -41,13 +41,15 @@ pub fn coarse_depth(ray: &TargetRay, pixel: u32, sample: u32, block: &CoarseBloc
 
 /// The random numbers of a fine sample.
 pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [Bounded; 2] {
-    let pair = uniform_pair(block.seed, pixel, block.coarse_count + index).map(Bounded::from);
+    let [first, second] = uniform_pair(block.seed, pixel, block.coarse_count + index);
     if index < block.importance_count {
-        return [(Bounded::from(index) + pair[0]) / Bounded::from(block.importance_count), pair[1]];
+        let place = (Bounded::from(index) + first.into()) / Bounded::from(block.importance_count);
+        return [place, second.into()];
     }
-    let radius = (-Bounded::from(2.0) * (Bounded::ONE - pair[0]).ln()).square_root();
+    // A multiple of 2^-24 below 1 is subtracted from 1 exactly.
+    let radius = (-Bounded::from(2.0) * Bounded::from(1.0 - first).ln()).square_root();
     let turn = Bounded { value: TAU, error: (TAU - f64::from(std::f32::consts::TAU)).abs() };
-    [radius * (turn * pair[1]).cosine(), Bounded::ZERO]
+    [radius * (turn * second.into()).cosine(), Bounded::ZERO]
 }
 
 /// Depth of a fine sample; `seen[part]` is weight and transmittance. `None` where rounding decides which part it is.
@@ -156,11 +158,14 @@ pub fn is_wanted(
 
 /// Whether any is true, if those that are known tell.
 fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
-    answers.fold(Some(false), |any, answer| match (any, answer) {
-        (Some(true), _) | (_, Some(true)) => Some(true),
-        (None, _) | (_, None) => None,
-        _ => Some(false),
-    })
+    let answers: Vec<Option<bool>> = answers.collect();
+    if answers.contains(&Some(true)) {
+        Some(true)
+    } else if answers.contains(&None) {
+        None
+    } else {
+        Some(false)
+    }
 }
 
 /// Whether what was seen of a ray makes samples in a part wanted.

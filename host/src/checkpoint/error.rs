@@ -73,7 +73,7 @@ pub enum CheckpointError {
         tensor: String,
     },
     /// A value that is no number, infinite, or beyond what the type that is asked for holds.
-    #[error("{}: tensor '{tensor}': element {index} is {value}, {problem}", path.display())]
+    #[error("{}: tensor '{tensor}': element {index} is {value:?}, {problem}", path.display())]
     Value {
         /// The file.
         path: PathBuf,
@@ -88,10 +88,10 @@ pub enum CheckpointError {
     },
     /// A file that was to be made cannot be.
     #[error(transparent)]
-    Write(#[from] WriteError),
+    Write(WriteError),
     /// The work was stopped.
     #[error(transparent)]
-    Interrupted(#[from] crate::interrupt::Interrupted),
+    Interrupted(crate::interrupt::Interrupted),
 }
 
 /// What can be wrong with the content of a file, before it is said which file.

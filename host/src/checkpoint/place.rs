@@ -34,24 +34,18 @@ pub(super) struct Place {
 
 /// The number of elements of a shape, if it is a number that can be.
 pub(super) fn element_count(shape: &[usize]) -> Option<u64> {
-    // An axis of length 0 does not make the others sensible.
-    let most = shape.iter().try_fold(1u64, |product, &length| product.checked_mul(length.max(1) as u64))?;
-    Some(if shape.contains(&0) { 0 } else { most })
+    shape.iter().try_fold(1u64, |product, &length| product.checked_mul(length as u64))
 }
 
-/// Checks that a tensor of this shape is not absurdly large.
+/// Checks that a tensor of this shape is not absurdly large, and gives the number of its elements. An axis of length 0
+/// does not make the others sensible: it counts as 1.
 pub(super) fn check_size(name: &str, shape: &[usize]) -> Result<u64, Problem> {
-    let what = || format!("tensor '{name}' of shape {shape:?}");
-    let count = element_count(shape).ok_or_else(|| Problem::TooLarge {
-        what: what(),
-        bytes: shape.iter().fold(4u128, |product, &length| product.saturating_mul(length as u128)),
-        limit: LARGEST_TENSOR_BYTES,
-    })?;
-    let bytes = 4 * u128::from(count);
+    let bytes = shape.iter().fold(4u128, |product, &length| product.saturating_mul(length.max(1) as u128));
     if bytes > LARGEST_TENSOR_BYTES.into() {
-        return Err(Problem::TooLarge { what: what(), bytes, limit: LARGEST_TENSOR_BYTES });
+        let what = format!("tensor '{name}' of shape {shape:?}");
+        return Err(Problem::TooLarge { what, bytes, limit: LARGEST_TENSOR_BYTES });
     }
-    Ok(count)
+    Ok(element_count(shape).unwrap_or(0))
 }
 
 impl Place {

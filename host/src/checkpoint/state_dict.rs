@@ -73,7 +73,9 @@ impl Storage<'_> {
 /// What is wrong: with which key or tensor, and how.
 pub(super) fn find(pickle: &Pickle) -> Result<StateDict, String> {
     let root = entries(pickle, pickle.root()).ok_or_else(|| match pickle.object(pickle.root()) {
-        Some(object) => format!("holds a whole {}, not its tensors; {RESAVE}", class_of(pickle, object)),
+        Some(object) => {
+            format!("holds an object ({}), not a table of named tensors; {RESAVE}", class_of(pickle, object))
+        }
         None => format!("holds no table of named tensors; {RESAVE}"),
     })?;
     let at_root = root.iter().any(|&(_, value)| is_tensor(pickle, value));
@@ -91,7 +93,7 @@ pub(super) fn find(pickle: &Pickle) -> Result<StateDict, String> {
         }
         (true, None) => (None, root.clone()),
         (false, Some((place, inner))) => (Some(place), inner),
-        (false, None) => return Err(format!("holds no tensors where they are looked for; {}", keys_of(pickle, &root))),
+        (false, None) => return Err(format!("holds no tensors where they are looked for: {}", keys_of(pickle, &root))),
     };
     let mut claims = BTreeMap::new();
     for (key, value) in table {

@@ -81,13 +81,14 @@ impl Checkpoint {
             path: self.path().to_path_buf(),
             what: format!("its names cannot be written as JSON: {error}"),
         })?;
-        let mut file = WholeFile::create(path)?;
-        file.write(&(header.len() as u64).to_le_bytes())?;
-        file.write(&header)?;
+        let mut file = WholeFile::create(path).map_err(CheckpointError::Write)?;
+        let mut write = |bytes: &[u8]| file.write(bytes).map_err(CheckpointError::Write);
+        write(&(header.len() as u64).to_le_bytes())?;
+        write(&header)?;
         let bytes = 8 + header.len() as u64 + tensors.iter().map(|(_, _, _, bytes)| bytes).sum::<u64>();
         let mut written = Written { tensors, bytes, relative_error: 0.0, tiny_count: 0, tiny_error: 0.0 };
         for index in 0..written.tensors.len() {
-            interrupt::check()?;
+            interrupt::check().map_err(CheckpointError::Interrupted)?;
             let (name, target) = (written.tensors[index].0.clone(), written.tensors[index].1);
             let mut done = 0;
             self.read(&name, |element, bytes| {
@@ -97,15 +98,15 @@ impl Checkpoint {
                     return Err(self.not_finite(&name, done + at as u64, value));
                 }
                 if element == target {
-                    file.write(bytes)?;
+                    write(bytes)?;
                 } else {
-                    file.write(&self.halved(&name, done, element.values(bytes), &mut written)?)?;
+                    write(&self.halved(&name, done, element.values(bytes), &mut written)?)?;
                 }
                 done += (bytes.len() / element.size()) as u64;
                 Ok(())
             })?;
         }
-        file.finish()?;
+        file.finish().map_err(CheckpointError::Write)?;
         Ok(written)
     }
 

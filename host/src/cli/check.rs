@@ -10,12 +10,10 @@ use viewfuse::check::measure::{DEFAULT_SEED_COUNT, Role};
 use viewfuse::check::picture::Picture;
 use viewfuse::check::report::{PictureVersusCpu, VersusCpu};
 use viewfuse::check::{CheckError, DeviceReport, KernelReport, PictureReport, Report, check_device};
-use viewfuse::device::choice::{self, AnyDevice, DeviceChoice, vulkan_devices};
-use viewfuse::device::cpu::Cpu;
-use viewfuse::device::vulkan::Vulkan;
-use viewfuse::device::{Device, Memory};
+use viewfuse::device::Device;
+use viewfuse::device::choice::{AnyDevice, DeviceChoice, Several, open_several};
 use viewfuse::progress::Progress;
-use viewfuse_vulkan::{GpuOptions, VulkanError};
+use viewfuse_vulkan::GpuOptions;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse check\n  viewfuse check --device cpu --seeds 16 --json\n\n\
@@ -35,42 +33,19 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// The devices that were asked for, or all: the CPU, and every Vulkan device that can do the work. What is not there or
-/// cannot be opened is told in the report.
-fn devices(asked: &[DeviceChoice], report: &mut Report) -> Result<Vec<AnyDevice>, VulkanError> {
-    let options = GpuOptions::default();
-    if !asked.is_empty() {
-        return asked.iter().map(|choice| Ok(choice::open(choice, &options)?.device)).collect();
-    }
-    let mut devices = vec![AnyDevice::Cpu(Cpu)];
-    match vulkan_devices() {
-        Ok((instance, adapters)) => {
-            for adapter in &adapters {
-                match Vulkan::open(&instance, adapter, &options) {
-                    Ok(device) => devices.push(AnyDevice::Vulkan(Box::new(device))),
-                    Err(error @ VulkanError::Missing { .. }) => report.notes.push(format!("not checked: {error}")),
-                    Err(error) => report.failures.push(error.to_string()),
-                }
-            }
-        }
-        // A machine without Vulkan has a CPU to check.
-        Err(error) => report.notes.push(format!("only the CPU was checked: {error}")),
-    }
-    Ok(devices)
-}
-
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let progress = Progress::new("checking");
     let picture = Picture::new(arguments.scene.as_deref(), &progress)?;
+    let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
     let mut report = Report {
         viewfuse: env!("CARGO_PKG_VERSION"),
         seed_count: arguments.seeds,
         sizes: SIZES.to_vec(),
         devices: Vec::new(),
-        failures: Vec::new(),
-        notes: Vec::new(),
+        failures,
+        notes,
     };
-    for device in devices(&arguments.device, &mut report)? {
+    for device in devices {
         let checked = match &device {
             AnyDevice::Cpu(cpu) => check(cpu, Role::Reference, arguments.seeds, &picture, &progress),
             AnyDevice::Vulkan(vulkan) => check(vulkan.as_ref(), Role::Other, arguments.seeds, &picture, &progress),
@@ -79,7 +54,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             Ok(checked) => report.devices.push(checked),
             Err(error @ CheckError::Interrupted(_)) => return Err(error.into()),
             // One device that fails is no reason to lose what is known of the others.
-            Err(error) => report.failures.push(format!("{}: {:#}", name_of(&device), anyhow::Error::from(error))),
+            Err(error) => report.failures.push(format!("{}: {:#}", device.name(), anyhow::Error::from(error))),
         }
     }
     drop(progress);
@@ -92,13 +67,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         report.failures.iter().try_for_each(|failure| say(format_args!("FAILED: {failure}")))?;
     }
     Ok(ExitCode::from(report.exit_code()))
-}
-
-fn name_of(device: &AnyDevice) -> String {
-    match device {
-        AnyDevice::Cpu(cpu) => cpu.name(),
-        AnyDevice::Vulkan(vulkan) => vulkan.name(),
-    }
 }
 
 fn check<D: Device>(

@@ -7,8 +7,8 @@ use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use viewfuse::device::Device;
 use viewfuse::device::choice::{AnyDevice, Chosen};
-use viewfuse::device::{Device, Memory};
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
 use viewfuse::few_shot::Selection;
 use viewfuse::field::Field;
@@ -83,11 +83,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         let scores: Vec<Score> = all.iter().map(|(_, score)| score.clone()).collect();
         print_table(&format!("all {} scenes", arguments.scenes.len()), &means(&scores))?;
     }
-    let name = match &device {
-        AnyDevice::Cpu(cpu) => cpu.name(),
-        AnyDevice::Vulkan(vulkan) => vulkan.name(),
-    };
-    say(format_args!("device: {name}, {reason}"))?;
+    say(format_args!("device: {}, {reason}", device.name()))?;
     if let Some(path) = &arguments.output {
         write_whole(path, &csv_of(&all)?)?;
         say(format_args!("{}", path.display()))?;

@@ -71,7 +71,7 @@ impl Model {
             None => Architecture::published(),
         };
         Ok(match self {
-            Model::File(path) => anyhow::bail!("{}: reading checkpoints comes next", path.display()),
+            Model::File(path) => Checkpoint::open(path)?,
             Model::Formula(width) => made::by_formula(&sizes(width)),
             Model::Body(width) => made::body(&sizes(width)),
         })
@@ -95,13 +95,26 @@ pub(crate) enum Omission {
     Hidden,
 }
 
-/// Which network makes the pictures.
+/// Which network makes the pictures, and where it looks.
 #[derive(Args)]
-pub(crate) struct ModelOptions {
+pub(crate) struct NetworkOptions {
     /// PixelNeRF checkpoint (.pth, .pt, .safetensors); or formula[:WIDTH] or body[:WIDTH], networks without training for
     /// measuring [default: the field that needs no network]
     #[arg(long, value_name = "FILE")]
     model: Option<Model>,
+    /// Samples on a ray: first pass, second pass by weight, second pass around the depth
+    #[arg(long, value_name = "N,N,N", default_value = "64,16,16", value_parser = parse_samples, requires = "model")]
+    samples: [u32; 3],
+    /// Where rays begin and end, world units [default: 8/13 and 18/13 of the cameras' distance from what they look at]
+    #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model")]
+    near_far: Option<[f32; 2]>,
+}
+
+/// Which network makes the pictures, and what it leaves out.
+#[derive(Args)]
+pub(crate) struct ModelOptions {
+    #[command(flatten)]
+    network: NetworkOptions,
     /// Leave nothing out: every view, sample and layer as published (sets --leave-out 0, --settled 0, --compute all)
     #[arg(long)]
     pub(crate) exact: bool,
@@ -111,15 +124,17 @@ pub(crate) struct ModelOptions {
     /// Probe one ray in every square of this many pixels on a side for empty space
     #[arg(long, value_name = "PIXELS", default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..=64), requires = "model")]
     probe_step: u32,
-    /// Samples on a ray: first pass, second pass by weight, second pass around the depth
-    #[arg(long, value_name = "N,N,N", default_value = "64,16,16", value_parser = parse_samples, requires = "model")]
-    samples: [u32; 3],
-    /// Where rays begin and end, world units [default: 8/13 and 18/13 of the cameras' distance from what they look at]
-    #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model")]
-    near_far: Option<[f32; 2]>,
 }
 
 impl AnyField {
+    /// What the run record calls it.
+    pub(crate) fn name(&self) -> &'static str {
+        match self {
+            AnyField::Photo(field) => Field::<Cpu>::name(field),
+            AnyField::PixelNerf(field) => Field::<Cpu>::name(field.as_ref()),
+        }
+    }
+
     /// The least number of sources it can work with.
     pub(crate) fn least_sources(&self) -> usize {
         match self {
@@ -129,40 +144,50 @@ impl AnyField {
     }
 }
 
-impl ModelOptions {
+impl NetworkOptions {
     /// Where the network comes from, if there is one.
     pub(crate) fn label(&self) -> Option<String> {
         self.model.as_ref().map(Model::to_string)
     }
 
     /// Reads the field.
-    pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
+    pub(crate) fn open(&self, seed: u64, omissions: Omissions) -> anyhow::Result<AnyField> {
         let Some(model) = &self.model else { return Ok(AnyField::Photo(PhotoField::default())) };
         let checkpoint = model.checkpoint()?;
-        let field = PixelNerf::new(&checkpoint, self.options(seed)).context("--model")?;
+        let [coarse_count, importance_count, depth_count] = self.samples;
+        let sampling = Sampling {
+            coarse_count,
+            importance_count,
+            depth_count,
+            seed,
+            near_far: self.near_far,
+            ..Sampling::default()
+        };
+        let field = PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions }).context("--model")?;
         Ok(AnyField::PixelNerf(Box::new(field)))
     }
+}
 
-    fn options(&self, seed: u64) -> PixelNerfOptions {
+impl ModelOptions {
+    /// Where the network comes from, if there is one.
+    pub(crate) fn label(&self) -> Option<String> {
+        self.network.label()
+    }
+
+    /// Reads the field.
+    pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
+        self.network.open(seed, self.omissions())
+    }
+
+    fn omissions(&self) -> Omissions {
         let computes = |what| self.exact || self.compute.contains(&what);
-        let [coarse_count, importance_count, depth_count] = self.samples;
-        PixelNerfOptions {
-            sampling: Sampling {
-                coarse_count,
-                importance_count,
-                depth_count,
-                seed,
-                near_far: self.near_far,
-                ..Sampling::default()
-            },
-            omissions: Omissions {
-                unused_views: !computes(Omission::Views),
-                latent_layers: !computes(Omission::Layers),
-                empty_space: if computes(Omission::Space) { 0 } else { self.probe_step },
-                empty_rays: !computes(Omission::Rays),
-                empty_parts: !computes(Omission::Parts),
-                hidden_samples: !computes(Omission::Hidden),
-            },
+        Omissions {
+            unused_views: !computes(Omission::Views),
+            latent_layers: !computes(Omission::Layers),
+            empty_space: if computes(Omission::Space) { 0 } else { self.probe_step },
+            empty_rays: !computes(Omission::Rays),
+            empty_parts: !computes(Omission::Parts),
+            hidden_samples: !computes(Omission::Hidden),
         }
     }
 }

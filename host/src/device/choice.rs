@@ -1,6 +1,7 @@
 //! Which device: what is there, what a person asked for, and why it became this one.
 
 use super::cpu::Cpu;
+use super::memory::Memory;
 use super::vulkan::Vulkan;
 use std::env;
 use std::fmt;
@@ -59,6 +60,16 @@ pub enum AnyDevice {
     Vulkan(Box<Vulkan>),
 }
 
+impl AnyDevice {
+    /// What the run record calls it.
+    pub fn name(&self) -> String {
+        match self {
+            AnyDevice::Cpu(cpu) => cpu.name(),
+            AnyDevice::Vulkan(vulkan) => vulkan.name(),
+        }
+    }
+}
+
 /// A device, and why it is this one.
 pub struct Chosen {
     /// The device.
@@ -89,6 +100,44 @@ pub fn open(choice: &DeviceChoice, options: &GpuOptions) -> Result<Chosen, Vulka
             Err(reason) => cpu(reason),
         }),
     }
+}
+
+/// Devices to go through one after the other.
+#[derive(Default)]
+pub struct Several {
+    /// The devices, the CPU first unless asked for otherwise.
+    pub devices: Vec<AnyDevice>,
+    /// Devices that are there and cannot do the work, and what they lack; or why there is only the CPU.
+    pub notes: Vec<String>,
+    /// Devices that should be able to do the work but could not be opened.
+    pub failures: Vec<String>,
+}
+
+/// Opens the devices that a person asked for, in that order; if none, all that can do the work.
+///
+/// # Errors
+/// [`VulkanError`] if a device was asked for and cannot be had.
+pub fn open_several(asked: &[DeviceChoice], options: &GpuOptions) -> Result<Several, VulkanError> {
+    let mut several = Several::default();
+    if !asked.is_empty() {
+        several.devices = asked.iter().map(|choice| Ok(open(choice, options)?.device)).collect::<Result<_, _>>()?;
+        return Ok(several);
+    }
+    several.devices.push(AnyDevice::Cpu(Cpu));
+    match vulkan_devices() {
+        Ok((instance, adapters)) => {
+            for adapter in &adapters {
+                match Vulkan::open(&instance, adapter, options) {
+                    Ok(device) => several.devices.push(AnyDevice::Vulkan(Box::new(device))),
+                    Err(error @ VulkanError::Missing { .. }) => several.notes.push(format!("left aside: {error}")),
+                    Err(error) => several.failures.push(error.to_string()),
+                }
+            }
+        }
+        // A machine without Vulkan has a CPU.
+        Err(error) => several.notes.push(format!("only the CPU: {error}")),
+    }
+    Ok(several)
 }
 
 /// The first graphics processor that can do the work, or why there is none.

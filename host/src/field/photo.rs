@@ -25,12 +25,14 @@ pub struct PhotoField {
     /// Most values in each of the three buffers of a sweep. Larger pictures are swept in bands of rows, which changes
     /// the memory and the time but not the result.
     pub most_band_values: usize,
+    /// Side of the sources as a share of the pictures', above 0: matching sources costs less and less as they shrink.
+    pub source_share: f32,
 }
 
 impl Default for PhotoField {
-    /// 16 Mi values: 256 MiB in all.
+    /// 16 Mi values: 256 MiB in all. Sources as large as the pictures.
     fn default() -> PhotoField {
-        PhotoField { most_band_values: 16 << 20 }
+        PhotoField { most_band_values: 16 << 20, source_share: 1.0 }
     }
 }
 
@@ -53,6 +55,10 @@ impl<D: Device> Field<D> for PhotoField {
     fn least_sources(&self) -> usize {
         // One view shows no depth.
         2
+    }
+
+    fn source_side(&self, picture_side: u32) -> u32 {
+        ((picture_side as f32 * self.source_share).round() as u32).max(1)
     }
 
     fn prepare(

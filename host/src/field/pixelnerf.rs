@@ -30,7 +30,7 @@ use network::{Network, Views, Workspace};
 use parameters::{HostLayer, Parameters};
 use pass::{Asked, MOST_RAYS, Renderer};
 use std::cell::OnceCell;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
 
@@ -43,7 +43,7 @@ const NEAR_FAR_SHARES: [f32; 2] = [8.0 / 13.0, 18.0 / 13.0];
 /// A PixelNeRF with its parameters, ready for any device.
 pub struct PixelNerf {
     architecture: Architecture,
-    parameters: Parameters<HostLayer>,
+    parameters: Arc<Parameters<HostLayer>>,
     options: PixelNerfOptions,
     counts: Mutex<Counts>,
 }
@@ -76,7 +76,7 @@ impl PixelNerf {
     /// [`CheckpointError`] if it is not of this family, or cannot be read.
     pub fn new(checkpoint: &Checkpoint, options: PixelNerfOptions) -> Result<PixelNerf, CheckpointError> {
         let architecture = Architecture::of(checkpoint)?;
-        let parameters = Parameters::read(checkpoint, &architecture)?;
+        let parameters = Arc::new(Parameters::read(checkpoint, &architecture)?);
         Ok(PixelNerf { architecture, parameters, options, counts: Mutex::default() })
     }
 
@@ -85,9 +85,26 @@ impl PixelNerf {
         &self.architecture
     }
 
-    /// The same network with other settings; what was counted is forgotten.
-    pub fn with_options(self, options: PixelNerfOptions) -> PixelNerf {
-        PixelNerf { options, counts: Mutex::default(), ..self }
+    /// Its settings.
+    pub fn options(&self) -> PixelNerfOptions {
+        self.options
+    }
+
+    /// The same network with other settings, and nothing counted yet. The parameters are shared.
+    pub fn with_options(&self, options: PixelNerfOptions) -> PixelNerf {
+        let PixelNerf { architecture, parameters, .. } = self;
+        PixelNerf {
+            architecture: architecture.clone(),
+            parameters: Arc::clone(parameters),
+            options,
+            counts: Mutex::default(),
+        }
+    }
+
+    /// The views that a target with these weights asks about.
+    fn used_views<D: Device>(&self, prepared: &Prepared<D>, weights: &SourceWeights) -> Vec<usize> {
+        let all = !self.options.omissions.unused_views;
+        (0..prepared.images.len()).filter(|view| all || weights.get(*view as u32) > 0.0).collect()
     }
 
     fn encode_view<D: Device>(&self, device: &D, prepared: &Prepared<D>, view: usize) -> Result<(), D::Error> {
@@ -175,6 +192,24 @@ impl<D: Device> Field<D> for PixelNerf {
         device.finish().map_err(FieldError::Device)
     }
 
+    fn encode_used(
+        &self,
+        device: &D,
+        prepared: &Prepared<D>,
+        (): &(),
+        weights: &SourceWeights,
+    ) -> Result<(), FieldError<D::Error>> {
+        let encoded_views = self.counts().encoded_views;
+        for view in self.used_views(prepared, weights) {
+            interrupt::check()?;
+            self.encode_view(device, prepared, view).map_err(FieldError::Device)?;
+        }
+        if self.counts().encoded_views > encoded_views {
+            device.finish().map_err(FieldError::Device)?;
+        }
+        Ok(())
+    }
+
     fn render(
         &self,
         device: &D,
@@ -186,13 +221,8 @@ impl<D: Device> Field<D> for PixelNerf {
         progress: &Progress,
     ) -> Result<Rendered, FieldError<D::Error>> {
         let failed = FieldError::Device;
-        let leave_out = self.options.omissions.unused_views;
-        let used: Vec<usize> =
-            (0..prepared.images.len()).filter(|view| !leave_out || weights.get(*view as u32) > 0.0).collect();
-        for &view in &used {
-            interrupt::check()?;
-            self.encode_view(device, prepared, view).map_err(failed)?;
-        }
+        self.encode_used(device, prepared, &(), weights)?;
+        let used = self.used_views(prepared, weights);
         let cameras: Vec<CameraBlock> = used.iter().map(|view| prepared.cameras[*view]).collect();
         let view_weights: Vec<f32> = used.iter().map(|view| weights.get(*view as u32)).collect();
         let views = Views {

@@ -7,6 +7,7 @@
 //! backend   where the compiler is            a folder named by RUST_GPU_HOME, a cache, or the official toolchain
 //! compile   sources -> module                spirv-builder, without its optimiser
 //! legalise  module -> module                 no composites of pointers
+//! share     module -> module                 a workgroup's memory is its invocations' common one
 //! refine    module -> module                 no trace of paths, no contraction of float arithmetic
 //! stamp     what the module was made from    sha256 of the sources and locked versions; kernels.toml
 //! ```
@@ -15,4 +16,5 @@ pub mod backend;
 pub mod compile;
 pub mod legalise;
 pub mod refine;
+pub mod share;
 pub mod stamp;

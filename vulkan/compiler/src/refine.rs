@@ -5,6 +5,7 @@
 //!   products with their rounding errors (`viewfuse_core::math::two_sum`) mean nothing otherwise.
 
 use crate::legalise::legalise;
+use crate::share::share;
 use rspirv::binary::{Assemble, ParseState};
 use rspirv::dr::{Instruction, Module, Operand, load_bytes};
 use rspirv::spirv::{Decoration, Op};
@@ -46,6 +47,7 @@ pub fn refine(bytes: &[u8]) -> Result<Vec<u8>, RefineError> {
     let mut module = read(bytes)?;
     leave_out_names(&mut module);
     legalise(&mut module);
+    share(&mut module);
     forbid_contraction(&mut module);
     Ok(module.assemble().iter().flat_map(|word| word.to_le_bytes()).collect())
 }

@@ -15,12 +15,13 @@ pub const MODULE: &str = "vulkan/src/kernels.spv";
 /// What it was made from.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
 /// Files, and folders with all their Rust files, that the module is made from.
-pub const SOURCES: [&str; 7] = [
+pub const SOURCES: [&str; 8] = [
     "core/Cargo.toml",
     "core/src",
     "vulkan/compiler/src/compile.rs",
     "vulkan/compiler/src/legalise.rs",
     "vulkan/compiler/src/refine.rs",
+    "vulkan/compiler/src/share.rs",
     "vulkan/shaders/Cargo.toml",
     "vulkan/shaders/src",
 ];

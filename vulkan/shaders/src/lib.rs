@@ -7,6 +7,10 @@
 //!
 //! ```text
 //! weighting   how relevant each source is               weigh, embed_pose, attend
+//! rays        where to look        cast_rays, coarse_depths, place_points, weigh_samples, draw_chances, fine_depths,
+//!                                  merge_depths, wanted_samples
+//! points      a network's ends     embed_points, visible_weights, gather_latents, radiance
+//! network     layers               convolve, max_pool, upsample, product
 //! light       views become one, samples become a pixel  fuse_views, composite
 //! sweep       the depths of source pixels               hull_entry, match_cost, sum_row, mean_column, pick_depth
 //! march       a target pixel's ray                      march
@@ -17,7 +21,12 @@
 
 pub mod light;
 pub mod march;
+pub mod network;
+pub mod points;
+pub mod rays;
 pub mod sweep;
+mod tile;
+mod unchecked;
 pub mod weighting;
 
 /// Which elements a dispatch has: its invocation `i` works on element `first + i`, if `i < count`. The same bytes as

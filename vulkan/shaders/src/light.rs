@@ -20,7 +20,9 @@ pub fn fuse_views(
         return;
     }
     let element = (push.piece.first + id.x) as usize;
-    fused[element] = fuse_element(weights, &StartingAt { all: latents, first: element }, &push.parameters);
+    let block = &push.parameters;
+    let weights = StartingAt { all: weights, first: block.first_weight(element) };
+    fused[element] = fuse_element(&weights, &StartingAt { all: latents, first: element }, block);
 }
 
 /// The pixel of ray number `first + id.x` from its samples.

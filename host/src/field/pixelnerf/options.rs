@@ -37,7 +37,8 @@ impl Default for Sampling {
     }
 }
 
-/// What may be left out. Each is a switch of its own; all at once are [`Omissions::none`] and the default.
+/// What may be left out. Each is a switch of its own; none at all are [`Omissions::NONE`], all are
+/// [`Omissions::ALL`] and the default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Omissions {
     /// The encoding of views that no target uses. Exact.
@@ -71,18 +72,22 @@ impl Omissions {
         empty_parts: false,
         hidden_samples: false,
     };
+
+    /// All that is left out unless a person says otherwise.
+    pub const ALL: Omissions = Omissions {
+        unused_views: true,
+        latent_layers: true,
+        empty_space: 4,
+        empty_rays: true,
+        empty_parts: true,
+        hidden_samples: true,
+    };
 }
 
 impl Default for Omissions {
+    /// [`Omissions::ALL`].
     fn default() -> Omissions {
-        Omissions {
-            unused_views: true,
-            latent_layers: true,
-            empty_space: 4,
-            empty_rays: true,
-            empty_parts: true,
-            hidden_samples: true,
-        }
+        Omissions::ALL
     }
 }
 

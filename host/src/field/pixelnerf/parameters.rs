@@ -137,7 +137,9 @@ impl PointNetwork<HostLayer> {
         let (width, latent_channels) = (architecture.width, architecture.latent_channels());
         let linear = |name: String, inner| linear(checkpoint, &format!("{prefix}.{name}"), inner);
         let pair = |block| {
-            Ok([linear(format!("blocks.{block}.fc_0"), width)?, linear(format!("blocks.{block}.fc_1"), width)?])
+            let layers =
+                [linear(format!("blocks.{block}.fc_0"), width)?, linear(format!("blocks.{block}.fc_1"), width)?];
+            Ok::<_, CheckpointError>(layers)
         };
         Ok(PointNetwork {
             entry: linear("lin_in".to_owned(), architecture.embedded_len())?,

@@ -1,0 +1,59 @@
+//! `viewfuse convert`: what it prints, and what it refuses.
+
+use super::{BINARY, done};
+use std::path::Path;
+use viewfuse::checkpoint::Checkpoint;
+use viewfuse_tests::command::{assert_refused, files_below};
+use viewfuse_tests::scenes::Folder;
+
+/// A folder with a training checkpoint that PyTorch wrote.
+fn training() -> Folder {
+    let folder = Folder::new();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/checkpoints/training.pth");
+    std::fs::copy(file, folder.path().join("training.pth")).expect("the checkpoint");
+    folder
+}
+
+/// What the command prints, its words separated by single blanks.
+#[track_caller]
+fn words(folder: &Path, arguments: &str) -> String {
+    done(folder, arguments).split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[test]
+fn a_training_checkpoint() {
+    let folder = training();
+    let printed = words(folder.path(), "convert training.pth new/out.safetensors");
+    for part in [
+        "0.weight float32 [2, 1, 3, 3] 72",
+        "kept epoch = 12",
+        "read training.pth (PyTorch, before 1.6; under 'state_dict')",
+        "written new/out.safetensors: 20 tensors, ",
+    ] {
+        assert!(printed.contains(part), "no {part:?} in:\n{printed}");
+    }
+    assert!(!printed.contains("rounding"), "{printed}");
+    let written = Checkpoint::open(&folder.path().join("new/out.safetensors")).expect("safetensors");
+    assert_eq!(written.tensor("1.bias").expect("a tensor"), [3.0, 4.0]);
+}
+
+#[test]
+fn in_half_precision() {
+    let folder = training();
+    let printed = words(folder.path(), "convert training.pth out.safetensors --half");
+    assert!(printed.contains("0.weight float16 [2, 1, 3, 3] 36"), "{printed}");
+    assert!(printed.contains("rounding 0.00e0 of the value at most"), "all values are exact: {printed}");
+}
+
+#[test]
+fn refusals() {
+    let folder = training();
+    let before = files_below(folder.path());
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
+    refused("convert training.pth out.pth", &["out.pth: only safetensors are written"]);
+    refused("convert none.pth out.safetensors", &["none.pth: cannot be read: No such file"]);
+    std::fs::write(folder.path().join("page.pth"), "<html>").expect("a file");
+    refused("convert page.pth out.safetensors", &["page.pth: no checkpoint: a web page"]);
+    std::fs::remove_file(folder.path().join("page.pth")).expect("removed");
+    assert_eq!(files_below(folder.path()), before, "nothing is left behind");
+}

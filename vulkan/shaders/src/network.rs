@@ -1,0 +1,106 @@
+//! Layers of networks.
+
+use crate::Push;
+use crate::tile::{Shape, Shared, multiply};
+use crate::unchecked::{Endless, store};
+use spirv_std::glam::UVec3;
+use spirv_std::spirv;
+use viewfuse_core::network::convolve::{ConvolveBlock, patch_value};
+use viewfuse_core::network::product::{ProductBlock, first_of_sum, input_value, rectified};
+use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_core::pages::Fetch;
+
+/// A part of a tile of pixels and output channels: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "convolve"))]
+#[allow(clippy::too_many_arguments)]
+pub fn convolve(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<ConvolveBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let channels = block.out_channels;
+    let (inputs, weights, bias, addend) = (Endless(inputs), Endless(weights), Endless(bias), Endless(addend));
+    multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
+        rows,
+        columns,
+        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
+        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
+        move |pixel, channel, sum| {
+            let element = (pixel * channels + channel) as usize;
+            let first = first_of_sum(&bias, &addend, block.has_addend, element, channel as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
+        },
+    );
+}
+
+/// Channel of an output pixel number `first + id.x`, flat in `[row][column][channel]`.
+#[spirv(compute(threads(64), entry_point_name = "max_pool"))]
+pub fn max_pool(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<PoolBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] outputs: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let element = (push.piece.first + id.x) as usize;
+    outputs[element] = pooled_element(inputs, &push.parameters, element);
+}
+
+/// Input channel of an output pixel number `first + id.x`, flat in `[row][column][channel]`.
+#[spirv(compute(threads(64), entry_point_name = "upsample"))]
+pub fn upsample(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<UpsampleBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] outputs: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let block = &push.parameters;
+    let element = (push.piece.first + id.x) as usize;
+    outputs[block.place(element)] = upsampled_element(inputs, block, element);
+}
+
+/// A part of a tile of rows and columns: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "product"))]
+#[allow(clippy::too_many_arguments)]
+pub fn product(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<ProductBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (inputs, weights, bias, addend) = (Endless(inputs), Endless(weights), Endless(bias), Endless(addend));
+    multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        columns,
+        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |row, column, sum| {
+            let element = (row * column_count + column) as usize;
+            let first = first_of_sum(&bias, &addend, block.has_addend, element, column as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
+        },
+    );
+}
