@@ -20,6 +20,8 @@ mod loader;
 mod memory;
 #[path = "vulkan/picture.rs"]
 mod picture;
+#[path = "vulkan/pixelnerf.rs"]
+mod pixelnerf;
 #[path = "vulkan/time.rs"]
 mod time;
 #[path = "vulkan/transfers.rs"]
@@ -51,12 +53,20 @@ fn main() -> ExitCode {
     let drivers: BTreeSet<String> = candidates.iter().map(|candidate| candidate.adapter.driver.clone()).collect();
     let mut trials = vec![Trial::test("so_many_drivers_as_required", move || enough_drivers(&drivers))];
     trials.extend(loader::TESTS.iter().map(|(name, test)| Trial::test(*name, test)));
-    let tests: Vec<Test> =
-        [arguments::TESTS, transfers::TESTS, memory::TESTS, time::TESTS, layers::TESTS, picture::TESTS, limits::TESTS]
-            .concat()
-            .into_iter()
-            .chain(validation::tests())
-            .collect();
+    let tests: Vec<Test> = [
+        arguments::TESTS,
+        transfers::TESTS,
+        memory::TESTS,
+        time::TESTS,
+        layers::TESTS,
+        picture::TESTS,
+        pixelnerf::TESTS,
+        limits::TESTS,
+    ]
+    .concat()
+    .into_iter()
+    .chain(validation::tests())
+    .collect();
     for candidate in &candidates {
         for test in &tests {
             let (work, candidate) = (test.work, candidate.clone());

@@ -28,7 +28,7 @@ use crate::sources::SourceWeights;
 use encoder::{Image, Size, ViewLatents, encode};
 use network::{Network, Views, Workspace};
 use parameters::{HostLayer, Parameters};
-use pass::{Asked, MOST_RAYS, Renderer};
+use pass::{Asked, Renderer, rays_at_once};
 use std::cell::OnceCell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -259,9 +259,10 @@ impl<D: Device> Field<D> for PixelNerf {
             }
             false => None,
         };
-        progress.expect(pixels.len().div_ceil(MOST_RAYS));
+        let at_once = rays_at_once(device, &self.options.sampling);
+        progress.expect(pixels.len().div_ceil(at_once));
         let mut tiles: Vec<Pixels<D>> = Vec::new();
-        for some in pixels.chunks(MOST_RAYS) {
+        for some in pixels.chunks(at_once) {
             tiles.push(renderer.render(&mut workspace, some, seen.as_ref(), &mut asked)?);
             progress.step();
         }

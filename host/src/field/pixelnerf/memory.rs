@@ -3,7 +3,7 @@
 use super::architecture::Architecture;
 use super::network::workspace_bytes;
 use super::options::{PixelNerfOptions, Sampling};
-use super::pass::{MOST_RAYS, ray_bytes};
+use super::pass::{ray_bytes, rays_at_once};
 use crate::device::Device;
 
 /// Bytes that a run takes at most beside the photographs and the pictures: parameters (on the host and on the device),
@@ -27,7 +27,7 @@ pub(super) fn estimate<D: Device>(
     let largest = source_sizes.iter().map(nodes).max().unwrap_or(0);
     let trunk = largest * (latents + 4 * architecture.stem_channels) * float;
     let Sampling { coarse_count, importance_count, depth_count, .. } = options.sampling;
-    let rays = MOST_RAYS * ray_bytes(coarse_count, importance_count + depth_count);
+    let rays = rays_at_once(device, &options.sampling) * ray_bytes(coarse_count, importance_count + depth_count);
     let activations = workspace_bytes(device, architecture, source_sizes.len(), maps);
     (parameters + views + trunk + rays + activations) as u64
 }

@@ -77,7 +77,8 @@ fn points_at_once<D: Device>(
     most_points: usize,
     maps: bool,
 ) -> usize {
-    let widest = architecture.width.max(if maps { 0 } else { architecture.latent_channels() });
+    let latents = if maps { 0 } else { architecture.latent_channels() };
+    let widest = architecture.width.max(architecture.embedded_len()).max(latents);
     let busy = LEAST_ACTIVATIONS.max(device.busy_elements().saturating_mul(OUTPUTS_AN_INVOCATION));
     let rows = (busy / widest).min(device.most_elements::<f32>() / widest);
     (rows / view_count.max(1)).clamp(1, most_points.max(1))

@@ -13,6 +13,12 @@ use viewfuse_core::wanted::WantedBlock;
 /// Most rays at a time.
 pub(super) const MOST_RAYS: usize = 4096;
 
+/// How many rays at a time: as many as a buffer of the device holds the samples of.
+pub(super) fn rays_at_once<D: Device>(device: &D, sampling: &Sampling) -> usize {
+    let samples = sampling.coarse_count as usize + sampling.importance_count as usize + sampling.depth_count as usize;
+    MOST_RAYS.min(device.most_elements::<[f32; 4]>() / samples).max(1)
+}
+
 /// Bytes that a ray takes on its way through both passes.
 pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
     // Depth, colour with optical depth, mark and place in the list, of both passes' samples; weights and transmittances
@@ -68,10 +74,11 @@ impl<D: Device> Renderer<'_, D> {
             (0..columns * rows).map(|ray| ray / columns * step * width + ray % columns * step).collect();
         let count = self.sampling.coarse_count;
         let mut seen = self.zeros(pixels.len() * count as usize)?;
-        for (first, some) in (0..).step_by(MOST_RAYS).zip(pixels.chunks(MOST_RAYS)) {
+        let at_once = rays_at_once(self.device, &self.sampling);
+        for (first, some) in (0..).step_by(at_once).zip(pixels.chunks(at_once)) {
             let rays = self.rays(some)?;
             let samples = self.first_pass(workspace, &rays, None, asked)?;
-            if pixels.len() <= MOST_RAYS {
+            if pixels.len() <= at_once {
                 self.device.weigh_samples(count, rays.count, &samples.values, &mut seen).map_err(FieldError::Device)?;
                 continue;
             }
