@@ -107,7 +107,7 @@ impl Product {
             name: format!("{row_count}x{inner_count}x{column_count}{what}"),
             block,
             inputs: numbers(row_count * inner_count),
-            layer: Layer { weights: numbers(inner_count * column_count), bias: numbers(column_count) },
+            layer: Layer::new(numbers(inner_count * column_count), numbers(column_count)),
             addend: has_addend.then(|| numbers(row_count * column_count)),
             outputs: numbers(row_count * column_count),
         }

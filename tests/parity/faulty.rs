@@ -60,6 +60,7 @@ fn with_pixels(pixels: &mut Pixels<Faulty>, run: impl FnOnce(&mut Pixels<Cpu>) -
 
 impl Memory for Faulty {
     type Buffer<T: Element> = Vec<T>;
+    type Rearranged = ();
     type Error = Infallible;
 
     fn name(&self) -> String {

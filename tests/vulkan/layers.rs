@@ -51,7 +51,7 @@ impl Numbered {
         device: &D,
         run: impl FnOnce(&D::Buffer<f32>, &Layer<D>, &D::Buffer<f32>, &mut D::Buffer<f32>) -> Result<(), D::Error>,
     ) -> Result<Vec<f32>, D::Error> {
-        let layer = Layer { weights: device.upload(&self.weights)?, bias: device.upload(&self.bias)? };
+        let layer = Layer::new(device.upload(&self.weights)?, device.upload(&self.bias)?);
         let mut outputs = device.upload(&vec![UNTOUCHED; self.addend.len() + 1])?;
         run(&device.upload(&self.inputs)?, &layer, &device.upload(&self.addend)?, &mut outputs)?;
         device.download(&outputs)

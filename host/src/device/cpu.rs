@@ -9,7 +9,9 @@ mod rays;
 mod weighting;
 
 use super::memory::{Element, KernelTime, Memory};
+use product::Panels;
 use std::convert::Infallible;
+use std::sync::OnceLock;
 
 /// All cores of this machine. Buffers are vectors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -17,6 +19,7 @@ pub struct Cpu;
 
 impl Memory for Cpu {
     type Buffer<T: Element> = Vec<T>;
+    type Rearranged = OnceLock<Panels>;
     type Error = Infallible;
 
     fn name(&self) -> String {

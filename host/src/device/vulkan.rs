@@ -41,6 +41,7 @@ fn count_of(len: usize) -> u32 {
 
 impl Memory for Vulkan {
     type Buffer<T: Element> = Buffer<T>;
+    type Rearranged = ();
     type Error = VulkanError;
 
     fn name(&self) -> String {

@@ -11,7 +11,7 @@ use viewfuse_vulkan::kernel::Kernel;
 
 /// The same layer for the CPU.
 fn on_cpu(layer: &Layer<Faulty>) -> Layer<Cpu> {
-    Layer { weights: layer.weights.clone(), bias: layer.bias.clone() }
+    Layer::new(layer.weights().clone(), layer.bias().clone())
 }
 
 impl NetworkKernels for Faulty {

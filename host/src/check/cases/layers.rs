@@ -64,7 +64,7 @@ impl<B> Job<B> {
         let longer = |values: &[f32]| device.upload(&[values, &[f32::NAN; SLACK]].concat());
         Ok(LoadedJob {
             inputs: longer(&self.inputs)?,
-            layer: Layer { weights: longer(&self.weights)?, bias: longer(&self.bias)? },
+            layer: Layer::new(longer(&self.weights)?, longer(&self.bias)?),
             addend: self.addend.as_deref().map(longer).transpose()?,
             outputs: device.zeros(self.output_count + SLACK)?,
         })

@@ -27,7 +27,7 @@ impl NetworkKernels for Cpu {
     ) -> Result<(), Infallible> {
         let (pixel_count, patch_len) = (block.pixel_count() as usize, block.patch_len() as usize);
         let columns = block.out_channels as usize;
-        let panels = Panels::new(&layer.weights, patch_len, columns);
+        let panels = Panels::of(layer, patch_len, columns);
         let rows = chunk_rows(pixel_count);
         let chunks = outputs[..pixel_count * columns].par_chunks_mut(rows * columns).enumerate();
         chunks.for_each_init(Vec::new, |patches, (chunk, outputs)| {
@@ -39,7 +39,7 @@ impl NetworkKernels for Cpu {
             panels.multiply(Rows {
                 inputs: patches,
                 relu_inputs: 0,
-                bias: &layer.bias,
+                bias: layer.bias(),
                 addend: addend.map(|addend| &addend[first * columns..]),
                 relu_outputs: block.relu_outputs,
                 outputs,
@@ -80,7 +80,7 @@ impl NetworkKernels for Cpu {
     ) -> Result<(), Infallible> {
         let inner = block.inner_count as usize;
         let (row_count, columns) = (block.row_count as usize, block.column_count as usize);
-        let panels = Panels::new(&layer.weights, inner, columns);
+        let panels = Panels::of(layer, inner, columns);
         let rows = chunk_rows(row_count);
         let chunks = outputs[..row_count * columns].par_chunks_mut(rows * columns).enumerate();
         chunks.for_each(|(chunk, outputs)| {
@@ -88,7 +88,7 @@ impl NetworkKernels for Cpu {
             panels.multiply(Rows {
                 inputs: &inputs[first * inner..],
                 relu_inputs: block.relu_inputs,
-                bias: &layer.bias,
+                bias: layer.bias(),
                 addend: addend.map(|addend| &addend[first * columns..]),
                 relu_outputs: block.relu_outputs,
                 outputs,

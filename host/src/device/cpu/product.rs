@@ -3,17 +3,17 @@
 //! With 32 vector registers a tile is 12 rows of two vectors (24 sums, two vectors of weights, one input in every lane),
 //! with 16 it is 6 rows: per step of the inner index the arithmetic takes longer than the loads. Rows are copied into a
 //! small array first, so that their places are constants and they stay in the first-level cache; weights are put in order
-//! once a product ([`Panels`]), where a panel is read from front to back. Bias, addend and rectification are part of
+//! once and for all ([`Panels`]): a panel is read from front to back. Bias, addend and rectification are part of
 //! writing a tile. Sums run along the inner index, [`DEPTH`] products at a time; a multiplication is fused with its
 //! addition where the core can.
 //!
 //! The crate `pulp` picks the widest instructions of the machine; nothing here is written for one of them.
 
+use super::Cpu;
+use crate::device::Layer;
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
-use std::cell::Cell;
-use std::mem::take;
 use viewfuse_core::network::product::rectified;
 
 /// Products that are summed before outputs are written: most of the layers in one go.
@@ -26,33 +26,32 @@ const GAP: usize = 16;
 #[repr(C, align(64))]
 struct Line([f32; 16]);
 
-thread_local! {
-    /// A buffer for panels that is in no use: fresh memory would cost as much as a tenth of a product.
-    static SPARE: Cell<Vec<Line>> = const { Cell::new(Vec::new()) };
-}
-
 /// Weights in the order in which they are needed: `[panel][inner][column of the panel]`, two vectors wide, zeros behind
 /// the last column.
-pub(super) struct Panels {
+pub struct Panels {
     lines: Vec<Line>,
     inner: usize,
     columns: usize,
 }
 
 impl Panels {
-    /// Puts `weights[inner][column]` in order. Both counts are at least 1.
-    pub(super) fn new(weights: &[f32], inner: usize, columns: usize) -> Panels {
+    /// Those of a layer, put in order when they are first asked for. Both counts are at least 1.
+    pub(super) fn of(layer: &Layer<Cpu>, inner: usize, columns: usize) -> &Panels {
+        let panels = layer.rearranged().get_or_init(|| Panels::new(layer.weights(), inner, columns));
+        assert_eq!((panels.inner, panels.columns), (inner, columns), "a layer has one size");
+        panels
+    }
+
+    fn new(weights: &[f32], inner: usize, columns: usize) -> Panels {
         let width = Arch::new().dispatch(PanelWidth);
         let panel_lines = (inner * width).div_ceil(16);
-        let mut lines = SPARE.take();
-        lines.resize(columns.div_ceil(width) * panel_lines, Line::zeroed());
+        let mut lines = vec![Line::zeroed(); columns.div_ceil(width) * panel_lines];
         lines.par_chunks_exact_mut(panel_lines).enumerate().for_each(|(panel, lines)| {
             let first = panel * width;
             let count = width.min(columns - first);
             let rows = cast_slice_mut::<Line, f32>(lines).chunks_exact_mut(width);
-            for (row, weights) in rows.zip(weights.chunks_exact(columns)) {
+            for (row, weights) in rows.zip(weights.chunks_exact(columns).take(inner)) {
                 row[..count].copy_from_slice(&weights[first..first + count]);
-                row[count..].fill(0.0);
             }
         });
         Panels { lines, inner, columns }
@@ -61,12 +60,6 @@ impl Panels {
     /// Computes some rows.
     pub(super) fn multiply(&self, rows: Rows<'_>) {
         Arch::new().dispatch(Multiply { panels: self, rows });
-    }
-}
-
-impl Drop for Panels {
-    fn drop(&mut self) {
-        SPARE.set(take(&mut self.lines));
     }
 }
 

@@ -5,12 +5,35 @@ use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
 
-/// The parameters of a layer in a device's memory.
+/// The parameters of a layer in a device's memory. They never change, and all blocks that they are used with have the
+/// same inner index and columns.
 pub struct Layer<D: Memory + ?Sized> {
-    /// `[inner][column]`, for a convolution `[row of the window][column of the window][input channel][output channel]`.
-    pub weights: D::Buffer<f32>,
-    /// `[column]` or `[output channel]`.
-    pub bias: D::Buffer<f32>,
+    weights: D::Buffer<f32>,
+    bias: D::Buffer<f32>,
+    rearranged: D::Rearranged,
+}
+
+impl<D: Memory + ?Sized> Layer<D> {
+    /// A layer of `weights[inner][column]` (for a convolution `[row of the window][column of the window][input
+    /// channel][output channel]`) and `bias[column]`.
+    pub fn new(weights: D::Buffer<f32>, bias: D::Buffer<f32>) -> Layer<D> {
+        Layer { weights, bias, rearranged: D::Rearranged::default() }
+    }
+
+    /// As given to [`Layer::new`].
+    pub fn weights(&self) -> &D::Buffer<f32> {
+        &self.weights
+    }
+
+    /// As given to [`Layer::new`].
+    pub fn bias(&self) -> &D::Buffer<f32> {
+        &self.bias
+    }
+
+    /// What the device made of the weights.
+    pub fn rearranged(&self) -> &D::Rearranged {
+        &self.rearranged
+    }
 }
 
 /// Kernels of [`viewfuse_core::network`]. Buffers may be longer than a block says. Sums run in an order of the device's

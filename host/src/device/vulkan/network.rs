@@ -20,8 +20,8 @@ impl NetworkKernels for Vulkan {
     ) -> Result<(), VulkanError> {
         let block = ConvolveBlock { has_addend: u32::from(addend.is_some()), ..*block };
         // Something must be bound.
-        let addend = addend.unwrap_or(&layer.bias);
-        let arrays = [inputs.bind(), layer.weights.bind(), layer.bias.bind(), addend.bind(), outputs.bind()];
+        let addend = addend.unwrap_or(layer.bias());
+        let arrays = [inputs.bind(), layer.weights().bind(), layer.bias().bind(), addend.bind(), outputs.bind()];
         let elements = tile_elements(block.pixel_count(), block.out_channels);
         self.gpu.dispatch(Kernel::Convolve, bytes_of(&block), 0..elements, &arrays)
     }
@@ -50,8 +50,8 @@ impl NetworkKernels for Vulkan {
         outputs: &mut Buffer<f32>,
     ) -> Result<(), VulkanError> {
         let block = ProductBlock { has_addend: u32::from(addend.is_some()), ..*block };
-        let addend = addend.unwrap_or(&layer.bias);
-        let arrays = [inputs.bind(), layer.weights.bind(), layer.bias.bind(), addend.bind(), outputs.bind()];
+        let addend = addend.unwrap_or(layer.bias());
+        let arrays = [inputs.bind(), layer.weights().bind(), layer.bias().bind(), addend.bind(), outputs.bind()];
         let elements = tile_elements(block.row_count, block.column_count);
         self.gpu.dispatch(Kernel::Product, bytes_of(&block), 0..elements, &arrays)
     }

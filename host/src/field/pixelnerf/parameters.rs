@@ -16,7 +16,7 @@ pub(super) struct HostLayer {
 
 impl HostLayer {
     fn load<D: Memory>(&self, device: &D) -> Result<Layer<D>, D::Error> {
-        Ok(Layer { weights: device.upload(&self.weights)?, bias: device.upload(&self.bias)? })
+        Ok(Layer::new(device.upload(&self.weights)?, device.upload(&self.bias)?))
     }
 }
 
