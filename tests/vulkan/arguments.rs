@@ -4,6 +4,7 @@ use crate::candidate::{Candidate, Test, assert_works};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use viewfuse_core::fuse::FuseBlock;
+use viewfuse_core::network::product::ProductBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Limits, Missing, VulkanError};
 
@@ -20,7 +21,7 @@ const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3, channel_count: 1,
 
 fn detail(outcome: Result<(), VulkanError>) -> Result<String, Failed> {
     match outcome {
-        Err(VulkanError::Arguments { kernel: "fuse_views" | "hull_entry", detail }) => Ok(detail),
+        Err(VulkanError::Arguments { kernel: "fuse_views" | "hull_entry" | "product", detail }) => Ok(detail),
         other => Err(format!("{other:?}").into()),
     }
 }
@@ -33,9 +34,9 @@ fn wrong_arguments_are_refused(candidate: &Candidate) -> Result<(), Failed> {
     let parameters = bytes_of(&BLOCK);
     let run = |parameters: &[u8], arrays: &[_]| gpu.dispatch(Kernel::FuseViews, parameters, 0..3, arrays);
 
-    assert_eq!(detail(run(&parameters[1..], &right))?, "7 bytes of parameters instead of 8");
-    assert_eq!(detail(run(&[0; 16], &right))?, "16 bytes of parameters instead of 8");
-    assert_eq!(detail(run(&[], &right))?, "0 bytes of parameters instead of 8");
+    assert_eq!(detail(run(&parameters[1..], &right))?, "15 bytes of parameters instead of 16");
+    assert_eq!(detail(run(&[0; 24], &right))?, "24 bytes of parameters instead of 16");
+    assert_eq!(detail(run(&[], &right))?, "0 bytes of parameters instead of 16");
     assert_eq!(detail(run(parameters, &right[1..]))?, "2 arrays instead of 3");
     let twice = [weights.bind(), fused.bind(), fused.bind()];
     assert_eq!(detail(run(parameters, &twice))?, "fused is written, and bound a second time");
@@ -68,6 +69,14 @@ fn arrays_of_other_elements_are_refused(candidate: &Candidate) -> Result<(), Fai
     let arrays = [short.bind(), arrays[1].bind(), arrays[2].bind(), arrays[3].bind()];
     let outcome = gpu.dispatch(Kernel::HullEntry, &[0; 4], 0..1, &arrays);
     assert_eq!(detail(outcome)?, "object has 4 bytes instead of 48");
+    // A number that is read if there is nothing else to read.
+    let (block, [one, none, half]) = (ProductBlock::default(), [4_usize, 0, 2].map(|bytes| gpu.zeros::<u8>(bytes)));
+    let (one, none, half) = (one?, none?, half?);
+    for (short, bytes) in [(&none, 0), (&half, 2)] {
+        let arrays = [one.bind(), short.bind(), one.bind(), one.bind(), one.bind()];
+        let outcome = gpu.dispatch(Kernel::Product, bytes_of(&block), 0..64, &arrays);
+        assert_eq!(detail(outcome)?, format!("weights has {bytes} bytes instead of 4"));
+    }
     Ok(())
 }
 
