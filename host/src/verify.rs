@@ -100,14 +100,19 @@ impl Quantity {
         }
     }
 
-    /// Compares two lists of equal length, the place being an index.
+    /// Compares two lists, the place being an index. A list that is shorter than the other counts as NaN there.
     fn compare_all(
         &mut self,
         ours: impl IntoIterator<Item = f64>,
         reference: impl IntoIterator<Item = f64>,
         place: &str,
     ) {
-        for (index, (a, e)) in ours.into_iter().zip(reference).enumerate() {
+        let (mut ours, mut reference) = (ours.into_iter(), reference.into_iter());
+        for index in 0.. {
+            let (a, e) = match (ours.next(), reference.next()) {
+                (None, None) => break,
+                (a, e) => (a.unwrap_or(f64::NAN), e.unwrap_or(f64::NAN)),
+            };
             self.compare(a, e, || format!("{place}[{index}]"));
         }
     }

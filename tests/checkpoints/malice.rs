@@ -51,17 +51,22 @@ fn absurd_sizes() {
     assert_claims_refused(&huge(&[1; 65], &[1; 65], 6), &["tensor 'a.weight': is not described as PyTorch does"]);
     assert_refused(&legacy(&state_dict(&huge(&[2, 3], &[3, 1], -1)), &pair()), &["storage 'a.weight'", "length"]);
     assert_refused(&legacy(&state_dict(&huge(&[2, 3], &[3, 1], 1 << 62)), &pair()), &["storage 'a.weight'"]);
-    // Each is allowed, all together are not.
-    let many: Vec<Claim> = (0..5)
+    // One number, said to be a thousand million of them, as steps of 0 allow.
+    assert_refused(
+        &zipped(&huge(&[1 << 30], &[0], 6)),
+        &["shape [1073741824] has more elements than the 6 of storage 'a.weight'"],
+    );
+    // Each of so many is allowed, all together are not.
+    let many: Vec<Claim> = (0..5000)
         .map(|number| Claim {
             name: format!("t{number}"),
             key: "0".to_owned(),
-            shape: vec![1 << 30],
+            shape: vec![1 << 20],
             strides: vec![0],
             ..Claim::new("", &[1], &[1.0])
         })
         .collect();
-    let parts = ["all its 5 tensors would take 21474836480 bytes of memory, at most 17179869184"];
+    let parts = ["all its 5000 tensors would take 20971520000 bytes of memory, at most 17179869184"];
     assert_claims_refused(&many, &parts);
 }
 

@@ -16,6 +16,16 @@ fn one_source_and_the_most_sources() {
 }
 
 #[test]
+fn one_source_looks_as_far_as_several() {
+    let picture = picture(&body(PixelNerfOptions::default()), &sources(1), &target(16));
+    let middle = picture.colours[16 * 8 + 8][3];
+    let corner = picture.colours[0][3];
+    assert!(middle > 0.9 && corner == 0.0, "the body is there, and all of it: {middle}, {corner}");
+    let depth = picture.depths[16 * 8 + 8];
+    assert!((0.8..1.3).contains(&depth), "{depth}");
+}
+
+#[test]
 fn a_target_that_is_a_source() {
     let sources = sources(3);
     let mut scores = [0.0; viewfuse::sources::MOST_SOURCES];

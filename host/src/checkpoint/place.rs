@@ -11,6 +11,8 @@ use std::io::{Read, Seek, SeekFrom};
 pub const LARGEST_TENSOR_BYTES: u64 = 4 << 30;
 /// Memory that all tensors of a file may take as `f32`, in bytes.
 pub const LARGEST_TOTAL_BYTES: u64 = 16 << 30;
+/// Elements that a tensor may have although its storage has fewer.
+const LARGEST_REPEATED: u64 = 1 << 20;
 /// Bytes that are read at once.
 pub(super) const CHUNK_BYTES: usize = 1 << 16;
 
@@ -70,6 +72,11 @@ impl Place {
                 storage.element_size()
             ))
         })?;
+        // Steps of 0 are fine in small, but would let a file of a few bytes claim gigabytes.
+        if count > storage.count.max(LARGEST_REPEATED) {
+            let (shape, stored) = (&claim.shape, storage.count);
+            return Err(wrong(format!("shape {shape:?} has more elements than the {stored} of storage '{key}'")));
+        }
         let steps = claim.shape.iter().zip(&claim.strides);
         let last = steps.clone().try_fold(0u64, |last, (&length, &stride)| {
             (length as u64).saturating_sub(1).checked_mul(stride as u64)?.checked_add(last)

@@ -108,6 +108,10 @@ pub(crate) struct NetworkOptions {
     /// Where rays begin and end, world units [default: 8/13 and 18/13 of the cameras' distance from what they look at]
     #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model")]
     near_far: Option<[f32; 2]>,
+    /// Second-pass samples around the depth that the published code takes (the sum of weights times depths, too near on
+    /// rays that are not opaque), not around the mean depth
+    #[arg(long, requires = "model")]
+    published_depth: bool,
 }
 
 /// Which network makes the pictures, and what it leaves out.
@@ -115,8 +119,8 @@ pub(crate) struct NetworkOptions {
 pub(crate) struct ModelOptions {
     #[command(flatten)]
     network: NetworkOptions,
-    /// Leave nothing out: every view, sample and layer as published (sets --leave-out 0, --settled 0, --compute all)
-    #[arg(long)]
+    /// Leave nothing out: every view, layer and sample, whether the scene needs it or not
+    #[arg(long, conflicts_with_all = ["compute", "probe_step", "leave_out", "settled"])]
     pub(crate) exact: bool,
     /// Compute these although the scene does not need them
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model")]
@@ -161,6 +165,7 @@ impl NetworkOptions {
             depth_count,
             seed,
             near_far: self.near_far,
+            published_depth: self.published_depth,
             ..Sampling::default()
         };
         let field = PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions }).context("--model")?;
@@ -193,9 +198,9 @@ impl ModelOptions {
 }
 
 fn parse_samples(text: &str) -> Result<[u32; 3], String> {
-    let counts: Vec<u32> = text.split(',').map_while(|count| count.trim().parse().ok()).collect();
-    match counts.as_slice() {
-        &[coarse, importance, depth] if (1..=1024).contains(&coarse) && importance <= 1024 && depth <= 1024 => {
+    let counts: Option<Vec<u32>> = text.split(',').map(|count| count.trim().parse().ok()).collect();
+    match counts.as_deref() {
+        Some(&[coarse, importance, depth]) if (1..=1024).contains(&coarse) && importance <= 1024 && depth <= 1024 => {
             Ok([coarse, importance, depth])
         }
         _ => Err("three whole numbers up to 1024, the first at least 1, for example 64,16,16".to_owned()),
@@ -203,9 +208,9 @@ fn parse_samples(text: &str) -> Result<[u32; 3], String> {
 }
 
 fn parse_near_far(text: &str) -> Result<[f32; 2], String> {
-    let ends: Vec<f32> = text.split(',').map_while(|end| end.trim().parse().ok()).collect();
-    match ends.as_slice() {
-        &[near, far] if near >= 0.0 && near < far && far.is_finite() => Ok([near, far]),
+    let ends: Option<Vec<f32>> = text.split(',').map(|end| end.trim().parse().ok()).collect();
+    match ends.as_deref() {
+        Some(&[near, far]) if near >= 0.0 && near < far && far.is_finite() => Ok([near, far]),
         _ => Err("two distances, for example 0.8,1.8, the first at least 0 and less than the second".to_owned()),
     }
 }

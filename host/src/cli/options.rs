@@ -11,7 +11,7 @@ use viewfuse_vulkan::VulkanError;
 /// How pictures are made.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
-    /// Size of the pictures; the sources are resampled to the same scale [default: the views' size, at most 512]
+    /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at most 512]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
     /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)

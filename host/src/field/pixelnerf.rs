@@ -77,6 +77,7 @@ impl PixelNerf {
     pub fn new(checkpoint: &Checkpoint, options: PixelNerfOptions) -> Result<PixelNerf, CheckpointError> {
         let architecture = Architecture::of(checkpoint)?;
         let parameters = Arc::new(Parameters::read(checkpoint, &architecture)?);
+        let options = options.checked();
         Ok(PixelNerf { architecture, parameters, options, counts: Mutex::default() })
     }
 
@@ -96,7 +97,7 @@ impl PixelNerf {
         PixelNerf {
             architecture: architecture.clone(),
             parameters: Arc::clone(parameters),
-            options,
+            options: options.checked(),
             counts: Mutex::default(),
         }
     }
@@ -159,7 +160,6 @@ impl<D: Device> Field<D> for PixelNerf {
     ) -> Result<Prepared<D>, FieldError<D::Error>> {
         let failed = FieldError::Device;
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-        let distance = Rig::of(&cameras).distance;
         let images =
             sources.images.iter().map(|image| upload_image(device, image)).collect::<Result<_, _>>().map_err(failed)?;
         self.counts().views += cameras.len() as u64;
@@ -168,7 +168,7 @@ impl<D: Device> Field<D> for PixelNerf {
             images,
             cameras: cameras.iter().map(|camera| camera.block(0)).collect(),
             latents: cameras.iter().map(|_| OnceCell::new()).collect(),
-            near_far: self.options.sampling.near_far.unwrap_or(NEAR_FAR_SHARES.map(|share| share * distance)),
+            near_far: self.options.sampling.near_far.unwrap_or_else(|| default_near_far(&cameras)),
             background: sources.background,
         })
     }
@@ -320,6 +320,16 @@ impl PixelNerf {
             total.asked += own.asked;
         }
     }
+}
+
+/// Where rays begin and end unless a person says so: by the mean distance of the cameras from what they look at. A single
+/// camera does not show that: its distance from the world's origin counts then, where SRN's objects stand.
+fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
+    let distance = match cameras {
+        [camera] => camera.pose.centre_world().length(),
+        cameras => Rig::of(cameras).distance,
+    };
+    NEAR_FAR_SHARES.map(|share| share * if distance > 0.0 { distance } else { 1.0 })
 }
 
 /// An image over white, as the networks are trained: red, green, blue in `[-1, 1]`.

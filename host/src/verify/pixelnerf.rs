@@ -127,6 +127,26 @@ impl File<'_> {
         Ok(view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 
+    /// So many numbers, and no others.
+    fn many(&self, name: &str, count: usize) -> Result<Vec<f32>, VerifyError> {
+        let values = self.floats(name)?;
+        match values.len() == count {
+            true => Ok(values),
+            false => Err(self.wrong(name, format!("has {} numbers instead of {count}", values.len()))),
+        }
+    }
+
+    /// As many numbers for each of some rows, at least one.
+    fn many_a_row(&self, name: &str, row_count: usize) -> Result<Vec<f32>, VerifyError> {
+        let values = self.floats(name)?;
+        match !values.is_empty() && values.len() % row_count == 0 {
+            true => Ok(values),
+            false => {
+                Err(self.wrong(name, format!("{} numbers are not as many for each of {row_count} rays", values.len())))
+            }
+        }
+    }
+
     fn rows<const N: usize>(&self, name: &str) -> Result<Vec<[f32; N]>, VerifyError> {
         let values = self.floats(name)?;
         let (rows, rest) = values.as_chunks::<N>();
@@ -229,7 +249,7 @@ impl Comparison<'_> {
             .map(|((position, direction), sample)| RayPoint { position, length: 1.0, direction, sample })
             .collect();
         for weights_name in WEIGHTS {
-            let weights = self.file.floats(&format!("weights.{weights_name}"))?;
+            let weights = self.file.many(&format!("weights.{weights_name}"), reference.view_count())?;
             for (pass, pass_name) in PASSES {
                 let expected = self.file.rows::<4>(&format!("points.{weights_name}.{pass_name}"))?;
                 let ours = reference.radiance(pass, &weights, &points).map_err(|error| self.failed(error))?;
@@ -258,9 +278,9 @@ impl Comparison<'_> {
     fn rays<D: Device>(&self, reference: &Reference<'_, D>, report: &mut Report) -> Result<(), VerifyError> {
         let file = self.file;
         let rays = file.rays()?;
-        let weights = file.floats(&format!("weights.{RAY_WEIGHTS}"))?;
+        let weights = file.many(&format!("weights.{RAY_WEIGHTS}"), reference.view_count())?;
         for (pass, name, depths) in [(Pass::Coarse, "coarse", "z_coarse"), (Pass::Fine, "fine", "z_all")] {
-            let depths = file.floats(depths)?;
+            let depths = file.many_a_row(depths, rays.len())?;
             let SeenRays { weights: ours, colours, depths: seen } =
                 reference.look(pass, &weights, &rays, &depths).map_err(|error| self.failed(error))?;
             let compare = |what: &str, ours: &[f32]| -> Result<Quantity, VerifyError> {
@@ -274,8 +294,13 @@ impl Comparison<'_> {
         if !self.suffix.is_empty() {
             return Ok(());
         }
-        let (z_coarse, z_fine, z_depth) = (file.floats("z_coarse")?, file.floats("z_fine")?, file.floats("z_depth")?);
-        let (u, jitter, normal) = (file.floats("u_fine")?, file.floats("jitter_fine")?, file.floats("normal_depth")?);
+        let (z_coarse, z_fine, z_depth) = (
+            file.many_a_row("z_coarse", rays.len())?,
+            file.many_a_row("z_fine", rays.len())?,
+            file.many_a_row("z_depth", rays.len())?,
+        );
+        let (u, jitter) = (file.many("u_fine", z_fine.len())?, file.many("jitter_fine", z_fine.len())?);
+        let normal = file.many("normal_depth", z_depth.len())?;
         let ray_count = rays.len();
         let (importance_count, depth_count) = (z_fine.len() / ray_count, z_depth.len() / ray_count);
         let chance = |ray: usize, index: usize| match index.checked_sub(importance_count) {
@@ -292,9 +317,10 @@ impl Comparison<'_> {
             depth_deviation: 0.01,
             ..FineBlock::default()
         };
-        let coarse_weights = file.floats("coarse_weights")?;
+        let coarse_weights = file.many("coarse_weights", z_coarse.len())?;
+        let coarse_depth = file.many("coarse_depth", ray_count)?;
         let [fine, merged] = reference
-            .fine_depths(&block, &rays, &z_coarse, &coarse_weights, &file.floats("coarse_depth")?, &chances)
+            .fine_depths(&block, &rays, &z_coarse, &coarse_weights, &coarse_depth, &chances)
             .map_err(|error| self.failed(error))?;
         let expected: Vec<f32> = (0..ray_count)
             .flat_map(|ray| {

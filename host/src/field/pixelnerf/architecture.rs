@@ -1,4 +1,4 @@
-//! The family of networks: which tensors a checkpoint must have, by its sizes, and what a run takes of memory.
+//! The family of networks: which tensors a checkpoint must have, by its sizes.
 //!
 //! Names and shapes are those of the official `state_dict` (pixelNeRF, `src/model/{models,encoder,resnetfc}.py`; the
 //! trunk is torchvision's ResNet of basic blocks). Sizes are read off the tensors: trunk width and depth, how many trunk
@@ -9,6 +9,9 @@ use std::collections::BTreeMap;
 
 /// Largest size of anything in an architecture: more is not this family but a mistake, or an attempt to fill the memory.
 const LARGEST_SIZE: usize = 1 << 14;
+
+/// Most octaves: sines of more are noise in `f32`.
+const MOST_OCTAVES: usize = 20;
 
 /// A level of the trunk: basic blocks of two 3x3 convolutions. All but the first level halve the image.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -114,10 +117,10 @@ impl Architecture {
         let stem_channels = shapes.size("encoder.model.conv1.weight", 4, 0)?;
         let width = shapes.size("mlp_coarse.lin_in.weight", 2, 0)?;
         let embedded_len = shapes.size("mlp_coarse.lin_in.weight", 2, 1)?;
-        if embedded_len < 12 || embedded_len % 6 != 0 {
+        if embedded_len < 12 || embedded_len % 6 != 0 || embedded_len > 6 + 6 * MOST_OCTAVES {
             return Err(shapes.refuse(format!(
                 "mlp_coarse.lin_in.weight takes {embedded_len} numbers a point; this family takes 6 + 6 x octaves (a point \
-                 with sines and cosines, and a direction)"
+                 with sines and cosines, and a direction), at most {MOST_OCTAVES}"
             )));
         }
         let block_count = shapes.count(|block| format!("mlp_coarse.blocks.{block}.fc_0.weight"));
@@ -159,9 +162,9 @@ impl Architecture {
             block_count,
             injected_count,
             frequency_count: (embedded_len - 6) / 6,
-            frequency: shapes.frequency()?,
+            frequency: shapes.frequency((embedded_len - 6) / 6)?,
             has_fine: shapes.shapes.keys().any(|name| name.starts_with("mlp_fine.")),
-            pixel_centre: shapes.number("pixel_centre", 0.0)?,
+            pixel_centre: shapes.number("viewfuse.pixel_centre", 0.0)?,
         };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
         Ok(architecture)
@@ -279,17 +282,18 @@ impl Shapes<'_> {
     }
 
     /// The lowest frequency: of the checkpoint's own table if it has one, otherwise the published one.
-    fn frequency(&self) -> Result<f32, CheckpointError> {
+    fn frequency(&self, octaves: usize) -> Result<f32, CheckpointError> {
         const TABLE: &str = "code._freqs";
         let published = Architecture::published().frequency;
-        if !self.shapes.contains_key(TABLE) {
-            return self.number("frequency", published);
+        let Some(shape) = self.shapes.get(TABLE) else { return self.number("viewfuse.frequency", published) };
+        // Each frequency stands twice, for sine and cosine.
+        if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
+            return Err(self.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));
         }
         let table = self.checkpoint.tensor(TABLE)?;
         let lowest = table.first().copied().unwrap_or(published);
-        // Each frequency stands twice, for sine and cosine.
         let is_octaves = table.iter().zip(0..).all(|(value, index)| *value == lowest * 2_f32.powi(index / 2));
-        if !is_octaves {
+        if !is_octaves || !(lowest > 0.0) {
             return Err(self.refuse(format!("{TABLE} does not hold octaves of one frequency")));
         }
         Ok(lowest)

@@ -6,9 +6,10 @@ use super::options::{PixelNerfOptions, Sampling};
 use super::pass::{ray_bytes, rays_at_once};
 use crate::device::Device;
 
-/// Bytes that a run takes at most beside the photographs and the pictures: parameters (on the host and on the device),
-/// what is known of every view (`source_sizes[view]` is width and height), activations, the rays of a tile. It does not
-/// depend on the size of the pictures.
+/// Bytes that a run takes beside the photographs and the pictures: parameters (on the host, on the device, and there in the
+/// order in which products need them), what is known of every view (`source_sizes[view]` is width and height),
+/// activations, the rays of a tile. Probes come on top: 8 bytes a first-pass sample of one ray in every square that is
+/// probed, which is half a byte a pixel and sample for squares of 4.
 pub(super) fn estimate<D: Device>(
     device: &D,
     architecture: &Architecture,
@@ -17,7 +18,7 @@ pub(super) fn estimate<D: Device>(
 ) -> u64 {
     let float = size_of::<f32>();
     let maps = options.omissions.latent_layers;
-    let parameters = 2 * architecture.parameter_count() * float;
+    let parameters = 3 * architecture.parameter_count() * float;
     let latents = architecture.latent_channels();
     let known =
         if maps { architecture.passes().len() * architecture.injected_count * architecture.width } else { latents };

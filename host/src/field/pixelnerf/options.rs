@@ -99,3 +99,11 @@ pub struct PixelNerfOptions {
     /// What may be left out.
     pub omissions: Omissions,
 }
+
+impl PixelNerfOptions {
+    /// With at least one sample in the first pass.
+    pub(super) fn checked(self) -> PixelNerfOptions {
+        let coarse_count = self.sampling.coarse_count.max(1);
+        PixelNerfOptions { sampling: Sampling { coarse_count, ..self.sampling }, ..self }
+    }
+}

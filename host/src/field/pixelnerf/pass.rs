@@ -66,32 +66,34 @@ struct Samples<D: Device> {
 type Outcome<T, D> = Result<T, FieldError<<D as crate::device::Memory>::Error>>;
 
 impl<D: Device> Renderer<'_, D> {
-    /// Looks at one ray in every square of `step` pixels, by the first pass.
+    /// Looks at one ray in every square of `step` pixels, and at those of the last row and column, by the first pass.
     pub(super) fn probe(&self, workspace: &mut Workspace<D>, step: u32, asked: &mut Asked) -> Outcome<Seen<D>, D> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
-        let (columns, rows) = (width.div_ceil(step), height.div_ceil(step));
+        let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
+        let place = |index: u32, side: u32| (index * step).min(side - 1);
         let pixels: Vec<u32> =
-            (0..columns * rows).map(|ray| ray / columns * step * width + ray % columns * step).collect();
+            (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
         let count = self.sampling.coarse_count;
-        let mut seen = self.zeros(pixels.len() * count as usize)?;
-        let at_once = rays_at_once(self.device, &self.sampling);
-        for (first, some) in (0..).step_by(at_once).zip(pixels.chunks(at_once)) {
+        let mut parts = Vec::new();
+        for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
             let samples = self.first_pass(workspace, &rays, None, asked)?;
-            if pixels.len() <= at_once {
-                self.device.weigh_samples(count, rays.count, &samples.values, &mut seen).map_err(FieldError::Device)?;
-                continue;
-            }
-            // Rare (pictures of 256 rays squared and more): the pieces are put together on the host.
             let mut part = self.zeros(some.len() * count as usize)?;
             self.device.weigh_samples(count, rays.count, &samples.values, &mut part).map_err(FieldError::Device)?;
-            let mut all = self.device.download(&seen).map_err(FieldError::Device)?;
-            let start = first * count as usize;
-            let part = self.device.download(&part).map_err(FieldError::Device)?;
-            all[start..start + part.len()].copy_from_slice(&part);
-            seen = self.device.upload(&all).map_err(FieldError::Device)?;
+            parts.push(part);
         }
-        Ok(Seen { values: seen, columns, rows })
+        // Large pictures: the pieces are put together on the host.
+        let values = match <[_; 1]>::try_from(parts) {
+            Ok([all]) => all,
+            Err(parts) => {
+                let mut all = Vec::with_capacity(pixels.len() * count as usize);
+                for part in &parts {
+                    all.extend(self.device.download(part).map_err(FieldError::Device)?);
+                }
+                self.device.upload(&all).map_err(FieldError::Device)?
+            }
+        };
+        Ok(Seen { values, columns, rows })
     }
 
     /// The colours and depths (along the rays) of some pixels.

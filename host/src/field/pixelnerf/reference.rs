@@ -44,6 +44,11 @@ impl<'a, D: Device> Reference<'a, D> {
         &self.field.architecture
     }
 
+    /// How many sources there are.
+    pub fn view_count(&self) -> usize {
+        self.prepared.images.len()
+    }
+
     /// `[view][row][column][channel]`: the latents of all views.
     ///
     /// # Errors
