@@ -1,7 +1,7 @@
 //! Error against run time: one scene rendered under a list of settings, each compared with the first of them, which
 //! leaves nothing out.
 //!
-//! A field says what can be set about it in [`settings`]; [`measure`] renders, [`front`] marks the settings that are the
+//! A field says what can be set about it in [`settings`]; [`Subject::measure`] renders, [`front`] marks the settings that are the
 //! best for their time, [`plot`] and [`record`] show the outcome. Nothing here knows a particular field but the lists.
 //!
 //! Times are medians over rounds. A round goes once through all settings, so that what else a machine does at one time
