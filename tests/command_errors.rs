@@ -181,6 +181,22 @@ fn sizes_that_do_not_fit() {
 }
 
 #[test]
+fn wrong_arguments_of_networks() {
+    for samples in ["64,16", "64,16,16,x", "64,16,16,", "0,1,1", "1025,1,1"] {
+        assert_wrong(&format!("render toy --model body:16 --samples {samples} -o out"), &["--samples", "64,16,16"]);
+    }
+    for near_far in ["0.8", "0.8,1.8,oops", "1.8,0.8", "nan,1"] {
+        assert_wrong(&format!("render toy --model body:16 --near-far {near_far} -o out"), &["--near-far", "0.8,1.8"]);
+    }
+    for other in ["--settled 0.1", "--leave-out 0.2", "--compute rays", "--probe-step 8"] {
+        let option = other.split(' ').next().unwrap_or(other);
+        assert_wrong(&format!("render toy --model body:16 --exact {other} -o out"), &["--exact", option]);
+    }
+    assert_wrong("render toy --compute rays -o out", &["required arguments were not provided"]);
+    assert_wrong("render toy --model body:17 -o out", &["body:17", "multiple of 8"]);
+}
+
+#[test]
 fn wrong_arguments() {
     assert_wrong("", &[]);
     assert_wrong("paint toy", &["paint"]);

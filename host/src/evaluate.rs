@@ -82,6 +82,8 @@ pub fn evaluate<D: Device, F: Field<D>>(
                 Duration::ZERO,
             ));
         }
+        // Views that a field encodes when a target first needs them: all schemes and targets share that.
+        let (first, mut shared) = (scores.len(), Duration::ZERO);
         for weighting in weightings {
             let start = Instant::now();
             let latents = stage.encode(weighting, progress)?;
@@ -89,11 +91,14 @@ pub fn evaluate<D: Device, F: Field<D>>(
             for &target in targets {
                 let frame = stage.frame(weighting, &latents, &target_of(scene, target), progress)?;
                 if let Some(truth) = &frame.truth {
-                    let time = encode_share + frame.time;
+                    let time = encode_share + frame.time.saturating_sub(frame.encode);
+                    shared += frame.encode;
                     scores.push(score(&weighting.to_string(), scene, target, sources.len(), truth, time));
                 }
             }
         }
+        let share = shared / (scores.len() - first).max(1) as u32;
+        scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
     }
     Ok(scores)
 }
