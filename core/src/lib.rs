@@ -21,6 +21,7 @@
 //! network           layers                                        product, convolve, resample
 //! pixelnerf         a point in, radiance out                      embedded_value, gathered_value, radiance
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
+//! sampler           ... with few calls of the denoiser            Sampler, Mix, History, Churn, verdict
 //! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
 //! ```
@@ -45,6 +46,7 @@ pub mod pixelnerf;
 pub mod pose;
 pub mod random;
 pub mod rays;
+pub mod sampler;
 pub mod schedule;
 pub mod sources;
 pub mod wanted;

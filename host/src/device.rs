@@ -12,6 +12,6 @@ pub mod vulkan;
 
 pub use kernels::{
     Device, Layer, LightKernels, NetworkKernels, PhotoKernels, PhotoScene, Pixels, PointKernels, RayKernels, Rays,
-    WeightingKernels,
+    SamplerKernels, WeightingKernels,
 };
 pub use memory::{Element, KernelTime, Memory};

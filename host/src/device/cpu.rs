@@ -6,6 +6,7 @@ mod photo;
 mod points;
 mod product;
 mod rays;
+mod sampler;
 mod weighting;
 
 use super::memory::{Element, KernelTime, Memory};

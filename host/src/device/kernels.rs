@@ -5,6 +5,7 @@ pub mod network;
 pub mod photo;
 pub mod points;
 pub mod rays;
+pub mod sampler;
 pub mod weighting;
 
 pub use light::{LightKernels, Pixels};
@@ -12,8 +13,15 @@ pub use network::{Layer, NetworkKernels};
 pub use photo::{PhotoKernels, PhotoScene};
 pub use points::PointKernels;
 pub use rays::{RayKernels, Rays};
+pub use sampler::SamplerKernels;
 pub use weighting::WeightingKernels;
 
 /// Something that runs every kernel.
-pub trait Device: WeightingKernels + RayKernels + PointKernels + NetworkKernels + LightKernels + PhotoKernels {}
-impl<D: WeightingKernels + RayKernels + PointKernels + NetworkKernels + LightKernels + PhotoKernels> Device for D {}
+pub trait Device:
+    WeightingKernels + RayKernels + PointKernels + NetworkKernels + LightKernels + PhotoKernels + SamplerKernels
+{
+}
+impl<D: WeightingKernels + RayKernels + PointKernels + NetworkKernels + LightKernels + PhotoKernels + SamplerKernels>
+    Device for D
+{
+}

@@ -5,6 +5,7 @@ mod network;
 mod photo;
 mod points;
 mod rays;
+mod sampler;
 mod weighting;
 
 use super::memory::{Element, KernelTime, Memory};
