@@ -137,7 +137,7 @@ fn a_run_ends_when_nothing_changes() {
         let last = *sampled.levels.last().expect("calls");
         assert!(last <= UNDECIDED_ABOVE && last > 0.3 * UNDECIDED_ABOVE, "{}: {last}", sampler.name());
         assert_eq!(sampled.call_count() + sampled.left_out, sampler.call_count(25));
-        assert!(sampled.left_out > 5 && sampled.picture == vec![0.3; COUNT]);
+        assert!(sampled.left_out >= 5 && sampled.picture == vec![0.3; COUNT]);
         // One value that changes is enough to go on.
         let mut calls = 0;
         let (outcome, _) = run(&plan, None, |_, _| {
@@ -149,7 +149,7 @@ fn a_run_ends_when_nothing_changes() {
         let sampled = outcome.expect("a picture");
         assert!(*sampled.levels.last().expect("calls") < 0.01, "{}", sampler.name());
     }
-    let plan = Plan { steps: Steps::Chosen { tolerance: 1.0e-2, most_calls: 99 }, ..Plan::published(9) };
+    let plan = Plan { steps: Steps::Chosen { tolerance: 1.0e-3, most_calls: 99 }, ..Plan::published(9) };
     let stopped = picture(&Plan { settled: Some(HALF_A_LEVEL), ..plan });
     let whole = picture(&plan);
     let largest = stopped.picture.iter().zip(&whole.picture).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);

@@ -5,14 +5,14 @@
 //! method of the kind (Milne 1926). Steps are measured in the logarithm of the level, where the flow changes evenly: it is
 //! stiff towards small noise in the level itself.
 
-use crate::math::{clamp, exp, ln, max};
+use crate::math::{clamp, exp, ln, ln_ratio, max, min};
 use crate::schedule::SIGMA_DATA;
 
 /// The first step, for which there is no estimate: from 80 to 40.
 pub const FIRST_STEP: f32 = core::f32::consts::LN_2;
 /// The longest step: a factor of 4.5. Further than that a polynomial through results says nothing.
 pub const LONGEST_STEP: f32 = 1.5;
-/// Steps up to this length are taken whatever the estimate says.
+/// Steps of this length (and up to half as long again) are taken whatever the estimate says.
 pub const SHORTEST_STEP: f32 = 0.05;
 
 /// What the largest value of a picture may still change for it to count as finished: half of one of the 255 steps between
@@ -42,15 +42,17 @@ pub fn verdict(error: f32, tolerance: f32, step: f32, local_order: u32) -> Verdi
     let factor = 0.9 * exp(clamp(ln(ratio) / local_order as f32, -5.0, 5.0));
     let factor = if error <= f32::MAX { clamp(factor, 0.3, 2.0) } else { 0.3 };
     Verdict {
-        is_accepted: error <= REFUSED_FROM * tolerance || step <= SHORTEST_STEP,
+        // The last step may be a little longer than asked for, and a length measured between two levels is rounded.
+        is_accepted: error <= REFUSED_FROM * tolerance || step <= 1.5 * SHORTEST_STEP,
         step: clamp(step * factor, SHORTEST_STEP, LONGEST_STEP),
     }
 }
 
-/// The level that a step of this length reaches from level `sigma`; the smallest one, if little more than that is left.
+/// The level that a step of this length reaches from level `sigma`; the smallest one, if little more than that is left: a
+/// sixth of a longest step is not worth a call, nor is a third of a short one.
 pub fn reached(sigma: f32, step: f32, smallest: f32) -> f32 {
-    let level = sigma * exp(-step);
-    if level > 1.3 * smallest { level } else { smallest }
+    let left = ln_ratio(sigma, smallest);
+    if left <= step + 0.3 * min(step, 0.8) { smallest } else { sigma * exp(-step) }
 }
 
 /// How much a picture will still change: between two calls, at levels `before` and `sigma` below it, it changed by
