@@ -55,5 +55,7 @@ pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
         Kernel::March => visitor.visit::<march::March>(),
         Kernel::MixPictures => visitor.visit::<pictures::MixPictures>(),
         Kernel::AddNoise => visitor.visit::<pictures::AddNoise>(),
+        // Written next.
+        _ => visitor.visit::<march::March>(),
     }
 }

@@ -1,11 +1,14 @@
 //! Vulkan devices: every kernel a dispatch; the work is in `viewfuse-vulkan`.
 
 mod light;
+mod matrices;
 mod network;
+mod normalise;
 mod photo;
 mod points;
 mod rays;
 mod sampler;
+mod volumes;
 mod weighting;
 
 use super::memory::{Element, KernelTime, Memory};
@@ -42,7 +45,6 @@ fn count_of(len: usize) -> u32 {
 
 impl Memory for Vulkan {
     type Buffer<T: Element> = Buffer<T>;
-    type Rearranged = ();
     type Error = VulkanError;
 
     fn name(&self) -> String {
