@@ -3,7 +3,6 @@
 //! the same in `vulkan`.
 
 use std::convert::Infallible;
-use viewfuse::device::Memory;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;

@@ -17,10 +17,10 @@
 //! ipndm-v     order 4   the same with the coefficients of the steps that are taken
 //! ```
 //!
-//! Multistep samplers begin with lower orders until they have enough results. As published, all but `ipndm` and
-//! `ipndm-v` are exact for a result that is a polynomial in the logarithm of the level, these two for a direction
-//! `(x - D) / s` that is one in the level itself. Nothing that cancels is subtracted: the coefficients are good to a few
-//! units of `f32`, so the state may be `f32` too.
+//! Multistep samplers begin with lower orders until they have enough results. What they put a polynomial through is the
+//! denoised picture over the logarithm of the level, for `ipndm` and `ipndm-v` the direction `(x - D) / s` over the level
+//! itself. Nothing that cancels is subtracted: the coefficients are good to a few units of `f32`, so the state may be
+//! `f32` too.
 //!
 //! ```text
 //! exponential     dpm++2m, dpm++3m, unipc          results are denoised pictures

@@ -100,6 +100,19 @@ fn the_default_is_about_as_good_as_the_published_run() {
         let [own, published] = [error(sampler, calls, mixture, &truth), error(Sampler::Heun, 49, mixture, &truth)];
         println!("{name}: {} {own:.1e} at {calls} calls, heun {published:.1e} at 49", sampler.name());
         assert!(own <= 0.01 && own <= 2.0 * published, "{name}");
+        for plan in [Plan::fast(5), Plan::careful(5)] {
+            let (picture, sampled) = on_cpu(&plan, mixture);
+            let whole = on_cpu(&Plan { settled: None, ..plan }, mixture);
+            let (made, whole) = (distance(&picture, &truth), (distance(&whole.0, &truth), whole.1.call_count()));
+            println!(
+                "    {:?}: {made:.1e} at {} calls, without stopping {:.1e} at {}",
+                plan.steps,
+                sampled.call_count(),
+                whole.0,
+                whole.1
+            );
+            assert!(made <= 0.012 && sampled.call_count() <= 18, "{name}");
+        }
     }
 }
 
