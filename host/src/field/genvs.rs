@@ -9,3 +9,4 @@ mod encoder;
 mod feature_image;
 mod image;
 mod layers;
+pub mod sampling;
