@@ -1,12 +1,12 @@
 //! Files of network parameters: named tensors.
 //!
 //! Opening a file reads what it says about its tensors, not the tensors: names and shapes are checked against an
-//! architecture before anything large is allocated. Read are safetensors and what PyTorch's `torch.save` writes of a
-//! `state_dict`, in its zip archives and in its older format; which of them it is, the content decides. No code in a
-//! file is ever executed: see [`pickle`].
+//! architecture before anything large is allocated. Read are safetensors, what PyTorch's `torch.save` writes, in its zip
+//! archives and in its older format, and networks that Python's `pickle` wrote, as the snapshots of EDM's training are;
+//! which of them it is, the content decides. No code in a file is ever executed: see [`pickle`].
 //!
-//! A `state_dict` is looked for at the top of the file and under [`PLACES`]; a `module.` in front of every name, from
-//! training on several GPUs, is taken off.
+//! A `state_dict`, or a network itself, is looked for at the top of the file and under [`PLACES`]; a `module.` in front
+//! of every name, from training on several GPUs, is taken off.
 //!
 //! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of what the file says about its
 //! tensors; reading takes what [`Checkpoint::byte_estimate`] says, which is known before and limited by
@@ -19,9 +19,11 @@ mod error;
 pub mod input;
 mod kind;
 mod legacy;
+mod modules;
 pub mod pickle;
 mod place;
 mod safe;
+mod snapshot;
 mod state_dict;
 mod write;
 
@@ -39,8 +41,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Memory that opening a file takes at most, in bytes.
-pub const OPENING_BYTES: u64 = 2 * pickle::PICKLE_BYTES;
+/// Memory that opening a file takes at most, in bytes: for the pickles that are there at once.
+pub const OPENING_BYTES: u64 = 3 * pickle::PICKLE_BYTES;
 
 /// A tensor that an architecture has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,9 +89,12 @@ impl Checkpoint {
             let mut origin = kind.name().to_owned();
             let (places, metadata) = match kind {
                 Kind::Safetensors => safe::open(&file, facts.len())?,
-                Kind::TorchZip | Kind::TorchLegacy => {
-                    let open = if kind == Kind::TorchZip { archive::open } else { legacy::open };
-                    let (found, places) = open(&file, facts.len())?;
+                Kind::TorchZip | Kind::TorchLegacy | Kind::Snapshot => {
+                    let (found, places) = match kind {
+                        Kind::TorchZip => archive::open(&file, facts.len())?,
+                        Kind::Snapshot => snapshot::open(&file, facts.len())?,
+                        _ => legacy::open(&file, facts.len())?,
+                    };
                     origin.extend(found.place.map(|place| format!("; under '{place}'")));
                     if !found.prefix.is_empty() {
                         origin.push_str(&format!("; without the '{}' in front of every name", found.prefix));
