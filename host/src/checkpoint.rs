@@ -23,6 +23,7 @@ mod modules;
 pub mod pickle;
 mod place;
 mod safe;
+mod sizes;
 mod snapshot;
 mod state_dict;
 mod write;
@@ -31,6 +32,7 @@ pub use element::Element;
 pub use error::CheckpointError;
 pub use kind::Kind;
 pub use place::{LARGEST_TENSOR_BYTES, LARGEST_TOTAL_BYTES};
+pub use sizes::{LARGEST_SIZE, Sizes};
 pub use state_dict::PLACES;
 pub use write::{Precision, Written};
 
@@ -66,10 +68,19 @@ pub struct Checkpoint {
 /// Where the values are.
 #[derive(Debug)]
 enum Content {
-    /// Here.
-    Memory(BTreeMap<String, Vec<f32>>),
+    /// Nowhere: they are computed whenever they are asked for.
+    Computed(Formula),
     /// In the file, which readers use one after another: they move its cursor.
     File(Mutex<File>, Places),
+}
+
+/// What computes the values of a tensor.
+struct Formula(Box<dyn Fn(&TensorShape) -> Vec<f32> + Send + Sync>);
+
+impl std::fmt::Debug for Formula {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Formula")
+    }
 }
 
 impl Checkpoint {
@@ -123,13 +134,27 @@ impl Checkpoint {
         tensors: impl IntoIterator<Item = (TensorShape, Vec<f32>)>,
         metadata: BTreeMap<String, String>,
     ) -> Checkpoint {
-        let (mut shapes, mut values) = (BTreeMap::new(), BTreeMap::new());
-        for (TensorShape { name, shape }, numbers) in tensors {
-            shapes.insert(name.clone(), shape);
-            values.insert(name, numbers);
+        let (shapes, values): (Vec<_>, BTreeMap<_, _>) =
+            tensors.into_iter().map(|(tensor, values)| (tensor.clone(), (tensor.name, values))).unzip();
+        let values = move |tensor: &TensorShape| values.get(&tensor.name).cloned().unwrap_or_default();
+        Checkpoint::computed(label, shapes, metadata, values)
+    }
+
+    /// A checkpoint without values of its own: `values` computes a tensor each time that it is read. `label` takes the
+    /// place of its path in messages.
+    pub fn computed(
+        label: &str,
+        tensors: impl IntoIterator<Item = TensorShape>,
+        metadata: BTreeMap<String, String>,
+        values: impl Fn(&TensorShape) -> Vec<f32> + Send + Sync + 'static,
+    ) -> Checkpoint {
+        Checkpoint {
+            path: PathBuf::from(label),
+            origin: "computed".to_owned(),
+            shapes: tensors.into_iter().map(|TensorShape { name, shape }| (name, shape)).collect(),
+            metadata,
+            content: Content::Computed(Formula(Box::new(values))),
         }
-        let origin = "computed".to_owned();
-        Checkpoint { path: PathBuf::from(label), origin, shapes, metadata, content: Content::Memory(values) }
     }
 
     /// The file, for messages.
@@ -150,7 +175,7 @@ impl Checkpoint {
     /// The type in which it holds the elements of a tensor.
     pub fn element(&self, name: &str) -> Option<Element> {
         match &self.content {
-            Content::Memory(values) => values.get(name).map(|_| Element::F32),
+            Content::Computed(_) => self.shapes.get(name).map(|_| Element::F32),
             Content::File(_, places) => places.get(name).map(|place| place.element),
         }
     }
@@ -168,9 +193,10 @@ impl Checkpoint {
         for name in names {
             let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
             kept = kept.saturating_add(count.saturating_mul(4));
-            if let Content::File(_, places) = &self.content {
-                working = working.max(places.get(name).map_or(0, Place::working_bytes));
-            }
+            working = working.max(match &self.content {
+                Content::Computed(_) => count.saturating_mul(4),
+                Content::File(_, places) => places.get(name).map_or(0, Place::working_bytes),
+            });
         }
         kept.saturating_add(working)
     }
@@ -219,9 +245,10 @@ impl Checkpoint {
     ) -> Result<(), CheckpointError> {
         let none = || CheckpointError::NoTensor { path: self.path.clone(), tensor: shortened(name) };
         match &self.content {
-            Content::Memory(values) => {
-                let values = values.get(name).ok_or_else(none)?;
-                if self.shapes.get(name).and_then(|shape| element_count(shape)) != Some(values.len() as u64) {
+            Content::Computed(Formula(compute)) => {
+                let shape = self.shapes.get(name).ok_or_else(none)?;
+                let values = compute(&TensorShape { name: name.to_owned(), shape: shape.clone() });
+                if element_count(shape) != Some(values.len() as u64) {
                     return Err(CheckpointError::Content {
                         path: self.path.clone(),
                         what: format!(

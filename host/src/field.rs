@@ -3,8 +3,10 @@
 //! A field turns prepared photographs into latents and latents into a target's picture. The renderer knows no more
 //! about it than this trait; the weight-free field ([`photo`]) is the first, networks are further ones.
 
+pub mod genvs;
 pub mod photo;
 pub mod pixelnerf;
+mod resnet;
 
 use crate::device::Device;
 use crate::interrupt::Interrupted;
