@@ -85,7 +85,7 @@ fn rays_go_through_their_pixels() {
     for _ in 0..5_000 {
         let camera = sights::camera(&mut random);
         let pixel_centre = [0.5, 0.0, 0.3][random.below(3)];
-        let block = CastBlock { camera, near: 0.5, far: 2.0, pixel_centre };
+        let block = CastBlock { camera, near: 0.5, far: 2.0, pixel_centre, along_axis: 0 };
         let pixel = random.below((camera.width * camera.height) as usize) as u32;
         let ray = cast_ray(&block, pixel);
         let length: f64 = ray.direction.iter().map(|d| f64::from(*d).powi(2)).sum::<f64>().sqrt();

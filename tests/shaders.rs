@@ -138,7 +138,7 @@ fn light_is_core_s() {
 fn rays_of(world: &World) -> (Vec<u32>, Vec<TargetRay>, CastBlock) {
     let count = world.target.width * world.target.height;
     let pixels: Vec<u32> = (0..70).map(|ray| ray * 31 % count).collect();
-    let block = CastBlock { camera: world.target, near: 0.5, far: 4.0, pixel_centre: 0.5 };
+    let block = CastBlock { camera: world.target, near: 0.5, far: 4.0, pixel_centre: 0.5, along_axis: 0 };
     let rays = pixels.iter().map(|pixel| cast_ray(&block, *pixel)).collect();
     (pixels, rays, block)
 }

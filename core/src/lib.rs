@@ -18,8 +18,9 @@
 //! fuse              the views' latents become one                 fuse_views, fuse_visible
 //! composite         samples along a ray become a pixel            Compositor<C>
 //! wanted            which samples can be left out                 is_wanted
-//! network           layers                                        product, convolve, resample
+//! network           layers                                        product, convolve, normalise, attend, resample
 //! pixelnerf         a point in, radiance out                      embedded_value, gathered_value, radiance
+//! genvs             volumes of features become a feature image    VolumePlace, weigh_features, denoiser_input
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
 //! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
@@ -35,6 +36,7 @@ pub mod camera;
 pub mod composite;
 pub mod depths;
 pub mod fuse;
+pub mod genvs;
 pub mod lookup;
 pub mod math;
 pub mod metrics;

@@ -6,7 +6,11 @@
 //!
 //! Arrays that a layer may do without (`addend`) can be anything where the block says that there is none.
 
+pub mod attend;
 pub mod convolve;
+pub mod depthwise;
+pub mod normalise;
 pub mod product;
 pub mod resample;
 pub mod tile;
+pub mod transpose;

@@ -6,7 +6,7 @@ use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
 /// A ray of a target with the part of it that is looked at, as plain data. World coordinates; `near` and `far` are
-/// distances from the origin, `far` at least `near`.
+/// distances from the origin in lengths of `direction`, `far` at least `near`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct TargetRay {
@@ -14,7 +14,7 @@ pub struct TargetRay {
     pub origin: [f32; 3],
     /// Where looking begins.
     pub near: f32,
-    /// Unit vector along it.
+    /// Vector along it: of length 1, or, where depths are along the principal axis, with 1 along that.
     pub direction: [f32; 3],
     /// Where looking ends.
     pub far: f32,
@@ -33,6 +33,8 @@ pub struct CastBlock {
     /// Where in a pixel its centre is: 0.5 in this crate's convention, 0 in published PixelNeRF's, whose rays go through
     /// the pixels' upper left corners.
     pub pixel_centre: f32,
+    /// 1 if depths are measured along the target's principal axis, 0 if along the rays.
+    pub along_axis: u32,
 }
 
 /// The ray through a pixel (flat, row-major).
@@ -41,7 +43,7 @@ pub fn cast_ray(block: &CastBlock, pixel: u32) -> TargetRay {
     let camera = &block.camera;
     let (column, row) = (pixel % camera.width, pixel / camera.width);
     let towards = camera.towards(column as f32 + block.pixel_centre, row as f32 + block.pixel_centre);
-    let length = norm3(towards.x, towards.y, towards.z);
+    let length = if block.along_axis != 0 { 1.0 } else { norm3(towards.x, towards.y, towards.z) };
     TargetRay {
         origin: camera.centre_world().to_array(),
         near: block.near,
@@ -58,7 +60,7 @@ pub struct RayPoint {
     pub position: [f32; 3],
     /// Length of ray that it stands for: up to the next sample, at the last one up to `far`.
     pub length: f32,
-    /// Unit vector along its ray.
+    /// Vector along its ray, see [`TargetRay::direction`].
     pub direction: [f32; 3],
     /// Which sample it is, flat in `[ray][sample]`.
     pub sample: u32,

@@ -11,7 +11,7 @@ pub mod memory;
 pub mod vulkan;
 
 pub use kernels::{
-    Device, Layer, LightKernels, NetworkKernels, PhotoKernels, PhotoScene, Pixels, PointKernels, RayKernels, Rays,
-    WeightingKernels,
+    Device, Layer, LayerShape, LightKernels, MatrixKernels, NetworkKernels, NormaliseKernels, PhotoKernels, PhotoScene,
+    Pixels, PointKernels, RayKernels, Rays, VolumeKernels, WeightingKernels,
 };
 pub use memory::{Element, KernelTime, Memory};

@@ -15,9 +15,14 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::fuse::FuseBlock;
+use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
+use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::depthwise::DepthwiseBlock;
+use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock};
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
+use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_core::pages::MOST_PAGES;
 use viewfuse_core::photo::ObjectBlock;
 use viewfuse_core::photo::march::MarchBlock;
@@ -73,14 +78,32 @@ pub enum Kernel {
     VisibleWeights,
     /// Latents where points appear in a view. An element is a channel of a point.
     GatherLatents,
+    /// Features where points lie in a view's volume. An element is a feature of a point.
+    GatherVolume,
     /// Convolutions of an image. An element is an 8x8 part of a tile of [`TILE`] pixels and channels.
     Convolve,
+    /// Convolutions of every channel by itself. An element is a channel of an output pixel.
+    ConvolveDepthwise,
+    /// Transposed convolutions. An element is an 8x8 part of a tile of [`TILE`] input pixels and what they become.
+    ConvolveTransposed,
     /// Largest numbers of windows. An element is a channel of an output pixel.
     MaxPool,
     /// Enlarged images. An element is an input channel of an output pixel.
     Upsample,
     /// Matrix products. An element is an 8x8 part of a tile of [`TILE`] rows and columns.
     Product,
+    /// Means of an image's channels. An element is a channel.
+    ChannelMeans,
+    /// Moments of parts of an image. An element is a group of channels in a part.
+    PartMoments,
+    /// Moments of an image from those of its parts. An element is a group of channels.
+    MergeMoments,
+    /// Normalised images. An element is a channel of a pixel.
+    Normalise,
+    /// Products of two computed matrices. An element is an 8x8 part of a tile of [`TILE`] rows and columns.
+    MultiplyMatrices,
+    /// Softmax over rows. An element is a row.
+    SoftmaxRows,
     /// Weighted sums over views. An element is a channel of a point.
     FuseViews,
     /// Colour and optical depth of points. An element is a point.
@@ -97,6 +120,12 @@ pub enum Kernel {
     MergeDepths,
     /// Which samples to look at. An element is a sample.
     WantedSamples,
+    /// Weights of samples on rays of features. An element is a ray.
+    WeighFeatures,
+    /// Sums of features along rays. An element is a feature of a ray.
+    SumFeatures,
+    /// What the denoiser is given. An element is a channel of a pixel.
+    DenoiserInput,
     /// Where a source pixel's ray enters the hull. An element is a pixel of the view.
     HullEntry,
     /// How badly other views match, at all planes. An element is a pixel of the band.
@@ -180,7 +209,7 @@ type WeightRow = [f32; MOST_WEIGHED];
 
 impl Kernel {
     /// Every kernel, in the order of the data.
-    pub const ALL: [Kernel; 27] = [
+    pub const ALL: [Kernel; 39] = [
         Kernel::Weigh,
         Kernel::EmbedPose,
         Kernel::Attend,
@@ -190,10 +219,19 @@ impl Kernel {
         Kernel::EmbedPoints,
         Kernel::VisibleWeights,
         Kernel::GatherLatents,
+        Kernel::GatherVolume,
         Kernel::Convolve,
+        Kernel::ConvolveDepthwise,
+        Kernel::ConvolveTransposed,
         Kernel::MaxPool,
         Kernel::Upsample,
         Kernel::Product,
+        Kernel::ChannelMeans,
+        Kernel::PartMoments,
+        Kernel::MergeMoments,
+        Kernel::Normalise,
+        Kernel::MultiplyMatrices,
+        Kernel::SoftmaxRows,
         Kernel::FuseViews,
         Kernel::Radiance,
         Kernel::Composite,
@@ -202,6 +240,9 @@ impl Kernel {
         Kernel::FineDepths,
         Kernel::MergeDepths,
         Kernel::WantedSamples,
+        Kernel::WeighFeatures,
+        Kernel::SumFeatures,
+        Kernel::DenoiserInput,
         Kernel::HullEntry,
         Kernel::MatchCost,
         Kernel::SumRow,
@@ -222,10 +263,19 @@ impl Kernel {
             Kernel::EmbedPoints => "embed_points",
             Kernel::VisibleWeights => "visible_weights",
             Kernel::GatherLatents => "gather_latents",
+            Kernel::GatherVolume => "gather_volume",
             Kernel::Convolve => "convolve",
+            Kernel::ConvolveDepthwise => "convolve_depthwise",
+            Kernel::ConvolveTransposed => "convolve_transposed",
             Kernel::MaxPool => "max_pool",
             Kernel::Upsample => "upsample",
             Kernel::Product => "product",
+            Kernel::ChannelMeans => "channel_means",
+            Kernel::PartMoments => "part_moments",
+            Kernel::MergeMoments => "merge_moments",
+            Kernel::Normalise => "normalise",
+            Kernel::MultiplyMatrices => "multiply_matrices",
+            Kernel::SoftmaxRows => "softmax_rows",
             Kernel::FuseViews => "fuse_views",
             Kernel::Radiance => "radiance",
             Kernel::Composite => "composite",
@@ -234,6 +284,9 @@ impl Kernel {
             Kernel::FineDepths => "fine_depths",
             Kernel::MergeDepths => "merge_depths",
             Kernel::WantedSamples => "wanted_samples",
+            Kernel::WeighFeatures => "weigh_features",
+            Kernel::SumFeatures => "sum_features",
+            Kernel::DenoiserInput => "denoiser_input",
             Kernel::HullEntry => "hull_entry",
             Kernel::MatchCost => "match_cost",
             Kernel::SumRow => "sum_row",
@@ -299,10 +352,23 @@ impl Kernel {
             Kernel::GatherLatents => {
                 const { &[VIEWS, POINTS, Array::read::<f32>("grid"), ADDEND, Array::write::<f32>("gathered")] }
             }
+            Kernel::GatherVolume => {
+                const { &[VIEWS, POINTS, Array::read::<f32>("volume"), Array::write::<f32>("gathered")] }
+            }
             Kernel::Convolve => const { &[INPUTS, WEIGHTS, BIAS, ADDEND, OUTPUTS] },
+            Kernel::ConvolveDepthwise => const { &[INPUTS, WEIGHTS, OUTPUTS] },
+            Kernel::ConvolveTransposed => const { &[INPUTS, WEIGHTS, BIAS, OUTPUTS] },
             Kernel::MaxPool => const { &[INPUTS, OUTPUTS] },
             Kernel::Upsample => const { &[INPUTS, OUTPUTS] },
             Kernel::Product => const { &[INPUTS, WEIGHTS, BIAS, ADDEND, OUTPUTS] },
+            Kernel::ChannelMeans => const { &[INPUTS, Array::write::<f32>("means")] },
+            Kernel::PartMoments => const { &[INPUTS, Array::write::<[f32; 2]>("parts")] },
+            Kernel::MergeMoments => const { &[Array::read::<[f32; 2]>("parts"), Array::write::<[f32; 2]>("moments")] },
+            Kernel::Normalise => const { &[INPUTS, Array::read::<[f32; 2]>("moments"), WEIGHTS, BIAS, OUTPUTS] },
+            Kernel::MultiplyMatrices => {
+                const { &[Array::read::<f32>("left").not_empty(), Array::read::<f32>("right").not_empty(), OUTPUTS] }
+            }
+            Kernel::SoftmaxRows => const { &[Array::read::<f32>("scores"), Array::write::<f32>("weights")] },
             Kernel::FuseViews => {
                 const { &[Array::read::<f32>("weights"), Array::read::<f32>("latents"), Array::write::<f32>("fused")] }
             }
@@ -336,6 +402,20 @@ impl Kernel {
             }
             Kernel::WantedSamples => {
                 const { &[SEEN, RAYS, PIXELS, Array::read::<f32>("depths"), Array::write::<u32>("wanted")] }
+            }
+            Kernel::WeighFeatures => const { &[Array::read::<f32>("raw"), POINTS, Array::write::<f32>("weights")] },
+            Kernel::SumFeatures => {
+                const {
+                    &[
+                        Array::read::<f32>("weights"),
+                        Array::read::<f32>("fused"),
+                        Array::read::<f32>("raw"),
+                        Array::write::<f32>("summed"),
+                    ]
+                }
+            }
+            Kernel::DenoiserInput => {
+                const { &[Array::read::<f32>("noisy"), Array::read::<f32>("condition"), Array::write::<f32>("inputs")] }
             }
             Kernel::HullEntry => const { &[OBJECT, VIEWS, TEXELS, Array::write::<f32>("entries").in_pages()] },
             Kernel::MatchCost => {
@@ -385,10 +465,20 @@ impl Kernel {
             Kernel::CoarseDepths => size_of::<CoarseBlock>(),
             Kernel::EmbedPoints => size_of::<EmbedBlock>(),
             Kernel::GatherLatents => size_of::<GatherBlock>(),
+            Kernel::GatherVolume => size_of::<VolumeBlock>(),
             Kernel::Convolve => size_of::<ConvolveBlock>(),
+            Kernel::ConvolveDepthwise => size_of::<DepthwiseBlock>(),
+            Kernel::ConvolveTransposed => size_of::<TransposedBlock>(),
             Kernel::MaxPool => size_of::<PoolBlock>(),
             Kernel::Upsample => size_of::<UpsampleBlock>(),
             Kernel::Product => size_of::<ProductBlock>(),
+            Kernel::ChannelMeans => size_of::<MeanBlock>(),
+            Kernel::PartMoments | Kernel::MergeMoments | Kernel::Normalise => size_of::<NormaliseBlock>(),
+            Kernel::MultiplyMatrices => size_of::<MatrixBlock>(),
+            // Columns of a row.
+            Kernel::SoftmaxRows => size_of::<u32>(),
+            Kernel::WeighFeatures | Kernel::SumFeatures => size_of::<FeatureBlock>(),
+            Kernel::DenoiserInput => size_of::<DenoiserInputBlock>(),
             // Samples on a ray.
             Kernel::PlacePoints | Kernel::WeighSamples => size_of::<u32>(),
             // How many views there are.
@@ -422,7 +512,7 @@ impl Kernel {
 
     /// Whether its workgroups compute tiles together: only those have memory of their own, and barriers.
     pub const fn is_tiled(self) -> bool {
-        matches!(self, Kernel::Convolve | Kernel::Product)
+        matches!(self, Kernel::Convolve | Kernel::ConvolveTransposed | Kernel::Product | Kernel::MultiplyMatrices)
     }
 
     /// Whether it binds pages, and so has the specialisation constant 0.

@@ -52,5 +52,7 @@ pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
         Kernel::MeanColumn => visitor.visit::<window::MeanColumn>(),
         Kernel::PickDepth => visitor.visit::<pick_depth::PickDepth>(),
         Kernel::March => visitor.visit::<march::March>(),
+        // Written next.
+        _ => visitor.visit::<march::March>(),
     }
 }

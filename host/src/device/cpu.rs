@@ -1,17 +1,19 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
 
 mod light;
+mod matrices;
 mod network;
+mod normalise;
 mod photo;
 mod points;
 mod product;
 mod rays;
+mod volumes;
 mod weighting;
+mod winograd;
 
 use super::memory::{Element, KernelTime, Memory};
-use product::Panels;
 use std::convert::Infallible;
-use std::sync::OnceLock;
 
 /// All cores of this machine. Buffers are vectors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -19,7 +21,6 @@ pub struct Cpu;
 
 impl Memory for Cpu {
     type Buffer<T: Element> = Vec<T>;
-    type Rearranged = OnceLock<Panels>;
     type Error = Infallible;
 
     fn name(&self) -> String {

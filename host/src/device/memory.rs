@@ -25,9 +25,6 @@ pub trait Memory {
     /// Memory of the device that holds `T`s.
     type Buffer<T: Element>;
 
-    /// What it makes of a layer's weights when it first needs them, to keep beside them.
-    type Rearranged: Default + Send + Sync;
-
     /// What can go wrong.
     type Error: std::error::Error + Send + Sync + 'static;
 

@@ -1,10 +1,13 @@
 //! Vulkan devices: every kernel a dispatch; the work is in `viewfuse-vulkan`.
 
 mod light;
+mod matrices;
 mod network;
+mod normalise;
 mod photo;
 mod points;
 mod rays;
+mod volumes;
 mod weighting;
 
 use super::memory::{Element, KernelTime, Memory};
@@ -41,7 +44,6 @@ fn count_of(len: usize) -> u32 {
 
 impl Memory for Vulkan {
     type Buffer<T: Element> = Buffer<T>;
-    type Rearranged = ();
     type Error = VulkanError;
 
     fn name(&self) -> String {

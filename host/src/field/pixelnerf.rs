@@ -239,7 +239,13 @@ impl<D: Device> Field<D> for PixelNerf {
             sampling: self.options.sampling,
             omissions: self.options.omissions,
             settled,
-            cast: CastBlock { camera: target.block(0), near, far, pixel_centre: self.architecture.pixel_centre },
+            cast: CastBlock {
+                camera: target.block(0),
+                near,
+                far,
+                pixel_centre: self.architecture.pixel_centre,
+                along_axis: 0,
+            },
             background: prepared.background,
         };
         let (width, height) = (target.pinhole.width(), target.pinhole.height());

@@ -6,7 +6,7 @@ use crate::check::bounded::Bounded;
 use crate::check::case::{Case, Spoiler};
 use crate::check::network_oracle::{self, LayerInputs};
 use crate::check::poses::{Random, numbers, random};
-use crate::device::{Device, Layer, Memory};
+use crate::device::{Device, Layer, LayerShape, Memory};
 use rayon::prelude::*;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::product::ProductBlock;
@@ -61,11 +61,13 @@ impl<B> Job<B> {
     }
 
     fn load<D: Device>(&self, device: &D) -> Result<LoadedJob<D>, D::Error> {
-        let longer = |values: &[f32]| device.upload(&[values, &[f32::NAN; SLACK]].concat());
+        let longer = |values: &[f32]| [values, &[f32::NAN; SLACK]].concat();
+        let column_count = self.bias.len();
+        let shape = LayerShape { inner_count: self.weights.len() / column_count, column_count, has_wide_images: false };
         Ok(LoadedJob {
-            inputs: longer(&self.inputs)?,
-            layer: Layer::new(longer(&self.weights)?, longer(&self.bias)?),
-            addend: self.addend.as_deref().map(longer).transpose()?,
+            inputs: device.upload(&longer(&self.inputs))?,
+            layer: Layer::new(device, &shape, &longer(&self.weights), &longer(&self.bias))?,
+            addend: self.addend.as_deref().map(|addend| device.upload(&longer(addend))).transpose()?,
             outputs: device.zeros(self.output_count + SLACK)?,
         })
     }
@@ -210,8 +212,9 @@ impl Case for Convolve {
                 stride,
                 padding,
                 relu_outputs: flags as u32 & 1,
-                has_addend: 0,
-            };
+                ..ConvolveBlock::default()
+            }
+            .packed();
             let shape = [block.patch_len(), out_channels, block.pixel_count()].map(|count| count as usize);
             Job::new(random, block, (in_height * in_width * in_channels) as usize, shape, flags >> 1 & 1 == 1)
         };

@@ -42,7 +42,7 @@ impl Case for CastRays {
             let (near, far) = (random.range(0.1, 1.0) as f32, random.range(1.0, 9.0) as f32);
             let pixel_count = (camera.width * camera.height) as usize;
             let pixels = (0..size).map(|_| random.below(pixel_count) as u32).collect();
-            Cast { block: CastBlock { camera, near, far, pixel_centre }, pixels }
+            Cast { block: CastBlock { camera, near, far, pixel_centre, along_axis: 0 }, pixels }
         };
         [0.5, 0.0, 0.5, 0.25].map(job).to_vec()
     }

@@ -1,14 +1,18 @@
-//! Layers of networks: blocked matrix products, convolutions as products of the image's patches, rows spread over the
-//! cores.
+//! Layers of networks: blocked matrix products, convolutions as products of the image's patches or by Winograd's way, rows
+//! spread over the cores.
 
 use super::Cpu;
-use super::product::{Panels, Rows};
-use crate::device::kernels::network::{Layer, NetworkKernels};
+use super::product::{Ending, Panels, Rows};
+use super::winograd::Winograd;
+use crate::device::kernels::network::{Layer, LayerShape, NetworkKernels};
+use pulp::Arch;
 use rayon::prelude::*;
 use std::convert::Infallible;
-use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
+use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_core::network::transpose::TransposedBlock;
 
 /// Most rows that a core takes at once: their inputs and outputs (512 columns) stay in its second-level cache, beside the
 /// weights, and the last ones keep no core waiting for long.
@@ -16,7 +20,37 @@ const MOST_ROWS: usize = 96;
 /// Rows of a product's tile (or a multiple): fewer at once are wasted.
 const ROW_STEP: usize = 12;
 
+/// A layer's weights in the order in which they are needed.
+pub enum Weights {
+    /// For products of matrices.
+    Product(Panels),
+    /// For convolutions of large images.
+    Winograd(Winograd),
+}
+
+impl Weights {
+    fn panels(&self, inner: usize, columns: usize) -> &Panels {
+        match self {
+            Weights::Product(panels) => {
+                assert_eq!(panels.size(), [inner, columns], "a layer has one size");
+                panels
+            }
+            Weights::Winograd(_) => panic!("a layer for large images is used for nothing else"),
+        }
+    }
+}
+
 impl NetworkKernels for Cpu {
+    type Weights = Weights;
+
+    fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, Infallible> {
+        let LayerShape { inner_count, column_count, has_wide_images } = *shape;
+        Ok(match has_wide_images {
+            true => Weights::Winograd(Winograd::new(weights, inner_count / 9, column_count)),
+            false => Weights::Product(Panels::new(weights, inner_count, column_count)),
+        })
+    }
+
     fn convolve(
         &self,
         block: &ConvolveBlock,
@@ -25,25 +59,94 @@ impl NetworkKernels for Cpu {
         addend: Option<&Vec<f32>>,
         outputs: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        let (pixel_count, patch_len) = (block.pixel_count() as usize, block.patch_len() as usize);
-        let columns = block.out_channels as usize;
-        let panels = Panels::of(layer, patch_len, columns);
+        let (pixel_count, columns) = (block.pixel_count() as usize, block.out_channels as usize);
+        let ending = Ending {
+            bias: &layer.bias,
+            addend: addend.map(|addend| (&addend[block.addend_first as usize..], block.addend_pitch as usize)),
+            scale: block.scale,
+            relu: block.relu_outputs,
+        };
+        let out_pitch = block.out_pitch as usize;
+        let outputs = window(outputs, block.out_first, pixel_count, out_pitch, columns);
+        if let Weights::Winograd(winograd) = &layer.weights {
+            winograd.convolve(block, inputs, ending, outputs);
+            return Ok(());
+        }
+        let patch_len = block.patch_len() as usize;
+        let panels = layer.weights.panels(patch_len, columns);
         let rows = chunk_rows(pixel_count);
-        let chunks = outputs[..pixel_count * columns].par_chunks_mut(rows * columns).enumerate();
-        chunks.for_each_init(Vec::new, |patches, (chunk, outputs)| {
+        // Windows of one pixel are what lies in the image already.
+        let is_plain = [block.size, block.stride, block.enlarge, block.padding] == [1, 1, 1, 0];
+        outputs.par_chunks_mut(rows * out_pitch).enumerate().for_each_init(Vec::new, |patches, (chunk, outputs)| {
             let first = chunk * rows;
-            patches.clear();
-            for pixel in first..first + outputs.len() / columns {
-                push_patch(patches, block, inputs, pixel as u32);
-            }
-            panels.multiply(Rows {
-                inputs: patches,
+            let row_count = rows.min(pixel_count - first);
+            let (inputs, in_pitch) = if is_plain {
+                (&inputs[block.in_first as usize + first * block.in_pitch as usize..], block.in_pitch as usize)
+            } else {
+                patches.clear();
+                for pixel in first..first + row_count {
+                    push_patch(patches, block, inputs, pixel as u32);
+                }
+                (&patches[..], patch_len)
+            };
+            let ending = ending.from_row(first);
+            panels.multiply(Rows { row_count, inputs, in_pitch, relu_inputs: 0, ending, outputs, out_pitch });
+        });
+        Ok(())
+    }
+
+    fn convolve_depthwise(
+        &self,
+        block: &DepthwiseBlock,
+        inputs: &Vec<f32>,
+        weights: &Vec<f32>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let channels = block.channels as usize;
+        let outputs = &mut outputs[..block.pixel_count() as usize * channels];
+        outputs.par_chunks_mut(channels).enumerate().for_each(|(pixel, outputs)| {
+            Arch::new().dispatch(|| filter_pixel(block, inputs, weights, pixel as u32, outputs));
+        });
+        Ok(())
+    }
+
+    fn convolve_transposed(
+        &self,
+        block: &TransposedBlock,
+        inputs: &Vec<f32>,
+        layer: &Layer<Self>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let (width, columns) = (block.in_width as usize, block.column_count() as usize);
+        let panels = layer.weights.panels(block.in_channels as usize, columns);
+        let (size, channels, pitch) = (block.size as usize, block.out_channels as usize, block.out_pitch as usize);
+        let pixels = block.pixel_count() as usize * size * size;
+        let bias = layer.bias[..channels].repeat(size * size);
+        let ending = Ending { bias: &bias, addend: None, scale: 1.0, relu: block.relu_outputs };
+        // A row of the input becomes some whole rows of the output.
+        let outputs = window(outputs, block.out_first, pixels, pitch, channels);
+        let rows = outputs.par_chunks_mut(width * size * size * pitch).enumerate();
+        rows.for_each_init(Vec::new, |results: &mut Vec<f32>, (row, outputs)| {
+            results.resize(width * columns, 0.0);
+            let in_pitch = block.in_pitch as usize;
+            let inputs = &inputs[block.in_first as usize + row * width * in_pitch..];
+            let results = &mut results[..];
+            let product = Rows {
+                row_count: width,
+                inputs,
+                in_pitch,
                 relu_inputs: 0,
-                bias: layer.bias(),
-                addend: addend.map(|addend| &addend[first * columns..]),
-                relu_outputs: block.relu_outputs,
-                outputs,
-            });
+                ending,
+                outputs: results,
+                out_pitch: columns,
+            };
+            panels.multiply(product);
+            for (column, result) in results.chunks_exact(columns).enumerate() {
+                for (corner, result) in result.chunks_exact(channels).enumerate() {
+                    let place = (corner / size * width + column) * size + corner % size;
+                    outputs[place * pitch..place * pitch + channels].copy_from_slice(result);
+                }
+            }
         });
         Ok(())
     }
@@ -80,22 +183,47 @@ impl NetworkKernels for Cpu {
     ) -> Result<(), Infallible> {
         let inner = block.inner_count as usize;
         let (row_count, columns) = (block.row_count as usize, block.column_count as usize);
-        let panels = Panels::of(layer, inner, columns);
-        let rows = chunk_rows(row_count);
-        let chunks = outputs[..row_count * columns].par_chunks_mut(rows * columns).enumerate();
-        chunks.for_each(|(chunk, outputs)| {
-            let first = chunk * rows;
-            panels.multiply(Rows {
-                inputs: &inputs[first * inner..],
-                relu_inputs: block.relu_inputs,
-                bias: layer.bias(),
-                addend: addend.map(|addend| &addend[first * columns..]),
-                relu_outputs: block.relu_outputs,
-                outputs,
-            });
-        });
+        let panels = layer.weights.panels(inner, columns);
+        let ending = Ending {
+            bias: &layer.bias,
+            addend: addend.map(|addend| (&addend[..], columns)),
+            scale: 1.0,
+            relu: block.relu_outputs,
+        };
+        multiply(panels, inputs, inner, block.relu_inputs, ending, &mut outputs[..row_count * columns]);
         Ok(())
     }
+}
+
+/// A product of rows that lie side by side, spread over the cores.
+pub(super) fn multiply(
+    panels: &Panels,
+    inputs: &[f32],
+    in_pitch: usize,
+    relu_inputs: u32,
+    ending: Ending<'_>,
+    outputs: &mut [f32],
+) {
+    let [_, columns] = panels.size();
+    let rows = chunk_rows(outputs.len() / columns);
+    outputs.par_chunks_mut(rows * columns).enumerate().for_each(|(chunk, outputs)| {
+        let first = chunk * rows;
+        panels.multiply(Rows {
+            row_count: outputs.len() / columns,
+            inputs: &inputs[first * in_pitch..],
+            in_pitch,
+            relu_inputs,
+            ending: ending.from_row(first),
+            outputs,
+            out_pitch: columns,
+        });
+    });
+}
+
+/// The part of a buffer that holds `count` rows of `columns` numbers.
+fn window(outputs: &mut [f32], first: u32, count: usize, pitch: usize, columns: usize) -> &mut [f32] {
+    let first = first as usize;
+    &mut outputs[first..first + count.saturating_sub(1) * pitch + columns]
 }
 
 /// How many of these rows a core takes at once.
@@ -110,15 +238,42 @@ fn push_patch(patches: &mut Vec<f32>, block: &ConvolveBlock, inputs: &[f32], pix
     let channels = block.in_channels as usize;
     let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
     for window_row in 0..block.size {
-        let row = (out_row * block.stride + window_row).wrapping_sub(block.padding);
+        let row = out_row * block.stride + window_row * block.dilation;
         for window_column in 0..block.size {
-            let column = (out_column * block.stride + window_column).wrapping_sub(block.padding);
-            if row < block.in_height && column < block.in_width {
-                let first = (row * block.in_width + column) as usize * channels;
-                patches.extend_from_slice(&inputs[first..first + channels]);
-            } else {
-                patches.resize(patches.len() + channels, 0.0);
+            let column = out_column * block.stride + window_column * block.dilation;
+            match window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column) {
+                u32::MAX => patches.resize(patches.len() + channels, 0.0),
+                seen => {
+                    let first = (block.in_first + seen * block.in_pitch) as usize;
+                    patches.extend_from_slice(&inputs[first..first + channels]);
+                }
             }
+        }
+    }
+}
+
+/// All channels of an output pixel, as [`viewfuse_core::network::depthwise::depthwise_element`] defines them.
+#[inline(always)]
+fn filter_pixel(block: &DepthwiseBlock, inputs: &[f32], weights: &[f32], pixel: u32, outputs: &mut [f32]) {
+    let channels = outputs.len();
+    outputs.fill(0.0);
+    let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
+    for place in 0..block.size * block.size {
+        let row = out_row * block.stride + place / block.size * block.dilation;
+        let column = out_column * block.stride + place % block.size * block.dilation;
+        let seen = window_pixel([block.in_height, block.in_width], 1, block.padding, row, column);
+        if seen == u32::MAX {
+            continue;
+        }
+        let first = (block.in_first + seen * block.in_pitch) as usize;
+        let inputs = &inputs[first..first + channels];
+        if block.is_shared != 0 {
+            let weight = weights[place as usize];
+            outputs.iter_mut().zip(inputs).for_each(|(output, input)| *output += input * weight);
+        } else {
+            let weights = &weights[place as usize * channels..][..channels];
+            let pairs = inputs.iter().zip(weights);
+            outputs.iter_mut().zip(pairs).for_each(|(output, (input, weight))| *output += input * weight);
         }
     }
 }

@@ -9,8 +9,6 @@
 //!
 //! The crate `pulp` picks the widest instructions of the machine; nothing here is written for one of them.
 
-use super::Cpu;
-use crate::device::Layer;
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -35,14 +33,16 @@ pub struct Panels {
 }
 
 impl Panels {
-    /// Those of a layer, put in order when they are first asked for. Both counts are at least 1.
-    pub(super) fn of(layer: &Layer<Cpu>, inner: usize, columns: usize) -> &Panels {
-        let panels = layer.rearranged().get_or_init(|| Panels::new(layer.weights(), inner, columns));
-        assert_eq!((panels.inner, panels.columns), (inner, columns), "a layer has one size");
-        panels
+    /// Those of `weights[inner][column]`; both counts are at least 1.
+    pub(super) fn new(weights: &[f32], inner: usize, columns: usize) -> Panels {
+        Panels::of(inner, columns, |row, first, panel| {
+            let start = row * columns + first;
+            panel.copy_from_slice(&weights[start..start + panel.len()]);
+        })
     }
 
-    fn new(weights: &[f32], inner: usize, columns: usize) -> Panels {
+    /// Those of a matrix that is read piece by piece: `read(inner, first column, values)`.
+    pub(super) fn of(inner: usize, columns: usize, read: impl Fn(usize, usize, &mut [f32]) + Sync) -> Panels {
         let width = Arch::new().dispatch(PanelWidth);
         let panel_lines = (inner * width).div_ceil(16);
         let mut lines = vec![Line::zeroed(); columns.div_ceil(width) * panel_lines];
@@ -50,11 +50,16 @@ impl Panels {
             let first = panel * width;
             let count = width.min(columns - first);
             let rows = cast_slice_mut::<Line, f32>(lines).chunks_exact_mut(width);
-            for (row, weights) in rows.zip(weights.chunks_exact(columns).take(inner)) {
-                row[..count].copy_from_slice(&weights[first..first + count]);
+            for (row, values) in rows.take(inner).enumerate() {
+                read(row, first, &mut values[..count]);
             }
         });
         Panels { lines, inner, columns }
+    }
+
+    /// Rows and columns of the matrix.
+    pub(super) fn size(&self) -> [usize; 2] {
+        [self.inner, self.columns]
     }
 
     /// Computes some rows.
@@ -63,20 +68,68 @@ impl Panels {
     }
 }
 
-/// Rows of a layer's inputs and outputs.
+/// Rows of a layer's inputs and outputs, each with its own distance from one to the next.
 pub(super) struct Rows<'a> {
+    /// How many there are.
+    pub(super) row_count: usize,
     /// `[row][inner]`.
     pub(super) inputs: &'a [f32],
+    /// From a row of the inputs to the next.
+    pub(super) in_pitch: usize,
     /// Whether negative inputs count as 0.
     pub(super) relu_inputs: u32,
-    /// `[column]`.
-    pub(super) bias: &'a [f32],
-    /// `[row][column]`.
-    pub(super) addend: Option<&'a [f32]>,
-    /// Whether negative outputs become 0.
-    pub(super) relu_outputs: u32,
+    /// What is done with the sums.
+    pub(super) ending: Ending<'a>,
     /// `[row][column]`.
     pub(super) outputs: &'a mut [f32],
+    /// From a row of the outputs to the next.
+    pub(super) out_pitch: usize,
+}
+
+/// What is done with sums before they are written.
+#[derive(Clone, Copy)]
+pub(super) struct Ending<'a> {
+    /// `[column]`.
+    pub(super) bias: &'a [f32],
+    /// `[row][column]`, and how far it is from a row to the next: 0 if all have the same.
+    pub(super) addend: Option<(&'a [f32], usize)>,
+    /// Factor of the sums with bias and addend.
+    pub(super) scale: f32,
+    /// Whether negative outputs become 0.
+    pub(super) relu: u32,
+}
+
+impl<'a> Ending<'a> {
+    /// The ending of the rows from `row` on.
+    pub(super) fn from_row(self, row: usize) -> Ending<'a> {
+        Ending { addend: self.addend.map(|(addend, pitch)| (&addend[row * pitch..], pitch)), ..self }
+    }
+
+    /// What is written for columns `start..end` of a row, from their sums.
+    #[inline(always)]
+    pub(super) fn finish<S: Simd>(&self, simd: S, sum: S::f32s, row: usize, start: usize, end: usize) -> S::f32s {
+        self.close(simd, self.open(simd, sum, row, start, end))
+    }
+
+    #[inline(always)]
+    fn open<S: Simd>(&self, simd: S, sum: S::f32s, row: usize, start: usize, end: usize) -> S::f32s {
+        let value = simd.add_f32s(load(simd, &self.bias[start..end]), sum);
+        match self.addend {
+            Some((addend, pitch)) => simd.add_f32s(load(simd, &addend[row * pitch + start..row * pitch + end]), value),
+            None => value,
+        }
+    }
+
+    #[inline(always)]
+    fn close<S: Simd>(&self, simd: S, value: S::f32s) -> S::f32s {
+        let value = simd.mul_f32s(value, simd.splat_f32s(self.scale));
+        if self.relu == 0 {
+            return value;
+        }
+        let zero = simd.splat_f32s(0.0);
+        // NaN becomes 0, as in `rectified`.
+        simd.select_f32s(simd.greater_than_f32s(value, zero), value, zero)
+    }
 }
 
 /// How many columns a panel has on this machine.
@@ -117,14 +170,14 @@ impl Multiply<'_> {
         let Multiply { panels: Panels { lines, inner, columns }, mut rows } = self;
         let (inner, columns, width) = (*inner, *columns, 2 * S::F32_LANES);
         let panel_lines = (inner * width).div_ceil(16);
-        let row_count = rows.outputs.len() / columns;
+        let row_count = rows.row_count;
         let mut inputs = [[0.0; DEPTH + GAP]; R];
         for first_row in (0..row_count).step_by(R) {
             for first in (0..inner).step_by(DEPTH) {
                 let depth = DEPTH.min(inner - first);
                 for (row, inputs) in inputs.iter_mut().enumerate() {
                     // Behind the last row it is computed once more.
-                    let start = (first_row + row).min(row_count - 1) * inner + first;
+                    let start = (first_row + row).min(row_count - 1) * rows.in_pitch + first;
                     let given = &rows.inputs[start..start + depth];
                     for (input, given) in inputs.iter_mut().zip(given) {
                         *input = rectified(*given, rows.relu_inputs);
@@ -172,42 +225,34 @@ struct Place {
     inner: usize,
 }
 
-/// Adds a tile's sums to bias and addend, or to what the outputs hold already; rectifies them with the last sums.
+/// Adds a tile's sums to bias and addend, or to what the outputs hold already; ends them with the last sums.
 #[inline(always)]
 fn write<S: Simd, const R: usize>(simd: S, sums: &[[S::f32s; 2]; R], rows: &mut Rows<'_>, place: &Place) {
     let Place { first_row, first_column, columns, first, inner } = *place;
     let is_last = first + DEPTH >= inner;
-    let row_count = rows.outputs.len() / columns;
-    for (row, sums) in (first_row..row_count).zip(sums) {
+    for (row, sums) in (first_row..rows.row_count).zip(sums) {
         for (half, sum) in sums.iter().enumerate() {
             let start = first_column + half * S::F32_LANES;
             let end = columns.min(start + S::F32_LANES);
             if start >= end {
                 continue;
             }
-            let range = row * columns + start..row * columns + end;
-            let mut value = if first > 0 {
-                simd.add_f32s(load(simd, &rows.outputs[range.clone()]), *sum)
-            } else {
-                let bias = simd.add_f32s(load(simd, &rows.bias[start..end]), *sum);
-                match rows.addend {
-                    Some(addend) => simd.add_f32s(load(simd, &addend[range.clone()]), bias),
-                    None => bias,
-                }
+            let output = &mut rows.outputs[row * rows.out_pitch + start..row * rows.out_pitch + end];
+            let mut value = match first {
+                0 => rows.ending.open(simd, *sum, row, start, end),
+                _ => simd.add_f32s(load(simd, output), *sum),
             };
-            if is_last && rows.relu_outputs != 0 {
-                let zero = simd.splat_f32s(0.0);
-                // NaN becomes 0, as in `rectified`.
-                value = simd.select_f32s(simd.greater_than_f32s(value, zero), value, zero);
+            if is_last {
+                value = rows.ending.close(simd, value);
             }
-            store(simd, &mut rows.outputs[range], value);
+            store(simd, output, value);
         }
     }
 }
 
 /// A vector from as many numbers or fewer.
 #[inline(always)]
-fn load<S: Simd>(simd: S, values: &[f32]) -> S::f32s {
+pub(super) fn load<S: Simd>(simd: S, values: &[f32]) -> S::f32s {
     match S::as_simd_f32s(values).0.first() {
         Some(vector) => *vector,
         None => simd.partial_load_f32s(values),
@@ -216,7 +261,7 @@ fn load<S: Simd>(simd: S, values: &[f32]) -> S::f32s {
 
 /// As many numbers of a vector as there is room for.
 #[inline(always)]
-fn store<S: Simd>(simd: S, values: &mut [f32], vector: S::f32s) {
+pub(super) fn store<S: Simd>(simd: S, values: &mut [f32], vector: S::f32s) {
     match S::as_mut_simd_f32s(values).0.first_mut() {
         Some(whole) => *whole = vector,
         None => simd.partial_store_f32s(values, vector),

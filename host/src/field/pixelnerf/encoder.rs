@@ -151,8 +151,9 @@ impl Convolution {
             stride: self.stride,
             padding: self.padding,
             relu_outputs: u32::from(self.relu),
-            has_addend: 0,
-        };
+            ..ConvolveBlock::default()
+        }
+        .packed();
         let mut values = device.zeros(size.len())?;
         device.convolve(&block, &image.values, layer, addend.map(|image| &image.values), &mut values)?;
         Ok(Image { size, values })

@@ -2,7 +2,7 @@
 
 use super::architecture::{Architecture, Pass};
 use crate::checkpoint::{Checkpoint, CheckpointError};
-use crate::device::{Device, Layer, Memory};
+use crate::device::{Device, Layer, LayerShape};
 use crate::field::resnet::needs_downsample;
 
 /// What torchvision's batch norm adds to variances.
@@ -16,8 +16,11 @@ pub(super) struct HostLayer {
 }
 
 impl HostLayer {
-    fn load<D: Memory>(&self, device: &D) -> Result<Layer<D>, D::Error> {
-        Ok(Layer::new(device.upload(&self.weights)?, device.upload(&self.bias)?))
+    fn load<D: Device>(&self, device: &D) -> Result<Layer<D>, D::Error> {
+        let column_count = self.bias.len();
+        let inner_count = self.weights.len() / column_count;
+        let shape = LayerShape { inner_count, column_count, has_wide_images: false };
+        Layer::new(device, &shape, &self.weights, &self.bias)
     }
 }
 
