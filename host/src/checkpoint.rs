@@ -75,7 +75,8 @@ enum Content {
 }
 
 /// What computes the values of a tensor.
-struct Formula(Box<dyn Fn(&TensorShape) -> Vec<f32> + Send + Sync>);
+type Values = dyn Fn(&TensorShape) -> Vec<f32> + Send + Sync;
+struct Formula(Box<Values>);
 
 impl std::fmt::Debug for Formula {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {

@@ -189,7 +189,7 @@ impl Denoiser {
 
     /// Refuses sizes that no network can have.
     fn check(&self, sizes: &Sizes<'_>) -> Result<(), CheckpointError> {
-        if self.noise_channels % 2 != 0 {
+        if !self.noise_channels.is_multiple_of(2) {
             return Err(sizes.refuse(format!(
                 "the denoiser takes noise levels as {} numbers, which are not as many cosines as sines",
                 self.noise_channels
