@@ -7,6 +7,7 @@ pub mod finite;
 pub mod genvs;
 pub mod photo;
 pub mod pixelnerf;
+mod resnet;
 
 use crate::checkpoint::CheckpointError;
 use crate::device::Device;

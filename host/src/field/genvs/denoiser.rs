@@ -8,6 +8,7 @@
 mod block;
 mod embedding;
 
+use super::architecture::COLOUR_CHANNELS;
 use super::image::{Image, Scratch, Size};
 use super::layers::{Addend, Convolution, Loader, Norm, Way};
 use crate::device::Device;
@@ -19,7 +20,7 @@ use viewfuse_core::genvs::DenoiserInputBlock;
 use viewfuse_core::schedule::Preconditioning;
 
 /// Channels of a picture.
-pub(super) const PICTURE_CHANNELS: u32 = 3;
+const PICTURE_CHANNELS: u32 = COLOUR_CHANNELS as u32;
 
 /// A level of the encoder.
 struct Level<D: Device> {

@@ -3,6 +3,7 @@
 //!
 //! Source: `genvs_encoder.py`; DeepLabV3+ (Chen et al. 2018) on ResNet-34, its batch norms and dropout switched off.
 
+use super::architecture::ASPP_RATES;
 use super::image::{Image, Scratch, Size, enlarge};
 use super::layers::{Addend, Convolution, Depthwise, Loader, Transposed, Way};
 use crate::device::Device;
@@ -12,8 +13,6 @@ use viewfuse_core::network::resample::PoolBlock;
 
 /// Rows and columns of images are multiples of this: the trunk's output stride.
 pub(super) const SIDE_STEP: u32 = 16;
-/// Dilations of the pyramid's separable convolutions.
-const RATES: [u32; 3] = [12, 24, 36];
 
 /// A basic block: two convolutions, and one beside them where sizes change.
 struct Block<D: Device> {
@@ -87,7 +86,7 @@ impl<D: Device> Encoder<D> {
             stem: loader.convolution("encoder.conv1", 0)?,
             levels: (1..=4).map(level).collect::<Result<_, _>>()?,
             pyramid_plain: loader.convolution(&format!("{pyramid}.convs.0.0"), 0)?,
-            pyramid_dilated: (1..=RATES.len())
+            pyramid_dilated: (1..=ASPP_RATES.len())
                 .map(|index| separable(&format!("{pyramid}.convs.{index}.0")))
                 .collect::<Result<_, _>>()?,
             pyramid_pooled: loader.convolution(&format!("{pyramid}.convs.4.1"), 0)?,
@@ -182,9 +181,9 @@ impl<D: Device> Encoder<D> {
         let wide = scratch.image(part.with_channels(channels * branch_count))?;
         let mut wide = wide.seen_as(0, channels);
         self.pyramid_plain.run_into(device, Way::RELU, image, Addend::None, &mut wide)?;
-        for (branch, (separable, dilation)) in (1..).zip(self.pyramid_dilated.iter().zip(RATES)) {
+        for (branch, (separable, dilation)) in (1..).zip(self.pyramid_dilated.iter().zip(ASPP_RATES)) {
             wide = wide.seen_as(branch * channels, channels);
-            let inside = separable.depthwise.run(scratch, device, Way { dilation, ..Way::PLAIN }, image)?;
+            let inside = separable.depthwise.run(scratch, device, Way { dilation: dilation as u32, ..Way::PLAIN }, image)?;
             separable.pointwise.run_into(device, Way::RELU, &inside, Addend::None, &mut wide)?;
             scratch.give(inside);
         }

@@ -1,6 +1,7 @@
 //! Layers with their parameters, as both networks use them: read from a checkpoint, taken to a device, run.
 
 use super::super::FieldError;
+use super::architecture::group_count;
 use super::image::{Image, Scratch, Size};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::device::{Device, Layer, LayerShape};
@@ -368,7 +369,7 @@ impl<D: Device> Norm<D> {
             channels,
             in_pitch: image.pitch,
             in_first: image.first,
-            group_count: group_count(channels),
+            group_count: group_count(channels as usize) as u32,
             variance_floor: VARIANCE_FLOOR,
             silu_outputs: u32::from(silu),
         };
@@ -380,9 +381,4 @@ impl<D: Device> Norm<D> {
         device.normalise(&block, &image.values, &moments, &self.weights, &self.bias, &mut output.values)?;
         Ok(output)
     }
-}
-
-/// Groups of so many channels: at most 32, at least 4 channels each (`networks.py`).
-pub(super) fn group_count(channels: u32) -> u32 {
-    (channels / 4).clamp(1, 32)
 }
