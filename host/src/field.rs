@@ -7,7 +7,9 @@ pub mod finite;
 pub mod genvs;
 pub mod photo;
 pub mod pixelnerf;
+mod resnet;
 
+use crate::checkpoint::CheckpointError;
 use crate::device::Device;
 use crate::interrupt::Interrupted;
 use crate::photographs::SourceImages;
@@ -25,7 +27,10 @@ pub enum FieldError<E: std::error::Error> {
     /// The device failed.
     #[error("the device failed")]
     Device(#[source] E),
-    /// A stage made numbers that are none.
+    /// The network's parameters could not be read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A number that is none came up inside.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
     /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
