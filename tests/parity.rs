@@ -110,6 +110,7 @@ fn seed_count(kernel: Kernel) -> u64 {
         Kernel::MaxPool | Kernel::Upsample => 4,
         Kernel::WeighSamples | Kernel::DrawChances | Kernel::MergeDepths => 4,
         Kernel::FineDepths | Kernel::WantedSamples => 8,
+        Kernel::MixPictures | Kernel::AddNoise => 8,
     }
 }
 
@@ -190,7 +191,7 @@ fn every_input_has_a_control() -> Result<(), Failed> {
             Kernel::MergeDepths => false,
             Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
             Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
-            Kernel::FineDepths | Kernel::WantedSamples => true,
+            Kernel::FineDepths | Kernel::WantedSamples | Kernel::MixPictures | Kernel::AddNoise => true,
             Kernel::Convolve | Kernel::MergeMoments | Kernel::MultiplyMatrices | Kernel::GatherVolume => true,
             Kernel::WeighFeatures | Kernel::DenoiserInput => true,
         };

@@ -3,15 +3,24 @@
 //! A field turns prepared photographs into latents and latents into a target's picture. The renderer knows no more
 //! about it than this trait; the weight-free field ([`photo`]) is the first, networks are further ones.
 
+pub mod finite;
+pub mod genvs;
+mod learned;
 pub mod photo;
 pub mod pixelnerf;
+mod resnet;
 
+use crate::checkpoint::CheckpointError;
 use crate::device::Device;
 use crate::interrupt::Interrupted;
 use crate::photographs::SourceImages;
 use crate::progress::Progress;
 use crate::sources::SourceWeights;
+use finite::NotFinite;
 use viewfuse_core::camera::Camera;
+
+/// Longest side of a picture whose size nobody asked for.
+pub const LONGEST_DEFAULT_SIDE: u32 = 512;
 
 /// Why a field could not make a picture.
 #[derive(Debug, thiserror::Error)]
@@ -22,6 +31,12 @@ pub enum FieldError<E: std::error::Error> {
     /// The device failed.
     #[error("the device failed")]
     Device(#[source] E),
+    /// The network's parameters could not be read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A number that is none came up inside.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
     /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
@@ -71,6 +86,11 @@ pub trait Field<D: Device> {
     /// Longest side of the sources that it wants for pictures of this longest side.
     fn source_side(&self, picture_side: u32) -> u32 {
         picture_side
+    }
+
+    /// The longest side of its pictures where nobody asks for a size.
+    fn longest_side(&self) -> u32 {
+        LONGEST_DEFAULT_SIDE
     }
 
     /// What it left out so far.

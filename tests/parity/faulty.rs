@@ -10,6 +10,8 @@ mod normalise;
 mod points;
 #[path = "faulty/rays.rs"]
 mod rays;
+#[path = "faulty/sampler.rs"]
+mod sampler;
 #[path = "faulty/volumes.rs"]
 mod volumes;
 

@@ -30,6 +30,7 @@ use viewfuse_core::photo::sweep::SweepBlock;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay};
+use viewfuse_core::sampler::{Mix, NoiseBlock};
 use viewfuse_core::wanted::WantedBlock;
 use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock};
 
@@ -138,6 +139,10 @@ pub enum Kernel {
     PickDepth,
     /// Rays through the solid. An element is a pixel of the target.
     March,
+    /// Linear combinations of pictures. An element is a channel of a pixel.
+    MixPictures,
+    /// Pictures with noise. An element is a channel of a pixel.
+    AddNoise,
 }
 
 /// What a kernel does with an array.
@@ -209,7 +214,7 @@ type WeightRow = [f32; MOST_WEIGHED];
 
 impl Kernel {
     /// Every kernel, in the order of the data.
-    pub const ALL: [Kernel; 39] = [
+    pub const ALL: [Kernel; 41] = [
         Kernel::Weigh,
         Kernel::EmbedPose,
         Kernel::Attend,
@@ -249,6 +254,8 @@ impl Kernel {
         Kernel::MeanColumn,
         Kernel::PickDepth,
         Kernel::March,
+        Kernel::MixPictures,
+        Kernel::AddNoise,
     ];
 
     /// Name of its entry point, and of the method of a device that runs it.
@@ -293,6 +300,8 @@ impl Kernel {
             Kernel::MeanColumn => "mean_column",
             Kernel::PickDepth => "pick_depth",
             Kernel::March => "march",
+            Kernel::MixPictures => "mix_pictures",
+            Kernel::AddNoise => "add_noise",
         }
     }
 
@@ -451,6 +460,19 @@ impl Kernel {
                     ]
                 }
             }
+            Kernel::MixPictures => {
+                const {
+                    &[
+                        Array::read::<f32>("state"),
+                        Array::read::<f32>("newest"),
+                        Array::read::<f32>("second"),
+                        Array::read::<f32>("third"),
+                        Array::read::<f32>("fourth"),
+                        Array::write::<f32>("mixed"),
+                    ]
+                }
+            }
+            Kernel::AddNoise => const { &[Array::read::<f32>("picture"), Array::write::<f32>("noisy")] },
         }
     }
 
@@ -491,6 +513,8 @@ impl Kernel {
             Kernel::HullEntry => size_of::<u32>(),
             Kernel::MatchCost | Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth => size_of::<SweepBlock>(),
             Kernel::March => size_of::<MarchBlock>(),
+            Kernel::MixPictures => size_of::<Mix>(),
+            Kernel::AddNoise => size_of::<NoiseBlock>(),
         }
     }
 

@@ -17,6 +17,7 @@ pub mod march;
 pub mod match_cost;
 pub mod normalise;
 pub mod pick_depth;
+pub mod pictures;
 pub mod points;
 pub mod rays;
 pub mod resample;
@@ -70,5 +71,7 @@ pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
         Kernel::MeanColumn => visitor.visit::<window::MeanColumn>(),
         Kernel::PickDepth => visitor.visit::<pick_depth::PickDepth>(),
         Kernel::March => visitor.visit::<march::March>(),
+        Kernel::MixPictures => visitor.visit::<pictures::MixPictures>(),
+        Kernel::AddNoise => visitor.visit::<pictures::AddNoise>(),
     }
 }
