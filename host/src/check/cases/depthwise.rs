@@ -44,7 +44,7 @@ pub enum ConvolveDepthwise {}
 
 impl Case for ConvolveDepthwise {
     const KERNEL: Kernel = Kernel::ConvolveDepthwise;
-    const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n summands, as many as places of the window";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[

@@ -65,7 +65,7 @@ pub enum ChannelMeans {}
 
 impl Case for ChannelMeans {
     const KERNEL: Kernel = Kernel::ChannelMeans;
-    const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n pixels, in whatever order, and a division";
     const SPOILERS: &'static [Spoiler<Vec<(MeanBlock, Vec<f32>)>>] =
@@ -117,7 +117,7 @@ pub enum PartMoments {}
 
 impl Case for PartMoments {
     const KERNEL: Kernel = Kernel::PartMoments;
-    const LIMITS: Limits = Limits { tolerance: 5.0, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 2.0, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of n differences from one of the values, a rounding of the \
         mean; n + 3 units of the sum of squares, which is up to 10^4";
     const SPOILERS: &'static [Spoiler<Vec<(NormaliseBlock, Vec<f32>)>>] =
@@ -276,7 +276,7 @@ pub enum Normalise {}
 
 impl Case for Normalise {
     const KERNEL: Kernel = Kernel::Normalise;
-    const LIMITS: Limits = Limits { tolerance: 2.0e-3, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "a difference from the mean, up to 10^3 deviations, two products and a sum; of SiLU an \
         exponential, a sum and a division";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
