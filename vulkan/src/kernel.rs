@@ -5,9 +5,9 @@
 //! test reads it back from the compiled module.
 //!
 //! All arrays are storage buffers of descriptor set 0, numbered in the order given here. An array in [`Layout::Pages`]
-//! takes [`MOST_PAGES`] bindings. Push constants are the kernel's parameters, then the [`Piece`].
-//! The specialisation constant 0, where a kernel binds pages, is the binary logarithm of a page's length, or 0 if all of
-//! the scene lies on first pages: choosing pages is then left out of the pipeline.
+//! takes [`MOST_PAGES`](viewfuse_core::pages::MOST_PAGES) bindings. Push constants are the kernel's parameters, then the
+//! [`Piece`]. The specialisation constant 0, where a kernel binds pages, is the binary logarithm of a page's length, or 0
+//! if all of the scene lies on first pages: choosing pages is then left out of the pipeline.
 
 mod arrays;
 mod parameters;
@@ -15,7 +15,6 @@ mod parameters;
 pub use arrays::{Access, Array, Layout};
 
 use bytemuck::{Pod, Zeroable};
-use viewfuse_core::pages::MOST_PAGES;
 
 /// Invocations of a workgroup, along its only axis.
 pub const WORKGROUP: u32 = 64;
