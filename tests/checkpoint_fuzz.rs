@@ -6,7 +6,7 @@ use peak_alloc::PeakAlloc;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viewfuse::checkpoint::{Checkpoint, OPENING_BYTES};
-use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, state_dict};
+use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, snapshot, state_dict};
 
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
@@ -134,7 +134,8 @@ fn broken_at_random() {
         files.extend([archive(pickle, &claims), legacy(pickle, &claims)]);
     }
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/checkpoints");
-    for name in ["zip.pth", "protocol4.pth", "legacy.pth", "training.pth"] {
+    files.push(snapshot(&claims));
+    for name in ["zip.pth", "protocol4.pth", "legacy.pth", "training.pth", "snapshot.pkl"] {
         files.push(std::fs::read(data.join(name)).expect(name));
     }
     let (_folder, path) = file(b"");
@@ -159,6 +160,16 @@ fn broken_at_random() {
     }
     println!("{tally:?}");
     assert!(tally.opened > ROUNDS / 20 && tally.refused > ROUNDS / 20, "both ways are tried: {tally:?}");
+    // The newest kind once more.
+    let (opened, refused) = (tally.opened, tally.refused);
+    let snapshots = [snapshot(&claims), files[files.len() - 1].clone()];
+    for round in 0..ROUNDS / 5 {
+        let other = &files[random.below(files.len())];
+        attempt(&path, &broken(&snapshots[round as usize % 2], other, &mut random), &mut tally);
+    }
+    let (opened, refused) = (tally.opened - opened, tally.refused - refused);
+    println!("snapshots: {opened} opened, {refused} refused");
+    assert!(opened > ROUNDS / 100 && refused > ROUNDS / 100, "both ways: {opened} opened, {refused} refused");
 
     // Files that are made of what grows most.
     for one in [
@@ -179,6 +190,21 @@ fn broken_at_random() {
         attempt(&path, &archive(&pickle, &[]), &mut tally);
         attempt(&path, &legacy(&pickle, &[]), &mut tally);
     }
+    // The same storage, and modules in modules, as often as a file of that size can say so.
+    let call = Pickle::new().raw(b"}0ctorch.storage\n_load_from_bytes\nq\x01");
+    let call = call.bytes(&legacy(&state_dict(&claims), &claims)).raw(b"\x85q\x02");
+    attempt(&path, &call.raw(&b"h\x01h\x02R".repeat(100_000)).end(), &mut tally);
+    let deep = (0..1000).fold(Pickle::default(), |inner, _| Pickle::default().module(&[], &[("m", inner)]));
+    attempt(&path, &Pickle::new().raw(&deep.0).end(), &mut tally);
+    let names: Vec<String> = (0..1000).map(|number| format!("{number:0>240}")).collect();
+    let one = Pickle::default().module(&claims[2..], &[]);
+    let wide: Vec<(&str, Pickle)> = names.iter().map(|name| (name.as_str(), one.clone())).collect();
+    attempt(&path, &Pickle::new().module(&[], &wide).end(), &mut tally);
+    let again = Pickle::default().raw(b"h\x00");
+    let shared = (0..15).fold(one.raw(b"q\x00"), |inner, _| {
+        Pickle::default().module(&[], &[("a", inner), ("b", again.clone())]).raw(b"q\x00")
+    });
+    attempt(&path, &Pickle::new().raw(&shared.0).end(), &mut tally);
     let many: Vec<Claim> = (0..2000).map(|number| Claim::new(&format!("t{number}"), &[1], &[1.0])).collect();
     attempt(&path, &archive(&state_dict(&many), &many), &mut tally);
     attempt(&path, &legacy(&state_dict(&many), &many), &mut tally);

@@ -6,6 +6,8 @@ mod damage;
 mod malice;
 #[path = "checkpoints/reading.rs"]
 mod reading;
+#[path = "checkpoints/snapshots.rs"]
+mod snapshots;
 #[path = "checkpoints/tensors.rs"]
 mod tensors;
 #[path = "checkpoints/writing.rs"]

@@ -10,6 +10,7 @@ use viewfuse_list::Inputs;
 use viewfuse_list::attended::attention;
 use viewfuse_list::formulas::formulas;
 use viewfuse_list::rig::schemes;
+use viewfuse_list::sampled::sampling;
 use viewfuse_tests::emulator::Emulator;
 use viewfuse_tests::emulator::image::Image;
 use viewfuse_tests::emulator::list::{Difference, Line, compare, gathered, parsed};
@@ -25,7 +26,7 @@ const MOST_BYTES: u64 = 32 * 1024;
 
 /// For size, and for speed.
 const PROFILES: [&str; 2] = ["release", "fast"];
-const PROGRAMS: [&str; 2] = ["formulas", "attention"];
+const PROGRAMS: [&str; 3] = ["formulas", "attention", "samplers"];
 /// Of so many different numbers a list consists at least.
 const LEAST_DIFFERENT: usize = 200;
 
@@ -36,6 +37,7 @@ fn repository() -> PathBuf {
 fn host_list(program: &str, inputs: Inputs) -> Vec<Line> {
     match program {
         "formulas" => gathered(|emit| formulas(inputs, emit)),
+        "samplers" => gathered(|emit| sampling(inputs, emit)),
         _ => gathered(|emit| attention(inputs, emit)),
     }
 }

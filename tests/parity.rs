@@ -106,6 +106,7 @@ fn seed_count(kernel: Kernel) -> u64 {
         Kernel::MaxPool | Kernel::Upsample => 4,
         Kernel::WeighSamples | Kernel::DrawChances | Kernel::MergeDepths => 4,
         Kernel::FineDepths | Kernel::WantedSamples => 8,
+        Kernel::MixPictures | Kernel::AddNoise => 8,
     }
 }
 
@@ -185,7 +186,7 @@ fn every_input_has_a_control() -> Result<(), Failed> {
             Kernel::MergeDepths => false,
             Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
             Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
-            Kernel::FineDepths | Kernel::WantedSamples => true,
+            Kernel::FineDepths | Kernel::WantedSamples | Kernel::MixPictures | Kernel::AddNoise => true,
         };
         if controls.contains(&"parameters") != has_numbers {
             return Err(format!("{}: parameters", kernel.name()).into());

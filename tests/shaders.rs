@@ -19,10 +19,11 @@ use viewfuse_core::pages::StartingAt;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, embedded_value, gathered_value, radiance, visible_weight};
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay, cast_ray, place_point};
+use viewfuse_core::sampler::{Mix, NoiseBlock, noisy_element};
 use viewfuse_core::sources::Sources;
 use viewfuse_core::wanted::{WantedBlock, is_wanted, weigh_sample};
 use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock, weigh};
-use viewfuse_shaders::{Piece, Push, light, points, rays, weighting};
+use viewfuse_shaders::{Piece, Push, light, points, rays, sampler, weighting};
 
 /// What an element holds before anything is written.
 const UNTOUCHED: f32 = -77.0;
@@ -115,6 +116,30 @@ fn light_is_core_s() {
         assert_eq!(*colour, [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity]);
         assert_eq!(*depth, seen.depth);
     }
+}
+
+#[test]
+fn samplers_are_core_s() {
+    let arrays: Vec<Vec<f32>> = (30..35).map(|seed| numbers(seed, 90)).collect();
+    let [state, newest, second, third, fourth] = [0, 1, 2, 3, 4].map(|index| &arrays[index][..]);
+    let mix = Mix { state: 0.7, results: [0.5, -0.25, 0.125, 3.0] };
+    // Not read: nothing of the last.
+    for (mix, fourth) in [(mix, fourth), (Mix { results: [0.5, -0.25, 0.125, 0.0], ..mix }, &[][..])] {
+        let mut mixed = vec![UNTOUCHED; 90];
+        dispatch(mix, 90, |id, push| {
+            sampler::mix_pictures(id, push, state, newest, second, third, fourth, &mut mixed);
+        });
+        let last = |at| fourth.get(at).copied().unwrap_or(f32::NAN);
+        let expected: Vec<f32> =
+            (0..90).map(|at| mix.of(state[at], &[newest[at], second[at], third[at], last(at)])).collect();
+        assert_eq!(mixed, expected);
+    }
+
+    let block = NoiseBlock { seed: [7, 8], stream: 3, scale: 0.5 };
+    let mut noisy = vec![UNTOUCHED; 90];
+    dispatch(block, 90, |id, push| sampler::add_noise(id, push, state, &mut noisy));
+    let expected: Vec<f32> = (0..90).map(|at| noisy_element(&block, state[at as usize], at)).collect();
+    assert_eq!(noisy, expected);
 }
 
 /// Some pixels of a world's target, not in order, and their rays.

@@ -22,6 +22,8 @@ mod memory;
 mod picture;
 #[path = "vulkan/pixelnerf.rs"]
 mod pixelnerf;
+#[path = "vulkan/sampling.rs"]
+mod sampling;
 #[path = "vulkan/time.rs"]
 mod time;
 #[path = "vulkan/transfers.rs"]
@@ -61,6 +63,7 @@ fn main() -> ExitCode {
         layers::TESTS,
         picture::TESTS,
         pixelnerf::TESTS,
+        sampling::TESTS,
         limits::TESTS,
     ]
     .concat()

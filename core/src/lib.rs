@@ -22,6 +22,7 @@
 //! pixelnerf         a point in, radiance out                      embedded_value, gathered_value, radiance
 //! genvs             volumes of features become a feature image    VolumePlace, weigh_features, denoiser_input
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
+//! sampler           ... with few calls of the denoiser            Sampler, Mix, History, Churn, verdict
 //! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
 //! ```
@@ -47,6 +48,7 @@ pub mod pixelnerf;
 pub mod pose;
 pub mod random;
 pub mod rays;
+pub mod sampler;
 pub mod schedule;
 pub mod sources;
 pub mod wanted;

@@ -1,12 +1,12 @@
 //! Files of network parameters: named tensors.
 //!
 //! Opening a file reads what it says about its tensors, not the tensors: names and shapes are checked against an
-//! architecture before anything large is allocated. Read are safetensors and what PyTorch's `torch.save` writes of a
-//! `state_dict`, in its zip archives and in its older format; which of them it is, the content decides. No code in a
-//! file is ever executed: see [`pickle`].
+//! architecture before anything large is allocated. Read are safetensors, what PyTorch's `torch.save` writes, in its zip
+//! archives and in its older format, and networks that Python's `pickle` wrote, as the snapshots of EDM's training are;
+//! which of them it is, the content decides. No code in a file is ever executed: see [`pickle`].
 //!
-//! A `state_dict` is looked for at the top of the file and under [`PLACES`]; a `module.` in front of every name, from
-//! training on several GPUs, is taken off.
+//! A `state_dict`, or a network itself, is looked for at the top of the file and under [`PLACES`]; a `module.` in front
+//! of every name, from training on several GPUs, is taken off.
 //!
 //! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of what the file says about its
 //! tensors; reading takes what [`Checkpoint::byte_estimate`] says, which is known before and limited by
@@ -19,9 +19,12 @@ mod error;
 pub mod input;
 mod kind;
 mod legacy;
+mod modules;
 pub mod pickle;
 mod place;
 mod safe;
+mod sizes;
+mod snapshot;
 mod state_dict;
 mod write;
 
@@ -29,6 +32,7 @@ pub use element::Element;
 pub use error::CheckpointError;
 pub use kind::Kind;
 pub use place::{LARGEST_TENSOR_BYTES, LARGEST_TOTAL_BYTES};
+pub use sizes::{LARGEST_SIZE, Sizes};
 pub use state_dict::PLACES;
 pub use write::{Precision, Written};
 
@@ -39,8 +43,8 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Memory that opening a file takes at most, in bytes.
-pub const OPENING_BYTES: u64 = 2 * pickle::PICKLE_BYTES;
+/// Memory that opening a file takes at most, in bytes: for the pickles that are there at once.
+pub const OPENING_BYTES: u64 = 3 * pickle::PICKLE_BYTES;
 
 /// A tensor that an architecture has.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -64,10 +68,20 @@ pub struct Checkpoint {
 /// Where the values are.
 #[derive(Debug)]
 enum Content {
-    /// Here.
-    Memory(BTreeMap<String, Vec<f32>>),
+    /// Nowhere: they are computed whenever they are asked for.
+    Computed(Formula),
     /// In the file, which readers use one after another: they move its cursor.
     File(Mutex<File>, Places),
+}
+
+/// What computes the values of a tensor.
+type Values = dyn Fn(&TensorShape) -> Vec<f32> + Send + Sync;
+struct Formula(Box<Values>);
+
+impl std::fmt::Debug for Formula {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Formula")
+    }
 }
 
 impl Checkpoint {
@@ -87,9 +101,12 @@ impl Checkpoint {
             let mut origin = kind.name().to_owned();
             let (places, metadata) = match kind {
                 Kind::Safetensors => safe::open(&file, facts.len())?,
-                Kind::TorchZip | Kind::TorchLegacy => {
-                    let open = if kind == Kind::TorchZip { archive::open } else { legacy::open };
-                    let (found, places) = open(&file, facts.len())?;
+                Kind::TorchZip | Kind::TorchLegacy | Kind::Snapshot => {
+                    let (found, places) = match kind {
+                        Kind::TorchZip => archive::open(&file, facts.len())?,
+                        Kind::Snapshot => snapshot::open(&file, facts.len())?,
+                        _ => legacy::open(&file, facts.len())?,
+                    };
                     origin.extend(found.place.map(|place| format!("; under '{place}'")));
                     if !found.prefix.is_empty() {
                         origin.push_str(&format!("; without the '{}' in front of every name", found.prefix));
@@ -118,13 +135,27 @@ impl Checkpoint {
         tensors: impl IntoIterator<Item = (TensorShape, Vec<f32>)>,
         metadata: BTreeMap<String, String>,
     ) -> Checkpoint {
-        let (mut shapes, mut values) = (BTreeMap::new(), BTreeMap::new());
-        for (TensorShape { name, shape }, numbers) in tensors {
-            shapes.insert(name.clone(), shape);
-            values.insert(name, numbers);
+        let (shapes, values): (Vec<_>, BTreeMap<_, _>) =
+            tensors.into_iter().map(|(tensor, values)| (tensor.clone(), (tensor.name, values))).unzip();
+        let values = move |tensor: &TensorShape| values.get(&tensor.name).cloned().unwrap_or_default();
+        Checkpoint::computed(label, shapes, metadata, values)
+    }
+
+    /// A checkpoint without values of its own: `values` computes a tensor each time that it is read. `label` takes the
+    /// place of its path in messages.
+    pub fn computed(
+        label: &str,
+        tensors: impl IntoIterator<Item = TensorShape>,
+        metadata: BTreeMap<String, String>,
+        values: impl Fn(&TensorShape) -> Vec<f32> + Send + Sync + 'static,
+    ) -> Checkpoint {
+        Checkpoint {
+            path: PathBuf::from(label),
+            origin: "computed".to_owned(),
+            shapes: tensors.into_iter().map(|TensorShape { name, shape }| (name, shape)).collect(),
+            metadata,
+            content: Content::Computed(Formula(Box::new(values))),
         }
-        let origin = "computed".to_owned();
-        Checkpoint { path: PathBuf::from(label), origin, shapes, metadata, content: Content::Memory(values) }
     }
 
     /// The file, for messages.
@@ -145,7 +176,7 @@ impl Checkpoint {
     /// The type in which it holds the elements of a tensor.
     pub fn element(&self, name: &str) -> Option<Element> {
         match &self.content {
-            Content::Memory(values) => values.get(name).map(|_| Element::F32),
+            Content::Computed(_) => self.shapes.get(name).map(|_| Element::F32),
             Content::File(_, places) => places.get(name).map(|place| place.element),
         }
     }
@@ -163,9 +194,10 @@ impl Checkpoint {
         for name in names {
             let count = self.shapes.get(name).and_then(|shape| element_count(shape)).unwrap_or(0);
             kept = kept.saturating_add(count.saturating_mul(4));
-            if let Content::File(_, places) = &self.content {
-                working = working.max(places.get(name).map_or(0, Place::working_bytes));
-            }
+            working = working.max(match &self.content {
+                Content::Computed(_) => count.saturating_mul(4),
+                Content::File(_, places) => places.get(name).map_or(0, Place::working_bytes),
+            });
         }
         kept.saturating_add(working)
     }
@@ -214,9 +246,10 @@ impl Checkpoint {
     ) -> Result<(), CheckpointError> {
         let none = || CheckpointError::NoTensor { path: self.path.clone(), tensor: shortened(name) };
         match &self.content {
-            Content::Memory(values) => {
-                let values = values.get(name).ok_or_else(none)?;
-                if self.shapes.get(name).and_then(|shape| element_count(shape)) != Some(values.len() as u64) {
+            Content::Computed(Formula(compute)) => {
+                let shape = self.shapes.get(name).ok_or_else(none)?;
+                let values = compute(&TensorShape { name: name.to_owned(), shape: shape.clone() });
+                if element_count(shape) != Some(values.len() as u64) {
                     return Err(CheckpointError::Content {
                         path: self.path.clone(),
                         what: format!(

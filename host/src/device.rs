@@ -12,6 +12,6 @@ pub mod vulkan;
 
 pub use kernels::{
     Device, Layer, LayerShape, LightKernels, MatrixKernels, NetworkKernels, NormaliseKernels, PhotoKernels, PhotoScene,
-    Pixels, PointKernels, RayKernels, Rays, VolumeKernels, WeightingKernels,
+    Pixels, PointKernels, RayKernels, Rays, SamplerKernels, VolumeKernels, WeightingKernels,
 };
 pub use memory::{Element, KernelTime, Memory};

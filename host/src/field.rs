@@ -3,14 +3,19 @@
 //! A field turns prepared photographs into latents and latents into a target's picture. The renderer knows no more
 //! about it than this trait; the weight-free field ([`photo`]) is the first, networks are further ones.
 
+pub mod finite;
+pub mod genvs;
 pub mod photo;
 pub mod pixelnerf;
+mod resnet;
 
+use crate::checkpoint::CheckpointError;
 use crate::device::Device;
 use crate::interrupt::Interrupted;
 use crate::photographs::SourceImages;
 use crate::progress::Progress;
 use crate::sources::SourceWeights;
+use finite::NotFinite;
 use viewfuse_core::camera::Camera;
 
 /// Why a field could not make a picture.
@@ -22,6 +27,12 @@ pub enum FieldError<E: std::error::Error> {
     /// The device failed.
     #[error("the device failed")]
     Device(#[source] E),
+    /// The network's parameters could not be read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A number that is none came up inside.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
     /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),

@@ -6,6 +6,8 @@ mod network;
 mod points;
 #[path = "faulty/rays.rs"]
 mod rays;
+#[path = "faulty/sampler.rs"]
+mod sampler;
 
 use std::convert::Infallible;
 use std::ops::Range;

@@ -80,17 +80,48 @@ impl Pickle {
     /// Pushes a tensor.
     pub fn tensor(self, claim: &Claim) -> Pickle {
         self.global("torch._utils", "_rebuild_tensor_v2")
-            .raw(b"((")
-            .text("storage")
-            .global("torch", claim.class)
-            .text(&claim.key)
-            .text("cpu")
-            .int(claim.count)
-            .raw(b"tQ")
+            .raw(b"(")
+            .storage(claim)
             .int(claim.first)
             .tuple(&claim.shape)
             .tuple(&claim.strides)
             .raw(b"\x89ccollections\nOrderedDict\n)RtR")
+    }
+
+    /// Pushes a tensor whose storage is a file within this file.
+    pub fn nested_tensor(self, claim: &Claim) -> Pickle {
+        let storage = legacy(&Pickle::new().storage(claim).end(), std::slice::from_ref(claim));
+        self.global("torch._utils", "_rebuild_tensor_v2")
+            .raw(b"(")
+            .global("torch.storage", "_load_from_bytes")
+            .bytes(&storage)
+            .raw(b"\x85R")
+            .int(claim.first)
+            .tuple(&claim.shape)
+            .tuple(&claim.strides)
+            .raw(b"\x89ccollections\nOrderedDict\n)RtR")
+    }
+
+    /// Pushes a storage that stands outside.
+    fn storage(self, claim: &Claim) -> Pickle {
+        let named = self.raw(b"(").text("storage").global("torch", claim.class).text(&claim.key);
+        named.text("cpu").int(claim.count).raw(b"tQ")
+    }
+
+    /// Pushes bytes.
+    pub fn bytes(self, bytes: &[u8]) -> Pickle {
+        self.raw(b"B").raw(&(bytes.len() as u32).to_le_bytes()).raw(bytes)
+    }
+
+    /// Pushes a module with these parameters, whose storages are files within this file, and with these modules in it.
+    pub fn module(self, parameters: &[Claim], modules: &[(&str, Pickle)]) -> Pickle {
+        let start = self.global("nets", "Net").raw(b")\x81}(").text("training").raw(b"\x88").text("_parameters");
+        let filled = parameters
+            .iter()
+            .fold(start.raw(b"}("), |pickle, claim| pickle.text(&claim.name).nested_tensor(claim))
+            .raw(b"u");
+        let between = filled.text("_buffers").raw(b"}").text("_modules").raw(b"}(");
+        modules.iter().fold(between, |pickle, (name, module)| pickle.text(name).raw(&module.0)).raw(b"uub")
     }
 
     /// Pushes a `state_dict`.
@@ -186,6 +217,12 @@ pub fn legacy_of(little_endian: bool, pickle: &[u8], claims: &[Claim]) -> Vec<u8
         file.extend(&claim.bytes);
     }
     file
+}
+
+/// A file as EDM's training writes it: a network with these parameters, and something beside it.
+pub fn snapshot(claims: &[Claim]) -> Vec<u8> {
+    let table = Pickle::new().raw(b"}(").text("ema").module(claims, &[]);
+    table.text("dataset_kwargs").raw(b"}u").end()
 }
 
 /// A safetensors file with this header.

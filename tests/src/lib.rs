@@ -6,5 +6,6 @@ pub mod checkpoints;
 pub mod command;
 pub mod contract;
 pub mod emulator;
+pub mod mixture;
 pub mod module;
 pub mod scenes;

@@ -121,11 +121,15 @@ pub enum Kernel {
     PickDepth,
     /// Rays through the solid. An element is a pixel of the target.
     March,
+    /// Linear combinations of pictures. An element is a channel of a pixel.
+    MixPictures,
+    /// Pictures with noise. An element is a channel of a pixel.
+    AddNoise,
 }
 
 impl Kernel {
     /// Every kernel, in the order of the data.
-    pub const ALL: [Kernel; 39] = [
+    pub const ALL: [Kernel; 41] = [
         Kernel::Weigh,
         Kernel::EmbedPose,
         Kernel::Attend,
@@ -165,6 +169,8 @@ impl Kernel {
         Kernel::MeanColumn,
         Kernel::PickDepth,
         Kernel::March,
+        Kernel::MixPictures,
+        Kernel::AddNoise,
     ];
 
     /// Name of its entry point, and of the method of a device that runs it.
@@ -209,6 +215,8 @@ impl Kernel {
             Kernel::MeanColumn => "mean_column",
             Kernel::PickDepth => "pick_depth",
             Kernel::March => "march",
+            Kernel::MixPictures => "mix_pictures",
+            Kernel::AddNoise => "add_noise",
         }
     }
 

@@ -12,6 +12,7 @@ pub mod layers;
 pub mod march;
 pub mod match_cost;
 pub mod pick_depth;
+pub mod pictures;
 pub mod points;
 pub mod rays;
 pub mod resample;
@@ -52,6 +53,8 @@ pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
         Kernel::MeanColumn => visitor.visit::<window::MeanColumn>(),
         Kernel::PickDepth => visitor.visit::<pick_depth::PickDepth>(),
         Kernel::March => visitor.visit::<march::March>(),
+        Kernel::MixPictures => visitor.visit::<pictures::MixPictures>(),
+        Kernel::AddNoise => visitor.visit::<pictures::AddNoise>(),
         // Written next.
         _ => visitor.visit::<march::March>(),
     }

@@ -41,15 +41,21 @@ pub fn coarse_depth(ray: &TargetRay, pixel: u32, sample: u32, block: &CoarseBloc
 
 /// The random numbers of a fine sample.
 pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [Bounded; 2] {
-    let [first, second] = uniform_pair(block.seed, pixel, block.coarse_count + index);
     if index < block.importance_count {
+        let [first, second] = uniform_pair(block.seed, pixel, block.coarse_count + index);
         let place = (Bounded::from(index) + first.into()) / Bounded::from(block.importance_count);
         return [place, second.into()];
     }
+    [normal(block.seed, pixel, block.coarse_count + index), Bounded::ZERO]
+}
+
+/// A normally distributed random number.
+pub fn normal(seed: [u32; 2], pixel: u32, sample: u32) -> Bounded {
+    let [first, second] = uniform_pair(seed, pixel, sample);
     // A multiple of 2^-24 below 1 is subtracted from 1 exactly.
     let radius = (-Bounded::from(2.0) * Bounded::from(1.0 - first).ln()).square_root();
     let turn = Bounded { value: TAU, error: (TAU - f64::from(std::f32::consts::TAU)).abs() };
-    [radius * (turn * second.into()).cosine(), Bounded::ZERO]
+    radius * (turn * second.into()).cosine()
 }
 
 /// Depth of a fine sample; `seen[part]` is weight and transmittance. `None` where rounding decides which part it is.

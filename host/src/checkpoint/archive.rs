@@ -47,7 +47,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Prob
         return Err(Problem::Content(format!("has no entry {folder}data.pkl")));
     };
     let pickle = Pickle::read(&mut Input::new(file, start, start + length)?)?;
-    let found = state_dict::find(&pickle).map_err(Problem::Content)?;
+    let found = state_dict::find(&pickle, &|id| state_dict::storage(&pickle, id)).map_err(Problem::Content)?;
     let mut places = Places::new();
     for (name, claim) in &found.claims {
         let wrong = |what: String| Problem::Content(format!("tensor '{}': {what}", shortened(name)));

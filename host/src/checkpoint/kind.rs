@@ -1,6 +1,7 @@
 //! What a file is, by its first bytes, whatever its name.
 
 use super::error::Problem;
+use super::legacy;
 use std::fs::File;
 use std::io::{Read, Seek};
 
@@ -13,10 +14,14 @@ pub enum Kind {
     TorchZip,
     /// What it wrote before.
     TorchLegacy,
+    /// A network that Python's own `pickle` wrote, as an object.
+    Snapshot,
 }
 
 /// As much as the header of a tar archive takes.
 const LOOK: u64 = 512;
+/// How far into a file PyTorch's old magic number ends.
+const MAGIC_WITHIN: usize = 32;
 /// Where such a header names itself, and how.
 const TAR: (usize, &[u8]) = (257, b"ustar");
 
@@ -27,6 +32,7 @@ impl Kind {
             Kind::Safetensors => "safetensors",
             Kind::TorchZip => "PyTorch, zip",
             Kind::TorchLegacy => "PyTorch, before 1.6",
+            Kind::Snapshot => "pickled network",
         }
     }
 
@@ -43,7 +49,10 @@ impl Kind {
             return Ok(Kind::Safetensors);
         }
         if start.first() == Some(&0x80) {
-            return Ok(Kind::TorchLegacy);
+            // Whatever the pickle's protocol, the magic number is among its first opcodes.
+            let first = &start[..start.len().min(MAGIC_WITHIN)];
+            let is_legacy = first.windows(legacy::MAGIC.len()).any(|bytes| bytes == legacy::MAGIC);
+            return Ok(if is_legacy { Kind::TorchLegacy } else { Kind::Snapshot });
         }
         Err(Problem::NoCheckpoint(match () {
             () if start.is_empty() => "the file is empty; was the download complete?".to_owned(),

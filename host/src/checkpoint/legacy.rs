@@ -10,29 +10,16 @@ use std::collections::HashMap;
 use std::fs::File;
 
 /// The magic number 0x1950a86a20f9469cfc6c as pickles hold it.
-const MAGIC: [u8; 10] = [0x6c, 0xfc, 0x9c, 0x46, 0xf9, 0x20, 0x6a, 0xa8, 0x50, 0x19];
+pub(super) const MAGIC: [u8; 10] = [0x6c, 0xfc, 0x9c, 0x46, 0xf9, 0x20, 0x6a, 0xa8, 0x50, 0x19];
 /// The only version there ever was.
 const VERSION: i64 = 1001;
 
 /// Opens the file.
 pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Problem> {
     let mut input = Input::new(file, 0, length)?;
-    let magic = Pickle::read(&mut input)?;
-    if magic.wide(magic.root()) != Some(&MAGIC) {
-        return Err(Problem::NoCheckpoint(
-            "a pickle that torch.save did not write; in PyTorch, load it and save its state_dict with torch.save"
-                .to_owned(),
-        ));
-    }
-    let version = Pickle::read(&mut input)?;
-    if version.integer(version.root()) != Some(VERSION) {
-        return Err(Problem::Content(format!("is of another version than {VERSION} of PyTorch's old format")));
-    }
-    check_machine(&Pickle::read(&mut input)?)?;
-    let pickle = Pickle::read(&mut input)?;
-    let keys = Pickle::read(&mut input)?;
-    let storages = lay_out(&pickle, &keys, &mut input, length)?;
-    let found = state_dict::find(&pickle).map_err(Problem::Content)?;
+    let pickle = description(&mut input)?;
+    let storages = lay_out(&pickle, &mut input, length)?;
+    let found = state_dict::find(&pickle, &|id| state_dict::storage(&pickle, id)).map_err(Problem::Content)?;
     let mut places = Places::new();
     for (name, claim) in &found.claims {
         let wrong = |what: String| Problem::Content(format!("tensor '{}': {what}", shortened(name)));
@@ -43,6 +30,22 @@ pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Prob
         places.insert(name.clone(), Place::of(&shortened(name), claim, storage, start, available)?);
     }
     Ok((found, places))
+}
+
+/// The description, behind what every file of this format begins with.
+pub(super) fn description(input: &mut Input<'_>) -> Result<Pickle, Problem> {
+    let magic = Pickle::read(input)?;
+    if magic.wide(magic.root()) != Some(&MAGIC) {
+        return Err(Problem::Content("does not begin as files of torch.save do".to_owned()));
+    }
+    drop(magic);
+    let version = Pickle::read(input)?;
+    if version.integer(version.root()) != Some(VERSION) {
+        return Err(Problem::Content(format!("is of another version than {VERSION} of PyTorch's old format")));
+    }
+    drop(version);
+    check_machine(&Pickle::read(input)?)?;
+    Ok(Pickle::read(input)?)
 }
 
 /// Refuses numbers in another byte order.
@@ -59,13 +62,14 @@ fn check_machine(machine: &Pickle) -> Result<(), Problem> {
     }
 }
 
-/// Offset and length in the file of each storage, in the order of their keys.
-fn lay_out<'a>(
+/// Offset and length in the file of each storage that a description names. `input` stands behind the description, in
+/// front of the list of the storages' keys; the storages end at offset `end`.
+pub(super) fn lay_out<'a>(
     pickle: &'a Pickle,
-    keys: &Pickle,
     input: &mut Input<'_>,
-    length: u64,
+    end: u64,
 ) -> Result<HashMap<&'a str, (u64, u64)>, Problem> {
+    let keys = Pickle::read(input)?;
     let mut described = HashMap::new();
     for storage in state_dict::storages(pickle).map_err(Problem::Content)? {
         let size = (storage.count, storage.element_size());
@@ -85,7 +89,7 @@ fn lay_out<'a>(
         let begin = input.position();
         let cut_off = |_| {
             wrong(format!(
-                "{count} elements of {size} bytes are to begin at byte {begin}, but the file has {length} bytes; it is \
+                "{count} elements of {size} bytes do not fit between byte {begin} and byte {end}, where it ends; it is \
                  cut off or damaged"
             ))
         };

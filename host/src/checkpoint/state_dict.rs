@@ -2,10 +2,12 @@
 //!
 //! Only a few names have a meaning here: `collections.OrderedDict`, the functions of `torch._utils` that put a tensor
 //! or a parameter together, `torch.Size`, and the classes of storages. Everything else (optimizers, schedulers, a
-//! class of somebody's own, `os.system`) may stand in the file and means nothing.
+//! class of somebody's own, `os.system`) may stand in the file and means nothing. In place of a `state_dict` may stand
+//! the network itself, as an object: see [`modules`].
 
 use super::element::Element;
 use super::error::shortened;
+use super::modules;
 use super::pickle::{Id, Object, Pickle, Value};
 use std::collections::{BTreeMap, HashSet};
 
@@ -37,7 +39,7 @@ pub(super) struct StateDict {
 /// What a tensor is, as far as the pickle says. Nothing of it is checked against the file yet.
 #[derive(Debug)]
 pub(super) struct Claim {
-    /// The identity of its storage: see [`storage`].
+    /// What stands for its storage: see [`storage`].
     pub(super) storage: Id,
     /// The type of its elements.
     pub(super) element: Element,
@@ -67,38 +69,37 @@ impl Storage<'_> {
     }
 }
 
+/// What a tensor's storage is, by the value that stands for it.
+pub(super) type StorageOf<'a> = dyn Fn(Id) -> Result<Storage<'a>, String> + 'a;
+
 /// Finds the `state_dict`.
 ///
 /// # Errors
 /// What is wrong: with which key or tensor, and how.
-pub(super) fn find(pickle: &Pickle) -> Result<StateDict, String> {
-    let root = entries(pickle, pickle.root()).ok_or_else(|| match pickle.object(pickle.root()) {
-        Some(object) => {
-            format!("holds an object ({}), not a table of named tensors; {RESAVE}", class_of(pickle, object))
-        }
-        None => format!("holds no table of named tensors; {RESAVE}"),
-    })?;
-    let at_root = root.iter().any(|&(_, value)| is_tensor(pickle, value));
+pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateDict, String> {
+    let root = pickle.root();
+    let holds_tensors = |id: Id| {
+        entries(pickle, id).is_some_and(|table| table.iter().any(|&(_, value)| is_tensor(pickle, value)))
+            || modules::is_module(pickle, id)
+    };
+    let table = entries(pickle, root).unwrap_or_default();
     let inner = PLACES.iter().find_map(|&place| {
         // Python takes the last of several values of one key.
-        let (_, value) = root.iter().rev().find(|&&(key, _)| pickle.text(key) == Some(place))?;
-        let inner = entries(pickle, *value)?;
-        inner.iter().any(|&(_, value)| is_tensor(pickle, value)).then_some((place, inner))
+        let (_, value) = table.iter().rev().find(|&&(key, _)| pickle.text(key) == Some(place))?;
+        holds_tensors(*value).then_some((place, *value))
     });
-    let (place, table) = match (at_root, inner) {
+    let (place, found) = match (holds_tensors(root), inner) {
         (true, Some((place, _))) => {
             return Err(format!(
                 "holds tensors at its top and also under '{place}', so it is not clear which are meant; {RESAVE}"
             ));
         }
-        (true, None) => (None, root.clone()),
+        (true, None) => (None, root),
         (false, Some((place, inner))) => (Some(place), inner),
-        (false, None) => return Err(format!("holds no tensors where they are looked for: {}", keys_of(pickle, &root))),
+        (false, None) => return Err(no_tensors(pickle)),
     };
     let mut claims = BTreeMap::new();
-    for (key, value) in table {
-        let Some(claim) = claim(pickle, value, key)? else { continue };
-        let name = pickle.text(key).ok_or("holds a tensor under a key that is no text")?;
+    let mut keep = |name: &str, claim: Claim| {
         if name.is_empty() {
             return Err("holds a tensor without a name".to_owned());
         }
@@ -108,13 +109,26 @@ pub(super) fn find(pickle: &Pickle) -> Result<StateDict, String> {
         if claims.len() > MOST_TENSORS {
             return Err(format!("holds more than {MOST_TENSORS} tensors, which no network here has"));
         }
+        Ok(())
+    };
+    if modules::is_module(pickle, found) {
+        modules::each_tensor(pickle, found, &mut |name, value| match claim(pickle, value, name, storage_of)? {
+            Some(claim) => keep(name, claim),
+            None => Err(format!("holds '{}' where a tensor is to be, which is none", shortened(name))),
+        })?;
+    } else {
+        for (key, value) in entries(pickle, found).unwrap_or_default() {
+            let name = pickle.text(key);
+            let Some(claim) = claim(pickle, value, name.unwrap_or("?"), storage_of)? else { continue };
+            keep(name.ok_or("holds a tensor under a key that is no text")?, claim)?;
+        }
     }
     let mut prefix = "";
     if claims.keys().all(|name| name.len() > PARALLEL_PREFIX.len() && name.starts_with(PARALLEL_PREFIX)) {
         prefix = PARALLEL_PREFIX;
         claims = claims.into_iter().map(|(name, claim)| (name[prefix.len()..].to_owned(), claim)).collect();
     }
-    Ok(StateDict { place, prefix, claims, settings: settings(pickle, &root) })
+    Ok(StateDict { place, prefix, claims, settings: settings(pickle, &table) })
 }
 
 const RESAVE: &str = "in PyTorch, save model.state_dict() and use that file";
@@ -128,14 +142,25 @@ pub(super) fn storages(pickle: &Pickle) -> Result<Vec<Storage<'_>>, String> {
         Value::Persistent(identity) => Some(*identity),
         _ => None,
     });
-    persistent.map(|identity| storage(pickle, identity)).collect()
+    persistent.map(|identity| identified(pickle, identity)).collect()
 }
 
-/// What the identity of a storage says: `('storage', class, key, device, element count)`.
+/// A storage that stands outside of its pickle.
 ///
 /// # Errors
 /// What about it is not understood.
-pub(super) fn storage(pickle: &Pickle, identity: Id) -> Result<Storage<'_>, String> {
+pub(super) fn storage(pickle: &Pickle, id: Id) -> Result<Storage<'_>, String> {
+    match *pickle.value(id) {
+        Value::Persistent(identity) => identified(pickle, identity),
+        _ => Err(NO_STORAGE.to_owned()),
+    }
+}
+
+/// What is said of a value that should stand for a storage and does not.
+pub(super) const NO_STORAGE: &str = "has no storage; the file is damaged, or it is no file of torch.save";
+
+/// What the identity of a storage says: `('storage', class, key, device, element count)`.
+fn identified(pickle: &Pickle, identity: Id) -> Result<Storage<'_>, String> {
     let unknown = || "refers to something stored outside its description that is no storage of tensors".to_owned();
     let fields = pickle.sequence(identity).ok_or_else(unknown)?;
     let [tag, class, key, _device, count, view @ ..] = fields else { return Err(unknown()) };
@@ -194,10 +219,9 @@ fn is_tensor(pickle: &Pickle, id: Id) -> bool {
     tensor_call(pickle, id).is_some()
 }
 
-fn claim(pickle: &Pickle, id: Id, key: Id) -> Result<Option<Claim>, String> {
+fn claim(pickle: &Pickle, id: Id, name: &str, storage_of: &StorageOf<'_>) -> Result<Option<Claim>, String> {
     let Some((object, function)) = tensor_call(pickle, id) else { return Ok(None) };
-    let name = shortened(pickle.text(key).unwrap_or("?"));
-    let wrong = |what: &str| format!("tensor '{name}': {what}");
+    let wrong = |what: &str| format!("tensor '{}': {what}", shortened(name));
     if !matches!(function, "_rebuild_tensor" | "_rebuild_tensor_v2" | "_rebuild_tensor_v3") {
         return Err(wrong(&format!("is of a kind that is not read (torch._utils.{})", shortened(function))));
     }
@@ -205,10 +229,7 @@ fn claim(pickle: &Pickle, id: Id, key: Id) -> Result<Option<Claim>, String> {
     let [from, first, shape, strides, more @ ..] = pickle.sequence(object.arguments).ok_or_else(malformed)? else {
         return Err(malformed());
     };
-    let Value::Persistent(identity) = *pickle.value(*from) else {
-        return Err(wrong("has no storage; the file is damaged, or it is no file of torch.save"));
-    };
-    let stored = storage(pickle, identity).map_err(|what| wrong(&what))?;
+    let stored = storage_of(*from).map_err(|what| wrong(&what))?;
     let element = match (function, more) {
         ("_rebuild_tensor_v3", [_, _, element, ..]) => {
             let (_, element) = pickle.global(*element).ok_or_else(malformed)?;
@@ -225,7 +246,7 @@ fn claim(pickle: &Pickle, id: Id, key: Id) -> Result<Option<Claim>, String> {
     if shape.len() != strides.len() {
         return Err(malformed());
     }
-    Ok(Some(Claim { storage: identity, element, first, shape, strides }))
+    Ok(Some(Claim { storage: *from, element, first, shape, strides }))
 }
 
 /// A tuple of numbers, or a `torch.Size` of one.
@@ -258,7 +279,19 @@ fn settings(pickle: &Pickle, root: &[(Id, Id)]) -> BTreeMap<String, String> {
     root.iter().filter_map(setting).take(MOST_SETTINGS).collect()
 }
 
-fn class_of(pickle: &Pickle, object: &Object) -> String {
+/// Why there is no `state_dict` in a pickle.
+fn no_tensors(pickle: &Pickle) -> String {
+    match (entries(pickle, pickle.root()), pickle.object(pickle.root())) {
+        (Some(table), _) => format!("holds no tensors where they are looked for: {}", keys_of(pickle, &table)),
+        (None, Some(object)) => {
+            format!("holds an object ({}), not a table of named tensors; {RESAVE}", class_of(pickle, object))
+        }
+        (None, None) => format!("holds no table of named tensors; {RESAVE}"),
+    }
+}
+
+/// The class of an object, for messages.
+pub(super) fn class_of(pickle: &Pickle, object: &Object) -> String {
     // Classes of somebody's own are made through helpers whose first argument is the class.
     let first = pickle.sequence(object.arguments).and_then(|arguments| arguments.first());
     let helper = pickle.global(object.callable);

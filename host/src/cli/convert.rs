@@ -11,7 +11,8 @@ use viewfuse::files::check_writable;
 
 #[derive(Args)]
 #[command(after_help = "Example:\n  viewfuse convert pixel_nerf_latest pixelnerf.safetensors --half\n\n\
-    Read are safetensors and what torch.save writes of a state_dict, new and old. Nothing in a file is executed.")]
+    Read are safetensors, what torch.save writes, new and old, and networks that Python's pickle wrote (.pkl), such as \
+    snapshots of EDM's training. Nothing in a file is executed.")]
 pub(crate) struct Arguments {
     /// The checkpoint
     input: PathBuf,

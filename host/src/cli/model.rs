@@ -8,6 +8,7 @@ use std::str::FromStr;
 use viewfuse::checkpoint::Checkpoint;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::Field;
+use viewfuse::field::genvs;
 use viewfuse::field::photo::PhotoField;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, made};
 
@@ -26,17 +27,19 @@ pub(crate) enum Model {
     Formula(Option<u16>),
     /// A solid body, for measuring.
     Body(Option<u16>),
+    /// GeNVS, computed from the tensors' names: the small member of its family, or the published size.
+    Genvs { small: bool },
 }
 
 impl FromStr for Model {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Model, String> {
-        let (name, width) = match text.split_once(':') {
-            Some((name, width)) => (name, Some(width)),
+        let (name, size) = match text.split_once(':') {
+            Some((name, size)) => (name, Some(size)),
             None => (text, None),
         };
-        let width = || match width.map(str::parse::<u16>) {
+        let width = || match size.map(str::parse::<u16>) {
             None => Ok(None),
             Some(Ok(width)) if (8..=2048).contains(&width) && width % 8 == 0 => Ok(Some(width)),
             Some(_) => Err(format!("'{text}': a width is a multiple of 8 from 8 to 2048")),
@@ -44,6 +47,11 @@ impl FromStr for Model {
         match name {
             "formula" => Ok(Model::Formula(width()?)),
             "body" => Ok(Model::Body(width()?)),
+            "genvs" => match size {
+                None => Ok(Model::Genvs { small: false }),
+                Some("small") => Ok(Model::Genvs { small: true }),
+                Some(_) => Err(format!("'{text}': there is genvs, of the published size, and genvs:small")),
+            },
             _ => Ok(Model::File(PathBuf::from(text))),
         }
     }
@@ -55,6 +63,7 @@ impl fmt::Display for Model {
             Model::File(path) => return write!(f, "{}", path.display()),
             Model::Formula(width) => ("formula", width),
             Model::Body(width) => ("body", width),
+            Model::Genvs { small } => return f.write_str(if *small { "genvs:small" } else { "genvs" }),
         };
         match width {
             Some(width) => write!(f, "{name}:{width}"),
@@ -74,6 +83,8 @@ impl Model {
             Model::File(path) => Checkpoint::open(path)?,
             Model::Formula(width) => made::by_formula(&sizes(width)),
             Model::Body(width) => made::body(&sizes(width)),
+            Model::Genvs { small: true } => genvs::made::by_formula(&genvs::Architecture::small()),
+            Model::Genvs { small: false } => genvs::made::by_formula(&genvs::Architecture::published()),
         })
     }
 }
@@ -212,5 +223,24 @@ fn parse_near_far(text: &str) -> Result<[f32; 2], String> {
     match ends.as_deref() {
         Some(&[near, far]) if near >= 0.0 && near < far && far.is_finite() => Ok([near, far]),
         _ => Err("two distances, for example 0.8,1.8, the first at least 0 and less than the second".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Model;
+
+    #[test]
+    fn models_by_name() {
+        for text in ["formula", "formula:64", "body", "body:16", "genvs", "genvs:small", "network-snapshot-005000.pkl"]
+        {
+            let model: Model = text.parse().expect(text);
+            assert_eq!(model.to_string(), text);
+            assert_eq!(matches!(model, Model::File(_)), text.ends_with(".pkl"));
+        }
+        for text in ["formula:7", "body:", "genvs:", "genvs:64", "genvs:Small"] {
+            let message = text.parse::<Model>().expect_err(text);
+            assert!(message.starts_with(&format!("'{text}': ")), "{message}");
+        }
     }
 }

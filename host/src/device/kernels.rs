@@ -7,6 +7,7 @@ pub mod normalise;
 pub mod photo;
 pub mod points;
 pub mod rays;
+pub mod sampler;
 pub mod volumes;
 pub mod weighting;
 
@@ -17,6 +18,7 @@ pub use normalise::NormaliseKernels;
 pub use photo::{PhotoKernels, PhotoScene};
 pub use points::PointKernels;
 pub use rays::{RayKernels, Rays};
+pub use sampler::SamplerKernels;
 pub use volumes::VolumeKernels;
 pub use weighting::WeightingKernels;
 
@@ -31,6 +33,7 @@ pub trait Device:
     + MatrixKernels
     + LightKernels
     + PhotoKernels
+    + SamplerKernels
 {
 }
 
@@ -44,5 +47,6 @@ impl<D> Device for D where
         + MatrixKernels
         + LightKernels
         + PhotoKernels
+        + SamplerKernels
 {
 }

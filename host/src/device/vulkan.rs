@@ -7,6 +7,7 @@ mod normalise;
 mod photo;
 mod points;
 mod rays;
+mod sampler;
 mod volumes;
 mod weighting;
 

@@ -17,6 +17,7 @@
 //! light       views become one, samples become a pixel  fuse_views, composite
 //! sweep       the depths of source pixels               hull_entry, match_cost, sum_row, mean_column, pick_depth
 //! march       a target pixel's ray                      march
+//! sampler     from noise to a picture                   mix_pictures, add_noise
 //! ```
 //!
 //! On the host the same entry points are plain functions, which tests call.
@@ -29,6 +30,7 @@ pub mod network;
 pub mod normalise;
 pub mod points;
 pub mod rays;
+pub mod sampler;
 pub mod sweep;
 mod tile;
 mod unchecked;

@@ -232,6 +232,19 @@ impl Kernel {
                     ]
                 }
             }
+            Kernel::MixPictures => {
+                const {
+                    &[
+                        Array::read::<f32>("state"),
+                        Array::read::<f32>("newest"),
+                        Array::read::<f32>("second"),
+                        Array::read::<f32>("third"),
+                        Array::read::<f32>("fourth"),
+                        Array::write::<f32>("mixed"),
+                    ]
+                }
+            }
+            Kernel::AddNoise => const { &[Array::read::<f32>("picture"), Array::write::<f32>("noisy")] },
         }
     }
 

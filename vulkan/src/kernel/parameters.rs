@@ -16,6 +16,7 @@ use viewfuse_core::photo::march::MarchBlock;
 use viewfuse_core::photo::sweep::SweepBlock;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::rays::CastBlock;
+use viewfuse_core::sampler::{Mix, NoiseBlock};
 use viewfuse_core::wanted::WantedBlock;
 use viewfuse_core::weighting::WeighBlock;
 
@@ -57,6 +58,8 @@ impl Kernel {
             Kernel::HullEntry => size_of::<u32>(),
             Kernel::MatchCost | Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth => size_of::<SweepBlock>(),
             Kernel::March => size_of::<MarchBlock>(),
+            Kernel::MixPictures => size_of::<Mix>(),
+            Kernel::AddNoise => size_of::<NoiseBlock>(),
         }
     }
 

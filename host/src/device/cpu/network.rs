@@ -105,7 +105,10 @@ impl NetworkKernels for Cpu {
         let channels = block.channels as usize;
         let outputs = &mut outputs[..block.pixel_count() as usize * channels];
         outputs.par_chunks_mut(channels).enumerate().for_each(|(pixel, outputs)| {
-            Arch::new().dispatch(|| filter_pixel(block, inputs, weights, pixel as u32, outputs));
+            Arch::new().dispatch(
+                #[inline(always)]
+                || filter_pixel(block, inputs, weights, pixel as u32, outputs),
+            );
         });
         Ok(())
     }

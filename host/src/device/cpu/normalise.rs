@@ -24,7 +24,10 @@ impl NormaliseKernels for Cpu {
         let groups = block.group_count as usize;
         let parts = &mut parts[..block.part_count() as usize * groups];
         parts.par_chunks_mut(groups).enumerate().for_each_init(Vec::new, |sums, (part, moments)| {
-            Arch::new().dispatch(|| moments_of(block, inputs, part, sums, moments));
+            Arch::new().dispatch(
+                #[inline(always)]
+                || moments_of(block, inputs, part, sums, moments),
+            );
         });
         Ok(())
     }

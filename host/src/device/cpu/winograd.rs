@@ -151,15 +151,21 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Look<'_, T> {
                 let mut values = [[zero; REACH]; REACH];
                 for (values, pixels) in values.iter_mut().zip(&pixels) {
                     for (value, pixel) in values.iter_mut().zip(pixels) {
-                        *value = pixel.map_or(zero, |pixel| load(simd, &pixel[start..end]));
+                        if let Some(pixel) = pixel {
+                            *value = load(simd, &pixel[start..end]);
+                        }
                     }
                     *values = look_along(simd, *values);
                 }
                 for column in 0..REACH {
-                    let along = look_along(simd, std::array::from_fn(|row| values[row][column]));
-                    for (row, value) in along.into_iter().enumerate() {
+                    let mut down = [zero; REACH];
+                    for row in 0..REACH {
+                        down[row] = values[row][column];
+                    }
+                    let along = look_along(simd, down);
+                    for row in 0..REACH {
                         let place = ((row * REACH + column) * stride + tile) * channels;
-                        store(simd, &mut seen[place + start..place + end], value);
+                        store(simd, &mut seen[place + start..place + end], along[row]);
                     }
                 }
             }
@@ -167,22 +173,29 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Look<'_, T> {
     }
 }
 
-/// `B^T` times six numbers.
+/// `B^T` times six numbers. No closures here and in what calls it: they would be functions of their own, without the wide
+/// instructions of the one around them.
 #[inline(always)]
 fn look_along<S: Simd>(simd: S, d: [S::f32s; REACH]) -> [S::f32s; REACH] {
-    let times = |factor: f32, x| simd.mul_f32s(simd.splat_f32s(factor), x);
-    let (add, sub) = (|a, b| simd.add_f32s(a, b), |a, b| simd.sub_f32s(a, b));
     let [d0, d1, d2, d3, d4, d5] = d;
-    let (far, near) = (sub(d4, times(4.0, d2)), sub(d3, times(4.0, d1)));
-    let (even, odd) = (sub(d4, d2), times(2.0, sub(d3, d1)));
+    let far = times(simd, -4.0, d2, d4);
+    let near = times(simd, -4.0, d1, d3);
+    let even = simd.sub_f32s(d4, d2);
+    let odd = simd.sub_f32s(d3, d1);
     [
-        add(sub(times(4.0, d0), times(5.0, d2)), d4),
-        add(far, near),
-        sub(far, near),
-        add(even, odd),
-        sub(even, odd),
-        add(sub(times(4.0, d1), times(5.0, d3)), d5),
+        times(simd, 4.0, d0, times(simd, -5.0, d2, d4)),
+        simd.add_f32s(far, near),
+        simd.sub_f32s(far, near),
+        times(simd, 2.0, odd, even),
+        times(simd, -2.0, odd, even),
+        times(simd, 4.0, d1, times(simd, -5.0, d3, d5)),
     ]
+}
+
+/// `factor * x + y`.
+#[inline(always)]
+fn times<S: Simd>(simd: S, factor: f32, x: S::f32s, y: S::f32s) -> S::f32s {
+    simd.mul_add_f32s(simd.splat_f32s(factor), x, y)
 }
 
 /// `A^T m A` for tiles of the products, with bias and what follows.
@@ -209,20 +222,25 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Put<'_, T> {
         for (tile, [first_row, first_column]) in tiles.enumerate() {
             for start in (0..channels).step_by(S::F32_LANES) {
                 let end = channels.min(start + S::F32_LANES);
-                let rows: [[S::f32s; SIDE]; REACH] = std::array::from_fn(|row| {
-                    put_along(
-                        simd,
-                        std::array::from_fn(|column| {
-                            let place = ((row * REACH + column) * stride + tile) * channels;
-                            load(simd, &products[place + start..place + end])
-                        }),
-                    )
-                });
+                let zero = simd.splat_f32s(0.0);
+                let mut rows = [[zero; SIDE]; REACH];
+                for row in 0..REACH {
+                    let mut across = [zero; REACH];
+                    for column in 0..REACH {
+                        let place = ((row * REACH + column) * stride + tile) * channels;
+                        across[column] = load(simd, &products[place + start..place + end]);
+                    }
+                    rows[row] = put_along(simd, across);
+                }
                 for column in 0..SIDE.min(width - first_column) {
-                    let along = put_along(simd, std::array::from_fn(|row| rows[row][column]));
-                    for (row, sum) in along.into_iter().enumerate().take(height - first_row) {
+                    let mut down = [zero; REACH];
+                    for row in 0..REACH {
+                        down[row] = rows[row][column];
+                    }
+                    let along = put_along(simd, down);
+                    for row in 0..SIDE.min(height - first_row) {
                         let pixel = (first_row + row) * width + first_column + column;
-                        let value = ending.finish(simd, sum, pixel, start, end);
+                        let value = ending.finish(simd, along[row], pixel, start, end);
                         store(simd, &mut outputs[pixel * pitch + start..pixel * pitch + end], value);
                     }
                 }
@@ -234,14 +252,15 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Put<'_, T> {
 /// `A^T` times six numbers.
 #[inline(always)]
 fn put_along<S: Simd>(simd: S, m: [S::f32s; REACH]) -> [S::f32s; SIDE] {
-    let times = |factor: f32, x| simd.mul_f32s(simd.splat_f32s(factor), x);
-    let (add, sub) = (|a, b| simd.add_f32s(a, b), |a, b| simd.sub_f32s(a, b));
     let [m0, m1, m2, m3, m4, m5] = m;
-    let (near, near_odd, far, far_odd) = (add(m1, m2), sub(m1, m2), add(m3, m4), sub(m3, m4));
+    let near = simd.add_f32s(m1, m2);
+    let near_odd = simd.sub_f32s(m1, m2);
+    let far = simd.add_f32s(m3, m4);
+    let far_odd = simd.sub_f32s(m3, m4);
     [
-        add(add(m0, near), far),
-        add(near_odd, times(2.0, far_odd)),
-        add(near, times(4.0, far)),
-        add(add(near_odd, times(8.0, far_odd)), m5),
+        simd.add_f32s(simd.add_f32s(m0, near), far),
+        times(simd, 2.0, far_odd, near_odd),
+        times(simd, 4.0, far, near),
+        simd.add_f32s(times(simd, 8.0, far_odd, near_odd), m5),
     ]
 }

@@ -4,23 +4,13 @@
 //! trunk is torchvision's ResNet of basic blocks). Sizes are read off the tensors: trunk width and depth, how many trunk
 //! levels there are latents of, the width and depth of the two point networks, how many blocks latents are injected into.
 
-use crate::checkpoint::{Checkpoint, CheckpointError, TensorShape};
-use std::collections::BTreeMap;
+pub use crate::field::resnet::Level;
 
-/// Largest size of anything in an architecture: more is not this family but a mistake, or an attempt to fill the memory.
-const LARGEST_SIZE: usize = 1 << 14;
+use crate::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
+use crate::field::resnet;
 
 /// Most octaves: sines of more are noise in `f32`.
 const MOST_OCTAVES: usize = 20;
-
-/// A level of the trunk: basic blocks of two 3x3 convolutions. All but the first level halve the image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Level {
-    /// Its channels.
-    pub channels: usize,
-    /// Its blocks.
-    pub block_count: usize,
-}
 
 /// Sizes of a member of the family.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,43 +103,43 @@ impl Architecture {
     /// # Errors
     /// [`CheckpointError`] if it is not of this family.
     pub fn of(checkpoint: &Checkpoint) -> Result<Architecture, CheckpointError> {
-        let shapes = Shapes { checkpoint, shapes: checkpoint.shapes() };
-        let stem_channels = shapes.size("encoder.model.conv1.weight", 4, 0)?;
-        let width = shapes.size("mlp_coarse.lin_in.weight", 2, 0)?;
-        let embedded_len = shapes.size("mlp_coarse.lin_in.weight", 2, 1)?;
+        let sizes = Sizes::new(checkpoint, "PixelNeRF");
+        let stem_channels = sizes.size("encoder.model.conv1.weight", 4, 0)?;
+        let width = sizes.size("mlp_coarse.lin_in.weight", 2, 0)?;
+        let embedded_len = sizes.size("mlp_coarse.lin_in.weight", 2, 1)?;
         if embedded_len < 12 || embedded_len % 6 != 0 || embedded_len > 6 + 6 * MOST_OCTAVES {
-            return Err(shapes.refuse(format!(
+            return Err(sizes.refuse(format!(
                 "mlp_coarse.lin_in.weight takes {embedded_len} numbers a point; this family takes 6 + 6 x octaves (a point \
                  with sines and cosines, and a direction), at most {MOST_OCTAVES}"
             )));
         }
-        let block_count = shapes.count(|block| format!("mlp_coarse.blocks.{block}.fc_0.weight"));
-        let injected_count = shapes.count(|block| format!("mlp_coarse.lin_z.{block}.weight"));
+        let block_count = sizes.count(|block| format!("mlp_coarse.blocks.{block}.fc_0.weight"));
+        let injected_count = sizes.count(|block| format!("mlp_coarse.lin_z.{block}.weight"));
         if block_count == 0 || injected_count == 0 || injected_count > block_count {
-            return Err(shapes.refuse(format!(
+            return Err(sizes.refuse(format!(
                 "mlp_coarse has {block_count} blocks and {injected_count} latent layers (lin_z); at least one of each is \
                  needed, and no more latent layers than blocks"
             )));
         }
-        let latent_channels = shapes.size("mlp_coarse.lin_z.0.weight", 2, 1)?;
+        let latent_channels = sizes.size("mlp_coarse.lin_z.0.weight", 2, 1)?;
         let mut levels = Vec::new();
         let mut channels = stem_channels;
         while channels < latent_channels {
             let level = levels.len() + 1;
-            let block_count = shapes.count(|block| format!("encoder.model.layer{level}.{block}.conv1.weight"));
+            let block_count = sizes.count(|block| format!("encoder.model.layer{level}.{block}.conv1.weight"));
             if block_count == 0 {
-                return Err(shapes.refuse(format!(
+                return Err(sizes.refuse(format!(
                     "the point networks take latents of {latent_channels} channels, but the trunk's levels up to layer{} \
                      have {channels} and there is no layer{level}",
                     level - 1
                 )));
             }
-            let own = shapes.size(&format!("encoder.model.layer{level}.0.conv1.weight"), 4, 0)?;
+            let own = sizes.size(&format!("encoder.model.layer{level}.0.conv1.weight"), 4, 0)?;
             channels += own;
             levels.push(Level { channels: own, block_count });
         }
         if channels != latent_channels {
-            return Err(shapes.refuse(format!(
+            return Err(sizes.refuse(format!(
                 "the point networks take latents of {latent_channels} channels; the trunk's levels up to layer{} have \
                  {channels}",
                 levels.len()
@@ -162,9 +152,9 @@ impl Architecture {
             block_count,
             injected_count,
             frequency_count: (embedded_len - 6) / 6,
-            frequency: shapes.frequency((embedded_len - 6) / 6)?,
-            has_fine: shapes.shapes.keys().any(|name| name.starts_with("mlp_fine.")),
-            pixel_centre: shapes.number("viewfuse.pixel_centre", 0.0)?,
+            frequency: frequency(&sizes, (embedded_len - 6) / 6)?,
+            has_fine: checkpoint.shapes().keys().any(|name| name.starts_with("mlp_fine.")),
+            pixel_centre: sizes.number("viewfuse.pixel_centre", 0.0)?,
         };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
         Ok(architecture)
@@ -172,21 +162,7 @@ impl Architecture {
 
     /// Every tensor that it needs, in the order of the data.
     pub fn tensors(&self) -> Vec<TensorShape> {
-        let mut tensors = Vec::new();
-        convolution(&mut tensors, "conv1", "bn1", [self.stem_channels, 3, 7, 7]);
-        let mut channels = self.stem_channels;
-        for (level, Level { channels: own, block_count }) in (1..).zip(&self.levels) {
-            for block in 0..*block_count {
-                let name = format!("layer{level}.{block}");
-                convolution(&mut tensors, &format!("{name}.conv1"), &format!("{name}.bn1"), [*own, channels, 3, 3]);
-                convolution(&mut tensors, &format!("{name}.conv2"), &format!("{name}.bn2"), [*own, *own, 3, 3]);
-                if block == 0 && needs_downsample(level, channels, *own) {
-                    let shape = [*own, channels, 1, 1];
-                    convolution(&mut tensors, &format!("{name}.downsample.0"), &format!("{name}.downsample.1"), shape);
-                }
-                channels = *own;
-            }
-        }
+        let mut tensors = resnet::tensors("encoder.model", self.stem_channels, &self.levels);
         for pass in self.passes() {
             let prefix = pass.prefix();
             linear(&mut tensors, &format!("{prefix}.lin_in"), self.width, self.embedded_len());
@@ -231,80 +207,25 @@ impl Architecture {
     }
 }
 
-/// Whether a level's first block has a convolution beside it: where it halves the image or changes the channels.
-pub(super) fn needs_downsample(level: usize, in_channels: usize, out_channels: usize) -> bool {
-    level > 1 || in_channels != out_channels
-}
-
-fn convolution(tensors: &mut Vec<TensorShape>, name: &str, norm: &str, shape: [usize; 4]) {
-    tensors.push(TensorShape { name: format!("encoder.model.{name}.weight"), shape: shape.to_vec() });
-    for leaf in ["weight", "bias", "running_mean", "running_var"] {
-        tensors.push(TensorShape { name: format!("encoder.model.{norm}.{leaf}"), shape: vec![shape[0]] });
-    }
-}
-
 fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count: usize) {
     tensors.push(TensorShape { name: format!("{name}.weight"), shape: vec![out_count, in_count] });
     tensors.push(TensorShape { name: format!("{name}.bias"), shape: vec![out_count] });
 }
 
-/// A checkpoint's shapes, to read sizes off.
-struct Shapes<'a> {
-    checkpoint: &'a Checkpoint,
-    shapes: &'a BTreeMap<String, Vec<usize>>,
-}
-
-impl Shapes<'_> {
-    fn refuse(&self, detail: String) -> CheckpointError {
-        let detail = format!("is no PixelNeRF: {detail}");
-        CheckpointError::Tensors { path: self.checkpoint.path().to_path_buf(), detail }
+/// The lowest frequency: of the checkpoint's own table if it has one, otherwise the published one.
+fn frequency(sizes: &Sizes<'_>, octaves: usize) -> Result<f32, CheckpointError> {
+    const TABLE: &str = "code._freqs";
+    let published = Architecture::published().frequency;
+    let Some(shape) = sizes.shape(TABLE) else { return sizes.number("viewfuse.frequency", published) };
+    // Each frequency stands twice, for sine and cosine.
+    if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
+        return Err(sizes.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));
     }
-
-    /// One extent of a tensor that must be there.
-    fn size(&self, name: &str, dimensions: usize, axis: usize) -> Result<usize, CheckpointError> {
-        let Some(shape) = self.shapes.get(name) else {
-            return Err(self.refuse(format!("it has no tensor {name}")));
-        };
-        if shape.len() != dimensions {
-            return Err(self.refuse(format!("{name} has the shape {shape:?} instead of {dimensions} dimensions")));
-        }
-        match shape[axis] {
-            size @ 1..=LARGEST_SIZE => Ok(size),
-            size => {
-                Err(self.refuse(format!("{name} has the size {size} on axis {axis}; 1 to {LARGEST_SIZE} is usable")))
-            }
-        }
+    let table = sizes.checkpoint().tensor(TABLE)?;
+    let lowest = table.first().copied().unwrap_or(published);
+    let is_octaves = table.iter().zip(0..).all(|(value, index)| *value == lowest * 2_f32.powi(index / 2));
+    if !is_octaves || !(lowest > 0.0) {
+        return Err(sizes.refuse(format!("{TABLE} does not hold octaves of one frequency")));
     }
-
-    /// How many tensors of numbered names there are, counted from 0.
-    fn count(&self, name: impl Fn(usize) -> String) -> usize {
-        (0..).take_while(|index| self.shapes.contains_key(&name(*index))).count()
-    }
-
-    /// The lowest frequency: of the checkpoint's own table if it has one, otherwise the published one.
-    fn frequency(&self, octaves: usize) -> Result<f32, CheckpointError> {
-        const TABLE: &str = "code._freqs";
-        let published = Architecture::published().frequency;
-        let Some(shape) = self.shapes.get(TABLE) else { return self.number("viewfuse.frequency", published) };
-        // Each frequency stands twice, for sine and cosine.
-        if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
-            return Err(self.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));
-        }
-        let table = self.checkpoint.tensor(TABLE)?;
-        let lowest = table.first().copied().unwrap_or(published);
-        let is_octaves = table.iter().zip(0..).all(|(value, index)| *value == lowest * 2_f32.powi(index / 2));
-        if !is_octaves || !(lowest > 0.0) {
-            return Err(self.refuse(format!("{TABLE} does not hold octaves of one frequency")));
-        }
-        Ok(lowest)
-    }
-
-    /// A number that the file may say.
-    fn number(&self, key: &str, otherwise: f32) -> Result<f32, CheckpointError> {
-        let Some(text) = self.checkpoint.metadata().get(key) else { return Ok(otherwise) };
-        match text.parse::<f32>() {
-            Ok(number) if number.is_finite() => Ok(number),
-            _ => Err(self.refuse(format!("its metadata says {key} = '{text}', which is no number"))),
-        }
-    }
+    Ok(lowest)
 }

@@ -27,7 +27,8 @@ pub fn by_formula(architecture: &Architecture) -> Checkpoint {
 /// decides the density.
 pub fn body(architecture: &Architecture) -> Checkpoint {
     let frequency_axes = 6..9;
-    made("body", architecture, |tensor| {
+    let frequency = architecture.frequency;
+    made("body", architecture, move |tensor| {
         let TensorShape { name, shape } = tensor;
         let mut values = by_formula_values(tensor);
         let leaf = name.split_once('.').map_or("", |(_, leaf)| leaf);
@@ -42,7 +43,7 @@ pub fn body(architecture: &Architecture) -> Checkpoint {
                 }
             }
             // The sum of three cosines at the surface.
-            "lin_in.bias" => values[0] = -3.0 * (architecture.frequency * SURFACE_COORDINATE).cos(),
+            "lin_in.bias" => values[0] = -3.0 * (frequency * SURFACE_COORDINATE).cos(),
             "lin_out.weight" => {
                 let density = &mut values[3 * columns..];
                 density.iter_mut().for_each(|value| *value *= DENSITY_NOISE);
@@ -73,10 +74,10 @@ fn by_formula_values(tensor: &TensorShape) -> Vec<f32> {
     formula::tensor(&tensor.name, &tensor.shape)
 }
 
-fn made(label: &str, architecture: &Architecture, values: impl Fn(&TensorShape) -> Vec<f32>) -> Checkpoint {
-    let tensors = architecture.tensors().into_iter().map(|tensor| {
-        let values = values(&tensor);
-        (tensor, values)
-    });
-    Checkpoint::in_memory(label, tensors, BTreeMap::new())
+fn made(
+    label: &str,
+    architecture: &Architecture,
+    values: impl Fn(&TensorShape) -> Vec<f32> + Send + Sync + 'static,
+) -> Checkpoint {
+    Checkpoint::computed(label, architecture.tensors(), BTreeMap::new(), values)
 }

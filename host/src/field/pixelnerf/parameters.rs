@@ -1,8 +1,9 @@
 //! A checkpoint's parameters as the kernels take them: batch norm folded into the convolutions, matrices transposed.
 
-use super::architecture::{Architecture, Pass, needs_downsample};
+use super::architecture::{Architecture, Pass};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::device::{Device, Layer, LayerShape};
+use crate::field::resnet::needs_downsample;
 
 /// What torchvision's batch norm adds to variances.
 const VARIANCE_FLOOR: f64 = 1.0e-5;

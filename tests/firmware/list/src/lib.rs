@@ -9,6 +9,7 @@ pub mod attended;
 pub mod denoised;
 pub mod formulas;
 pub mod rig;
+pub mod sampled;
 
 /// Where the named numbers go. One function on purpose: a firmware has no room for a copy per caller.
 pub type Emit<'a> = &'a mut dyn FnMut(&str, f32);

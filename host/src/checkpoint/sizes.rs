@@ -1,0 +1,73 @@
+//! Reading the sizes of a network off the shapes of its tensors.
+
+use super::{Checkpoint, CheckpointError};
+
+/// Largest size of anything in an architecture: more is no network that is meant here but a mistake, or an attempt to
+/// fill the memory.
+pub const LARGEST_SIZE: usize = 1 << 14;
+
+/// A checkpoint's shapes, to read the sizes of a member of a family of networks off.
+#[derive(Clone, Copy, Debug)]
+pub struct Sizes<'a> {
+    checkpoint: &'a Checkpoint,
+    family: &'static str,
+}
+
+impl<'a> Sizes<'a> {
+    /// Of this checkpoint, which is to be of the family of this name.
+    pub fn new(checkpoint: &'a Checkpoint, family: &'static str) -> Sizes<'a> {
+        Sizes { checkpoint, family }
+    }
+
+    /// The checkpoint.
+    pub fn checkpoint(&self) -> &'a Checkpoint {
+        self.checkpoint
+    }
+
+    /// The error that it is not of the family, for this reason.
+    pub fn refuse(&self, detail: String) -> CheckpointError {
+        let detail = format!("is no {}: {detail}", self.family);
+        CheckpointError::Tensors { path: self.checkpoint.path().to_path_buf(), detail }
+    }
+
+    /// The shape of a tensor that may be there.
+    pub fn shape(&self, name: &str) -> Option<&'a [usize]> {
+        self.checkpoint.shapes().get(name).map(Vec::as_slice)
+    }
+
+    /// One extent of a tensor that must be there, with this number of dimensions.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if it is not, or if the extent is not from 1 to [`LARGEST_SIZE`].
+    pub fn size(&self, name: &str, dimensions: usize, axis: usize) -> Result<usize, CheckpointError> {
+        let Some(shape) = self.shape(name) else {
+            return Err(self.refuse(format!("it has no tensor {name}")));
+        };
+        if shape.len() != dimensions {
+            return Err(self.refuse(format!("{name} has the shape {shape:?} instead of {dimensions} dimensions")));
+        }
+        match shape.get(axis).copied().unwrap_or(0) {
+            size @ 1..=LARGEST_SIZE => Ok(size),
+            size => {
+                Err(self.refuse(format!("{name} has the size {size} on axis {axis}; 1 to {LARGEST_SIZE} is usable")))
+            }
+        }
+    }
+
+    /// How many tensors of numbered names there are, counted from 0.
+    pub fn count(&self, name: impl Fn(usize) -> String) -> usize {
+        (0..).take_while(|index| self.shape(&name(*index)).is_some()).count()
+    }
+
+    /// A number that the file may say in its metadata.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if it says something there that is no finite number.
+    pub fn number(&self, key: &str, otherwise: f32) -> Result<f32, CheckpointError> {
+        let Some(text) = self.checkpoint.metadata().get(key) else { return Ok(otherwise) };
+        match text.parse::<f32>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(self.refuse(format!("its metadata says {key} = '{text}', which is no number"))),
+        }
+    }
+}

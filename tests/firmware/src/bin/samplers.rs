@@ -1,0 +1,14 @@
+//! Prints the list of the samplers.
+#![no_std]
+#![no_main]
+
+use viewfuse_firmware::{Output, finish};
+use viewfuse_list::{Inputs, sampled::sampling};
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let mut output = Output::open();
+    // A black box: otherwise the compiler could compute the list itself.
+    sampling(core::hint::black_box(Inputs::STANDARD), &mut |name, value| output.number(name, value));
+    finish()
+}
