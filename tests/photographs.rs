@@ -1,9 +1,10 @@
 //! Photographs on their way to a field: where they are kept and how large they are worked on changes what it should.
 
 use std::convert::Infallible;
+use viewfuse::field::LONGEST_DEFAULT_SIDE;
 use viewfuse::photographs::{Album, BackgroundChoice, reduced_size, scaled_size};
 use viewfuse::progress::Progress;
-use viewfuse::render::{LONGEST_DEFAULT_SIDE, RenderOptions, working_side};
+use viewfuse::render::{RenderOptions, working_side};
 use viewfuse::scene::Scene;
 use viewfuse_tests::command::toy;
 use viewfuse_tests::scenes;
@@ -27,7 +28,7 @@ fn the_largest_photograph_decides_the_size_up_to_the_limit() {
     let side = |folder: &scenes::Folder, size: Option<[u32; 2]>| {
         let scene = Scene::open(folder.path()).expect("a scene");
         let options = RenderOptions { size, ..RenderOptions::default() };
-        working_side::<Infallible>(&scene, &options).expect("a size")
+        working_side::<Infallible>(&scene, &options, LONGEST_DEFAULT_SIDE).expect("a size")
     };
     let folder = scenes::srn();
     assert_eq!(side(&folder, None), 16);

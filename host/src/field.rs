@@ -5,6 +5,7 @@
 
 pub mod finite;
 pub mod genvs;
+mod learned;
 pub mod photo;
 pub mod pixelnerf;
 mod resnet;
@@ -17,6 +18,9 @@ use crate::progress::Progress;
 use crate::sources::SourceWeights;
 use finite::NotFinite;
 use viewfuse_core::camera::Camera;
+
+/// Longest side of a picture whose size nobody asked for.
+pub const LONGEST_DEFAULT_SIDE: u32 = 512;
 
 /// Why a field could not make a picture.
 #[derive(Debug, thiserror::Error)]
@@ -82,6 +86,11 @@ pub trait Field<D: Device> {
     /// Longest side of the sources that it wants for pictures of this longest side.
     fn source_side(&self, picture_side: u32) -> u32 {
         picture_side
+    }
+
+    /// The longest side of its pictures where nobody asks for a size.
+    fn longest_side(&self) -> u32 {
+        LONGEST_DEFAULT_SIDE
     }
 
     /// What it left out so far.

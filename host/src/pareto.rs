@@ -146,7 +146,7 @@ impl Subject<'_> {
         let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
         let mut images = Vec::new();
         for Setting { field, options, .. } in settings {
-            let side = field.source_side(working_side(scene, options)?);
+            let side = field.source_side(working_side(scene, options, field.longest_side())?);
             if !known.iter().any(|(known_side, _)| *known_side == side) {
                 let prepared = album.sources(&job.sources, side, options.background)?;
                 if let Some(warning) = &prepared.warning {

@@ -19,9 +19,6 @@ use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_core::weights::{Omission, Weights};
 
-/// Longest side of a picture whose size nobody asked for.
-pub const LONGEST_DEFAULT_SIDE: u32 = 512;
-
 /// Why a render failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RenderError<E: std::error::Error> {
@@ -78,7 +75,7 @@ pub enum RenderError<E: std::error::Error> {
 /// What a person can set about a render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Width and height of the pictures; otherwise the views' size, at most [`LONGEST_DEFAULT_SIDE`] on a side.
+    /// Width and height of the pictures; otherwise the views' size, at most the field's [`Field::longest_side`] on a side.
     pub size: Option<[u32; 2]>,
     /// What is behind the object.
     pub background: BackgroundChoice,
@@ -162,15 +159,19 @@ impl Truth {
     }
 }
 
-/// The longest side of the pictures of a run: what was asked for, or that of the largest photograph, at most
-/// [`LONGEST_DEFAULT_SIDE`].
+/// The longest side of the pictures of a run: what was asked for, or that of the largest photograph, at most `longest`
+/// (a field's [`Field::longest_side`]).
 ///
 /// # Errors
 /// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
-pub fn working_side<E: std::error::Error>(scene: &Scene, options: &RenderOptions) -> Result<u32, RenderError<E>> {
+pub fn working_side<E: std::error::Error>(
+    scene: &Scene,
+    options: &RenderOptions,
+    longest: u32,
+) -> Result<u32, RenderError<E>> {
     let Some([width, height]) = options.size else {
         let largest = scene.views.iter().map(|view| longest_side(&view.camera)).max();
-        return Ok(largest.unwrap_or(LONGEST_DEFAULT_SIDE).min(LONGEST_DEFAULT_SIDE));
+        return Ok(largest.unwrap_or(longest).min(longest));
     };
     if let Some(View { camera, .. }) = scene.views.first() {
         let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
@@ -213,7 +214,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         options: &'a RenderOptions,
         progress: &Progress,
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
-        let side = working_side(scene, options)?;
+        let side = working_side(scene, options, field.longest_side())?;
         let mut photographs = Duration::ZERO;
         let images = timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background))?;
         if let Some(warning) = &images.warning {
@@ -243,7 +244,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
-        let side = working_side(scene, options)?;
+        let side = working_side(scene, options, field.longest_side())?;
         let mut costs = StageCosts::default();
         let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
         let sizes: Vec<[u32; 2]> = images.images.iter().map(size).collect();

@@ -34,7 +34,7 @@ fn error(sampler: Sampler, calls: u32, mixture: &Mixture, truth: &[f64]) -> f64 
 fn on_cpu(plan: &Plan, mixture: &Mixture) -> (Vec<f64>, Sampled<Cpu>) {
     let denoise = |state: &_, sigma, denoised: &mut _| mixture.denoise(&Cpu, state, sigma, denoised);
     let count = start(80.0).len();
-    let sampled = sample(&Cpu, plan, count, None, &Progress::hidden(), denoise).expect("a picture");
+    let sampled = sample(&Cpu, plan, count, Start::Noise, &Progress::hidden(), denoise).expect("a picture");
     let picture = Cpu.download(&sampled.picture).expect("the CPU").into_iter().map(f64::from).collect();
     (picture, sampled)
 }

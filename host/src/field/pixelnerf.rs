@@ -17,13 +17,13 @@ pub mod reference;
 pub use architecture::{Architecture, Level, Pass};
 pub use options::{LEAST_OPACITY, LEAST_SHARE, Omissions, PixelNerfOptions, Sampling};
 
+use super::learned::{default_near_far, over_white};
 use super::{Field, FieldError, LeftOut, Rendered};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::device::{Device, Layer, Pixels};
 use crate::interrupt;
 use crate::photographs::{SourceImage, SourceImages};
 use crate::progress::Progress;
-use crate::rig::Rig;
 use crate::sources::SourceWeights;
 use encoder::{Image, Size, ViewLatents, encode};
 use network::{Network, Views, Workspace};
@@ -36,10 +36,6 @@ use viewfuse_core::rays::CastBlock;
 
 /// Longest side of the photographs that a network is shown: the size that the published ones were trained on.
 pub const SOURCE_SIDE: u32 = 128;
-/// Where rays begin and end as published for SRN's cars (0.8 and 1.8 of cameras at distance 1.3), as shares of the
-/// cameras' distance from what they look at.
-const NEAR_FAR_SHARES: [f32; 2] = [8.0 / 13.0, 18.0 / 13.0];
-
 /// A PixelNeRF with its parameters, ready for any device.
 pub struct PixelNerf {
     architecture: Architecture,
@@ -328,19 +324,8 @@ impl PixelNerf {
     }
 }
 
-/// Where rays begin and end unless a person says so: by the mean distance of the cameras from what they look at. A single
-/// camera does not show that: its distance from the world's origin counts then, where SRN's objects stand.
-fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
-    let distance = match cameras {
-        [camera] => camera.pose.centre_world().length(),
-        cameras => Rig::of(cameras).distance,
-    };
-    NEAR_FAR_SHARES.map(|share| share * if distance > 0.0 { distance } else { 1.0 })
-}
-
 /// An image over white, as the networks are trained: red, green, blue in `[-1, 1]`.
 fn upload_image<D: Device>(device: &D, image: &SourceImage) -> Result<Image<D>, D::Error> {
-    let over_white = |[red, green, blue, alpha]: [f32; 4]| [red, green, blue].map(|c| 2.0 * (c + 1.0 - alpha) - 1.0);
     let values: Vec<f32> = image.texels.iter().flat_map(|texel| over_white(*texel)).collect();
     let (width, height) = (image.camera.pinhole.width(), image.camera.pinhole.height());
     Ok(Image { size: Size { height, width, channels: 3 }, values: device.upload(&values)? })

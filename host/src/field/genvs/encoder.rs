@@ -8,6 +8,7 @@ use super::image::{Image, Scratch, Size, enlarge};
 use super::layers::{Addend, Convolution, Depthwise, Loader, Transposed, Way};
 use crate::device::Device;
 use crate::field::FieldError;
+use std::ops::Range;
 use viewfuse_core::network::normalise::MeanBlock;
 use viewfuse_core::network::resample::PoolBlock;
 
@@ -110,7 +111,7 @@ impl<D: Device> Encoder<D> {
         })
     }
 
-    /// The volume `[row][column][depth][feature]` of an image (red, green, blue in `[-1, 1]`) whose rows and columns are
+    /// What the last layer makes a volume of, for an image (red, green, blue in `[-1, 1]`) whose rows and columns are
     /// multiples of [`SIDE_STEP`].
     ///
     /// # Errors
@@ -145,9 +146,26 @@ impl<D: Device> Encoder<D> {
         scratch.give(half);
         let x = rise(device, scratch, &self.head_up[1], &self.head[1], x, &given)?;
         scratch.give(given);
-        let volume = self.volume.run(scratch, device, Way::RELU, &x, Addend::None)?;
-        scratch.give(x);
-        Ok(volume)
+        Ok(x)
+    }
+
+    /// Size of the volume `[row][column][depth][feature]` of an image: depths and features are its channels.
+    pub(super) fn volume_size(&self, image: Size) -> Size {
+        image.with_channels(self.volume.channels)
+    }
+
+    /// The last layer: some rows of the volume from what [`Encoder::encode`] made.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub(super) fn fill_rows(
+        &self,
+        device: &D,
+        deep: &Image<D>,
+        rows: Range<u32>,
+        volume: &mut Image<D>,
+    ) -> Result<(), D::Error> {
+        self.volume.run_rows(device, Way::RELU, deep, rows, volume)
     }
 
     /// The trunk's four levels.
@@ -183,7 +201,8 @@ impl<D: Device> Encoder<D> {
         self.pyramid_plain.run_into(device, Way::RELU, image, Addend::None, &mut wide)?;
         for (branch, (separable, dilation)) in (1..).zip(self.pyramid_dilated.iter().zip(ASPP_RATES)) {
             wide = wide.seen_as(branch * channels, channels);
-            let inside = separable.depthwise.run(scratch, device, Way { dilation: dilation as u32, ..Way::PLAIN }, image)?;
+            let inside =
+                separable.depthwise.run(scratch, device, Way { dilation: dilation as u32, ..Way::PLAIN }, image)?;
             separable.pointwise.run_into(device, Way::RELU, &inside, Addend::None, &mut wide)?;
             scratch.give(inside);
         }

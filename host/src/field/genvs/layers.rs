@@ -5,6 +5,7 @@ use super::architecture::group_count;
 use super::image::{Image, Scratch, Size};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::device::{Device, Layer, LayerShape};
+use std::ops::Range;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_core::network::normalise::NormaliseBlock;
@@ -242,14 +243,43 @@ impl<D: Device> Convolution<D> {
         addend: Addend<'_, D>,
         output: &mut Image<D>,
     ) -> Result<(), D::Error> {
-        let (size, padding) = way.out(image.size, self.size, self.channels);
-        debug_assert_eq!(size, output.size);
+        let block = self.block(way, image, output);
+        debug_assert_eq!([block.out_height, block.out_width], [output.size.height, output.size.width]);
         let (addend, addend_pitch, addend_first) = match addend {
             Addend::None => (None, 0, 0),
             Addend::Image(image) => (Some(&image.values), image.pitch, image.first),
             Addend::Shared(values, first) => (Some(values), 0, first),
         };
+        let block = ConvolveBlock { addend_pitch, addend_first, ..block };
+        device.convolve(&block, &image.values, &self.layer, addend, &mut output.values)
+    }
+
+    /// The same for some rows alone; its windows are single pixels.
+    pub(super) fn run_rows(
+        &self,
+        device: &D,
+        way: Way,
+        image: &Image<D>,
+        rows: Range<u32>,
+        output: &mut Image<D>,
+    ) -> Result<(), D::Error> {
+        let block = self.block(way, image, output);
+        debug_assert_eq!([block.size, block.stride], [1, 1]);
+        let (height, before) = (rows.len() as u32, rows.start * block.in_width);
         let block = ConvolveBlock {
+            in_height: height,
+            in_first: block.in_first + before * block.in_pitch,
+            out_height: height,
+            out_first: block.out_first + before * block.out_pitch,
+            ..block
+        };
+        device.convolve(&block, &image.values, &self.layer, None, &mut output.values)
+    }
+
+    /// The dispatch for an input and an output, without addend.
+    fn block(&self, way: Way, image: &Image<D>, output: &Image<D>) -> ConvolveBlock {
+        let (size, padding) = way.out(image.size, self.size, self.channels);
+        ConvolveBlock {
             in_height: image.size.height,
             in_width: image.size.width,
             in_channels: image.size.channels,
@@ -267,12 +297,8 @@ impl<D: Device> Convolution<D> {
             padding,
             scale: way.scale,
             relu_outputs: u32::from(way.relu),
-            // Set by the device.
-            has_addend: 0,
-            addend_pitch,
-            addend_first,
-        };
-        device.convolve(&block, &image.values, &self.layer, addend, &mut output.values)
+            ..ConvolveBlock::default()
+        }
     }
 }
 
