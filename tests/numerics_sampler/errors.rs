@@ -3,7 +3,7 @@
 use crate::walk::{published, row, start, walk};
 use viewfuse::device::Memory;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::genvs::sampling::{Plan, Sampled, Steps, sample};
+use viewfuse::field::genvs::sampling::{Plan, Sampled, Start, Steps, sample};
 use viewfuse::progress::Progress;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_tests::mixture::{DIMENSIONS, Mixture, distance};

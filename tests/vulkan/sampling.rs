@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory};
-use viewfuse::field::genvs::sampling::{Plan, Sampled, Steps, sample};
+use viewfuse::field::genvs::sampling::{Plan, Sampled, Start, Steps, sample};
 use viewfuse::progress::Progress;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
