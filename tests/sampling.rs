@@ -198,7 +198,7 @@ fn chosen_levels_fall_and_end() {
     }
     // A jump is noticed, and the step over it taken once more, shorter.
     let jump = |_: &[f32], sigma: f32| vec![if sigma > 0.5 { -0.9 } else { 0.9 }; COUNT];
-    let sampled = run(&chosen(1.0e-2, 200), None, jump).0.expect("a picture");
+    let sampled = run(&chosen(1.0e-2, 200), Start::Noise, jump).0.expect("a picture");
     assert!(sampled.levels.windows(2).any(|pair| pair[1] >= pair[0]), "{:?}", sampled.levels);
 }
 
