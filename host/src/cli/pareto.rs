@@ -10,12 +10,11 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse::device::Device;
 use viewfuse::device::choice::{AnyDevice, DeviceChoice, Several, open_several};
-use viewfuse::field::pixelnerf::Omissions;
 use viewfuse::field::{Field, FieldError, LeftOut};
 use viewfuse::files::{check_writable, write_whole};
 use viewfuse::pareto::front::{LARGEST_LOSS, SAME_LOOK};
 use viewfuse::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
-use viewfuse::pareto::settings::{of_photo, of_pixelnerf};
+use viewfuse::pareto::settings::{of_genvs, of_photo, of_pixelnerf};
 use viewfuse::pareto::{Measured, Setting, Subject, plot};
 use viewfuse::photographs::Album;
 use viewfuse::progress::Progress;
@@ -66,10 +65,10 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting: Weighting = arguments.weights.parse()?;
     let scene = Scene::open(&arguments.scene)?;
-    let field = arguments.network.open(arguments.seed, Omissions::ALL)?;
+    let field = arguments.network.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.least_sources())?;
-    let options = arguments.picture.to_render_options(false);
+    let options = arguments.picture.to_render_options(false, &field)?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
@@ -149,14 +148,18 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     fn on(&self, device: &AnyDevice, field: &AnyField) -> Result<Measured, Failure> {
-        match (device, field) {
-            (AnyDevice::Cpu(cpu), AnyField::Photo(field)) => self.measure(cpu, &of_photo(field, self.options)),
-            (AnyDevice::Cpu(cpu), AnyField::PixelNerf(field)) => self.measure(cpu, &of_pixelnerf(field, self.options)),
-            (AnyDevice::Vulkan(vulkan), AnyField::Photo(field)) => {
-                self.measure(vulkan.as_ref(), &of_photo(field, self.options))
-            }
-            (AnyDevice::Vulkan(vulkan), AnyField::PixelNerf(field)) => {
-                self.measure(vulkan.as_ref(), &of_pixelnerf(field, self.options))
+        match device {
+            AnyDevice::Cpu(cpu) => self.on_one(cpu, field),
+            AnyDevice::Vulkan(vulkan) => self.on_one(vulkan.as_ref(), field),
+        }
+    }
+
+    fn on_one<D: Device>(&self, device: &D, field: &AnyField) -> Result<Measured, Failure> {
+        match field {
+            AnyField::Photo(field) => self.measure(device, &of_photo(field, self.options)),
+            AnyField::PixelNerf(field) => self.measure(device, &of_pixelnerf(field, self.options)),
+            AnyField::Genvs(field) => {
+                self.measure(device, &of_genvs(field, self.options, self.subject.job.targets.len()))
             }
         }
     }
@@ -185,6 +188,8 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
         ["", "setting", "s/picture", "encoding", "gain", "PSNR dB\nto exact", "largest\ndifference"].to_vec();
     header.extend(if has_truth { &["PSNR dB\nto truth", "loss"][..] } else { &[] });
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
+    let has_calls = device.points.iter().any(|point| point.denoising.is_some());
+    header.extend(has_calls.then(|| "calls".to_owned()));
     let left_out = device.points.first().map_or(&[][..], |point| &point.left_out);
     header.extend(left_out.iter().map(|LeftOut { what, .. }| what.replace(' ', "\n")));
     let mut rows = table(header);
@@ -192,7 +197,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
         column.set_cell_alignment(CellAlignment::Left);
     }
     device.points.iter().for_each(|point| {
-        rows.add_row(row(point, has_truth));
+        rows.add_row(row(point, has_truth, has_calls));
     });
     say(rows)?;
     if !left_out.is_empty() {
@@ -216,7 +221,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     }
 }
 
-fn row(point: &PointRecord, has_truth: bool) -> Vec<String> {
+fn row(point: &PointRecord, has_truth: bool, has_calls: bool) -> Vec<String> {
     let mut row = vec![
         if point.best { "*" } else { "" }.to_owned(),
         point.setting.clone(),
@@ -230,6 +235,9 @@ fn row(point: &PointRecord, has_truth: bool) -> Vec<String> {
         row.extend(
             [point.truth_psnr, point.truth_loss].map(|value| value.map_or(String::new(), |v| format!("{v:.2}"))),
         );
+    }
+    if has_calls {
+        row.push(point.denoising.map_or(String::new(), |denoising| denoising.calls.to_string()));
     }
     row.extend(point.left_out.iter().map(|LeftOut { left_out, of, .. }| match left_out {
         0 => String::new(),

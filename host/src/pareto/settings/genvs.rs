@@ -1,0 +1,83 @@
+//! What is tried of GeNVS.
+
+use super::super::Setting;
+use super::super::enlarged::Enlarged;
+use super::{ALL, EXACT};
+use crate::field::genvs::sampling::{Plan, Steps};
+use crate::field::genvs::{Genvs, GenvsOptions, Omissions, Rays};
+use crate::render::RenderOptions;
+use viewfuse_core::sampler::Sampler;
+use viewfuse_core::sampler::control::HALF_A_LEVEL;
+
+const NONE: Omissions = Omissions::NONE;
+const VIEWS: Omissions = Omissions { unused_views: true, ..NONE };
+
+/// Each of these alone, with everything else as exact. Words, what is left out, `--leave-out`.
+#[rustfmt::skip]
+const ALONE: [(&str, Omissions, f32); 4] = [
+    ("unused views",   VIEWS,                                   0.0),
+    ("leave out 0.05", VIEWS,                                   0.05),
+    ("leave out 0.2",  VIEWS,                                   0.2),
+    ("unseen rows",    Omissions { unseen_rows: true, ..NONE }, 0.0),
+];
+/// Levels of the single-step sampler of the published run, which calls the denoiser twice for each.
+const HEUN: [u32; 4] = [18, 12, 8, 5];
+/// Levels of every multistep sampler.
+const LEVELS: [u32; 5] = [6, 8, 10, 12, 18];
+/// Errors of steps, where levels are chosen on the way.
+const TOLERANCES: [f32; 3] = [0.003, 0.01, 0.03];
+/// Samples on a ray, as shares of the exact picture's.
+const SAMPLES: [(&str, u32); 2] = [("1/2", 2), ("1/4", 4)];
+/// Levels at which a picture starts from the one before.
+const REUSED: [f32; 2] = [20.0, 2.0];
+
+/// The settings of a GeNVS, for so many targets. Of `field` the rays, the levels' ends and the seed are taken, of `options`
+/// how much weight `all` leaves out, besides the size and the background; what the field itself leaves out does not matter.
+pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> Vec<Setting<Enlarged<Genvs>>> {
+    let GenvsOptions { rays, plan: own, .. } = field.options();
+    let exact = Plan { schedule: own.schedule, ..Plan::published(own.seed) };
+    let over = |plan: Plan, sampler, level_count| Plan { steps: Steps::Fixed { sampler, level_count }, ..plan };
+    let careful = |plan: Plan, tolerance| match Plan::careful(own.seed).steps {
+        Steps::Chosen { most_calls, .. } => Plan { steps: Steps::Chosen { tolerance, most_calls }, ..plan },
+        steps => Plan { steps, ..plan },
+    };
+    let setting = |words: &str, rays, plan, omissions, leave_out, factor| Setting {
+        words: words.to_owned(),
+        field: Enlarged { field: field.with_options(GenvsOptions { rays, plan, omissions }), factor },
+        options: RenderOptions { leave_out, settled: 0.0, ..options.clone() },
+    };
+    let fewer = |share: u32| Rays { sample_count: rays.sample_count.div_ceil(share), ..rays };
+
+    let mut settings = vec![setting(EXACT, rays, exact, NONE, 0.0, 1)];
+    settings.extend(ALONE.map(|(words, omissions, leave_out)| setting(words, rays, exact, omissions, leave_out, 1)));
+    let planned = |words: String, plan| setting(&words, rays, plan, NONE, 0.0, 1);
+    settings.push(planned("settled".to_owned(), Plan { settled: Some(HALF_A_LEVEL), ..exact }));
+    settings.extend(HEUN.map(|count| planned(format!("heun, {count}"), over(exact, Sampler::Heun, count))));
+    for sampler in Sampler::ALL.into_iter().filter(|sampler| !sampler.is_single_step()) {
+        settings
+            .extend(LEVELS.map(|count| planned(format!("{}, {count}", sampler.name()), over(exact, sampler, count))));
+    }
+    settings.extend(TOLERANCES.map(|error| planned(format!("tolerance {error}"), careful(exact, error))));
+    settings
+        .extend(SAMPLES.map(|(words, share)| setting(&format!("samples {words}"), fewer(share), exact, NONE, 0.0, 1)));
+    settings.push(setting("half the size", rays, exact, NONE, 0.0, 2));
+
+    let fast = Plan { schedule: own.schedule, ..Plan::fast(own.seed) };
+    let all = |words: &str, rays, plan, reuse, factor| {
+        let omissions = Omissions { reuse, ..Omissions::default() };
+        setting(&format!("{ALL}{words}"), rays, plan, omissions, options.leave_out, factor)
+    };
+    settings.push(all("", rays, fast, None, 1));
+    settings.extend(
+        LEVELS[..4]
+            .iter()
+            .map(|count| all(&format!(", {count} levels"), rays, over(fast, Sampler::Ipndm, *count), None, 1)),
+    );
+    settings.extend(TOLERANCES.map(|error| all(&format!(", tolerance {error}"), rays, careful(fast, error), None, 1)));
+    settings.extend(SAMPLES.map(|(words, share)| all(&format!(", samples {words}"), fewer(share), fast, None, 1)));
+    settings.push(all(", half the size", rays, fast, None, 2));
+    if target_count > 1 {
+        settings.extend(REUSED.map(|level| all(&format!(", reuse {level}"), rays, fast, Some(level), 1)));
+    }
+    settings
+}
