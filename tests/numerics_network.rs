@@ -16,6 +16,12 @@ fn at(image: &[f32], [height, width, channels]: [usize; 3], row: i64, column: i6
     inside.then(|| f64::from(image[(row as usize * width + column as usize) * channels + channel]))
 }
 
+/// Channels put into a wider image of NaN, `gap` in front of every pixel's and behind.
+fn widened(image: &[f32], channels: usize, gap: usize) -> Vec<f32> {
+    let around = vec![f32::NAN; gap];
+    image.chunks_exact(channels).flat_map(|pixel| [&around, pixel, &around].concat()).collect()
+}
+
 #[test]
 fn products_are_sums_of_products() {
     let mut random = Random::new(41);
@@ -65,57 +71,86 @@ fn rectification_at_its_ends() {
 #[test]
 fn convolutions_are_direct_loops() {
     let mut random = Random::new(42);
-    for case in 0..300 {
-        let size = [1 + random.below(9), 1 + random.below(9), 1 + random.below(5)];
+    for case in 0..400 {
+        let size = [1 + random.below(7), 1 + random.below(7), 1 + random.below(5)];
         let [height, width, channels] = size;
         let (stride, padding, out_channels) = (1 + random.below(3), random.below(4), 1 + random.below(4));
-        let side = 1 + random.below(3.min(height.min(width) + 2 * padding));
-        let out = |inner: usize| (inner + 2 * padding - side) / stride + 1;
-        let (relu, has_addend) = (case & 1, case >> 1 & 1);
+        let (enlarge, dilation) = (1 + random.below(3), 1 + random.below(3));
+        let room = height.min(width) * enlarge + 2 * padding;
+        let side = 1 + random.below(3.min((room - 1) / dilation + 1));
+        let out = |inner: usize| (inner * enlarge + 2 * padding - (side - 1) * dilation - 1) / stride + 1;
+        let (relu, has_addend, is_shared) = (case & 1, case >> 1 & 1, case >> 2 & 1);
+        let [in_gap, out_gap, addend_gap] = [0, 1, 2].map(|_| random.below(3));
         let block = ConvolveBlock {
             in_height: height as u32,
             in_width: width as u32,
             in_channels: channels as u32,
+            in_pitch: (channels + 2 * in_gap) as u32,
+            in_first: in_gap as u32,
+            enlarge: enlarge as u32,
             out_height: out(height) as u32,
             out_width: out(width) as u32,
             out_channels: out_channels as u32,
+            out_pitch: (out_channels + 2 * out_gap) as u32,
+            out_first: out_gap as u32,
             size: side as u32,
             stride: stride as u32,
+            dilation: dilation as u32,
             padding: padding as u32,
+            scale: random.range(0.5, 1.5) as f32,
             relu_outputs: relu,
             has_addend,
+            addend_pitch: if is_shared == 1 { 0 } else { (out_channels + 2 * addend_gap) as u32 },
+            addend_first: addend_gap as u32,
         };
-        let inputs = numbers(&mut random, height * width * channels);
+        let image = numbers(&mut random, height * width * channels);
+        let inputs = widened(&image, channels, in_gap);
         let weights = numbers(&mut random, side * side * channels * out_channels);
         let bias = numbers(&mut random, out_channels);
-        let count = out(height) * out(width) * out_channels;
-        let addend = if has_addend == 1 { numbers(&mut random, count) } else { Vec::new() };
-        let mut element = 0;
+        let addends = numbers(&mut random, if is_shared == 1 { 1 } else { out(height) * out(width) } * out_channels);
+        // Without an addend nothing of it may be read.
+        let addend = if has_addend == 1 { widened(&addends, out_channels, addend_gap) } else { Vec::new() };
         for out_row in 0..out(height) {
             for out_column in 0..out(width) {
                 for column in 0..out_channels {
-                    let mut sum = f64::from(bias[column]) + addend.get(element).map_or(0.0, |a| f64::from(*a));
+                    let pixel = out_row * out(width) + out_column;
+                    let own = if is_shared == 1 { column } else { pixel * out_channels + column };
+                    let mut sum = f64::from(bias[column]) + f64::from(has_addend) * f64::from(addends[own]);
                     for window_row in 0..side {
                         for window_column in 0..side {
-                            let row = (out_row * stride + window_row) as i64 - padding as i64;
-                            let place = (out_column * stride + window_column) as i64 - padding as i64;
+                            let row = (out_row * stride + window_row * dilation) as i64 - padding as i64;
+                            let place = (out_column * stride + window_column * dilation) as i64 - padding as i64;
+                            // In the image before it was enlarged; what lies before it stays there.
+                            let [row, place] = [row, place].map(|at| at.div_euclid(enlarge as i64));
                             for channel in 0..channels {
                                 let inner = (window_row * side + window_column) * channels + channel;
                                 let weight = f64::from(weights[inner * out_channels + column]);
-                                sum += weight * at(&inputs, size, row, place, channel).unwrap_or(0.0);
+                                sum += weight * at(&image, size, row, place, channel).unwrap_or(0.0);
                             }
                         }
                     }
-                    let expected = if relu == 1 { sum.max(0.0) } else { sum };
-                    let actual = convolve_element(&inputs[..], &weights[..], &bias[..], &addend[..], &block, element);
+                    let expected = f64::from(block.scale) * if relu == 1 { sum.max(0.0) } else { sum };
+                    let (pixel, channel) = (pixel as u32, column as u32);
+                    let actual =
+                        convolve_element(&inputs[..], &weights[..], &bias[..], &addend[..], &block, pixel, channel);
                     // At most 47 summands of at most 16 each, most of them far smaller.
-                    assert!((f64::from(actual) - expected).abs() <= 2.0e-5, "{block:?} {element}: {actual} {expected}");
-                    element += 1;
+                    assert!((f64::from(actual) - expected).abs() <= 3.0e-5, "{block:?} {pixel}: {actual} {expected}");
+                    let place = out_gap + pixel as usize * block.out_pitch as usize + column;
+                    assert_eq!(block.place(pixel, channel), place);
                 }
             }
         }
-        assert_eq!(element, count);
     }
+}
+
+#[test]
+fn packed_images_lie_side_by_side() {
+    let block = ConvolveBlock { in_channels: 5, out_channels: 7, size: 3, padding: 1, ..ConvolveBlock::default() };
+    let packed = block.packed();
+    let whole = [packed.in_pitch, packed.out_pitch, packed.addend_pitch, packed.enlarge, packed.dilation];
+    assert_eq!((whole, packed.scale), ([5, 7, 7, 1, 1], 1.0));
+    assert_eq!([packed.in_first, packed.out_first, packed.addend_first], [0; 3]);
+    assert_eq!((packed.size, packed.padding, packed.place(3, 2)), (3, 1, 23));
 }
 
 #[test]

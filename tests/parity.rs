@@ -100,7 +100,11 @@ fn seed_count(kernel: Kernel) -> u64 {
         Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth | Kernel::HullEntry | Kernel::MatchCost => 4,
         Kernel::EmbedPose | Kernel::March => 3,
         // As many as give every shape every combination of addend and rectification.
-        Kernel::Product | Kernel::Convolve => 8,
+        Kernel::Product | Kernel::Convolve | Kernel::ConvolveTransposed | Kernel::MultiplyMatrices => 8,
+        // As many as give every shape floors, offsets and distances of all kinds.
+        Kernel::PartMoments | Kernel::MergeMoments | Kernel::Normalise => 8,
+        Kernel::GatherVolume | Kernel::WeighFeatures | Kernel::SumFeatures => 8,
+        Kernel::ConvolveDepthwise | Kernel::ChannelMeans | Kernel::SoftmaxRows | Kernel::DenoiserInput => 4,
         Kernel::CastRays | Kernel::CoarseDepths | Kernel::PlacePoints | Kernel::EmbedPoints => 4,
         Kernel::VisibleWeights | Kernel::GatherLatents | Kernel::Radiance => 8,
         Kernel::MaxPool | Kernel::Upsample => 4,
@@ -179,14 +183,17 @@ fn every_input_has_a_control() -> Result<(), Failed> {
             // Which view, how many sources, the shape of a band: whole numbers, or none at all.
             Kernel::EmbedPose | Kernel::Attend | Kernel::FuseViews | Kernel::HullEntry => false,
             Kernel::SumRow | Kernel::MeanColumn => false,
-            Kernel::PlacePoints | Kernel::VisibleWeights | Kernel::Convolve | Kernel::MaxPool | Kernel::Upsample => {
-                false
-            }
+            Kernel::PlacePoints | Kernel::VisibleWeights | Kernel::MaxPool | Kernel::Upsample => false,
+            Kernel::ConvolveDepthwise | Kernel::ConvolveTransposed | Kernel::SoftmaxRows => false,
+            // A floor of variances and a length are there for another kernel.
+            Kernel::ChannelMeans | Kernel::PartMoments | Kernel::Normalise | Kernel::SumFeatures => false,
             Kernel::Product | Kernel::Radiance | Kernel::WeighSamples | Kernel::DrawChances => false,
             Kernel::MergeDepths => false,
             Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
             Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
             Kernel::FineDepths | Kernel::WantedSamples | Kernel::MixPictures | Kernel::AddNoise => true,
+            Kernel::Convolve | Kernel::MergeMoments | Kernel::MultiplyMatrices | Kernel::GatherVolume => true,
+            Kernel::WeighFeatures | Kernel::DenoiserInput => true,
         };
         if controls.contains(&"parameters") != has_numbers {
             return Err(format!("{}: parameters", kernel.name()).into());

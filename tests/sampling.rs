@@ -6,7 +6,7 @@ use std::convert::Infallible;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;
-use viewfuse::field::genvs::sampling::{Earlier, Plan, Sampled, Steps, UnknownSampler, sample, sampler_named};
+use viewfuse::field::genvs::sampling::{Plan, Sampled, Start, Steps, UnknownSampler, sample, sampler_named};
 use viewfuse::progress::Progress;
 use viewfuse_core::random::normal;
 use viewfuse_core::sampler::Sampler;
@@ -22,11 +22,11 @@ type Outcome = Result<Sampled<Cpu>, FieldError<Infallible>>;
 /// Runs a plan with a denoiser of values; also gives the states at the calls.
 fn run(
     plan: &Plan,
-    earlier: Option<Earlier<'_, Cpu>>,
+    start: Start<'_, Cpu>,
     mut denoise: impl FnMut(&[f32], f32) -> Vec<f32>,
 ) -> (Outcome, Vec<Vec<f32>>) {
     let mut states = Vec::new();
-    let outcome = sample(&Cpu, plan, COUNT, earlier, &Progress::hidden(), |state, sigma, denoised| {
+    let outcome = sample(&Cpu, plan, COUNT, start, &Progress::hidden(), |state, sigma, denoised| {
         states.push(state.clone());
         *denoised = denoise(state, sigma);
         Ok(())
@@ -37,7 +37,7 @@ fn run(
 fn picture(plan: &Plan) -> Sampled<Cpu> {
     let mixture = Mixture::new(3, &[0.2, 0.3, 0.25]);
     let denoise = |state: &_, sigma, denoised: &mut _| mixture.denoise(&Cpu, state, sigma, denoised);
-    sample(&Cpu, plan, COUNT, None, &Progress::hidden(), denoise).expect("a picture")
+    sample(&Cpu, plan, COUNT, Start::Noise, &Progress::hidden(), denoise).expect("a picture")
 }
 
 fn fixed(sampler: Sampler, level_count: u32) -> Plan {
@@ -83,7 +83,7 @@ fn the_seed_decides() {
 fn the_last_denoised_picture_is_the_picture() {
     for sampler in Sampler::ALL {
         let mut calls = 0;
-        let (outcome, _) = run(&fixed(sampler, 6), None, |_, _| {
+        let (outcome, _) = run(&fixed(sampler, 6), Start::Noise, |_, _| {
             calls += 1;
             vec![calls as f32 * 0.1; COUNT]
         });
@@ -108,7 +108,7 @@ fn noise_has_the_deviation_of_its_level() {
             denoised.fill(0.0);
             Ok(())
         };
-        sample(&Cpu, &plan, MANY, None, &Progress::hidden(), look).expect("a picture");
+        sample(&Cpu, &plan, MANY, Start::Noise, &Progress::hidden(), look).expect("a picture");
     }
     let within = levels(12).iter().filter(|level| (0.05..=50.0).contains(*level)).count();
     assert_eq!(raised as usize, 2 * within);
@@ -131,7 +131,7 @@ fn a_run_ends_when_nothing_changes() {
     for sampler in Sampler::ALL {
         let plan = Plan { settled: Some(HALF_A_LEVEL), ..fixed(sampler, 25) };
         // Above a certain level nothing is decided, whatever does not change.
-        let (outcome, _) = run(&plan, None, |_, _| vec![0.3; COUNT]);
+        let (outcome, _) = run(&plan, Start::Noise, |_, _| vec![0.3; COUNT]);
         let sampled = outcome.expect("a picture");
         let last = *sampled.levels.last().expect("calls");
         assert!(last <= UNDECIDED_ABOVE && last > 0.3 * UNDECIDED_ABOVE, "{}: {last}", sampler.name());
@@ -139,7 +139,7 @@ fn a_run_ends_when_nothing_changes() {
         assert!(sampled.left_out >= 5 && sampled.picture == vec![0.3; COUNT]);
         // One value that changes is enough to go on.
         let mut calls = 0;
-        let (outcome, _) = run(&plan, None, |_, _| {
+        let (outcome, _) = run(&plan, Start::Noise, |_, _| {
             calls += 1;
             let mut values = vec![0.3; COUNT];
             values[COUNT - 1] = if calls % 2 == 0 { 0.9 } else { -0.9 };
@@ -159,7 +159,7 @@ fn a_run_ends_when_nothing_changes() {
 fn an_earlier_picture_saves_calls() {
     let earlier: Vec<f32> = (0..COUNT).map(|index| (index as f32 * 0.1).sin()).collect();
     for sampler in Sampler::ALL {
-        let start = |level| Some(Earlier { picture: &earlier, level });
+        let start = |level| Start::Picture { picture: &earlier, level };
         let (outcome, states) = run(&fixed(sampler, 10), start(1.0), |state, _| vec![0.5 * state[0]; COUNT]);
         let sampled = outcome.expect("a picture");
         let rest: Vec<f32> = levels(10).into_iter().filter(|level| *level <= 1.0).collect();
@@ -177,7 +177,7 @@ fn an_earlier_picture_saves_calls() {
     }
     let plan = Plan { steps: Steps::Chosen { tolerance: 1.0e-2, most_calls: 99 }, ..Plan::published(9) };
     for (level, first) in [(1.0, 1.0), (1.0e9, 80.0), (0.0, 0.002), (f32::NAN, 0.002)] {
-        let (outcome, _) = run(&plan, Some(Earlier { picture: &earlier, level }), |_, _| vec![0.0; COUNT]);
+        let (outcome, _) = run(&plan, Start::Picture { picture: &earlier, level }, |_, _| vec![0.0; COUNT]);
         assert_eq!(outcome.expect("a picture").levels[0], first);
     }
 }
@@ -198,7 +198,7 @@ fn chosen_levels_fall_and_end() {
     }
     // A jump is noticed, and the step over it taken once more, shorter.
     let jump = |_: &[f32], sigma: f32| vec![if sigma > 0.5 { -0.9 } else { 0.9 }; COUNT];
-    let sampled = run(&chosen(1.0e-2, 200), None, jump).0.expect("a picture");
+    let sampled = run(&chosen(1.0e-2, 200), Start::Noise, jump).0.expect("a picture");
     assert!(sampled.levels.windows(2).any(|pair| pair[1] >= pair[0]), "{:?}", sampled.levels);
 }
 
@@ -207,7 +207,7 @@ fn numbers_that_are_none_are_found() {
     for (bad, element) in [(f32::NAN, 0), (f32::INFINITY, 77), (f32::NEG_INFINITY, COUNT - 1)] {
         for sampler in Sampler::ALL {
             let level = levels(8)[3];
-            let (outcome, _) = run(&fixed(sampler, 8), None, |_, sigma| {
+            let (outcome, _) = run(&fixed(sampler, 8), Start::Noise, |_, sigma| {
                 let mut values = vec![0.1; COUNT];
                 if sigma == level {
                     values[element] = bad;

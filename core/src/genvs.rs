@@ -152,7 +152,8 @@ pub struct FeatureBlock {
 }
 
 /// Weights of a ray's samples, one at a time and front to back: `weigh(sample, weight)`. `raw[sample][0]` is the network's
-/// density (rectified; NaN counts as 0), `points[sample]` has its length.
+/// density (rectified; NaN counts as 0, behind infinity nothing is seen, however short it is), `points[sample]` has its
+/// length.
 ///
 /// With the optical depth `o_i` and the transmittance `T_i` in front of a sample, exclusive weights are `T_i - T_(i+1)` as
 /// in [`crate::composite`]; inclusive ones, `(1 - e^-o_i) T_(i+1)`, are those times `e^-o_i`.

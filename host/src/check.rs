@@ -11,7 +11,10 @@
 //! oracle, attention_oracle,     what must come out
 //!   camera_oracle, photo_oracle,
 //!   ray_oracle, light_oracle,
-//!   network_oracle, point_oracle
+//!   network_oracle, point_oracle,
+//!   winograd_oracle,
+//!   normalise_oracle,
+//!   matrix_oracle, volume_oracle
 //! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
 //! report, measure               a device's kernels, checked
 //! picture                       a whole picture against the CPU's
@@ -25,8 +28,10 @@ pub mod case;
 pub mod cases;
 pub mod compare;
 pub mod light_oracle;
+pub mod matrix_oracle;
 pub mod measure;
 pub mod network_oracle;
+pub mod normalise_oracle;
 pub mod oracle;
 pub mod photo_oracle;
 pub mod picture;
@@ -35,6 +40,8 @@ pub mod poses;
 pub mod ray_oracle;
 pub mod report;
 pub mod sights;
+pub mod volume_oracle;
+pub mod winograd_oracle;
 pub mod world;
 
 pub use measure::{check_device, check_kernel};

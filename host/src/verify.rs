@@ -4,6 +4,8 @@
 //! silence. Every comparison is `!(error <= tolerance)`: NaN fails.
 
 mod attention;
+mod file;
+mod genvs;
 mod metrics;
 mod pixelnerf;
 mod weighting;
@@ -152,12 +154,12 @@ pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError>
         Ok(tensors) => {
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };
             // The header was read once already.
-            let width = SafeTensors::read_metadata(&bytes)
-                .ok()
-                .and_then(|(_, metadata)| metadata.metadata().as_ref()?.get("width").cloned());
+            let metadata = SafeTensors::read_metadata(&bytes).ok().and_then(|(_, header)| header.metadata().clone());
+            let said = |key: &str| metadata.as_ref()?.get(key).map(String::as_str);
             let mut covered = attention::verify(path, &tensors, &mut report)?;
             covered.extend(metrics::verify(path, &tensors, &mut report)?);
-            covered.extend(pixelnerf::verify(path, &tensors, width.as_deref(), device, &mut report)?);
+            covered.extend(pixelnerf::verify(path, &tensors, said("width"), device, &mut report)?);
+            covered.extend(genvs::verify(path, &tensors, said("member"), device, &mut report)?);
             let mut rest: Vec<&str> =
                 tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
             rest.sort_unstable();

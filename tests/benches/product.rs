@@ -11,7 +11,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{Layer, NetworkKernels};
+use viewfuse::device::{Layer, LayerShape, NetworkKernels};
 use viewfuse_core::network::product::ProductBlock;
 
 const ROUNDS: usize = 40;
@@ -103,11 +103,14 @@ impl Product {
             (_, false) => ", rectified inputs",
             (_, true) => ", rectified inputs, addend",
         };
+        let [inner, columns] = [inner_count, column_count].map(|count| count as usize);
+        let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
+        let Ok(layer) = Layer::new(&Cpu, &shape, &numbers(inner_count * column_count), &numbers(column_count));
         Product {
             name: format!("{row_count}x{inner_count}x{column_count}{what}"),
             block,
             inputs: numbers(row_count * inner_count),
-            layer: Layer::new(numbers(inner_count * column_count), numbers(column_count)),
+            layer,
             addend: has_addend.then(|| numbers(row_count * column_count)),
             outputs: numbers(row_count * column_count),
         }

@@ -1,13 +1,19 @@
 //! A device that computes on the CPU and gets one kernel wrong.
 
+#[path = "faulty/matrices.rs"]
+mod matrices;
 #[path = "faulty/network.rs"]
 mod network;
+#[path = "faulty/normalise.rs"]
+mod normalise;
 #[path = "faulty/points.rs"]
 mod points;
 #[path = "faulty/rays.rs"]
 mod rays;
 #[path = "faulty/sampler.rs"]
 mod sampler;
+#[path = "faulty/volumes.rs"]
+mod volumes;
 
 use std::convert::Infallible;
 use std::ops::Range;
@@ -62,7 +68,6 @@ fn with_pixels(pixels: &mut Pixels<Faulty>, run: impl FnOnce(&mut Pixels<Cpu>) -
 
 impl Memory for Faulty {
     type Buffer<T: Element> = Vec<T>;
-    type Rearranged = ();
     type Error = Infallible;
 
     fn name(&self) -> String {

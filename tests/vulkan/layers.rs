@@ -1,18 +1,23 @@
-//! Products and convolutions of awkward sizes: tiles that stick out of the matrices, steps that end within.
+//! Products and convolutions of awkward sizes: tiles that stick out of the matrices, steps that end within, images that
+//! are some of the channels of wider ones.
 
 use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
 use viewfuse::check::world::Numbers;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::device::{Layer, Memory, NetworkKernels};
+use viewfuse::device::{Layer, LayerShape, MatrixKernels, NetworkKernels};
+use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
 pub(crate) const TESTS: &[Test] = &[
     Test::new("products_of_any_size_are_the_cpus", products_of_any_size_are_the_cpus),
     Test::new("convolutions_of_any_shape_are_the_cpus", convolutions_of_any_shape_are_the_cpus),
+    Test::new("transposed_convolutions_are_the_cpus", transposed_convolutions_are_the_cpus),
+    Test::new("products_of_computed_matrices_are_the_cpus", products_of_computed_matrices_are_the_cpus),
 ];
 
 /// Rows, inner numbers and columns.
@@ -22,37 +27,45 @@ const PRODUCTS: [[u32; 3]; 6] = [[1, 1, 1], [65, 3, 7], [1, 64, 65], [130, 64, 6
 const CONVOLUTIONS: [[u32; 7]; 4] =
     [[21, 30, 3, 64, 7, 2, 3], [9, 11, 20, 70, 3, 1, 1], [13, 8, 64, 5, 1, 2, 0], [1, 1, 1, 1, 3, 1, 1]];
 
-/// What `outputs` hold before anything is written, and must still hold behind the last one.
+/// Input height, width and channels, output channels, side of the square.
+const TRANSPOSED: [[u32; 5]; 4] = [[3, 5, 20, 7, 2], [1, 1, 1, 1, 1], [9, 8, 64, 33, 4], [13, 11, 5, 3, 2]];
+
+/// What `outputs` hold before anything is written, and must still hold where nothing is.
 const UNTOUCHED: f32 = -77.0;
 
-/// Numbers of a layer: inputs, weights, bias and addend.
+/// Numbers of a layer: inputs, weights, bias and addend; and how many outputs there are.
 struct Numbered {
+    shape: LayerShape,
     inputs: Vec<f32>,
     weights: Vec<f32>,
     bias: Vec<f32>,
     addend: Vec<f32>,
+    output_count: usize,
 }
 
 impl Numbered {
-    fn new(input_count: u32, inner: u32, columns: u32, output_count: u32) -> Numbered {
+    /// `addend` may be the shortest of all: `[column]`.
+    fn new(input_count: u32, [inner, columns]: [u32; 2], output_count: u32, addend_count: u32) -> Numbered {
         let numbers = &mut Numbers::new(u64::from(input_count + columns));
         let mut some = |count: u32| (0..count).map(|_| numbers.between(-1.0, 1.0)).collect::<Vec<f32>>();
         Numbered {
+            shape: LayerShape { inner_count: inner as usize, column_count: columns as usize, has_wide_images: false },
             inputs: some(input_count),
             weights: some(inner * columns),
             bias: some(columns),
-            addend: some(output_count),
+            addend: some(addend_count),
+            output_count: output_count as usize,
         }
     }
 
     /// Outputs of a device, with one number behind the last.
-    fn on<D: Memory>(
+    fn on<D: NetworkKernels>(
         &self,
         device: &D,
         run: impl FnOnce(&D::Buffer<f32>, &Layer<D>, &D::Buffer<f32>, &mut D::Buffer<f32>) -> Result<(), D::Error>,
     ) -> Result<Vec<f32>, D::Error> {
-        let layer = Layer::new(device.upload(&self.weights)?, device.upload(&self.bias)?);
-        let mut outputs = device.upload(&vec![UNTOUCHED; self.addend.len() + 1])?;
+        let layer = Layer::new(device, &self.shape, &self.weights, &self.bias)?;
+        let mut outputs = device.upload(&vec![UNTOUCHED; self.output_count + 1])?;
         run(&device.upload(&self.inputs)?, &layer, &device.upload(&self.addend)?, &mut outputs)?;
         device.download(&outputs)
     }
@@ -89,7 +102,8 @@ fn variants() -> impl Iterator<Item = [bool; 3]> {
 fn products_of_any_size_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let devices = devices(candidate)?;
     for [row_count, inner_count, column_count] in PRODUCTS {
-        let numbers = Numbered::new(row_count * inner_count, inner_count, column_count, row_count * column_count);
+        let output_count = row_count * column_count;
+        let numbers = Numbered::new(row_count * inner_count, [inner_count, column_count], output_count, output_count);
         for [has_addend, relu_inputs, relu_outputs] in variants() {
             let (relu_inputs, relu_outputs) = (relu_inputs.into(), relu_outputs.into());
             let block =
@@ -108,34 +122,129 @@ fn products_of_any_size_are_the_cpus(candidate: &Candidate) -> Result<(), Failed
     Ok(())
 }
 
+/// The output image has the size that it must have.
+fn fitted(block: ConvolveBlock) -> ConvolveBlock {
+    let reach = (block.size - 1) * block.dilation + 1;
+    let out = |side: u32| (side * block.enlarge + 2 * block.padding - reach) / block.stride + 1;
+    ConvolveBlock { out_height: out(block.in_height), out_width: out(block.in_width), ..block }
+}
+
+/// The same convolution, and what else it may be: between channels of wider images, scaled, with one addend for all
+/// pixels, with gaps in its windows, of an enlarged image, and all at once.
+fn extended(block: ConvolveBlock) -> [ConvolveBlock; 6] {
+    let packed = fitted(block.packed());
+    let within = |block: ConvolveBlock| ConvolveBlock {
+        in_pitch: block.in_channels + 3,
+        in_first: 2,
+        out_pitch: block.out_channels + 5,
+        out_first: 4,
+        addend_pitch: block.out_channels + 1,
+        addend_first: 3,
+        scale: 0.7,
+        ..block
+    };
+    let broadcast = ConvolveBlock { addend_pitch: 0, ..packed };
+    let dilated = fitted(ConvolveBlock { dilation: 2, padding: 2 * block.padding, ..packed });
+    let enlarged = fitted(ConvolveBlock { enlarge: 2, ..packed });
+    let all = fitted(ConvolveBlock { enlarge: 3, ..dilated });
+    [packed, within(packed), broadcast, dilated, enlarged, ConvolveBlock { addend_pitch: 0, ..within(all) }]
+}
+
 fn convolutions_of_any_shape_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
     let devices = devices(candidate)?;
     for [in_height, in_width, in_channels, out_channels, size, stride, padding] in CONVOLUTIONS {
-        let out = |side: u32| (side + 2 * padding - size) / stride + 1;
         let shape = ConvolveBlock {
             in_height,
             in_width,
             in_channels,
-            out_height: out(in_height),
-            out_width: out(in_width),
             out_channels,
             size,
             stride,
             padding,
             ..Default::default()
         };
-        let input_count = in_height * in_width * in_channels;
-        let numbers = Numbered::new(input_count, shape.patch_len(), out_channels, shape.pixel_count() * out_channels);
-        for [has_addend, relu_outputs, _] in variants().take(4) {
-            let block = ConvolveBlock { relu_outputs: relu_outputs.into(), ..shape };
-            let expected = numbers.on(&Cpu, |inputs, layer, addend, outputs| {
-                Cpu.convolve(&block, inputs, layer, has_addend.then_some(addend), outputs)
-            })?;
-            for device in &devices {
-                let actual = numbers.on(device, |inputs, layer, addend, outputs| {
-                    device.convolve(&block, inputs, layer, has_addend.then_some(addend), outputs)
+        for block in extended(shape) {
+            let input_count = block.in_first + in_height * in_width * block.in_pitch;
+            let output_count = block.out_first + block.pixel_count() * block.out_pitch;
+            let addend_count = block.addend_first + out_channels + (block.pixel_count() - 1) * block.addend_pitch;
+            let numbers = Numbered::new(input_count, [block.patch_len(), out_channels], output_count, addend_count);
+            for [has_addend, relu_outputs, _] in variants().take(4) {
+                let block = ConvolveBlock { relu_outputs: relu_outputs.into(), ..block };
+                let expected = numbers.on(&Cpu, |inputs, layer, addend, outputs| {
+                    Cpu.convolve(&block, inputs, layer, has_addend.then_some(addend), outputs)
                 })?;
-                assert_equal(&actual, &expected, shape.patch_len(), &format!("{block:?}, addend {has_addend}"))?;
+                for device in &devices {
+                    let actual = numbers.on(device, |inputs, layer, addend, outputs| {
+                        device.convolve(&block, inputs, layer, has_addend.then_some(addend), outputs)
+                    })?;
+                    assert_equal(&actual, &expected, block.patch_len(), &format!("{block:?}, addend {has_addend}"))?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+fn transposed_convolutions_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+    let devices = devices(candidate)?;
+    for [in_height, in_width, in_channels, out_channels, size] in TRANSPOSED {
+        for [is_within, relu_outputs, _] in variants().take(4) {
+            let (more, first) = if is_within { (3, 2) } else { (0, 0) };
+            let block = TransposedBlock {
+                in_height,
+                in_width,
+                in_channels,
+                in_pitch: in_channels + more,
+                in_first: first,
+                out_channels,
+                out_pitch: out_channels + more,
+                out_first: first,
+                size,
+                relu_outputs: relu_outputs.into(),
+            };
+            let input_count = block.in_first + block.pixel_count() * block.in_pitch;
+            let output_count = block.out_first + block.pixel_count() * size * size * block.out_pitch;
+            let numbers = Numbered::new(input_count, [in_channels, block.column_count()], output_count, 1);
+            let expected = numbers
+                .on(&Cpu, |inputs, layer, _, outputs| Cpu.convolve_transposed(&block, inputs, layer, outputs))?;
+            for device in &devices {
+                let actual = numbers.on(device, |inputs, layer, _, outputs| {
+                    device.convolve_transposed(&block, inputs, layer, outputs)
+                })?;
+                assert_equal(&actual, &expected, in_channels, &format!("{block:?}"))?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn products_of_computed_matrices_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+    let devices = devices(candidate)?;
+    for [row_count, inner_count, column_count] in PRODUCTS {
+        for is_transposed in [false, true] {
+            let (right_row_pitch, right_column_pitch, right_rows) =
+                if is_transposed { (1, inner_count + 2, column_count) } else { (column_count + 2, 1, inner_count) };
+            let block = MatrixBlock {
+                row_count,
+                inner_count,
+                column_count,
+                left_pitch: inner_count + 3,
+                left_first: 2,
+                right_row_pitch,
+                right_column_pitch,
+                // Both in one buffer.
+                right_first: 2 + row_count * (inner_count + 3),
+                scale: 0.3,
+            };
+            let input_count = block.right_first + right_rows * right_row_pitch.max(right_column_pitch);
+            let numbers = Numbered::new(input_count, [1, 1], row_count * column_count, 1);
+            let expected = numbers
+                .on(&Cpu, |matrices, _, _, outputs| Cpu.multiply_matrices(&block, matrices, matrices, outputs))?;
+            for device in &devices {
+                let actual = numbers.on(device, |matrices, _, _, outputs| {
+                    device.multiply_matrices(&block, matrices, matrices, outputs)
+                })?;
+                assert_equal(&actual, &expected, inner_count, &format!("{block:?}"))?;
             }
         }
     }

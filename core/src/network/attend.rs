@@ -64,7 +64,8 @@ pub fn matrix_element(
 }
 
 /// The largest number of a row `scores[column]`, and the reciprocal of the sum of `e^(score - largest)`, at most 1: what
-/// [`softmax_value`] needs. Scores that are NaN count as minus infinity; a row of nothing else gives 0 for the second.
+/// [`softmax_value`] needs. Scores that are NaN count as minus infinity; a row of nothing else gives 0 for the second, and
+/// so do all weights of a row with plus infinity.
 #[inline]
 pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_count: u32) -> [f32; 2] {
     let mut largest = -f32::MAX;

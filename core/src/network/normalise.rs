@@ -2,8 +2,9 @@
 //! channel by channel; and the mean of every channel.
 //!
 //! Moments are found in two steps, so that a device has enough to do at once: first of parts of the image, each in two
-//! passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). No difference of
-//! large sums is taken: a group whose values are 1e4 times its deviation loses nothing.
+//! passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). Means are sums of
+//! differences from one of the values, and no difference of large sums is taken: of a group whose values are 1e4 times
+//! its deviation only the mean's own rounding is lost, and a constant group has deviations of exactly 0.
 
 use crate::math::{exp, max, sqrt};
 use crate::pages::Fetch;
@@ -53,13 +54,15 @@ impl NormaliseBlock {
 }
 
 /// Mean, and sum of the squared deviations from it, of a group in a part of the image: number `element` of
-/// `[part][group]`. Sums run pixel by pixel.
+/// `[part][group]`. Sums run pixel by pixel; the mean's is of differences from the group's first value in the part.
 #[inline]
 pub fn part_moments(inputs: &(impl Fetch<f32> + ?Sized), block: &NormaliseBlock, element: usize) -> [f32; 2] {
     let (part, group) = (element as u32 / block.group_count, element as u32 % block.group_count);
     let (pixels, channels) = (block.pixels_of(part), block.group_channels());
     let first = block.in_first + part * PART * block.in_pitch + group * channels;
-    let (mut mean, mut deviations) = (0.0, 0.0);
+    // Nearer to the mean than 0 is, wherever the group lies.
+    let mut mean = inputs.fetch(first as usize);
+    let mut deviations = 0.0;
     let mut pass = 0;
     while pass < 2 {
         let mut sum = 0.0;
@@ -74,7 +77,7 @@ pub fn part_moments(inputs: &(impl Fetch<f32> + ?Sized), block: &NormaliseBlock,
             pixel += 1;
         }
         if pass == 0 {
-            mean = sum / (pixels * channels) as f32;
+            mean += sum / (pixels * channels) as f32;
         } else {
             deviations = sum;
         }
@@ -87,7 +90,9 @@ pub fn part_moments(inputs: &(impl Fetch<f32> + ?Sized), block: &NormaliseBlock,
 /// `parts[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives 0 for the factor.
 #[inline]
 pub fn merged_moments(parts: &(impl Fetch<[f32; 2]> + ?Sized), block: &NormaliseBlock, group: usize) -> [f32; 2] {
-    let (mut count, mut mean, mut deviations) = (0.0, 0.0, 0.0);
+    // The first part changes nothing of the mean, however a device divides.
+    let [mut mean, _] = parts.fetch(group);
+    let (mut count, mut deviations) = (0.0, 0.0);
     let mut part = 0;
     while part < block.part_count() {
         let [own_mean, own_deviations] = parts.fetch(part as usize * block.group_count as usize + group);
@@ -121,10 +126,11 @@ pub fn normalised_element(
     if block.silu_outputs != 0 { silu(value) } else { value }
 }
 
-/// `x / (1 + e^-x)`: 0 for minus infinity, NaN for NaN.
+/// `x / (1 + e^-x)`: NaN for NaN. Below -87, where the result is no normal number, it is that of -87, -1.4e-36.
 #[inline]
 pub fn silu(x: f32) -> f32 {
-    // The exponential of NaN is 0: x itself keeps it.
+    // Beyond it the exponential ends, and divisors are too large for a device to divide by. NaN is not below.
+    let x = max(-87.0, x);
     x / (1.0 + exp(-x))
 }
 

@@ -46,6 +46,12 @@ impl TransposedBlock {
         self.size * self.size * self.out_channels
     }
 
+    /// Channel `inner` of input pixel `pixel`.
+    #[inline]
+    pub fn input(&self, inputs: &(impl Fetch<f32> + ?Sized), pixel: u32, inner: u32) -> f32 {
+        inputs.fetch((self.in_first + pixel * self.in_pitch + inner) as usize)
+    }
+
     /// Where column `column` of input pixel `pixel` belongs in the output.
     #[inline]
     pub fn place(&self, pixel: u32, column: u32) -> usize {
@@ -77,8 +83,8 @@ pub fn transposed_element(
     let mut sum = 0.0;
     let mut inner = 0;
     while inner < block.in_channels {
-        let input = inputs.fetch((block.in_first + pixel * block.in_pitch + inner) as usize);
-        sum += input * weights.fetch((inner * block.column_count() + column) as usize);
+        let weight = weights.fetch((inner * block.column_count() + column) as usize);
+        sum += block.input(inputs, pixel, inner) * weight;
         inner += 1;
     }
     block.output(bias, column, sum)

@@ -17,6 +17,13 @@ pub const DIVISION: f64 = 3.0 * ROUNDING;
 /// Absolute error of our sine and cosine for arguments up to 8192.
 const SINE_ERROR: f64 = 9.0e-8;
 
+/// What `count` roundings, one after the other, may make of a number, relative: `n u / (1 - n u)` (Higham, "Accuracy and
+/// Stability of Numerical Algorithms", section 3.1).
+pub fn roundings(count: usize) -> f64 {
+    let all = count as f64 * ROUNDING / 2.0;
+    all / (1.0 - all)
+}
+
 /// A value and a bound on the error of its `f32` counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounded {
@@ -35,6 +42,21 @@ impl Bounded {
     /// The outcome of an operation: its own rounding is added to what its operands brought.
     fn rounded(value: f64, brought: f64) -> Bounded {
         Bounded { value, error: brought + ROUNDING * value.abs() }
+    }
+
+    /// A sum of products in any order.
+    ///
+    /// Of `n` summands each is rounded at most `n` times: once as a product, and in at most `n - 1` additions, in
+    /// whichever order they run (Higham, section 4.2). Products that a device may flush to 0 are counted as well.
+    pub fn sum(summands: impl Iterator<Item = f64>) -> Bounded {
+        let (mut value, mut magnitudes, mut count) = (0.0, 0.0, 0);
+        for summand in summands {
+            value += summand;
+            magnitudes += summand.abs();
+            count += 1;
+        }
+        let flushed = count as f64 * f64::from(f32::MIN_POSITIVE);
+        Bounded { value, error: magnitudes * roundings(count) + flushed }
     }
 
     /// Whether this is below another number; `None` where rounding decides.
@@ -84,7 +106,10 @@ impl Bounded {
     /// `e^x`; the function under test is off by at most 2 ULP and has no subnormal results.
     pub fn exp(self) -> Bounded {
         let value = self.value.exp();
-        Bounded { value, error: value * self.error.exp_m1() + 2.0 * ROUNDING * value + 2.0e-38 }
+        // The exponential of an error this large may be infinite where the value is 0.
+        let brought =
+            if self.error < 1.0 { value * self.error.exp_m1() } else { (self.value + self.error).exp() - value };
+        Bounded { value, error: brought + 2.0 * ROUNDING * value + 2.0e-38 }
     }
 
     /// The natural logarithm of a positive number; the function under test is off by at most 2 ULP.

@@ -2,9 +2,12 @@
 
 use super::bounded::{Bounded, DIVISION, ROUNDING};
 use super::camera_oracle::{bilinear, tents};
+use super::winograd_oracle::{SIDE, Tile};
 use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
+use viewfuse_core::network::transpose::TransposedBlock;
 
 /// What a layer reads.
 #[derive(Clone, Copy, Debug)]
@@ -21,20 +24,17 @@ pub struct LayerInputs<'a> {
 
 impl LayerInputs<'_> {
     /// A sum in any order: bias, addend, and products of `input(inner)` with a column's weights.
-    ///
-    /// Of `n` summands each is rounded at most `n` times: once as a product, and in at most `n - 1` additions, in
-    /// whichever order they run (Higham, "Accuracy and Stability of Numerical Algorithms", section 4.2): the bound is
-    /// `n u / (1 - n u)` of the sum of magnitudes. Products that a device may flush to 0 are counted as well.
-    fn sum(&self, element: usize, columns: usize, inner_count: usize, input: impl Fn(usize) -> f32) -> Bounded {
-        let column = element % columns;
+    fn sum(
+        &self,
+        element: usize,
+        [inner_count, columns]: [usize; 2],
+        column: usize,
+        input: impl Fn(usize) -> f32,
+    ) -> Bounded {
         let products =
             (0..inner_count).map(|inner| f64::from(input(inner)) * f64::from(self.weights[inner * columns + column]));
         let addend = self.addend.map_or(0.0, |addend| f64::from(addend[element]));
-        let summands = products.chain([f64::from(self.bias[column]), addend]);
-        let (sum, magnitudes) = summands.fold((0.0, 0.0), |(sum, all), next| (sum + next, all + next.abs()));
-        let roundings = (inner_count + 2) as f64 * ROUNDING / 2.0;
-        let flushed = (inner_count + 2) as f64 * f64::from(f32::MIN_POSITIVE);
-        Bounded { value: sum, error: magnitudes * roundings / (1.0 - roundings) + flushed }
+        Bounded::sum(products.chain([f64::from(self.bias[column]), addend]))
     }
 }
 
@@ -48,30 +48,109 @@ pub fn product(layer: &LayerInputs, block: &ProductBlock, element: usize) -> Bou
     let (columns, inner_count) = (block.column_count as usize, block.inner_count as usize);
     let row = &layer.inputs[element / columns * inner_count..][..inner_count];
     let least = if block.relu_inputs == 0 { f32::MIN } else { 0.0 };
-    relu(layer.sum(element, columns, inner_count, |inner| row[inner].max(least)), block.relu_outputs)
+    let sum = layer.sum(element, [inner_count, columns], element % columns, |inner| row[inner].max(least));
+    relu(sum, block.relu_outputs)
 }
 
-/// The pixel that place `[row, column]` of the window of an output pixel `[row, column]` lies over; `None` outside the
-/// image.
-fn under(out: [usize; 2], place: [usize; 2], stride: u32, padding: u32, size: [u32; 2]) -> Option<usize> {
-    let at = |axis: usize| {
-        let at = (out[axis] * stride as usize + place[axis]) as i64 - i64::from(padding);
-        (0..i64::from(size[axis])).contains(&at).then_some(at as usize)
+/// Where windows lie over an image.
+#[derive(Clone, Copy, Debug)]
+struct Windows {
+    /// Rows and columns of the image, enlarged.
+    size: [u32; 2],
+    stride: u32,
+    dilation: u32,
+    padding: u32,
+}
+
+impl Windows {
+    /// The row and column that place `[row, column]` of the window of an output pixel `[row, column]` lies over; `None`
+    /// outside the image.
+    fn under(&self, out: [usize; 2], place: [usize; 2]) -> Option<[usize; 2]> {
+        let at = |axis: usize| {
+            let at = out[axis] * self.stride as usize + place[axis] * self.dilation as usize;
+            at.checked_sub(self.padding as usize).filter(|at| *at < self.size[axis] as usize)
+        };
+        Some([at(0)?, at(1)?])
+    }
+}
+
+/// What a convolution sees at `[row, column]` of its image, counted from `-padding`: 0 outside.
+fn seen(layer: &LayerInputs, block: &ConvolveBlock, out: [usize; 2], place: [usize; 2], channel: usize) -> f32 {
+    let size = [block.in_height, block.in_width].map(|side| side * block.enlarge);
+    let windows = Windows { size, stride: block.stride, dilation: block.dilation, padding: block.padding };
+    windows.under(out, place).map_or(0.0, |at| {
+        let [row, column] = at.map(|at| at / block.enlarge as usize);
+        let pixel = row * block.in_width as usize + column;
+        layer.inputs[block.in_first as usize + pixel * block.in_pitch as usize + channel]
+    })
+}
+
+/// Channel `channel` of output pixel `pixel` of a convolution whose products are summed one by one.
+pub fn convolve(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channel: usize) -> Bounded {
+    ended(block, convolve_sum(layer, block, pixel, channel))
+}
+
+/// The same of a layer for large images, for which a device may take Winograd's way.
+pub fn convolve_wide(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channel: usize) -> Bounded {
+    let sum = convolve_sum(layer, block, pixel, channel);
+    let side = [block.out_height, block.out_width].map(|side| side as usize);
+    let corner = [pixel / side[1], pixel % side[1]].map(|at| at / SIDE * SIDE);
+    let tile = Tile {
+        place: [pixel / side[1] - corner[0], pixel % side[1] - corner[1]],
+        channels: block.in_channels as usize,
+        input: |place, inner| f64::from(seen(layer, block, corner, place, inner)),
+        weight: |[row, column]: [usize; 2], inner| {
+            let inner = (row * 3 + column) * block.in_channels as usize + inner;
+            f64::from(layer.weights[inner * block.out_channels as usize + channel])
+        },
     };
-    Some(at(0)? * size[1] as usize + at(1)?)
+    ended(block, Bounded { error: sum.error + tile.error(), ..sum })
 }
 
-/// Output number `element` of a convolution.
-pub fn convolve(layer: &LayerInputs, block: &ConvolveBlock, element: usize) -> Bounded {
+/// Bias, addend and products.
+fn convolve_sum(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channel: usize) -> Bounded {
     let (columns, channels, side) = (block.out_channels as usize, block.in_channels as usize, block.size as usize);
-    let (pixel, out_width) = (element / columns, block.out_width as usize);
+    let out = [pixel / block.out_width as usize, pixel % block.out_width as usize];
     let input = |inner: usize| {
         let place = [inner / channels / side, inner / channels % side];
-        let size = [block.in_height, block.in_width];
-        let under = under([pixel / out_width, pixel % out_width], place, block.stride, block.padding, size);
-        under.map_or(0.0, |pixel| layer.inputs[pixel * channels + inner % channels])
+        seen(layer, block, out, place, inner % channels)
     };
-    relu(layer.sum(element, columns, side * side * channels, input), block.relu_outputs)
+    let addend = block.addend_first as usize + pixel * block.addend_pitch as usize + channel;
+    layer.sum(addend, [side * side * channels, columns], channel, input)
+}
+
+/// Scaled and rectified.
+fn ended(block: &ConvolveBlock, sum: Bounded) -> Bounded {
+    relu(sum * Bounded::from(block.scale), block.relu_outputs)
+}
+
+/// Channel `channel` of output pixel `pixel` of a convolution of every channel by itself.
+pub fn depthwise(inputs: &[f32], weights: &[f32], block: &DepthwiseBlock, pixel: usize, channel: usize) -> Bounded {
+    let size = [block.in_height, block.in_width];
+    let windows = Windows { size, stride: block.stride, dilation: block.dilation, padding: block.padding };
+    let (side, channels) = (block.size as usize, block.channels as usize);
+    let out = [pixel / block.out_width as usize, pixel % block.out_width as usize];
+    let product = |place: usize| {
+        let [row, column] = windows.under(out, [place / side, place % side])?;
+        let pixel = row * block.in_width as usize + column;
+        let input = inputs[block.in_first as usize + pixel * block.in_pitch as usize + channel];
+        let weight = if block.is_shared == 1 { weights[place] } else { weights[place * channels + channel] };
+        Some(f64::from(input) * f64::from(weight))
+    };
+    Bounded::sum((0..side * side).filter_map(product))
+}
+
+/// Channel `channel` of the output pixel at `[row, column]` of a transposed convolution.
+pub fn transposed(layer: &LayerInputs, block: &TransposedBlock, at: [usize; 2], channel: usize) -> Bounded {
+    let size = block.size as usize;
+    let [row, column] = at.map(|at| at / size);
+    let pixel =
+        &layer.inputs[block.in_first as usize + (row * block.in_width as usize + column) * block.in_pitch as usize..];
+    let columns = size * size * block.out_channels as usize;
+    let corner = (at[0] % size * size + at[1] % size) * block.out_channels as usize + channel;
+    let products = (0..block.in_channels as usize)
+        .map(|inner| f64::from(pixel[inner]) * f64::from(layer.weights[inner * columns + corner]));
+    relu(Bounded::sum(products.chain([f64::from(layer.bias[channel])])), block.relu_outputs)
 }
 
 /// Output number `element` of pooling: exact.
@@ -81,9 +160,10 @@ pub fn max_pool(inputs: &[f32], block: &PoolBlock, element: usize) -> Bounded {
     let out = [pixel / out_width, pixel % out_width];
     let places = (0..block.size as usize).flat_map(|row| (0..block.size as usize).map(move |column| [row, column]));
     let size = [block.in_height, block.in_width];
+    let windows = Windows { size, stride: block.stride, dilation: 1, padding: block.padding };
     places
-        .filter_map(|place| under(out, place, block.stride, block.padding, size))
-        .map(|pixel| inputs[pixel * channels + channel])
+        .filter_map(|place| windows.under(out, place))
+        .map(|[row, column]| inputs[(row * block.in_width as usize + column) * channels + channel])
         .fold(f32::MIN, f32::max)
         .into()
 }

@@ -34,7 +34,7 @@ pub fn embed(view: &CameraBlock, at: &RayPoint, block: &EmbedBlock) -> Vec<Bound
 }
 
 /// Whether a point is in front of a view; `None` where rounding decides.
-fn is_in_front(view: &CameraBlock, at: Vector) -> Option<bool> {
+pub(super) fn is_in_front(view: &CameraBlock, at: Vector) -> Option<bool> {
     let origin = centre(view);
     let [_, _, forward] = axes(view);
     Bounded::from(LEAST_DEPTH).below(dot(forward, [0, 1, 2].map(|axis| at[axis] - origin[axis])))

@@ -20,7 +20,10 @@ pub fn cast_ray(block: &CastBlock, pixel: u32) -> [Bounded; 8] {
     let camera: &CameraBlock = &block.camera;
     let at = [pixel % camera.width, pixel / camera.width].map(|at| at as f32 + block.pixel_centre);
     let [x, y, z] = towards(camera, at);
-    let length = (x.squared() + y.squared() + z.squared()).square_root();
+    let length = match block.along_axis {
+        0 => (x.squared() + y.squared() + z.squared()).square_root(),
+        _ => Bounded::ONE,
+    };
     let [origin_x, origin_y, origin_z] = centre(camera);
     let (near, far) = (block.near.into(), block.far.into());
     [origin_x, origin_y, origin_z, near, x / length, y / length, z / length, far]

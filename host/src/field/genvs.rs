@@ -36,7 +36,7 @@ use encoder::SIDE_STEP;
 use feature_image::{Looking, Views};
 use image::{Scratch, Size};
 use parts::Parts;
-use sampling::Earlier;
+use sampling::Start;
 use std::cell::{Ref, RefCell};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -283,13 +283,11 @@ impl<D: Device> Field<D> for Genvs {
         let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
         let sampled = {
             let earlier = prepared.earlier.borrow();
-            let earlier = match (&*earlier, self.options.omissions.reuse) {
-                (Some((earlier_size, picture)), Some(level)) if *earlier_size == size => {
-                    Some(Earlier { picture, level })
-                }
-                _ => None,
+            let start = match (&*earlier, self.options.omissions.reuse) {
+                (Some((of_size, picture)), Some(level)) if *of_size == size => Start::Picture { picture, level },
+                _ => Start::Noise,
             };
-            prepared.parts.picture(device, &mut scratch, &features, &self.options.plan, earlier, progress)?
+            prepared.parts.picture(device, &mut scratch, &features, &self.options.plan, start, progress)?
         };
         let mut counts = self.counts();
         counts.calls += u64::from(sampled.call_count());

@@ -1,18 +1,15 @@
 //! PixelNeRF with parameters by formula: latents, points, rays. The official network at full size, or, where the file's
 //! metadata say `width`, the small member of the family of that width.
 
-use super::{Measure, Quantity, Report, VerifyError};
+use super::file::{File, compared, full};
+use super::{Quantity, Report, VerifyError};
 use crate::device::Device;
-use crate::field::FieldError;
 use crate::field::pixelnerf::reference::{Reference, SeenRays};
 use crate::field::pixelnerf::{Architecture, Omissions, Pass, PixelNerf, PixelNerfOptions, made};
-use crate::photographs::{SourceImage, SourceImages};
-use safetensors::tensor::Dtype;
-use safetensors::{SafeTensors, tensor::TensorView};
+use crate::photographs::SourceImages;
+use safetensors::SafeTensors;
 use std::path::Path;
-use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::depths::FineBlock;
-use viewfuse_core::pose::Pose;
 use viewfuse_core::rays::{RayPoint, TargetRay};
 
 /// Weights of the views by the names of the file.
@@ -42,7 +39,7 @@ pub(super) fn verify<D: Device>(
     let failed =
         |message: String| VerifyError::Content { path: path.to_path_buf(), place: "pixelnerf".to_owned(), message };
     let options = |omissions| PixelNerfOptions { omissions, ..PixelNerfOptions::default() };
-    let sources = file.sources()?;
+    let sources = file.sources("focal", |_| 1.0)?;
     let latent_layers = Omissions { latent_layers: true, ..Omissions::NONE };
     let field = PixelNerf::new(&checkpoint, options(Omissions::NONE)).map_err(|error| failed(error.to_string()))?;
     let exact = Comparison { file: &file, suffix: "" };
@@ -96,101 +93,11 @@ const NAMES: [&str; 33] = [
     "poses",
 ];
 
-/// An error with its cause.
-fn full<E: std::error::Error>(error: &FieldError<E>) -> String {
-    match error {
-        FieldError::Device(cause) => format!("{error}: {cause}"),
-        error => error.to_string(),
-    }
-}
-
-struct File<'a> {
-    path: &'a Path,
-    tensors: &'a SafeTensors<'a>,
-}
-
-impl File<'_> {
-    fn wrong(&self, name: &str, message: impl Into<String>) -> VerifyError {
-        VerifyError::Content { path: self.path.to_path_buf(), place: name.to_owned(), message: message.into() }
-    }
-
-    fn view(&self, name: &str, dtype: Dtype) -> Result<TensorView<'_>, VerifyError> {
-        let view = self.tensors.tensor(name).map_err(|error| self.wrong(name, error.to_string()))?;
-        if view.dtype() != dtype {
-            return Err(self.wrong(name, format!("holds {:?} instead of {dtype:?}", view.dtype())));
-        }
-        Ok(view)
-    }
-
-    fn floats(&self, name: &str) -> Result<Vec<f32>, VerifyError> {
-        let view = self.view(name, Dtype::F32)?;
-        Ok(view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
-    }
-
-    /// So many numbers, and no others.
-    fn many(&self, name: &str, count: usize) -> Result<Vec<f32>, VerifyError> {
-        let values = self.floats(name)?;
-        match values.len() == count {
-            true => Ok(values),
-            false => Err(self.wrong(name, format!("has {} numbers instead of {count}", values.len()))),
-        }
-    }
-
-    /// As many numbers for each of some rows, at least one.
-    fn many_a_row(&self, name: &str, row_count: usize) -> Result<Vec<f32>, VerifyError> {
-        let values = self.floats(name)?;
-        match !values.is_empty() && values.len() % row_count == 0 {
-            true => Ok(values),
-            false => {
-                Err(self.wrong(name, format!("{} numbers are not as many for each of {row_count} rays", values.len())))
-            }
-        }
-    }
-
-    fn rows<const N: usize>(&self, name: &str) -> Result<Vec<[f32; N]>, VerifyError> {
-        let values = self.floats(name)?;
-        let (rows, rest) = values.as_chunks::<N>();
-        if !rest.is_empty() || rows.is_empty() {
-            return Err(self.wrong(name, format!("{} numbers are no rows of {N}", values.len())));
-        }
-        Ok(rows.to_vec())
-    }
-
-    fn sources(&self) -> Result<SourceImages, VerifyError> {
-        let images = self.view("images", Dtype::U8)?;
-        let &[count, 3, height, width] = images.shape() else {
-            return Err(self.wrong("images", format!("has the shape {:?} instead of (n, 3, h, w)", images.shape())));
-        };
-        let focal = *self.floats("focal")?.first().ok_or_else(|| self.wrong("focal", "is empty"))?;
-        let principal = [width as f32 / 2.0, height as f32 / 2.0];
-        let pinhole = Pinhole::new([focal; 2], principal, width as u32, height as u32)
-            .map_err(|error| self.wrong("focal", error.to_string()))?;
-        let poses = self.rows::<16>("src_poses")?;
-        if poses.len() != count {
-            return Err(self.wrong("src_poses", format!("{} poses of {count} images", poses.len())));
-        }
-        let pixels = height * width;
-        let image = |(view, rows): (usize, &[f32; 16])| {
-            let matrix: [[f32; 4]; 4] = std::array::from_fn(|row| std::array::from_fn(|column| rows[row * 4 + column]));
-            let pose = Pose::from_opengl(&matrix).map_err(|error| self.wrong("src_poses", error.to_string()))?;
-            let level = |channel: usize, pixel: usize| images.data()[(view * 3 + channel) * pixels + pixel];
-            let texels = (0..pixels)
-                .map(|pixel| {
-                    let [red, green, blue] = [0, 1, 2].map(|channel| f32::from(level(channel, pixel)) / 255.0);
-                    [red, green, blue, 1.0]
-                })
-                .collect();
-            Ok(SourceImage { camera: Camera { pose, pinhole }, texels })
-        };
-        let images = poses.iter().enumerate().map(image).collect::<Result<_, VerifyError>>()?;
-        Ok(SourceImages { images, background: [1.0; 3], warning: None })
-    }
-
-    fn rays(&self) -> Result<Vec<TargetRay>, VerifyError> {
-        let ray =
-            |[x, y, z, a, b, c, near, far]: [f32; 8]| TargetRay { origin: [x, y, z], near, direction: [a, b, c], far };
-        Ok(self.rows::<8>("rays")?.into_iter().map(ray).collect())
-    }
+/// The rays of the file.
+fn rays(file: &File<'_>) -> Result<Vec<TargetRay>, VerifyError> {
+    let ray =
+        |[x, y, z, a, b, c, near, far]: [f32; 8]| TargetRay { origin: [x, y, z], near, direction: [a, b, c], far };
+    Ok(file.rows::<8>("rays")?.into_iter().map(ray).collect())
 }
 
 /// One way of computing, compared with the file.
@@ -202,12 +109,7 @@ struct Comparison<'a> {
 impl Comparison<'_> {
     /// A quantity whose tolerance is a share of the largest reference value, if `relative`.
     fn compare(&self, name: &str, ours: &[f32], reference: &[f32], tolerance: f64, relative: bool) -> Quantity {
-        let largest = reference.iter().fold(0.0_f64, |largest, value| largest.max(f64::from(value.abs())));
-        let scale = if relative { largest } else { 1.0 };
-        let mut quantity =
-            Quantity::new(format!("PixelNeRF {name}{}", self.suffix), Measure::Absolute, tolerance * scale);
-        quantity.compare_all(ours.iter().map(|v| f64::from(*v)), reference.iter().map(|v| f64::from(*v)), name);
-        quantity
+        compared(format!("PixelNeRF {name}{}", self.suffix), ours, reference, tolerance, relative)
     }
 
     fn failed<E: std::error::Error>(&self, error: E) -> VerifyError {
@@ -220,16 +122,15 @@ impl Comparison<'_> {
         sources: &SourceImages,
         report: &mut Report,
     ) -> Result<(), VerifyError> {
-        let indices = self.file.view("latent_index", Dtype::I64)?;
+        let indices = self.file.indices("latent_index")?;
         let expected = self.file.floats("latent_value")?;
         let latents = reference.latents().map_err(|error| self.failed(error))?;
         let view_len = latents.len() / sources.images.len();
         let channels = reference.architecture().latent_channels();
         let pixels = view_len / channels;
         let mut ours = Vec::with_capacity(expected.len());
-        for bytes in indices.data().as_chunks::<8>().0 {
+        for index in indices {
             // Theirs is (view, channel, row, column).
-            let index = usize::try_from(i64::from_le_bytes(*bytes)).unwrap_or(usize::MAX);
             let (view, rest) = (index / view_len, index % view_len);
             let at = view * view_len + rest % pixels * channels + rest / pixels;
             let value =
@@ -277,7 +178,7 @@ impl Comparison<'_> {
 
     fn rays<D: Device>(&self, reference: &Reference<'_, D>, report: &mut Report) -> Result<(), VerifyError> {
         let file = self.file;
-        let rays = file.rays()?;
+        let rays = rays(file)?;
         let weights = file.many(&format!("weights.{RAY_WEIGHTS}"), reference.view_count())?;
         for (pass, name, depths) in [(Pass::Coarse, "coarse", "z_coarse"), (Pass::Fine, "fine", "z_all")] {
             let depths = file.many_a_row(depths, rays.len())?;

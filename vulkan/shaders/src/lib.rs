@@ -10,7 +10,10 @@
 //! rays        where to look        cast_rays, coarse_depths, place_points, weigh_samples, draw_chances, fine_depths,
 //!                                  merge_depths, wanted_samples
 //! points      a network's ends     embed_points, visible_weights, gather_latents, radiance
-//! network     layers               convolve, max_pool, upsample, product
+//! volumes     what GeNVS sees      gather_volume, weigh_features, sum_features, denoiser_input
+//! network     layers               convolve, convolve_depthwise, convolve_transposed, max_pool, upsample, product
+//! normalise   moments of images    channel_means, part_moments, merge_moments, normalise
+//! matrices    attention            multiply_matrices, softmax_rows
 //! light       views become one, samples become a pixel  fuse_views, composite
 //! sweep       the depths of source pixels               hull_entry, match_cost, sum_row, mean_column, pick_depth
 //! march       a target pixel's ray                      march
@@ -22,13 +25,16 @@
 
 pub mod light;
 pub mod march;
+pub mod matrices;
 pub mod network;
+pub mod normalise;
 pub mod points;
 pub mod rays;
 pub mod sampler;
 pub mod sweep;
 mod tile;
 mod unchecked;
+pub mod volumes;
 pub mod weighting;
 
 /// Which elements a dispatch has: its invocation `i` works on element `first + i`, if `i < count`. The same bytes as

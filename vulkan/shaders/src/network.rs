@@ -5,9 +5,11 @@ use crate::tile::{Shape, Shared, multiply};
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::network::convolve::{ConvolveBlock, patch_value};
+use viewfuse_core::network::convolve::{ConvolveBlock, convolved, patch_value};
+use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
 use viewfuse_core::network::product::{ProductBlock, first_of_sum, input_value, rectified};
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_core::pages::Fetch;
 
 /// A part of a tile of pixels and output channels: invocation `first + id.x`.
@@ -35,10 +37,52 @@ pub fn convolve(
         move |pixel, inner| patch_value(&inputs, block, pixel, inner),
         move |inner, channel| weights.fetch((inner * channels + channel) as usize),
         move |pixel, channel, sum| {
-            let element = (pixel * channels + channel) as usize;
-            let first = first_of_sum(&bias, &addend, block.has_addend, element, channel as usize);
-            store(outputs, element, rectified(first + sum, block.relu_outputs));
+            let value = convolved(&bias, &addend, block, pixel, channel, sum);
+            store(outputs, block.place(pixel, channel), value);
         },
+    );
+}
+
+/// Channel of an output pixel number `first + id.x`, flat in `[row][column][channel]`.
+#[spirv(compute(threads(64), entry_point_name = "convolve_depthwise"))]
+pub fn convolve_depthwise(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<DepthwiseBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] outputs: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let element = (push.piece.first + id.x) as usize;
+    outputs[element] = depthwise_element(inputs, weights, &push.parameters, element);
+}
+
+/// A part of a tile of input pixels and what they become: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "convolve_transposed"))]
+#[allow(clippy::too_many_arguments)]
+pub fn convolve_transposed(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<TransposedBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count();
+    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
+    multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
+        rows,
+        columns,
+        move |pixel, inner| block.input(&inputs, pixel, inner),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
     );
 }
 

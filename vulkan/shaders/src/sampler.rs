@@ -7,6 +7,7 @@ use viewfuse_core::sampler::{Mix, NoiseBlock, mixed_element, noisy_element};
 
 /// The linear combination at element number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "mix_pictures"))]
+#[allow(clippy::too_many_arguments)]
 pub fn mix_pictures(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<Mix>,

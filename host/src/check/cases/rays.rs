@@ -1,4 +1,5 @@
-//! [`Kernel::CastRays`] and [`Kernel::PlacePoints`]: rays of any camera, points of some samples on some rays.
+//! [`Kernel::CastRays`] and [`Kernel::PlacePoints`]: rays of any camera with depths along them or along its axis,
+//! points of some samples on some rays.
 
 use crate::check::agreement::Limits;
 use crate::check::bounded::Bounded;
@@ -24,7 +25,7 @@ impl Case for CastRays {
     const KERNEL: Kernel = Kernel::CastRays;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "quotients of image coordinates by the focal length, three products with the axes, a norm \
-        and a division by it";
+        (1 where depths are along the axis) and a division by it";
     const SPOILERS: &'static [Spoiler<Vec<Cast>>] = &[
         ("pixels", |jobs| {
             jobs.iter_mut().for_each(|job| job.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 101 / 100))
@@ -37,14 +38,14 @@ impl Case for CastRays {
 
     fn inputs(seed: u64, size: u32) -> Vec<Cast> {
         let random = &mut random(5, seed, size);
-        let job = |pixel_centre| {
+        let job = |(pixel_centre, along_axis)| {
             let camera = camera(random);
             let (near, far) = (random.range(0.1, 1.0) as f32, random.range(1.0, 9.0) as f32);
             let pixel_count = (camera.width * camera.height) as usize;
             let pixels = (0..size).map(|_| random.below(pixel_count) as u32).collect();
-            Cast { block: CastBlock { camera, near, far, pixel_centre, along_axis: 0 }, pixels }
+            Cast { block: CastBlock { camera, near, far, pixel_centre, along_axis }, pixels }
         };
-        [0.5, 0.0, 0.5, 0.25].map(job).to_vec()
+        [(0.5, 0), (0.0, 0), (0.5, 1), (0.25, 1)].map(job).to_vec()
     }
 
     fn element_count(jobs: &Vec<Cast>) -> usize {

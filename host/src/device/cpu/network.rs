@@ -61,7 +61,7 @@ impl NetworkKernels for Cpu {
     ) -> Result<(), Infallible> {
         let (pixel_count, columns) = (block.pixel_count() as usize, block.out_channels as usize);
         let ending = Ending {
-            bias: &layer.bias,
+            bias: &layer.bias[..columns],
             addend: addend.map(|addend| (&addend[block.addend_first as usize..], block.addend_pitch as usize)),
             scale: block.scale,
             relu: block.relu_outputs,

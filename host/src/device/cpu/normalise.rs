@@ -92,11 +92,17 @@ fn moments_of(block: &NormaliseBlock, inputs: &[f32], part: usize, sums: &mut Ve
     sums.clear();
     sums.resize(2 * channels, 0.0);
     let (sums, means) = sums.split_at_mut(channels);
-    for pixel in pixels.clone() {
-        sums.iter_mut().zip(row(pixel)).for_each(|(sum, input)| *sum += input);
+    // First the group's first value, then its mean.
+    for (means, inputs) in means.chunks_mut(own).zip(row(first).chunks(own)) {
+        means.fill(inputs[0]);
     }
-    for ((sums, means), moments) in sums.chunks_mut(own).zip(means.chunks_mut(own)).zip(&mut *moments) {
-        *moments = [sums.iter().sum::<f32>() / count, 0.0];
+    for pixel in pixels.clone() {
+        for ((sum, mean), input) in sums.iter_mut().zip(&*means).zip(row(pixel)) {
+            *sum += input - mean;
+        }
+    }
+    for ((sums, means), moments) in sums.chunks(own).zip(means.chunks_mut(own)).zip(&mut *moments) {
+        *moments = [means[0] + sums.iter().sum::<f32>() / count, 0.0];
         means.fill(moments[0]);
     }
     sums.fill(0.0);

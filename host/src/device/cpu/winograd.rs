@@ -4,8 +4,8 @@
 //! Source: Lavin and Gray, "Fast algorithms for convolutional neural networks" (2016), F(4x4, 3x3). With the matrices
 //! `B`, `G`, `A` below, inputs `d` and weights `g`: `A^T ((G g G^T) * (B^T d B)) A`, where `*` goes number by number and
 //! is summed over the input channels: 36 matrix products with a tile's place in place of the pixel. In `f32` its error is
-//! about ten times that of the sum it replaces (the transforms multiply by up to 8 and subtract); parity cases hold it to
-//! a bound for that.
+//! about five times that of the sum it replaces, at worst ten times (the transforms multiply by up to 8 and subtract);
+//! parity cases hold it to a bound that is derived in [`crate::check::winograd_oracle`].
 
 use super::product::{Ending, Panels, Rows, load, store};
 use pulp::{Arch, Simd, WithSimd};

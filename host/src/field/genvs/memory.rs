@@ -4,8 +4,6 @@ use super::architecture::Architecture;
 use super::options::GenvsOptions;
 use crate::device::Device;
 
-/// Factor by which the weights of a convolution of large images may grow: 36 places of a tile for 9 of a window.
-const WINOGRAD_GROWTH: usize = 4;
 
 /// Bytes that a run takes beside photographs and pictures: parameters in the order in which products need them, each view's
 /// volume and what its last layer makes it of, and the images of the largest level of one network at a time.

@@ -8,7 +8,7 @@ use super::encoder::Encoder;
 use super::feature_image::{Looking, PointNetwork, Views, render};
 use super::image::{Image, Scratch, Size};
 use super::layers::Loader;
-use super::sampling::{Earlier, Plan, Sampled, sample};
+use super::sampling::{Plan, Sampled, Start, sample};
 use super::volume::Volume;
 use crate::checkpoint::Checkpoint;
 use crate::device::Device;
@@ -106,7 +106,7 @@ impl<D: Device> Parts<D> {
         scratch: &mut Scratch<'_, D>,
         features: &Image<D>,
         plan: &Plan,
-        earlier: Option<Earlier<'_, D>>,
+        start: Start<'_, D>,
         progress: &Progress,
     ) -> Outcome<Sampled<D>, D> {
         let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
@@ -119,7 +119,7 @@ impl<D: Device> Parts<D> {
             let picture = device.upload(&colours).map_err(FieldError::Device)?;
             return Ok(Sampled { picture, levels: Vec::new(), left_out: 0 });
         }
-        sample(device, plan, count, earlier, progress, |noisy, level, denoised| {
+        sample(device, plan, count, start, progress, |noisy, level, denoised| {
             self.denoise(device, scratch, noisy, features, level, denoised).map_err(FieldError::Device)
         })
     }

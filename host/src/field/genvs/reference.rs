@@ -2,6 +2,7 @@
 
 use super::feature_image::{Looking, Views};
 use super::image::{Image, Scratch, Size};
+use super::sampling::{Plan, Start};
 use super::{Architecture, Genvs, Outcome, Prepared};
 use crate::device::Device;
 use crate::field::{Field, FieldError};
@@ -125,6 +126,26 @@ impl<'a, D: Device> Reference<'a, D> {
             device.download(&denoised)
         };
         run().map_err(FieldError::Device)
+    }
+
+    /// The picture `[row][column][3]` in `[-1, 1]` that a plan makes of latents of variance 1, given features.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn sampled(&self, latents: &[f32], features: &[f32], size: [u32; 2], plan: &Plan) -> Outcome<Vec<f32>, D> {
+        let Reference { device, prepared, .. } = self;
+        let failed = FieldError::Device;
+        let mut scratch = Scratch::new(*device);
+        let features = self.condition(&mut scratch, features, size).map_err(failed)?;
+        let latents = device.upload(latents).map_err(failed)?;
+        let (start, progress) = (Start::Latents(&latents), Progress::hidden());
+        let sampled = prepared.parts.picture(*device, &mut scratch, &features, plan, start, &progress)?;
+        device.download(&sampled.picture).map_err(failed)
+    }
+
+    /// How many sources there are.
+    pub fn view_count(&self) -> usize {
+        self.prepared.images.len()
     }
 
     fn condition(

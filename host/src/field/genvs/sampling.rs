@@ -18,12 +18,29 @@ use crate::device::{Device, Memory};
 use crate::progress::Progress;
 use run::Run;
 
-/// A picture that a run may start from, instead of from noise alone: that of an earlier frame of the same orbit, say.
-pub struct Earlier<'a, D: Device> {
-    /// Its values, as many as the run's picture has.
-    pub picture: &'a D::Buffer<f32>,
-    /// The level to start at: as large as what may be different. Levels above it are left out.
-    pub level: f32,
+/// What a run starts from.
+pub enum Start<'a, D: Device> {
+    /// Noise of the plan's seed.
+    Noise,
+    /// Noise that is given: numbers of variance 1, which are multiplied by the largest level.
+    Latents(&'a D::Buffer<f32>),
+    /// A picture with noise of the plan's seed: that of an earlier frame of the same orbit, say.
+    Picture {
+        /// Its values, as many as the run's picture has.
+        picture: &'a D::Buffer<f32>,
+        /// The level to start at: as large as what may be different. Levels above it are left out.
+        level: f32,
+    },
+}
+
+impl<D: Device> Start<'_, D> {
+    /// The level above which levels are left out.
+    fn highest(&self) -> f32 {
+        match self {
+            Start::Picture { level, .. } => *level,
+            Start::Noise | Start::Latents(_) => f32::INFINITY,
+        }
+    }
 }
 
 /// What a run made.
@@ -58,13 +75,13 @@ pub fn sample<D: Device>(
     device: &D,
     plan: &Plan,
     element_count: usize,
-    earlier: Option<Earlier<'_, D>>,
+    start: Start<'_, D>,
     progress: &Progress,
     denoise: impl FnMut(&D::Buffer<f32>, f32, &mut D::Buffer<f32>) -> Outcome<(), D>,
 ) -> Outcome<Sampled<D>, D> {
     let run = Run::new(device, plan, element_count, progress, denoise);
     match plan.steps {
-        Steps::Fixed { sampler, level_count } => run.over_levels(sampler, level_count.max(1), earlier),
-        Steps::Chosen { tolerance, most_calls } => run.by_tolerance(tolerance, most_calls, earlier),
+        Steps::Fixed { sampler, level_count } => run.over_levels(sampler, level_count.max(1), start),
+        Steps::Chosen { tolerance, most_calls } => run.by_tolerance(tolerance, most_calls, start),
     }
 }

@@ -68,6 +68,7 @@ fn sampled(sampler: Sampler, schedule: &NoiseSchedule, start: f32, emit: Emit) -
         if sampler == Sampler::Heun && next > 0.0 {
             state = sampler.correction(&history, next).of(state, &[denoised(state, next), kept, 0.0, 0.0]);
         }
+        emit("state", state);
         index += 1;
     }
     state

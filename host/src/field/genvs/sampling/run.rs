@@ -2,7 +2,7 @@
 
 use super::super::super::FieldError;
 use super::super::super::finite::download_finite;
-use super::{Earlier, Outcome, Plan, Sampled};
+use super::{Outcome, Plan, Sampled, Start};
 use crate::device::Device;
 use crate::interrupt;
 use crate::progress::Progress;
@@ -68,15 +68,15 @@ where
         mut self,
         sampler: Sampler,
         level_count: u32,
-        earlier: Option<Earlier<'_, D>>,
+        start: Start<'_, D>,
     ) -> Outcome<Sampled<D>, D> {
         let schedule = self.plan.schedule;
         let level = |index: u32| schedule.level(index, level_count);
-        let is_reached = |index: &u32| earlier.as_ref().is_none_or(|earlier| level(*index) <= earlier.level);
+        let is_reached = |index: &u32| level(*index) <= start.highest();
         let first = (0..level_count).find(is_reached).unwrap_or(level_count - 1);
         let planned = sampler.call_count(level_count);
         self.progress.expect(sampler.call_count(level_count - first) as usize);
-        let mut state = self.noisy(earlier.map(|earlier| earlier.picture), level(first), START)?;
+        let mut state = self.begun(&start, level(first))?;
         // Where the last step began: its correction starts there.
         let mut begun: Option<D::Buffer<f32>> = None;
         for index in first..level_count {
@@ -125,13 +125,13 @@ where
         mut self,
         tolerance: f32,
         most_calls: u32,
-        earlier: Option<Earlier<'_, D>>,
+        start: Start<'_, D>,
     ) -> Outcome<Sampled<D>, D> {
         let sampler = Sampler::UniPc;
         let [largest, smallest] = [0, 1].map(|index| self.plan.schedule.level(index, 2));
-        let start = earlier.as_ref().map_or(largest, |earlier| clamp(earlier.level, smallest, largest));
-        let mut state = self.noisy(earlier.map(|earlier| earlier.picture), start, START)?;
-        let (mut sigma, mut step) = (start, FIRST_STEP);
+        let highest = clamp(start.highest(), smallest, largest);
+        let mut state = self.begun(&start, highest)?;
+        let (mut sigma, mut step) = (highest, FIRST_STEP);
         self.progress.expect(1);
         let mut newest = self.call(&state, sigma)?;
         loop {
@@ -224,6 +224,15 @@ where
         let results = std::array::from_fn(|_| all.next().unwrap_or(state));
         self.device.mix_pictures(mix, state, results, &mut mixed).map_err(FieldError::Device)?;
         Ok(mixed)
+    }
+
+    /// The state at a run's first level.
+    fn begun(&mut self, start: &Start<'_, D>, level: f32) -> Outcome<D::Buffer<f32>, D> {
+        match start {
+            Start::Noise => self.noisy(None, level, START),
+            Start::Picture { picture, .. } => self.noisy(Some(picture), level, START),
+            Start::Latents(latents) => self.mixed(&Mix { state: level, ..Mix::default() }, latents, None),
+        }
     }
 
     /// A picture, or nothing, with noise.

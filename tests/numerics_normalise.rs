@@ -1,0 +1,247 @@
+//! Normalisation, SiLU and softmax against `f64`, at their ends as well.
+
+use std::array::from_fn;
+use viewfuse::check::compare::relative_units;
+use viewfuse::check::poses::Random;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::device::{MatrixKernels, NormaliseKernels};
+use viewfuse_core::network::attend::{softmax_scale, softmax_value};
+use viewfuse_core::network::normalise::{
+    MeanBlock, NormaliseBlock, channel_mean, merged_moments, normalised_element, part_moments, silu,
+};
+
+/// An image through all three kernels: by their bodies, and by the CPU's own way.
+fn normalised(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBlock) -> [Vec<f32>; 2] {
+    let groups = block.group_count as usize;
+    let part_count = block.part_count() as usize;
+    let count = (block.pixel_count * block.channels) as usize;
+    let parts: Vec<[f32; 2]> = (0..part_count * groups).map(|element| part_moments(inputs, block, element)).collect();
+    let moments: Vec<[f32; 2]> = (0..groups).map(|group| merged_moments(&parts[..], block, group)).collect();
+    let output = |element| normalised_element(inputs, &moments[..], weights, bias, block, element);
+    let by_bodies = (0..count).map(output).collect();
+
+    let [inputs, weights, bias] = [inputs, weights, bias].map(<[f32]>::to_vec);
+    let (mut parts, mut moments) = (vec![[0.0; 2]; parts.len()], vec![[0.0; 2]; groups]);
+    let mut outputs = vec![0.0; count];
+    let Ok(()) = Cpu.part_moments(block, &inputs, &mut parts);
+    let Ok(()) = Cpu.merge_moments(block, &parts, &mut moments);
+    let Ok(()) = Cpu.normalise(block, &inputs, &moments, &weights, &bias, &mut outputs);
+    [by_bodies, outputs]
+}
+
+/// The same in `f64`: the groups' values gathered, their mean, then their variance.
+fn expected(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBlock) -> Vec<f64> {
+    let [channels, pitch, first, groups, pixels] =
+        [block.channels, block.in_pitch, block.in_first, block.group_count, block.pixel_count]
+            .map(|count| count as usize);
+    let input = |pixel: usize, channel: usize| f64::from(inputs[first + pixel * pitch + channel]);
+    let mut expected = vec![0.0; pixels * channels];
+    for group in 0..groups {
+        let own = channels / groups * group..channels / groups * (group + 1);
+        let values: Vec<f64> =
+            own.clone().flat_map(|channel| (0..pixels).map(move |pixel| input(pixel, channel))).collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        let spread = variance + f64::from(block.variance_floor);
+        let factor = if spread > 0.0 { 1.0 / spread.sqrt() } else { 0.0 };
+        for channel in own {
+            for pixel in 0..pixels {
+                let value = (input(pixel, channel) - mean) * factor * f64::from(weights[channel]);
+                let value = value + f64::from(bias[channel]);
+                expected[pixel * channels + channel] =
+                    if block.silu_outputs == 1 { value / (1.0 + (-value).exp()) } else { value };
+            }
+        }
+    }
+    expected
+}
+
+fn block(pixel_count: u32, group_count: u32, group_channels: u32) -> NormaliseBlock {
+    let channels = group_count * group_channels;
+    NormaliseBlock {
+        pixel_count,
+        channels,
+        in_pitch: channels,
+        in_first: 0,
+        group_count,
+        variance_floor: 1.0e-5,
+        silu_outputs: 0,
+    }
+}
+
+/// Largest error of both ways.
+fn error(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBlock) -> f64 {
+    let expected = expected(inputs, weights, bias, block);
+    let difference = |actual: Vec<f32>| {
+        assert_eq!(actual.len(), expected.len());
+        let differences = actual.iter().zip(&expected).map(|(actual, expected)| (f64::from(*actual) - expected).abs());
+        differences.fold(0.0, |largest, difference| if difference <= largest { largest } else { difference })
+    };
+    let [by_bodies, by_cpu] = normalised(inputs, weights, bias, block).map(difference);
+    if by_bodies <= by_cpu { by_cpu } else { by_bodies }
+}
+
+#[test]
+fn groups_have_mean_0_and_variance_1() {
+    let mut random = Random::new(61);
+    for case in 0..200 {
+        let (groups, channels) = (1 + random.below(5) as u32, 1 + random.below(9) as u32);
+        let block = block(1 + random.below(300) as u32, groups, channels);
+        let gap = random.below(3) as u32;
+        let block = NormaliseBlock {
+            in_pitch: block.channels + gap,
+            in_first: gap,
+            variance_floor: [1.0e-5, 0.0, 0.1][case % 3],
+            silu_outputs: case as u32 & 1,
+            ..block
+        };
+        let magnitude = random.log_range(1.0e-3, 1.0e3);
+        // A floor is nothing beside large variances, and most of small ones.
+        let count = (gap + block.pixel_count * block.in_pitch) as usize;
+        let inputs: Vec<f32> = (0..count).map(|_| (magnitude * (random.normal() + 1.0)) as f32).collect();
+        let [weights, bias]: [Vec<f32>; 2] = from_fn(|_| (0..block.channels).map(|_| random.normal() as f32).collect());
+        let error = error(&inputs, &weights, &bias, &block);
+        assert!(error <= 1.0e-5, "{block:?} {magnitude}: {error}");
+    }
+}
+
+#[test]
+fn values_far_from_0_are_normalised() {
+    let mut random = Random::new(62);
+    for (distance, tolerance) in [(1.0e2, 5.0e-5), (1.0e3, 5.0e-4), (1.0e4, 5.0e-3)] {
+        for (pixels, groups, channels) in [(64, 1, 32), (1024, 2, 16), (4096, 1, 4), (777, 3, 1)] {
+            let block = NormaliseBlock { variance_floor: 0.0, ..block(pixels, groups, channels) };
+            let count = (block.pixel_count * block.channels) as usize;
+            // As many bits as the inputs have decide: what they are is given, their mean is not.
+            let inputs: Vec<f32> = (0..count).map(|_| (distance + random.normal()) as f32).collect();
+            let ones = vec![1.0; block.channels as usize];
+            let error = error(&inputs, &ones, &vec![0.0; ones.len()], &block);
+            println!("{distance:e} {pixels}x{groups}x{channels}: {error:.1e}");
+            assert!(error <= tolerance, "{block:?} {distance}: {error}");
+        }
+    }
+}
+
+#[test]
+fn constant_groups_give_the_bias() {
+    for constant in [0.0, 1.0, 0.1, -10_000.3, 1.0e6, 3.3e-5] {
+        for (pixels, channels) in [(1, 1), (1, 7), (64, 32), (100, 3), (1000, 16)] {
+            for variance_floor in [0.0, 1.0e-5] {
+                let block = NormaliseBlock { variance_floor, ..block(pixels, 2, channels) };
+                let inputs = vec![constant; (block.pixel_count * block.channels) as usize];
+                let bias: Vec<f32> = (0..block.channels).map(|channel| channel as f32 + 0.5).collect();
+                let expected = bias.repeat(block.pixel_count as usize);
+                for outputs in normalised(&inputs, &vec![2.0; bias.len()], &bias, &block) {
+                    assert_eq!(outputs, expected, "{constant} {block:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pixel_alone_is_normalised_over_its_channels() {
+    let block = NormaliseBlock { variance_floor: 0.0, ..block(1, 2, 2) };
+    for outputs in normalised(&[1.0, 3.0, -5.0, -5.0], &[1.0, 2.0, 3.0, 4.0], &[0.0, 0.0, 0.0, 7.0], &block) {
+        assert_eq!(outputs, [-1.0, 2.0, 0.0, 7.0]);
+    }
+}
+
+#[test]
+fn means_are_means() {
+    let mut random = Random::new(63);
+    for _ in 0..50 {
+        let block = MeanBlock { pixel_count: 1 + random.below(5000) as u32, channels: 1 + random.below(4) as u32 };
+        let count = (block.pixel_count * block.channels) as usize;
+        let inputs: Vec<f32> = (0..count).map(|_| (1.0 + random.normal()) as f32).collect();
+        let mut sums = vec![0.0; block.channels as usize];
+        for pixel in inputs.chunks_exact(sums.len()) {
+            sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
+        }
+        let mut means = vec![0.0; sums.len()];
+        let Ok(()) = Cpu.channel_means(&block, &inputs, &mut means);
+        for (channel, sum) in sums.into_iter().enumerate() {
+            let expected = sum / f64::from(block.pixel_count);
+            for actual in [channel_mean(&inputs[..], &block, channel), means[channel]] {
+                assert!((f64::from(actual) - expected).abs() <= 2.0e-5, "{block:?} {channel}: {actual} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn silu_at_its_ends() {
+    let mut worst = 0.0_f64;
+    for step in -86_000..=200_000 {
+        let x = step as f32 / 1000.0;
+        let expected = f64::from(x) / (1.0 + (-f64::from(x)).exp());
+        worst = worst.max(relative_units(silu(x), expected));
+    }
+    println!("{worst:.2} units");
+    assert!(worst <= 6.0, "{worst} units of 2^-24");
+    for x in [-86.5, -87.0, -88.0, -100.0, -1.0e4, -1.0e30, f32::MIN, f32::NEG_INFINITY] {
+        assert!(silu(x) <= 0.0 && silu(x) >= -3.0e-36, "{x}: {}", silu(x));
+    }
+    for x in [100.0, 1.0e4, 1.0e30, f32::MAX, f32::INFINITY] {
+        assert_eq!(silu(x), x);
+    }
+    assert_eq!(silu(0.0), 0.0);
+    assert!(silu(f32::NAN).is_nan());
+}
+
+/// A row's weights: by the body, and by the CPU.
+fn softmax(scores: &[f32]) -> [Vec<f32>; 2] {
+    // Another row around it.
+    let rows = [&vec![7.0; scores.len()][..], scores, &vec![-7.0; scores.len()]].concat();
+    let scale = softmax_scale(&rows[..], scores.len(), scores.len() as u32);
+    let by_body = scores.iter().map(|score| softmax_value(*score, scale)).collect();
+    let mut weights = vec![0.0; rows.len()];
+    let Ok(()) = Cpu.softmax_rows(3, scores.len() as u32, &rows, &mut weights);
+    [by_body, weights[scores.len()..2 * scores.len()].to_vec()]
+}
+
+#[test]
+fn softmax_is_shares_of_exponentials() {
+    let mut random = Random::new(64);
+    for _ in 0..200 {
+        let (count, deviation) = (1 + random.below(300), random.log_range(1.0e-3, 30.0));
+        let scores: Vec<f32> = (0..count).map(|_| (deviation * random.normal()) as f32).collect();
+        let all: f64 = scores.iter().map(|score| f64::from(*score).exp()).sum();
+        for weights in softmax(&scores) {
+            for (score, weight) in scores.iter().zip(weights) {
+                // An error of the difference of scores is one of the exponent.
+                let expected = f64::from(*score).exp() / all;
+                let tolerance = expected * (1.0e-6 + 2.0e-7 * deviation * 8.0) + 1.0e-37;
+                assert!((f64::from(weight) - expected).abs() <= tolerance, "{weight} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn softmax_at_its_ends() {
+    const NAN: f32 = f32::NAN;
+    const INFINITE: f32 = f32::INFINITY;
+    let one_of = [
+        (vec![1.0e4, -1.0e4, 0.0], vec![1.0, 0.0, 0.0]),
+        (vec![-1.0e4], vec![1.0]),
+        (vec![f32::MAX, f32::MIN], vec![1.0, 0.0]),
+        (vec![f32::MIN, f32::MIN], vec![0.5, 0.5]),
+        (vec![1.0e4; 4], vec![0.25; 4]),
+        (vec![-1.0e4; 2], vec![0.5; 2]),
+        (vec![NAN, 3.0, 3.0], vec![0.0, 0.5, 0.5]),
+        (vec![-INFINITE, 3.0, NAN, 3.0], vec![0.0, 0.5, 0.0, 0.5]),
+        (vec![-INFINITE; 3], vec![0.0; 3]),
+        (vec![NAN; 2], vec![0.0; 2]),
+        (vec![INFINITE, 1.0, INFINITE], vec![0.0; 3]),
+    ];
+    for (scores, expected) in one_of {
+        for weights in softmax(&scores) {
+            assert_eq!(weights, expected, "{scores:?}");
+        }
+    }
+    for weights in softmax(&[1.0e4, 1.0e4 - 1.0]) {
+        let expected = 1.0 / (1.0 + (-1.0_f64).exp());
+        assert!((f64::from(weights[0]) - expected).abs() <= 2.0e-7, "{weights:?}");
+    }
+}

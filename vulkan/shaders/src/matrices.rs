@@ -1,0 +1,55 @@
+//! Products of matrices that are both computed, and softmax.
+
+use crate::Push;
+use crate::tile::{Shape, Shared, multiply};
+use crate::unchecked::{Endless, store};
+use spirv_std::glam::UVec3;
+use spirv_std::spirv;
+use viewfuse_core::network::attend::{MatrixBlock, softmax_scale, softmax_value};
+
+/// A part of a tile of rows and columns: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "multiply_matrices"))]
+#[allow(clippy::too_many_arguments)]
+pub fn multiply_matrices(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<MatrixBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] right: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (left, right) = (Endless(left), Endless(right));
+    multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        columns,
+        move |row, inner| block.left(&left, row, inner),
+        move |inner, column| block.right(&right, inner, column),
+        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
+    );
+}
+
+/// Weights of the scores in row number `first + id.x`; the parameter is how many columns a row has.
+#[spirv(compute(threads(64), entry_point_name = "softmax_rows"))]
+pub fn softmax_rows(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<u32>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] scores: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let column_count = push.parameters;
+    let first = ((push.piece.first + id.x) * column_count) as usize;
+    let scale = softmax_scale(scores, first, column_count);
+    let mut at = first;
+    while at < first + column_count as usize {
+        weights[at] = softmax_value(scores[at], scale);
+        at += 1;
+    }
+}

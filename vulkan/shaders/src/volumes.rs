@@ -1,0 +1,75 @@
+//! From volumes to a feature image, and the denoiser's inputs.
+
+use crate::Push;
+use spirv_std::glam::UVec3;
+use spirv_std::spirv;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock};
+use viewfuse_core::rays::RayPoint;
+
+/// Feature number `first + id.x` of a view's part of the latents, flat in `[point][feature]`.
+#[spirv(compute(threads(64), entry_point_name = "gather_volume"))]
+pub fn gather_volume(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<VolumeBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] volume: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] gathered: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let block = &push.parameters;
+    let element = (push.piece.first + id.x) as usize;
+    gathered[block.first() + element] = genvs::volume_value(views, points, volume, block, element);
+}
+
+/// Weights of the samples on ray number `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "weigh_features"))]
+pub fn weigh_features(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<FeatureBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] raw: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] weights: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let ray = (push.piece.first + id.x) as usize;
+    genvs::weigh_features(raw, points, &push.parameters, ray, move |sample, weight| weights[sample] = weight);
+}
+
+/// Feature of a ray number `first + id.x`, flat in `[ray][feature]`.
+#[spirv(compute(threads(64), entry_point_name = "sum_features"))]
+pub fn sum_features(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<FeatureBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] fused: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] raw: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] summed: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let element = (push.piece.first + id.x) as usize;
+    summed[element] = genvs::summed_feature(weights, fused, raw, &push.parameters, element);
+}
+
+/// Channel of a pixel number `first + id.x`, flat in `[pixel][channel]`.
+#[spirv(compute(threads(64), entry_point_name = "denoiser_input"))]
+pub fn denoiser_input(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<DenoiserInputBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] noisy: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] condition: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] inputs: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let element = (push.piece.first + id.x) as usize;
+    inputs[element] = genvs::denoiser_input(noisy, condition, &push.parameters, element);
+}
