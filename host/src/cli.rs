@@ -77,7 +77,8 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
 
 /// Arguments that do not fit what a file turned out to hold; the exit code is that of wrong arguments.
 fn wrong(message: impl Display) -> anyhow::Error {
-    clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n")).into()
+    clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n\nFor more information, try '--help'.\n"))
+        .into()
 }
 
 /// Prints a line. A reader that has gone away (`| head`) is no reason to stop: files are still to be written.

@@ -97,19 +97,18 @@ impl AnyField {
 
 /// Which network makes the pictures, and where it looks.
 #[derive(Args)]
-#[command(next_help_heading = NETWORK)]
 pub(crate) struct NetworkOptions {
     /// Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl); or one of the networks without training, for
     /// measuring: formula[:WIDTH] and body[:WIDTH] are PixelNeRFs, genvs and genvs:small GeNVSs [default: the field that
     /// needs no network]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = NETWORK)]
     model: Option<Model>,
     /// Samples on a ray: of PixelNeRF in the first pass, in the second by weight, in the second around the depth; of GeNVS a
     /// single number [default: 64,16,16 and 64]
-    #[arg(long, value_name = "N,N,N|N", value_parser = parse_samples, requires = "model")]
+    #[arg(long, value_name = "N,N,N|N", value_parser = parse_samples, requires = "model", help_heading = NETWORK)]
     samples: Option<Samples>,
     /// Where rays begin and end, world units [default: 8/13 and 18/13 of the cameras' distance from what they look at]
-    #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model")]
+    #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model", help_heading = NETWORK)]
     near_far: Option<[f32; 2]>,
     /// Second-pass samples around the depth that the published code takes (the sum of weights times depths, too near on
     /// rays that are not opaque), not around the mean depth
@@ -122,16 +121,15 @@ pub(crate) struct NetworkOptions {
 
 /// Which network makes the pictures, and what it leaves out.
 #[derive(Args)]
-#[command(next_help_heading = NETWORK)]
 pub(crate) struct ModelOptions {
     #[command(flatten)]
     network: NetworkOptions,
     /// Leave nothing out: every view, layer and sample, whether the scene needs it or not; of GeNVS also every call of the
     /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance say otherwise
-    #[arg(long, conflicts_with_all = ["compute", "probe_step", "leave_out", "settled"])]
+    #[arg(long, conflicts_with_all = ["compute", "probe_step", "leave_out", "settled"], help_heading = NETWORK)]
     pub(crate) exact: bool,
     /// Compute these although the scene does not need them
-    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model")]
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model", help_heading = NETWORK)]
     compute: Vec<Omission>,
     /// Probe one ray in every square of this many pixels on a side for empty space [default: 4]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(2..=64), requires = "model", help_heading = PIXELNERF)]
@@ -160,13 +158,13 @@ impl Unset<'_> {
     /// Arguments that were given for the other family are refused.
     fn refuse(&self, given: Given) -> anyhow::Result<()> {
         match given.into_iter().find(|(_, is_given)| *is_given) {
-            Some((option, _)) => Err(self.refused(option)),
+            Some((option, _)) => Err(self.refused(&format!("{option} cannot be used"))),
             None => Ok(()),
         }
     }
 
-    fn refused(&self, option: &str) -> anyhow::Error {
-        wrong(format_args!("{option} is nothing that can be said of '--model {}', a {}", self.model, self.family))
+    fn refused(&self, what: &str) -> anyhow::Error {
+        wrong(format_args!("{what} with '--model {}', which is a {}", self.model, self.family))
     }
 }
 
@@ -207,7 +205,7 @@ impl NetworkOptions {
         let [coarse_count, importance_count, depth_count] = match self.samples {
             None => [default.coarse_count, default.importance_count, default.depth_count],
             Some(Samples::Three(counts)) => counts,
-            Some(Samples::One(_)) => return Err(network.refused("a single number of --samples, instead of three,")),
+            Some(Samples::One(_)) => return Err(network.refused("--samples takes three numbers")),
         };
         let sampling = Sampling {
             coarse_count,
@@ -228,8 +226,7 @@ impl NetworkOptions {
         let sample_count = match self.samples {
             None => default.sample_count,
             Some(Samples::One(count)) if count >= 2 => count,
-            Some(Samples::One(_)) => return Err(network.refused("a single sample on a ray, instead of at least 2,")),
-            Some(Samples::Three(_)) => return Err(network.refused("three numbers of --samples, instead of one,")),
+            Some(_) => return Err(network.refused("--samples takes one number, at least 2,")),
         };
         let rays = Rays { sample_count, near_far: self.near_far, ..default };
         let field = Genvs::new(network.checkpoint, GenvsOptions { rays, plan, omissions }).context("--model")?;
@@ -248,7 +245,7 @@ impl ModelOptions {
         let Some(network) = self.network.unset()? else { return Ok(AnyField::Photo(PhotoField::default())) };
         if let Some(other) = self.compute.iter().find(|what| !what.is_of(network.family)) {
             let name = other.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-            return Err(network.refused(&format!("--compute {name}")));
+            return Err(network.refused(&format!("--compute {name} cannot be used")));
         }
         let computes = |what| self.exact || self.compute.contains(&what);
         match network.family {

@@ -35,7 +35,7 @@ impl PictureOptions {
     /// With `exact`, nothing is left out. What the field does not know must not have been given.
     pub(crate) fn to_render_options(&self, exact: bool, field: &AnyField) -> anyhow::Result<RenderOptions> {
         if self.settled.is_some() && !field.ends_rays() {
-            return Err(wrong("--settled is nothing that can be said of a GeNVS, whose rays go on to the end"));
+            return Err(wrong("--settled cannot be used with a GeNVS, whose rays go on to the end"));
         }
         let settled = if exact || !field.ends_rays() { 0.0 } else { self.settled.unwrap_or(DEFAULT_SETTLED) };
         let leave_out = if exact { 0.0 } else { self.leave_out };

@@ -175,7 +175,12 @@ impl Sweep<'_> {
 fn title(record: &ParetoRecord) -> String {
     let ParetoRecord { field, model, size: [width, height], sources, targets, .. } = record;
     let scene = record.scene.trim_end_matches('/').rsplit('/').next().unwrap_or_default();
-    let network = model.as_ref().map_or_else(|| (*field).to_owned(), |model| format!("{field} {model}"));
+    let network = match model {
+        None => (*field).to_owned(),
+        // The networks without training that are named after their field.
+        Some(model) if model.split(':').next() == Some(*field) => model.clone(),
+        Some(model) => format!("{field} {model}"),
+    };
     let targets = if targets.len() == 1 { "1 target".to_owned() } else { format!("{} targets", targets.len()) };
     format!("{scene}: {network}, {targets} of {width}x{height} from {} sources, {}", sources.len(), record.weighting)
 }

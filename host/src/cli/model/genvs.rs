@@ -9,19 +9,18 @@ use viewfuse_core::schedule::NoiseSchedule;
 
 /// How a run goes from noise to a picture.
 #[derive(Args)]
-#[command(next_help_heading = GENVS)]
 pub(crate) struct RunOptions {
-    #[arg(long, value_name = "NAME", value_parser = parse_sampler, requires = "model", help = sampler_help())]
+    #[arg(long, value_name = "NAME", value_parser = parse_sampler, requires = "model", help = sampler_help(), help_heading = GENVS)]
     sampler: Option<Sampler>,
     /// Noise levels: a call of the denoiser each, with heun two, but for the last [default: 18, with --exact 25]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "model")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "model", help_heading = GENVS)]
     steps: Option<u32>,
     /// Choose the levels on the way, each step's error below this (root mean square, of values between -1 and 1); 0.01 is
     /// about what can be seen
-    #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, requires = "model", conflicts_with_all = ["sampler", "steps"])]
+    #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, requires = "model", conflicts_with_all = ["sampler", "steps"], help_heading = GENVS)]
     tolerance: Option<f32>,
     /// Add noise on the way, as much as this over the whole run; samplers that look back begin anew each time, so take heun
-    #[arg(long, value_name = "AMOUNT", value_parser = parse_churn, requires = "model", conflicts_with = "tolerance")]
+    #[arg(long, value_name = "AMOUNT", value_parser = parse_churn, requires = "model", conflicts_with = "tolerance", help_heading = GENVS)]
     churn: Option<f32>,
 }
 
