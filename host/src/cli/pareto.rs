@@ -3,7 +3,7 @@
 use super::model::{AnyField, NetworkOptions};
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
-use super::{on_threads, say};
+use super::{on_threads, say, wrong};
 use clap::Args;
 use comfy_table::CellAlignment;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use viewfuse::field::{Field, FieldError, LeftOut};
 use viewfuse::files::{check_writable, write_whole};
 use viewfuse::pareto::front::{LARGEST_LOSS, SAME_LOOK};
 use viewfuse::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
-use viewfuse::pareto::settings::{of_genvs, of_photo, of_pixelnerf};
+use viewfuse::pareto::settings::{EXACT, of_genvs, of_photo, of_pixelnerf};
 use viewfuse::pareto::{Measured, Setting, Subject, plot};
 use viewfuse::photographs::Album;
 use viewfuse::progress::Progress;
@@ -27,6 +27,7 @@ use viewfuse_vulkan::GpuOptions;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, all together, and fewer samples, on every device\n  \
+    viewfuse pareto car/ --targets 5 --sources all/3 --model genvs:small --size 32x32 --only all -o out\n      samplers are not tried, and what is left out is\n  \
     viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the field that needs no network, on the CPU\n\n\
     Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared \
     with its pictures before rounding. The setting `all` leaves out what --leave-out and --settled say and every omission \
@@ -57,6 +58,9 @@ pub(crate) struct Arguments {
     /// Take the time of every setting this many times, after a round that is not timed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
+    /// Measure, besides exact, only settings whose words begin with this; may be given several times
+    #[arg(long, value_name = "WORDS")]
+    only: Vec<String>,
     /// Folder for the results; made if missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -77,7 +81,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let album = Album::open(&scene, job.sources.iter().copied().chain(truths), &progress)?;
     let subject = Subject { scene: &scene, album: &album, job: &job, weighting: &weighting };
-    let sweep = Sweep { subject, options: &options, round_count: arguments.repeat, progress: &progress };
+    let (only, round_count) = (&arguments.only, arguments.repeat);
+    let sweep = Sweep { subject, options: &options, only, round_count, progress: &progress };
     let mut record = ParetoRecord {
         viewfuse: env!("CARGO_PKG_VERSION"),
         scene: arguments.scene.display().to_string(),
@@ -142,6 +147,7 @@ enum Failure {
 struct Sweep<'a> {
     subject: Subject<'a>,
     options: &'a RenderOptions,
+    only: &'a [String],
     round_count: u32,
     progress: &'a Progress,
 }
@@ -156,16 +162,28 @@ impl Sweep<'_> {
 
     fn on_one<D: Device>(&self, device: &D, field: &AnyField) -> Result<Measured, Failure> {
         match field {
-            AnyField::Photo(field) => self.measure(device, &of_photo(field, self.options)),
-            AnyField::PixelNerf(field) => self.measure(device, &of_pixelnerf(field, self.options)),
+            AnyField::Photo(field) => self.measure(device, of_photo(field, self.options)),
+            AnyField::PixelNerf(field) => self.measure(device, of_pixelnerf(field, self.options)),
             AnyField::Genvs(field) => {
-                self.measure(device, &of_genvs(field, self.options, self.subject.job.targets.len()))
+                self.measure(device, of_genvs(field, self.options, self.subject.job.targets.len()))
             }
         }
     }
 
-    fn measure<D: Device, F: Field<D>>(&self, device: &D, settings: &[Setting<F>]) -> Result<Measured, Failure> {
-        self.subject.measure(device, settings, self.round_count, self.progress).map_err(|error| match error {
+    fn measure<D: Device, F: Field<D>>(&self, device: &D, settings: Vec<Setting<F>>) -> Result<Measured, Failure> {
+        let begins = |setting: &Setting<F>, words: &String| setting.words.starts_with(words.as_str());
+        if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
+            let all: Vec<&str> = settings.iter().map(|setting| setting.words.as_str()).collect();
+            let message = format!("--only {none}: no setting begins with it; there are: {}", all.join("; "));
+            return Err(Failure::Other(wrong(message)));
+        }
+        let is_exact = |setting: &Setting<F>| setting.words == EXACT;
+        let is_asked = |setting: &Setting<F>| self.only.iter().any(|words| begins(setting, words));
+        let settings: Vec<Setting<F>> = settings
+            .into_iter()
+            .filter(|setting| self.only.is_empty() || is_exact(setting) || is_asked(setting))
+            .collect();
+        self.subject.measure(device, &settings, self.round_count, self.progress).map_err(|error| match error {
             RenderError::Field(FieldError::Device(_)) => Failure::Device(format!("{:#}", anyhow::Error::from(error))),
             error => Failure::Other(error.into()),
         })

@@ -11,16 +11,12 @@ use viewfuse_core::sampler::control::HALF_A_LEVEL;
 
 const NONE: Omissions = Omissions::NONE;
 
-/// Each of these alone, with everything else as exact. Words, what is left out, `--leave-out`.
-#[rustfmt::skip]
-const ALONE: [(&str, Omissions, f32); 2] = [
-    ("leave out 0.1", Omissions { unused_views: true, ..NONE }, 0.1),
-    ("unseen rows",   Omissions { unseen_rows: true, ..NONE },  0.0),
-];
 /// Levels of the single-step sampler of the published run, which calls the denoiser twice for each.
-const HEUN: [u32; 3] = [18, 12, 8];
+const HEUN: [u32; 2] = [12, 8];
 /// Levels of every multistep sampler.
 const LEVELS: [u32; 5] = [6, 8, 10, 12, 18];
+/// Weight of the views that are left out.
+const LEAST: [f32; 2] = [0.05, 0.2];
 /// Levels with all left out.
 const FAST: [u32; 2] = [8, 12];
 /// Errors of steps, where levels are chosen on the way.
@@ -30,7 +26,8 @@ const FEWER: [u32; 2] = [2, 4];
 /// Levels at which a picture starts from the one before.
 const REUSED: [f32; 2] = [20.0, 2.0];
 
-/// The settings of a GeNVS, for so many targets. Of `field` the rays, the levels' ends and the seed are taken, of `options`
+/// The settings of a GeNVS, for so many targets. Calls of the denoiser cost nearly all of the time: what else can be left out
+/// is tried with as few of them as a run makes unless told otherwise. Of `field` the rays, the levels' ends and the seed are taken, of `options`
 /// how much weight `all` leaves out, besides the size and the background; what the field itself leaves out does not matter.
 pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> Vec<Setting<Enlarged<Genvs>>> {
     let GenvsOptions { rays, plan: own, .. } = field.options();
@@ -48,8 +45,8 @@ pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> 
     let fewer = |divisor: u32| Rays { sample_count: rays.sample_count.div_ceil(divisor), ..rays };
 
     let mut settings = vec![setting(EXACT, rays, exact, NONE, 0.0, 1)];
-    settings.extend(ALONE.map(|(words, omissions, leave_out)| setting(words, rays, exact, omissions, leave_out, 1)));
     let planned = |words: String, plan| setting(&words, rays, plan, NONE, 0.0, 1);
+    settings.push(setting("unseen rows", rays, exact, Omissions { unseen_rows: true, ..NONE }, 0.0, 1));
     settings.push(planned("settled".to_owned(), Plan { settled: Some(HALF_A_LEVEL), ..exact }));
     settings.extend(HEUN.map(|count| planned(format!("heun, {count}"), over(exact, Sampler::Heun, count))));
     for sampler in Sampler::ALL.into_iter().filter(|sampler| !sampler.is_single_step()) {
@@ -57,8 +54,6 @@ pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> 
             .extend(LEVELS.map(|count| planned(format!("{}, {count}", sampler.name()), over(exact, sampler, count))));
     }
     settings.extend(TOLERANCES.map(|error| planned(format!("tolerance {error}"), careful(exact, error))));
-    settings.extend(FEWER.map(|divisor| setting(&format!("samples 1/{divisor}"), fewer(divisor), exact, NONE, 0.0, 1)));
-    settings.push(setting("half the size", rays, exact, NONE, 0.0, 2));
 
     let fast = Plan { schedule: own.schedule, ..Plan::fast(own.seed) };
     let all = |words: &str, rays, plan, reuse, factor| {
@@ -66,6 +61,10 @@ pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> 
         setting(&format!("{ALL}{words}"), rays, plan, omissions, options.leave_out, factor)
     };
     settings.push(all("", rays, fast, None, 1));
+    settings.extend(LEAST.map(|least| Setting {
+        options: RenderOptions { leave_out: least, settled: 0.0, ..options.clone() },
+        ..all(&format!(", leave out {least}"), rays, fast, None, 1)
+    }));
     settings
         .extend(FAST.map(|count| all(&format!(", {count} levels"), rays, over(fast, Sampler::Ipndm, count), None, 1)));
     settings.extend(TOLERANCES.map(|error| all(&format!(", tolerance {error}"), rays, careful(fast, error), None, 1)));
