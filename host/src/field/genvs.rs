@@ -25,7 +25,7 @@ pub use architecture::{
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{default_near_far, over_white};
-use super::{Field, FieldError, LeftOut, Rendered};
+use super::{Denoising, Field, FieldError, LeftOut, Rendered};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::device::{Device, Memory};
 use crate::interrupt;
@@ -193,6 +193,12 @@ impl<D: Device> Field<D> for Genvs {
         self.architecture.image_side as u32
     }
 
+    fn denoising(&self) -> Option<Denoising> {
+        let Counts { planned_calls, calls, .. } = *self.counts();
+        let has_denoiser = self.architecture.denoiser.is_some();
+        has_denoiser.then(|| self.options.denoising(calls, planned_calls.saturating_sub(calls)))
+    }
+
     fn memory_estimate(&self, device: &D, source_sizes: &[[u32; 2]]) -> Option<u64> {
         Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
@@ -342,5 +348,5 @@ fn cropped(values: &[f32], size: Size, target: &Camera) -> Rendered {
         [red, green, blue, 1.0]
     };
     let colours: Vec<[f32; 4]> = pixels.map(colour).collect();
-    Rendered { depths: vec![0.0; colours.len()], colours, width, height }
+    Rendered { depths: Vec::new(), colours, width, height }
 }
