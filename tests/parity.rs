@@ -103,14 +103,14 @@ fn seed_count(kernel: Kernel) -> u64 {
         Kernel::Product | Kernel::Convolve | Kernel::ConvolveTransposed | Kernel::MultiplyMatrices => 8,
         // As many as give every shape floors, offsets and distances of all kinds.
         Kernel::PartMoments | Kernel::MergeMoments | Kernel::Normalise => 8,
-        Kernel::GatherVolume | Kernel::WeighFeatures | Kernel::SumFeatures => 8,
+        Kernel::GatherVolume | Kernel::GatherHalves | Kernel::WeighFeatures | Kernel::SumFeatures => 8,
         Kernel::ConvolveDepthwise | Kernel::ChannelMeans | Kernel::SoftmaxRows | Kernel::DenoiserInput => 4,
         Kernel::CastRays | Kernel::CoarseDepths | Kernel::PlacePoints | Kernel::EmbedPoints => 4,
         Kernel::VisibleWeights | Kernel::GatherLatents | Kernel::Radiance => 8,
         Kernel::MaxPool | Kernel::Upsample => 4,
         Kernel::WeighSamples | Kernel::DrawChances | Kernel::MergeDepths => 4,
         Kernel::FineDepths | Kernel::WantedSamples => 8,
-        Kernel::MixPictures | Kernel::AddNoise => 8,
+        Kernel::MixPictures | Kernel::AddNoise | Kernel::PackHalves => 8,
     }
 }
 
@@ -188,12 +188,12 @@ fn every_input_has_a_control() -> Result<(), Failed> {
             // A floor of variances and a length are there for another kernel.
             Kernel::ChannelMeans | Kernel::PartMoments | Kernel::Normalise | Kernel::SumFeatures => false,
             Kernel::Product | Kernel::Radiance | Kernel::WeighSamples | Kernel::DrawChances => false,
-            Kernel::MergeDepths => false,
+            Kernel::MergeDepths | Kernel::PackHalves => false,
             Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
             Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
             Kernel::FineDepths | Kernel::WantedSamples | Kernel::MixPictures | Kernel::AddNoise => true,
             Kernel::Convolve | Kernel::MergeMoments | Kernel::MultiplyMatrices | Kernel::GatherVolume => true,
-            Kernel::WeighFeatures | Kernel::DenoiserInput => true,
+            Kernel::GatherHalves | Kernel::WeighFeatures | Kernel::DenoiserInput => true,
         };
         if controls.contains(&"parameters") != has_numbers {
             return Err(format!("{}: parameters", kernel.name()).into());

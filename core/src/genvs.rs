@@ -5,13 +5,14 @@
 //! to `far` along its principal axis; depth node 0 is the *farthest* (published convention).
 
 use crate::camera::CameraBlock;
+use crate::half::fetch_half;
 use crate::math::{exp, floor_to_i32, max};
 use crate::pages::Fetch;
 use crate::rays::RayPoint;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// A dispatch of [`volume_value`], as plain data.
+/// A dispatch of [`volume_value`] or [`volume_value_of_halves`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct VolumeBlock {
@@ -80,10 +81,10 @@ impl VolumePlace {
         self.lower[0] < -1
     }
 
-    /// One feature there from `volume[row][column][depth][feature]`, trilinear, zeros around the volume: the sum over the
-    /// eight nodes, columns innermost, then rows, then depths.
-    #[inline]
-    pub fn value(&self, volume: &(impl Fetch<f32> + ?Sized), block: &VolumeBlock, feature: u32) -> f32 {
+    /// One feature there from `volume[row][column][depth][feature]`, flat, trilinear, zeros around the volume: the sum over
+    /// the eight nodes, columns innermost, then rows, then depths.
+    #[inline(always)]
+    pub fn value(&self, volume: impl Fn(usize) -> f32, block: &VolumeBlock, feature: u32) -> f32 {
         let mut sum = 0.0;
         if self.is_outside() {
             return sum;
@@ -92,7 +93,7 @@ impl VolumePlace {
         while corner < 8 {
             let (node, weight) = self.corner(block, corner);
             if node != u32::MAX {
-                sum += volume.fetch((node * block.feature_count + feature) as usize) * weight;
+                sum += volume((node * block.feature_count + feature) as usize) * weight;
             }
             corner += 1;
         }
@@ -130,7 +131,21 @@ pub fn volume_value(
 ) -> f32 {
     let (point, feature) = (element as u32 / block.feature_count, element as u32 % block.feature_count);
     let camera = views.fetch(block.view as usize);
-    VolumePlace::of(&camera, &points.fetch(point as usize), block).value(volume, block, feature)
+    VolumePlace::of(&camera, &points.fetch(point as usize), block).value(|at| volume.fetch(at), block, feature)
+}
+
+/// As [`volume_value`], from a volume in numbers of 16 bits, two in a word.
+#[inline]
+pub fn volume_value_of_halves(
+    views: &(impl Fetch<CameraBlock> + ?Sized),
+    points: &(impl Fetch<RayPoint> + ?Sized),
+    volume: &(impl Fetch<u32> + ?Sized),
+    block: &VolumeBlock,
+    element: usize,
+) -> f32 {
+    let (point, feature) = (element as u32 / block.feature_count, element as u32 % block.feature_count);
+    let camera = views.fetch(block.view as usize);
+    VolumePlace::of(&camera, &points.fetch(point as usize), block).value(|at| fetch_half(volume, at), block, feature)
 }
 
 /// A dispatch of [`weigh_features`] or [`summed_feature`], as plain data. The yes-or-no field is 0 or 1.

@@ -7,6 +7,7 @@
 //! ```text
 //! math              one result on every target                    sqrt, exp, sin_cos, angles, norms
 //! pages             reading elements wherever they lie             Fetch, Pages
+//! half              two numbers in a word                          half_bits, half_value, packed_halves
 //! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
 //! sources           the poses of the source views                 Sources<S>
 //! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
@@ -38,6 +39,7 @@ pub mod composite;
 pub mod depths;
 pub mod fuse;
 pub mod genvs;
+pub mod half;
 pub mod lookup;
 pub mod math;
 pub mod metrics;

@@ -63,6 +63,10 @@ pub enum Kernel {
     GatherLatents,
     /// Features where points lie in a view's volume. An element is a feature of a point.
     GatherVolume,
+    /// A volume in numbers of 16 bits, two in a word. An element is a word.
+    PackHalves,
+    /// Features where points lie in a view's volume of 16 bits. An element is a feature of a point.
+    GatherHalves,
     /// Convolutions of an image. An element is an 8x8 part of a tile of [`TILE`] pixels and channels.
     Convolve,
     /// Convolutions of every channel by itself. An element is a channel of an output pixel.
@@ -129,7 +133,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Every kernel, in the order of the data.
-    pub const ALL: [Kernel; 41] = [
+    pub const ALL: [Kernel; 43] = [
         Kernel::Weigh,
         Kernel::EmbedPose,
         Kernel::Attend,
@@ -140,6 +144,8 @@ impl Kernel {
         Kernel::VisibleWeights,
         Kernel::GatherLatents,
         Kernel::GatherVolume,
+        Kernel::PackHalves,
+        Kernel::GatherHalves,
         Kernel::Convolve,
         Kernel::ConvolveDepthwise,
         Kernel::ConvolveTransposed,
@@ -186,6 +192,8 @@ impl Kernel {
             Kernel::VisibleWeights => "visible_weights",
             Kernel::GatherLatents => "gather_latents",
             Kernel::GatherVolume => "gather_volume",
+            Kernel::PackHalves => "pack_halves",
+            Kernel::GatherHalves => "gather_halves",
             Kernel::Convolve => "convolve",
             Kernel::ConvolveDepthwise => "convolve_depthwise",
             Kernel::ConvolveTransposed => "convolve_transposed",

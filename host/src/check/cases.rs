@@ -11,6 +11,7 @@ pub mod feature_image;
 pub mod fine_depths;
 pub mod fuse_views;
 pub mod gather_latents;
+pub mod halves;
 pub mod hull_entry;
 pub mod layers;
 pub mod march;
@@ -42,6 +43,8 @@ pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
         Kernel::VisibleWeights => visitor.visit::<points::VisibleWeights>(),
         Kernel::GatherLatents => visitor.visit::<gather_latents::GatherLatents>(),
         Kernel::GatherVolume => visitor.visit::<volumes::GatherVolume>(),
+        Kernel::PackHalves => visitor.visit::<halves::PackHalves>(),
+        Kernel::GatherHalves => visitor.visit::<halves::GatherHalves>(),
         Kernel::Convolve => visitor.visit::<convolutions::Convolve>(),
         Kernel::ConvolveDepthwise => visitor.visit::<depthwise::ConvolveDepthwise>(),
         Kernel::ConvolveTransposed => visitor.visit::<convolutions::ConvolveTransposed>(),

@@ -6,6 +6,7 @@ use viewfuse::device::VolumeKernels;
 use viewfuse::device::cpu::Cpu;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
+use viewfuse_core::half::{half_bits, half_value};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -21,6 +22,30 @@ impl VolumeKernels for Faulty {
         Cpu.gather_volume(block, views, points, volume, gathered)?;
         let count = (block.point_count * block.feature_count) as usize;
         self.spoil(Kernel::GatherVolume, &mut gathered[block.first()..][..count]);
+        Ok(())
+    }
+
+    fn pack_halves(&self, number_count: u32, numbers: &Vec<f32>, words: &mut Vec<u32>) -> Result<(), Infallible> {
+        Cpu.pack_halves(number_count, numbers, words)?;
+        for word in words {
+            let mut halves = [half_value(*word), half_value(*word >> 16)];
+            self.spoil(Kernel::PackHalves, &mut halves);
+            *word = half_bits(halves[0]) | half_bits(halves[1]) << 16;
+        }
+        Ok(())
+    }
+
+    fn gather_halves(
+        &self,
+        block: &VolumeBlock,
+        views: &Vec<CameraBlock>,
+        points: &Vec<RayPoint>,
+        volume: &Vec<u32>,
+        gathered: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        Cpu.gather_halves(block, views, points, volume, gathered)?;
+        let count = (block.point_count * block.feature_count) as usize;
+        self.spoil(Kernel::GatherHalves, &mut gathered[block.first()..][..count]);
         Ok(())
     }
 

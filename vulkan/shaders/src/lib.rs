@@ -10,7 +10,8 @@
 //! rays        where to look        cast_rays, coarse_depths, place_points, weigh_samples, draw_chances, fine_depths,
 //!                                  merge_depths, wanted_samples
 //! points      a network's ends     embed_points, visible_weights, gather_latents, radiance
-//! volumes     what GeNVS sees      gather_volume, weigh_features, sum_features, denoiser_input
+//! volumes     what GeNVS sees      gather_volume, pack_halves, gather_halves, weigh_features,
+//!                                  sum_features, denoiser_input
 //! network     layers               convolve, convolve_depthwise, convolve_transposed, max_pool, upsample, product
 //! normalise   moments of images    channel_means, part_moments, merge_moments, normalise
 //! matrices    attention            multiply_matrices, softmax_rows

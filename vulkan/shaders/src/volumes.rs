@@ -5,6 +5,7 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock};
+use viewfuse_core::half;
 use viewfuse_core::rays::RayPoint;
 
 /// Feature number `first + id.x` of a view's part of the latents, flat in `[point][feature]`.
@@ -23,6 +24,39 @@ pub fn gather_volume(
     let block = &push.parameters;
     let element = (push.piece.first + id.x) as usize;
     gathered[block.first() + element] = genvs::volume_value(views, points, volume, block, element);
+}
+
+/// Word number `first + id.x`: two numbers of 16 bits.
+#[spirv(compute(threads(64), entry_point_name = "pack_halves"))]
+pub fn pack_halves(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<u32>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] numbers: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] words: &mut [u32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let element = (push.piece.first + id.x) as usize;
+    words[element] = half::packed_halves(numbers, push.parameters, element);
+}
+
+/// Feature number `first + id.x` of a view's part of the latents, flat in `[point][feature]`.
+#[spirv(compute(threads(64), entry_point_name = "gather_halves"))]
+pub fn gather_halves(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<VolumeBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] volume: &[u32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] gathered: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    let block = &push.parameters;
+    let element = (push.piece.first + id.x) as usize;
+    gathered[block.first() + element] = genvs::volume_value_of_halves(views, points, volume, block, element);
 }
 
 /// Weights of the samples on ray number `first + id.x`.

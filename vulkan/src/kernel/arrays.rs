@@ -136,6 +136,10 @@ impl Kernel {
             Kernel::GatherVolume => {
                 const { &[VIEWS, POINTS, Array::read::<f32>("volume"), Array::write::<f32>("gathered")] }
             }
+            Kernel::PackHalves => const { &[Array::read::<f32>("numbers"), Array::write::<u32>("words")] },
+            Kernel::GatherHalves => {
+                const { &[VIEWS, POINTS, Array::read::<u32>("volume"), Array::write::<f32>("gathered")] }
+            }
             Kernel::Convolve => const { &[INPUTS, WEIGHTS, BIAS, ADDEND, OUTPUTS] },
             Kernel::ConvolveDepthwise => const { &[INPUTS, WEIGHTS, OUTPUTS] },
             Kernel::ConvolveTransposed => const { &[INPUTS, WEIGHTS, BIAS, OUTPUTS] },

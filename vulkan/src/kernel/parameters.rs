@@ -32,7 +32,9 @@ impl Kernel {
             Kernel::CoarseDepths => size_of::<CoarseBlock>(),
             Kernel::EmbedPoints => size_of::<EmbedBlock>(),
             Kernel::GatherLatents => size_of::<GatherBlock>(),
-            Kernel::GatherVolume => size_of::<VolumeBlock>(),
+            Kernel::GatherVolume | Kernel::GatherHalves => size_of::<VolumeBlock>(),
+            // How many numbers there are.
+            Kernel::PackHalves => size_of::<u32>(),
             Kernel::Convolve => size_of::<ConvolveBlock>(),
             Kernel::ConvolveDepthwise => size_of::<DepthwiseBlock>(),
             Kernel::ConvolveTransposed => size_of::<TransposedBlock>(),

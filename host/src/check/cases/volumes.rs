@@ -17,15 +17,15 @@ use viewfuse_vulkan::kernel::Kernel;
 /// Views with their volumes: a dispatch each.
 #[derive(Clone, Debug)]
 pub struct Job {
-    block: VolumeBlock,
-    views: Vec<CameraBlock>,
-    points: Vec<RayPoint>,
+    pub(super) block: VolumeBlock,
+    pub(super) views: Vec<CameraBlock>,
+    pub(super) points: Vec<RayPoint>,
     /// `[view]`: `[row][column][depth][feature]`.
-    volumes: Vec<Vec<f32>>,
+    pub(super) volumes: Vec<Vec<f32>>,
 }
 
 impl Job {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.views.len() * self.points.len() * self.block.feature_count as usize
     }
 }
@@ -59,30 +59,53 @@ fn job(random: &mut Random, size: u32, [view_count, feature_count]: [u32; 2]) ->
     Job { block, views, points, volumes }
 }
 
+/// Jobs with odd and even numbers of features.
+pub(super) fn jobs(random: &mut Random, size: u32) -> Vec<Job> {
+    let kinds = [[1, 1], [2, 3], [3, 16], [1, 5], [2, 33], [1, 2]];
+    kinds.map(|kind| job(random, size, kind)).to_vec()
+}
+
+/// What is gathered from them, and what stays untouched behind it.
+pub(super) fn expected(jobs: &[Job]) -> Vec<Option<Bounded>> {
+    let mut expected = Vec::new();
+    for Job { block, views, points, volumes } in jobs {
+        for (view, volume) in views.iter().zip(volumes) {
+            let row = |point| match volume_oracle::gather(view, volume, point, block) {
+                Some(values) => values.into_iter().map(Some).collect(),
+                None => vec![None; block.feature_count as usize],
+            };
+            expected.par_extend(points.par_iter().flat_map_iter(row));
+        }
+        expected.push(Some(Bounded::ZERO));
+    }
+    expected
+}
+
+/// For every kernel that gathers from volumes.
+pub(super) const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
+/// What they read, off by 1 %.
+pub(super) const SPOILERS: &[Spoiler<Vec<Job>>] = &[
+    ("views", |jobs| jobs.iter_mut().flat_map(|job| &mut job.views).for_each(|view| view.intrinsics[0] *= 1.01)),
+    ("points", |jobs| jobs.iter_mut().flat_map(|job| &mut job.points).for_each(|point| point.position[1] *= 1.01)),
+    ("volume", |jobs| jobs.iter_mut().for_each(|job| job.volumes[0].iter_mut().for_each(|node| *node *= 1.01))),
+    ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.near *= 1.01)),
+];
+
 /// See the module.
 pub enum GatherVolume {}
 
 impl Case for GatherVolume {
     const KERNEL: Kernel = Kernel::GatherVolume;
-    const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
+    const LIMITS: Limits = LIMITS;
     const REASON: &'static str = "errors of a projection and of the depth, in nodes, times the change of the volume over a \
         node; eight products; undecided where a point is on the view's plane to within rounding";
-    const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
-        ("views", |jobs| jobs.iter_mut().flat_map(|job| &mut job.views).for_each(|view| view.intrinsics[0] *= 1.01)),
-        ("points", |jobs| {
-            jobs.iter_mut().flat_map(|job| &mut job.points).for_each(|point| point.position[1] *= 1.01);
-        }),
-        ("volume", |jobs| jobs.iter_mut().for_each(|job| job.volumes[0].iter_mut().for_each(|node| *node *= 1.01))),
-        ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.near *= 1.01)),
-    ];
+    const SPOILERS: &'static [Spoiler<Vec<Job>>] = SPOILERS;
 
     type Inputs = Vec<Job>;
     type Loaded<D: Device> = Vec<LoadedJob<D>>;
 
     fn inputs(seed: u64, size: u32) -> Vec<Job> {
-        let random = &mut random(33, seed, size);
-        let kinds = [[1, 1], [2, 3], [3, 16], [1, 5], [2, 33], [1, 2]];
-        kinds.map(|kind| job(random, size, kind)).to_vec()
+        jobs(&mut random(33, seed, size), size)
     }
 
     fn element_count(jobs: &Vec<Job>) -> usize {
@@ -117,17 +140,6 @@ impl Case for GatherVolume {
     }
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
-        let mut expected = Vec::new();
-        for Job { block, views, points, volumes } in jobs {
-            for (view, volume) in views.iter().zip(volumes) {
-                let row = |point| match volume_oracle::gather(view, volume, point, block) {
-                    Some(values) => values.into_iter().map(Some).collect(),
-                    None => vec![None; block.feature_count as usize],
-                };
-                expected.par_extend(points.par_iter().flat_map_iter(row));
-            }
-            expected.push(Some(Bounded::ZERO));
-        }
-        expected
+        expected(jobs)
     }
 }

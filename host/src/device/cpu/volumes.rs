@@ -9,7 +9,35 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{
     DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace, denoiser_input, weigh_features,
 };
+use viewfuse_core::half::{fetch_half, packed_halves, word_count};
 use viewfuse_core::rays::RayPoint;
+
+/// Adds up what the eight nodes around each point have: `add(first, weight, gathered)` adds the features of the node whose
+/// first one is number `first` of the volume.
+fn gather_nodes(
+    block: &VolumeBlock,
+    views: &[CameraBlock],
+    points: &[RayPoint],
+    gathered: &mut [f32],
+    add: impl Fn(usize, f32, &mut [f32]) + Sync,
+) {
+    let features = block.feature_count as usize;
+    let gathered = &mut gathered[block.first()..][..block.point_count as usize * features];
+    let camera = &views[block.view as usize];
+    gathered.par_chunks_mut(features).zip(points).with_min_len(256).for_each(|(gathered, point)| {
+        let place = VolumePlace::of(camera, point, block);
+        gathered.fill(0.0);
+        if place.is_outside() {
+            return;
+        }
+        for corner in 0..8 {
+            let (node, weight) = place.corner(block, corner);
+            if node != u32::MAX {
+                add(node as usize * features, weight, gathered);
+            }
+        }
+    });
+}
 
 impl VolumeKernels for Cpu {
     fn gather_volume(
@@ -20,21 +48,31 @@ impl VolumeKernels for Cpu {
         volume: &Vec<f32>,
         gathered: &mut Vec<f32>,
     ) -> Result<(), Infallible> {
-        let features = block.feature_count as usize;
-        let gathered = &mut gathered[block.first()..][..block.point_count as usize * features];
-        let camera = &views[block.view as usize];
-        gathered.par_chunks_mut(features).zip(points).with_min_len(256).for_each(|(gathered, point)| {
-            let place = VolumePlace::of(camera, point, block);
-            gathered.fill(0.0);
-            if place.is_outside() {
-                return;
-            }
-            for corner in 0..8 {
-                let (node, weight) = place.corner(block, corner);
-                if node != u32::MAX {
-                    let values = &volume[node as usize * features..][..features];
-                    gathered.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * weight);
-                }
+        gather_nodes(block, views, points, gathered, |first, weight, gathered| {
+            let values = &volume[first..][..gathered.len()];
+            gathered.iter_mut().zip(values).for_each(|(sum, value)| *sum += value * weight);
+        });
+        Ok(())
+    }
+
+    fn pack_halves(&self, number_count: u32, numbers: &Vec<f32>, words: &mut Vec<u32>) -> Result<(), Infallible> {
+        let words = words[..word_count(number_count) as usize].par_iter_mut().enumerate();
+        words.with_min_len(4096).for_each(|(element, word)| *word = packed_halves(&numbers[..], number_count, element));
+        Ok(())
+    }
+
+    fn gather_halves(
+        &self,
+        block: &VolumeBlock,
+        views: &Vec<CameraBlock>,
+        points: &Vec<RayPoint>,
+        volume: &Vec<u32>,
+        gathered: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        gather_nodes(block, views, points, gathered, |first, weight, gathered| {
+            let words = &volume[first / 2..(first + gathered.len()).div_ceil(2)];
+            for (index, sum) in gathered.iter_mut().enumerate() {
+                *sum += fetch_half(words, first % 2 + index) * weight;
             }
         });
         Ok(())

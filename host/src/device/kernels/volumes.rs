@@ -5,7 +5,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
 use viewfuse_core::rays::RayPoint;
 
-/// Kernels of [`viewfuse_core::genvs`]. Buffers may be longer than a block says.
+/// Kernels of [`viewfuse_core::genvs`] and [`viewfuse_core::half`]. Buffers may be longer than a block says.
 pub trait VolumeKernels: Memory {
     /// Kernel `gather_volume` for every feature of every point: writes a view's part of
     /// `gathered[view][point][feature]`, from the view's `volume[row][column][depth][feature]`.
@@ -18,6 +18,31 @@ pub trait VolumeKernels: Memory {
         views: &Self::Buffer<CameraBlock>,
         points: &Self::Buffer<RayPoint>,
         volume: &Self::Buffer<f32>,
+        gathered: &mut Self::Buffer<f32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `pack_halves` for every word: writes `number_count` numbers in 16 bits each, two in a word, the lower half
+    /// first.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn pack_halves(
+        &self,
+        number_count: u32,
+        numbers: &Self::Buffer<f32>,
+        words: &mut Self::Buffer<u32>,
+    ) -> Result<(), Self::Error>;
+
+    /// Kernel `gather_halves`: as [`VolumeKernels::gather_volume`], from the words of a volume.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    fn gather_halves(
+        &self,
+        block: &VolumeBlock,
+        views: &Self::Buffer<CameraBlock>,
+        points: &Self::Buffer<RayPoint>,
+        volume: &Self::Buffer<u32>,
         gathered: &mut Self::Buffer<f32>,
     ) -> Result<(), Self::Error>;
 

@@ -5,6 +5,7 @@ use crate::device::kernels::volumes::VolumeKernels;
 use bytemuck::bytes_of;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
+use viewfuse_core::half::word_count;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Buffer, VulkanError};
@@ -21,6 +22,30 @@ impl VolumeKernels for Vulkan {
         let arrays = [views.bind(), points.bind(), volume.bind(), gathered.bind()];
         let elements = block.point_count * block.feature_count;
         self.gpu.dispatch(Kernel::GatherVolume, bytes_of(block), 0..elements, &arrays)
+    }
+
+    fn pack_halves(
+        &self,
+        number_count: u32,
+        numbers: &Buffer<f32>,
+        words: &mut Buffer<u32>,
+    ) -> Result<(), VulkanError> {
+        let arrays = [numbers.bind(), words.bind()];
+        let elements = word_count(number_count);
+        self.gpu.dispatch(Kernel::PackHalves, bytes_of(&number_count), 0..elements, &arrays)
+    }
+
+    fn gather_halves(
+        &self,
+        block: &VolumeBlock,
+        views: &Buffer<CameraBlock>,
+        points: &Buffer<RayPoint>,
+        volume: &Buffer<u32>,
+        gathered: &mut Buffer<f32>,
+    ) -> Result<(), VulkanError> {
+        let arrays = [views.bind(), points.bind(), volume.bind(), gathered.bind()];
+        let elements = block.point_count * block.feature_count;
+        self.gpu.dispatch(Kernel::GatherHalves, bytes_of(block), 0..elements, &arrays)
     }
 
     fn weigh_features(
