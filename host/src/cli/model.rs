@@ -258,7 +258,7 @@ impl ModelOptions {
             Family::Genvs => {
                 network.refuse(vec![("--probe-step", self.probe_step.is_some())])?;
                 let plan = self.run.plan(seed, self.network.schedule(), self.exact, computes(Omission::Calls));
-                self.network.genvs(network, plan, of_genvs(computes, reuse))
+                self.network.genvs(network, plan, of_genvs(computes, reuse, self.run.half_volumes))
             }
         }
     }

@@ -59,6 +59,10 @@ struct Counts {
     encoded_views: u64,
     volume_rows: u64,
     filled_rows: u64,
+    /// As they are computed.
+    volume_bytes: u64,
+    /// As they are kept.
+    kept_bytes: u64,
     planned_calls: u64,
     calls: u64,
 }
@@ -129,10 +133,20 @@ impl Genvs {
         let mut volume = prepared.volumes[view].borrow_mut();
         if volume.is_none() {
             let SourceView { size, values, .. } = &prepared.images[view];
-            let encoded = prepared.parts.encode(device, values, *size)?;
+            let mut encoded = prepared.parts.encode(device, values, *size)?;
+            let (row_count, whole_bytes) = (encoded.row_count(), encoded.byte_count());
+            let mut filled_rows = 0;
+            if self.options.omissions.half_volumes {
+                // One view after the other: never is more than one there in full.
+                filled_rows = prepared.parts.fill(device, &mut encoded, 0..row_count, view)?;
+                encoded.pack(device).map_err(FieldError::Device)?;
+            }
             let mut counts = self.counts();
             counts.encoded_views += 1;
-            counts.volume_rows += u64::from(encoded.row_count());
+            counts.volume_rows += u64::from(row_count);
+            counts.filled_rows += u64::from(filled_rows);
+            counts.volume_bytes += whole_bytes;
+            counts.kept_bytes += encoded.byte_count();
             *volume = Some(encoded);
         }
         Ok(())
@@ -277,7 +291,7 @@ impl<D: Device> Field<D> for Genvs {
         let views = Views {
             cameras: device.upload(&cameras).map_err(failed)?,
             weights: device.upload(&view_weights).map_err(failed)?,
-            volumes: volumes.iter().filter_map(|volume| Some(&volume.as_ref()?.image)).collect(),
+            volumes: volumes.iter().filter_map(|volume| volume.as_ref()).collect(),
         };
         let mut scratch = Scratch::new(device);
         let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
@@ -301,13 +315,27 @@ impl<D: Device> Field<D> for Genvs {
     }
 
     fn left_out(&self) -> Vec<LeftOut> {
-        let Counts { views, encoded_views, volume_rows, filled_rows, planned_calls, calls } = *self.counts();
-        let Omissions { unused_views, unseen_rows, reuse } = self.options.omissions;
+        let Counts { views, encoded_views, volume_rows, filled_rows, volume_bytes, kept_bytes, planned_calls, calls } =
+            *self.counts();
+        let Omissions { unused_views, unseen_rows, reuse, half_volumes } = self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let ends = self.options.plan.settled.is_some();
         vec![
             line("encoded views", unused_views, views - encoded_views.min(views), views, "nothing"),
-            line("volume rows", unseen_rows, volume_rows - filled_rows.min(volume_rows), volume_rows, "nothing"),
+            line(
+                "volume rows",
+                unseen_rows && !half_volumes,
+                volume_rows - filled_rows.min(volume_rows),
+                volume_rows,
+                "nothing",
+            ),
+            line(
+                "volume bytes",
+                half_volumes,
+                volume_bytes - kept_bytes.min(volume_bytes),
+                volume_bytes,
+                "2^-11 of a feature",
+            ),
             line(
                 "denoiser calls",
                 ends || reuse.is_some(),

@@ -7,7 +7,7 @@ use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
 
-/// How a run goes from noise to a picture.
+/// How a run goes from noise to a picture, and what it keeps of the views.
 #[derive(Args)]
 pub(crate) struct RunOptions {
     #[arg(long, value_name = "NAME", value_parser = parse_sampler, requires = "model", help = sampler_help(), help_heading = GENVS)]
@@ -22,6 +22,9 @@ pub(crate) struct RunOptions {
     /// Add noise on the way, as much as this over the whole run; samplers that look back begin anew each time, so take heun
     #[arg(long, value_name = "AMOUNT", value_parser = parse_churn, requires = "model", conflicts_with = "tolerance", help_heading = GENVS)]
     churn: Option<f32>,
+    /// Keep views' features in 16 bits: half the memory, every row of them computed
+    #[arg(long, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
+    pub(super) half_volumes: bool,
 }
 
 impl RunOptions {
@@ -32,6 +35,7 @@ impl RunOptions {
             ("--steps", self.steps.is_some()),
             ("--tolerance", self.tolerance.is_some()),
             ("--churn", self.churn.is_some()),
+            ("--half-volumes", self.half_volumes),
         ]
     }
 

@@ -49,6 +49,11 @@ pub(super) fn of_pixelnerf(computes: impl Fn(Omission) -> bool, probe_step: u32)
 }
 
 /// What a GeNVS leaves out, besides calls, if it must compute these.
-pub(super) fn of_genvs(computes: impl Fn(Omission) -> bool, reuse: Option<f32>) -> genvs::Omissions {
-    genvs::Omissions { unused_views: !computes(Omission::Views), unseen_rows: !computes(Omission::Rows), reuse }
+pub(super) fn of_genvs(
+    computes: impl Fn(Omission) -> bool,
+    reuse: Option<f32>,
+    half_volumes: bool,
+) -> genvs::Omissions {
+    let (unused_views, unseen_rows) = (!computes(Omission::Views), !computes(Omission::Rows));
+    genvs::Omissions { unused_views, unseen_rows, reuse, half_volumes }
 }

@@ -5,6 +5,7 @@
 
 use super::image::{Image, Scratch, Size, enlarge};
 use super::layers::Loader;
+use super::volume::Volume;
 use crate::device::{Device, Layer, Rays};
 use crate::field::FieldError;
 use crate::field::finite::check_finite;
@@ -48,7 +49,7 @@ pub(super) struct Views<'a, D: Device> {
     /// Their weights, which sum to 1.
     pub(super) weights: D::Buffer<f32>,
     /// Their volumes.
-    pub(super) volumes: Vec<&'a Image<D>>,
+    pub(super) volumes: Vec<&'a Volume<D>>,
 }
 
 /// The network that is asked about points, on a device.
@@ -210,7 +211,7 @@ impl<'a, D: Device> Tile<'a, D> {
                 near,
                 far,
             };
-            device.gather_volume(&block, &views.cameras, &self.points, &volume.values, &mut self.gathered)?;
+            volume.gather(device, &block, &views.cameras, &self.points, &mut self.gathered)?;
         }
         let block = FuseBlock {
             view_count: views.volumes.len() as u32,

@@ -39,13 +39,16 @@ pub struct Omissions {
     /// Levels of the denoiser above this one, where there is a frame before: it is given noise of that level, and the run
     /// goes on from there. `None`: every frame starts from noise alone.
     pub reuse: Option<f32>,
+    /// Half of the bits of volumes: features are off by up to 2^-11 of what they are, beyond 65504 they are that. All rows
+    /// are computed at once then.
+    pub half_volumes: bool,
 }
 
 impl Omissions {
     /// Nothing is left out.
-    pub const NONE: Omissions = Omissions { unused_views: false, unseen_rows: false, reuse: None };
+    pub const NONE: Omissions = Omissions { unused_views: false, unseen_rows: false, reuse: None, half_volumes: false };
     /// All that is left out unless a person says otherwise: what costs nothing.
-    pub const EXACT: Omissions = Omissions { unused_views: true, unseen_rows: true, reuse: None };
+    pub const EXACT: Omissions = Omissions { unused_views: true, unseen_rows: true, reuse: None, half_volumes: false };
 }
 
 impl Default for Omissions {

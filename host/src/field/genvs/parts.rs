@@ -67,15 +67,16 @@ impl<D: Device> Parts<D> {
         if new_rows == 0 {
             return Ok(0);
         }
+        let Some(image) = volume.image() else { return Ok(new_rows) };
         // A mean is no number where one of its summands is none: a small download tells whether to look at all of them.
-        let Size { channels, .. } = volume.image.size;
-        let block = MeanBlock { pixel_count: volume.image.size.pixel_count(), channels };
+        let Size { channels, .. } = image.size;
+        let block = MeanBlock { pixel_count: image.size.pixel_count(), channels };
         let mut means = device.zeros(channels as usize).map_err(failed)?;
-        device.channel_means(&block, &volume.image.values, &mut means).map_err(failed)?;
+        device.channel_means(&block, &image.values, &mut means).map_err(failed)?;
         let means = device.download(&means).map_err(failed)?;
         if means.iter().any(|mean| !mean.is_finite()) {
             let (stage, tensor) = (format!("encoding source {view}"), "volume [row][column][depth][feature]");
-            download_finite(device, &volume.image.values, &stage, tensor)?;
+            download_finite(device, &image.values, &stage, tensor)?;
         }
         Ok(new_rows)
     }

@@ -43,7 +43,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let mut volume = prepared.volumes[view].borrow_mut();
         let Some(volume) = volume.as_mut() else { return Ok(Vec::new()) };
         prepared.parts.fill(*device, volume, 0..volume.row_count(), view)?;
-        device.download(&volume.image.values).map_err(FieldError::Device)
+        volume.values(*device).map_err(FieldError::Device)
     }
 
     /// Density (rectified) and features of points, `[point][1 + feature]`, from `looked_up[point][feature]`.
@@ -102,7 +102,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let views = Views {
             cameras: device.upload(&cameras).map_err(failed)?,
             weights: device.upload(weights).map_err(failed)?,
-            volumes: volumes.iter().filter_map(|volume| Some(&volume.as_ref()?.image)).collect(),
+            volumes: volumes.iter().filter_map(|volume| volume.as_ref()).collect(),
         };
         let mut scratch = Scratch::new(*device);
         let progress = Progress::hidden();

@@ -47,6 +47,7 @@ pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> 
     let mut settings = vec![setting(EXACT, rays, exact, NONE, 0.0, 1)];
     let planned = |words: String, plan| setting(&words, rays, plan, NONE, 0.0, 1);
     settings.push(setting("unseen rows", rays, exact, Omissions { unseen_rows: true, ..NONE }, 0.0, 1));
+    settings.push(setting("half volumes", rays, exact, Omissions { half_volumes: true, ..NONE }, 0.0, 1));
     settings.push(planned("settled".to_owned(), Plan { settled: Some(HALF_A_LEVEL), ..exact }));
     settings.extend(HEUN.map(|count| planned(format!("heun, {count}"), over(exact, Sampler::Heun, count))));
     for sampler in Sampler::ALL.into_iter().filter(|sampler| !sampler.is_single_step()) {
