@@ -253,6 +253,7 @@ fn wrong_arguments_of_genvs() {
         wrong(&format!("--reuse {level}"), &["--reuse", "above 0"]);
     }
     wrong("--exact --reuse 2", &["--exact", "--reuse"]);
+    wrong("--exact --half-volumes", &["--exact", "--half-volumes"]);
     wrong("--exact --compute rows", &["--exact", "--compute"]);
     for name in ["genvs:", "genvs:64"] {
         assert_wrong(&format!("render toy --model {name} -o out"), &[name, "genvs:small"]);

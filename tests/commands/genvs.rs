@@ -94,6 +94,10 @@ fn exact_leaves_nothing_out() {
     assert_eq!((&shorter["denoising"]["sampler"], &shorter["denoising"]["calls"]), (&"heun".into(), &3.into()));
     let rows = record(scene.path(), "--model genvs:small --compute rows --steps 1");
     assert_eq!(left_out(&rows, "volume rows"), (0, false, 128));
+    let halves = record(scene.path(), "--model genvs:small --half-volumes --steps 1");
+    let (bytes, is_on, of) = left_out(&halves, "volume bytes");
+    assert!(is_on && bytes > 0 && 2 * bytes == of, "{bytes} of {of}");
+    assert_eq!((left_out(&halves, "volume rows").1, left_out(&rows, "volume bytes").0), (false, 0));
     assert!(left_out(&rows, "encoded views").1 && left_out(&rows, "denoiser calls").1);
 }
 

@@ -3,8 +3,10 @@
 use super::{UNTOUCHED, dispatch, numbers, points_of};
 use viewfuse::check::world::World;
 use viewfuse_core::genvs::{
-    DenoiserInputBlock, FeatureBlock, VolumeBlock, denoiser_input, summed_feature, volume_value, weigh_features,
+    DenoiserInputBlock, FeatureBlock, VolumeBlock, denoiser_input, summed_feature, volume_value,
+    volume_value_of_halves, weigh_features,
 };
+use viewfuse_core::half::packed_halves;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_shaders::volumes;
 
@@ -25,6 +27,35 @@ fn gather_volume_is_core_s() {
     let mut gathered = vec![UNTOUCHED; views.len() * 120];
     dispatch(block, 120, |id, push| volumes::gather_volume(id, push, views, &there, &volume, &mut gathered));
     let expected: Vec<f32> = (0..120).map(|at| volume_value(&views[..], &there[..], &volume[..], &block, at)).collect();
+    assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));
+    assert_eq!(gathered[120..240], expected);
+    assert_eq!(gathered.iter().filter(|value| **value == UNTOUCHED).count(), gathered.len() - 120);
+}
+
+#[test]
+fn halves_are_core_s() {
+    let world = World::new(1);
+    let (views, there, numbers) = (&world.views, points_of(&world, 40), numbers(35, 5 * 7 * 3 * 3));
+    let mut volume = vec![0xabab_abab; 160];
+    dispatch(315, 158, |id, push| volumes::pack_halves(id, push, &numbers, &mut volume));
+    let expected: Vec<u32> = (0..158).map(|word| packed_halves(&numbers[..], 315, word)).collect();
+    assert_eq!(volume[..158], expected);
+    assert_eq!(volume[158..], [0xabab_abab; 2]);
+
+    let block = VolumeBlock {
+        view: 1,
+        point_count: 40,
+        feature_count: 3,
+        height: 5,
+        width: 7,
+        depth_count: 3,
+        near: 0.5,
+        far: 9.0,
+    };
+    let mut gathered = vec![UNTOUCHED; views.len() * 120];
+    dispatch(block, 120, |id, push| volumes::gather_halves(id, push, views, &there, &volume, &mut gathered));
+    let value = |at| volume_value_of_halves(&views[..], &there[..], &volume[..], &block, at);
+    let expected: Vec<f32> = (0..120).map(value).collect();
     assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));
     assert_eq!(gathered[120..240], expected);
     assert_eq!(gathered.iter().filter(|value| **value == UNTOUCHED).count(), gathered.len() - 120);

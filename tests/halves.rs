@@ -1,0 +1,184 @@
+//! Numbers of 16 bits: all of them, what becomes of others, and volumes of GeNVS that are kept in them.
+
+use half::f16;
+use viewfuse::check::poses::Random;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::genvs::reference::Reference;
+use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
+use viewfuse::field::{Field, LeftOut, Rendered};
+use viewfuse::photographs::{SourceImage, SourceImages};
+use viewfuse::progress::Progress;
+use viewfuse::synthetic::{Orbit, render, toy};
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::half::{LARGEST, fetch_half, half_bits, half_value, packed_halves, word_count};
+use viewfuse_core::weights::Weights;
+
+#[test]
+fn all_there_are() {
+    for bits in 0..=u16::MAX {
+        let (ours, theirs) = (half_value(u32::from(bits)), f16::from_bits(bits));
+        if theirs.is_nan() {
+            assert!(ours.is_nan() && f16::from_bits(half_bits(ours) as u16).is_nan(), "{bits:#06x}");
+            continue;
+        }
+        assert_eq!(ours.to_bits(), theirs.to_f32().to_bits(), "{bits:#06x}");
+        let back = if theirs.is_infinite() { bits - 1 } else { bits };
+        assert_eq!(half_bits(ours), u32::from(back), "{bits:#06x}");
+        // What else stands in the word does not matter.
+        assert_eq!(half_value(0xabcd_0000 | u32::from(bits)).to_bits(), ours.to_bits());
+    }
+}
+
+/// The bits that another hand rounds to; what it makes infinite is the largest.
+fn expected(number: f32) -> u32 {
+    let theirs = f16::from_f32(number);
+    u32::from(if theirs.is_infinite() { theirs.to_bits() - 1 } else { theirs.to_bits() })
+}
+
+#[test]
+fn halfway_between_two_and_beside_it() {
+    for bits in 0..0x7bff_u16 {
+        let (lower, upper) = (f16::from_bits(bits).to_f32(), f16::from_bits(bits + 1).to_f32());
+        let middle = 0.5 * (lower + upper);
+        for number in [middle, middle.next_down(), middle.next_up(), lower.next_up(), upper.next_down()] {
+            assert_eq!(half_bits(number), expected(number), "{number:e}");
+            assert_eq!(half_bits(-number), 0x8000 | expected(number), "{number:e}");
+        }
+        let even = u32::from(if bits % 2 == 0 { bits } else { bits + 1 });
+        assert_eq!(half_bits(middle), even, "{middle:e}");
+    }
+}
+
+#[test]
+fn numbers_at_random() {
+    let mut random = Random::new(91);
+    for _ in 0..2_000_000 {
+        let number = f32::from_bits((random.below(1 << 16) as u32) << 16 | random.below(1 << 16) as u32);
+        if number.is_nan() {
+            assert!(half_value(half_bits(number)).is_nan());
+            continue;
+        }
+        assert_eq!(half_bits(number), expected(number), "{number:e}");
+        let error = (f64::from(half_value(half_bits(number))) - f64::from(number.clamp(-LARGEST, LARGEST))).abs();
+        let bound = f64::from(number).abs() * 0.5_f64.powi(11);
+        assert!(error <= bound.max(0.5_f64.powi(25)), "{number:e} is off by {error:e}");
+    }
+    for (number, whole) in [(65519.9, LARGEST), (65520.0, LARGEST), (f32::MAX, LARGEST), (f32::INFINITY, LARGEST)] {
+        assert_eq!([half_value(half_bits(number)), half_value(half_bits(-number))], [whole, -whole]);
+    }
+}
+
+#[test]
+fn two_in_a_word() {
+    for numbers in [&[1.0, -2.0, 0.5][..], &[1.0, -2.0, 0.5, 3.0]] {
+        let count = numbers.len() as u32;
+        let words: Vec<u32> = (0..word_count(count) as usize).map(|word| packed_halves(numbers, count, word)).collect();
+        assert_eq!((words.len(), words[0]), (2, 0xc000_3c00));
+        let read: Vec<f32> = (0..numbers.len()).map(|index| fetch_half(&words[..], index)).collect();
+        assert_eq!(read, numbers);
+    }
+    // A number that is there and does not count is left out.
+    assert_eq!(packed_halves(&[1.0_f32, 1.0], 1, 0), 0x3c00);
+}
+
+const SIDE: u32 = 64;
+const VIEWS: u32 = 3;
+
+fn field(half_volumes: bool) -> Genvs {
+    let omissions = Omissions { half_volumes, ..Omissions::default() };
+    let options = GenvsOptions { omissions, ..GenvsOptions::default() };
+    Genvs::new(made::by_formula(&Architecture::small()), options).expect("a made network")
+}
+
+fn orbit() -> Orbit {
+    let pinhole = Pinhole::new([1.025 * SIDE as f32; 2], [0.5 * SIDE as f32; 2], SIDE, SIDE);
+    Orbit { radius: 1.3, pinhole: pinhole.expect("sound intrinsics") }
+}
+
+fn target() -> Camera {
+    orbit().camera(2.0, 0.35).expect("a camera off the pole")
+}
+
+/// The lorry from some sides, on white.
+fn sources() -> SourceImages {
+    let lorry = toy::lorry().expect("the lorry");
+    let image = |camera: Camera| {
+        let texel = |pixel: &image::Rgba<u8>| {
+            let [red, green, blue, alpha] = pixel.0.map(|value| f32::from(value) / 255.0);
+            [red * alpha, green * alpha, blue * alpha, alpha]
+        };
+        SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() }
+    };
+    let cameras = orbit().spiral(VIEWS, [-0.4, 0.8]).expect("cameras off the pole");
+    SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
+}
+
+fn picture(field: &Genvs, sources: &SourceImages) -> Rendered {
+    let quiet = Progress::hidden();
+    let prepared = field.prepare(&Cpu, sources, &quiet).expect("sources on the device");
+    field.encode(&Cpu, &prepared, &[], &quiet).expect("nothing to do");
+    field.render(&Cpu, &prepared, &(), &Weights::mean(VIEWS), &target(), 0.0, &quiet).expect("a picture")
+}
+
+fn left_out(field: &Genvs, what: &str) -> LeftOut {
+    let lines = Field::<Cpu>::left_out(field);
+    lines.into_iter().find(|line| line.what == what).expect("a line")
+}
+
+#[test]
+fn a_volume_is_the_nearest_of_16_bits() {
+    let sources = sources();
+    let volume = |half_volumes| {
+        let field = field(half_volumes);
+        let reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
+        reference.volume(1).expect("a volume")
+    };
+    let (whole, halves) = (volume(false), volume(true));
+    let nearest: Vec<f32> = whole.iter().map(|value| f16::from_f32(*value).to_f32()).collect();
+    assert!(halves == nearest && halves != whole);
+}
+
+/// What is looked up are sums with weights that sum to 1: off by no more than a feature of a volume is. What the network makes
+/// of them may grow that; measured are 5e-5 of the largest feature, and 3e-5 of a picture's range.
+#[test]
+fn features_and_pictures_hardly_change() {
+    let sources = sources();
+    let features = |half_volumes| {
+        let field = field(half_volumes);
+        let reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
+        let weights = [1.0 / VIEWS as f32; VIEWS as usize];
+        reference.features(&weights, &target().block(0), [0.8, 1.8], 1.0).expect("features")
+    };
+    let (whole, halves) = (features(false), features(true));
+    let largest = whole.iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
+    let off = whole.iter().zip(&halves).fold(0.0_f32, |off, (whole, half)| off.max((whole - half).abs()));
+    assert!(off > 0.0 && off < 0.5_f32.powi(11) * largest, "{off:e} of {largest:e}");
+
+    let (exact, packed) = (field(false), field(true));
+    let [whole, halves] = [&exact, &packed].map(|field| picture(field, &sources).colours);
+    let pairs = whole.iter().flatten().zip(halves.iter().flatten());
+    let off = pairs.fold(0.0_f32, |off, (whole, half)| off.max((whole - half).abs()));
+    assert!(off > 0.0 && off < 0.5 / 255.0, "{off:e}");
+}
+
+#[test]
+fn half_the_memory() {
+    let sources = sources();
+    let (exact, packed) = (field(false), field(true));
+    for field in [&exact, &packed] {
+        picture(field, &sources);
+    }
+    let whole = left_out(&exact, "volume bytes");
+    let halves = left_out(&packed, "volume bytes");
+    assert_eq!((whole.switch, whole.left_out), (false, 0));
+    assert_eq!((halves.switch, halves.left_out * 2, halves.of), (true, whole.of, whole.of));
+    // Rows cannot be left out then: what they are made of is not kept.
+    assert!(left_out(&exact, "volume rows").switch);
+    let rows = left_out(&packed, "volume rows");
+    assert_eq!((rows.switch, rows.left_out, rows.of), (false, 0, u64::from(VIEWS * SIDE)));
+    // Before anything is there, more views cost less than half.
+    let estimate = |field: &Genvs, count| field.memory_estimate(&Cpu, &vec![[SIDE; 2]; count]).expect("a number");
+    let per_view = |field| (estimate(field, 9) - estimate(field, 1)) / 8;
+    assert_eq!(per_view(&packed), whole.of / u64::from(VIEWS) / 2);
+    assert!(2 * per_view(&packed) < per_view(&exact));
+}
