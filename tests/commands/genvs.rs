@@ -6,7 +6,9 @@ use std::fs;
 use std::path::Path;
 use viewfuse::checkpoint::Precision;
 use viewfuse::field::{genvs, pixelnerf};
-use viewfuse_tests::command::{Outcome, assert_refused, command, f32_bytes, names_in, safetensors, toy};
+use viewfuse_tests::command::{
+    Outcome, assert_refused, assert_wrong_arguments, command, f32_bytes, names_in, safetensors, toy,
+};
 
 const RENDER: &str = "render toy --targets 20 --views 2 --size 16x16 --device cpu -o out";
 
@@ -140,6 +142,14 @@ fn files_of_either_network() {
     assert!(genvs == picture(folder, "--steps 2 --model genvs:small"), "a file is not what was written");
     let pixelnerf = record(folder, "--samples 8,4,4 --model two.safetensors");
     assert_eq!((&pixelnerf["field"], &pixelnerf["denoising"]), (&"pixelnerf".into(), &Value::Null));
+    let without = genvs::Architecture { denoiser: None, ..genvs::Architecture::small() };
+    genvs::made::by_formula(&without)
+        .write_safetensors(&folder.join("three.safetensors"), Precision::Kept)
+        .expect("a file");
+    let plain = record(folder, "--model three.safetensors");
+    assert_eq!((&plain["field"], &plain["denoising"]), (&"genvs".into(), &Value::Null));
+    let arguments = "render toy --targets 20 --model three.safetensors --sampler heun -o new";
+    assert_wrong_arguments(BINARY, folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
     let other = safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]);
     scene.write("other.safetensors", other);
     let parts =
