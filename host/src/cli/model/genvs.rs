@@ -12,7 +12,7 @@ use viewfuse_core::schedule::NoiseSchedule;
 pub(crate) struct RunOptions {
     #[arg(long, value_name = "NAME", value_parser = parse_sampler, requires = "model", help = sampler_help(), help_heading = GENVS)]
     sampler: Option<Sampler>,
-    /// Noise levels: a call of the denoiser each, with heun two, but for the last [default: 18, with --exact 25]
+    /// Noise levels: a call of the denoiser each, with heun two, but for the last [default: 10, with --exact 25]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "model", help_heading = GENVS)]
     steps: Option<u32>,
     /// Choose the levels on the way, each step's error below this (root mean square, of values between -1 and 1); 0.01 is
