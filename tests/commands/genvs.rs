@@ -197,7 +197,7 @@ fn sweeps_samplers_and_what_is_left_out() {
     assert_eq!((calls("exact"), calls("heun, 8"), calls("ipndm, 6")), (98, 30, 12));
     assert_eq!(point("exact")["versus_exact"]["root_mean_square"], 0.0);
     assert!(psnr("ipndm, 6") < psnr("ipndm, 12") && psnr("all, half the size") < psnr("heun, 8"));
-    assert!(calls("all, reuse 2") < calls("all, reuse 20") && calls("all, reuse 20") < 36);
+    assert!(calls("all, reuse 2") < calls("all, reuse 20") && calls("all, reuse 20") < 20);
     assert!(points.iter().all(|point| point["repeatable"] == true), "{printed}");
     let table = fs::read_to_string(folder.join("out/pareto.csv")).expect("a table");
     assert!(table.lines().next().is_some_and(|header| header.contains(",repeatable,calls,encoded_views_left_out,")));
