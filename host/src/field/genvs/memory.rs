@@ -4,7 +4,6 @@ use super::architecture::Architecture;
 use super::options::GenvsOptions;
 use crate::device::Device;
 
-
 /// Bytes that a run takes beside photographs and pictures: parameters in the order in which products need them, each view's
 /// volume and what its last layer makes it of, and the images of the largest level of one network at a time.
 pub(super) fn estimate<D: Device>(
