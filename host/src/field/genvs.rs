@@ -129,7 +129,7 @@ impl Genvs {
         let mut volume = prepared.volumes[view].borrow_mut();
         if volume.is_none() {
             let SourceView { size, values, .. } = &prepared.images[view];
-            let encoded = prepared.parts.encode(device, values, *size)?;
+            let encoded = prepared.parts.encode(device, values, *size, view)?;
             let mut counts = self.counts();
             counts.encoded_views += 1;
             counts.volume_rows += u64::from(encoded.row_count());
@@ -161,11 +161,19 @@ impl Genvs {
     }
 
     /// How rays go through volumes, for a target.
-    fn looking(&self, near_far: [f32; 2], target: &Camera) -> Looking {
+    ///
+    /// # Errors
+    /// [`FieldError::NoDepths`] if there is nothing between their ends: a volume of no depth has no nodes to look up.
+    fn looking<D: Device>(&self, near_far: [f32; 2], target: &Camera) -> Outcome<Looking, D> {
+        let [near, far] = near_far;
+        // Not the other way round: NaN is no depth either.
+        if !(near < far && (far - near).is_finite()) {
+            return Err(FieldError::NoDepths { near, far });
+        }
         let Rays { sample_count, jitter, length, inclusive, .. } = self.options.rays;
         let focal = 2.0 * target.pinhole.focal()[1] / target.pinhole.height() as f32;
         let ray_length = length.unwrap_or(1.0 / focal);
-        Looking { near_far, sample_count, jitter, seed: self.options.plan.seed, ray_length, inclusive }
+        Ok(Looking { near_far, sample_count, jitter, seed: self.options.plan.seed, ray_length, inclusive })
     }
 
     fn counts(&self) -> MutexGuard<'_, Counts> {
@@ -260,6 +268,7 @@ impl<D: Device> Field<D> for Genvs {
         progress: &Progress,
     ) -> Outcome<Rendered, D> {
         let failed = FieldError::Device;
+        let looking = self.looking::<D>(prepared.near_far, target)?;
         self.encode_used(device, prepared, &(), weights)?;
         let used = self.used_views(prepared, weights);
         let cameras: Vec<CameraBlock> = used.iter().map(|view| prepared.images[*view].camera).collect();
@@ -270,7 +279,6 @@ impl<D: Device> Field<D> for Genvs {
             channels: COLOUR_CHANNELS as u32,
         };
         let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
-        let looking = self.looking(prepared.near_far, target);
         self.fill_seen(device, prepared, &used, &camera, &looking)?;
         let volumes: Vec<Ref<'_, Option<Volume<D>>>> =
             used.iter().map(|view| prepared.volumes[*view].borrow()).collect();
