@@ -141,8 +141,7 @@ pub struct FeatureBlock {
     pub sample_count: u32,
     /// Features of a sample.
     pub feature_count: u32,
-    /// What the length of a point is multiplied by: 1 over the focal length in halves of the image's height, in published
-    /// checkpoints, whose rays are measured on an image plane at that distance.
+    /// What the length of a point is multiplied by, to have it in the lengths that the network's densities are for.
     pub length_scale: f32,
     /// Length of the last sample, which has none behind it; 1e10 as published.
     pub last_length: f32,

@@ -211,12 +211,20 @@ impl<D: Device> Field<D> for Genvs {
         Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
 
-    fn prepare(&self, device: &D, sources: &SourceImages, _progress: &Progress) -> Outcome<Prepared<D>, D> {
+    fn prepare(&self, device: &D, sources: &SourceImages, progress: &Progress) -> Outcome<Prepared<D>, D> {
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let near_far = self.options.rays.near_far.unwrap_or_else(|| default_near_far(&cameras));
         let images: Vec<SourceView> = sources.images.iter().map(padded).collect();
         let side = images.iter().map(|image| image.size.height.min(image.size.width)).min().unwrap_or(SIDE_STEP);
         self.counts().views += images.len() as u64;
+        if sources.background != [1.0; 3] {
+            progress.warn("this network's pictures are over white; truths over another background differ by that");
+        }
+        let trained = self.architecture.image_side as u32;
+        if images.iter().any(|image| image.size.height.max(image.size.width) != trained) {
+            progress
+                .warn(&format!("the network was trained on images of {trained} pixels on a side; these are smaller"));
+        }
         Ok(Prepared {
             parts: Parts::load(device, &self.checkpoint, &self.architecture, side)?,
             volumes: images.iter().map(|_| RefCell::new(None)).collect(),
@@ -288,7 +296,7 @@ impl<D: Device> Field<D> for Genvs {
             volumes: volumes.iter().filter_map(|volume| Some(&volume.as_ref()?.image)).collect(),
         };
         let mut scratch = Scratch::new(device);
-        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
+        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking)?;
         let sampled = {
             let earlier = prepared.earlier.borrow();
             let start = match (&*earlier, self.options.omissions.reuse) {
