@@ -101,7 +101,7 @@ pub(super) struct Ending<'a> {
 
 impl<'a> Ending<'a> {
     /// The ending of the rows from `row` on.
-    pub(super) fn from_row(self, row: usize) -> Ending<'a> {
+    pub(super) fn rows_from(self, row: usize) -> Ending<'a> {
         Ending { addend: self.addend.map(|(addend, pitch)| (&addend[row * pitch..], pitch)), ..self }
     }
 
