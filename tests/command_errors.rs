@@ -197,6 +197,69 @@ fn wrong_arguments_of_networks() {
 }
 
 #[test]
+fn arguments_of_another_network() {
+    let wrong =
+        |arguments: &str, parts: &[&str]| assert_wrong(&format!("render toy --targets 20 {arguments} -o out"), parts);
+    for option in ["--sampler heun", "--steps 4", "--tolerance 0.1", "--churn 1", "--noise 80,1", "--reuse 2"] {
+        let name = option.split(' ').next().unwrap_or(option);
+        wrong(
+            &format!("--model formula:8 {option}"),
+            &[&format!("{name} cannot be used with '--model formula:8'"), "a PixelNeRF"],
+        );
+        assert_wrong(&format!("render toy {option} -o out"), &["required arguments were not provided"]);
+    }
+    for option in ["--published-depth", "--probe-step 8", "--compute layers", "--compute views,hidden"] {
+        let name = option.split(' ').next().unwrap_or(option);
+        wrong(
+            &format!("--model genvs:small {option}"),
+            &[name, "cannot be used with '--model genvs:small'", "a GeNVS"],
+        );
+    }
+    wrong("--model body:8 --compute space,rows", &["--compute rows cannot be used", "a PixelNeRF"]);
+    wrong("--model body:8 --samples 64", &["--samples takes three numbers", "a PixelNeRF"]);
+    for samples in ["64,16,16", "1"] {
+        wrong(
+            &format!("--model genvs:small --samples {samples}"),
+            &["--samples takes one number, at least 2,", "a GeNVS"],
+        );
+    }
+    wrong("--model genvs:small --settled 0.1", &["--settled cannot be used with a GeNVS"]);
+    assert_wrong("pareto toy --targets 20 --model genvs:small --published-depth -o out", &["--published-depth cannot"]);
+    assert_wrong("evaluate toy --targets 20 --model genvs:small --probe-step 8", &["--probe-step cannot"]);
+}
+
+#[test]
+fn wrong_arguments_of_genvs() {
+    let wrong = |arguments: &str, parts: &[&str]| {
+        assert_wrong(&format!("render toy --model genvs:small {arguments} -o out"), parts)
+    };
+    wrong("--sampler plms", &["unknown sampler 'plms'; there are: euler, heun, dpm++2m, dpm++3m, unipc, ipndm"]);
+    wrong("--steps 0", &["--steps", "1..=1000"]);
+    for tolerance in ["0", "1.5", "nan", "small"] {
+        wrong(&format!("--tolerance {tolerance}"), &["--tolerance", "above 0, at most 1"]);
+    }
+    for other in ["--sampler heun", "--steps 3", "--churn 1"] {
+        wrong(&format!("--tolerance 0.1 {other}"), &["--tolerance", other.split(' ').next().unwrap_or(other)]);
+    }
+    for churn in ["inf", "nan", "1001"] {
+        wrong(&format!("--churn {churn}"), &["--churn", "0 to 1000"]);
+    }
+    for (noise, part) in
+        [("80", "80,0.002"), ("1,2", "must not be above"), ("80,0", "must lie between"), ("80,1,1", "80,0.002")]
+    {
+        wrong(&format!("--noise {noise}"), &["--noise", part]);
+    }
+    for level in ["0", "inf", "nan"] {
+        wrong(&format!("--reuse {level}"), &["--reuse", "above 0"]);
+    }
+    wrong("--exact --reuse 2", &["--exact", "--reuse"]);
+    wrong("--exact --compute rows", &["--exact", "--compute"]);
+    for name in ["genvs:", "genvs:64"] {
+        assert_wrong(&format!("render toy --model {name} -o out"), &[name, "genvs:small"]);
+    }
+}
+
+#[test]
 fn wrong_arguments() {
     assert_wrong("", &[]);
     assert_wrong("paint toy", &["paint"]);

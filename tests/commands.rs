@@ -6,6 +6,8 @@ mod check;
 mod convert;
 #[path = "commands/devices.rs"]
 mod devices;
+#[path = "commands/genvs.rs"]
+mod genvs;
 #[path = "commands/inspect.rs"]
 mod inspect;
 #[path = "commands/interrupt.rs"]

@@ -68,12 +68,17 @@ pub fn exp(x: f32) -> f32 {
     // ln 2 in two parts: the first has few enough bits that its product with the whole number is exact.
     const LN_2_HIGH: f32 = 0.693_359_4;
     const LN_2_LOW: f32 = -2.121_944_4e-4;
+    // 1.5 * 2^23: see below.
+    const WHOLE: f32 = 12_582_912.0;
     if !(x >= LOWEST) {
         return 0.0;
     }
     let x = min(x, HIGHEST);
-    let power = floor_to_i32(x * LOG2_E + 0.5);
-    let k = power as f32;
+    // In [2^23, 2^24) numbers are whole: adding rounds, and the last bits are the integer. A conversion, which must
+    // saturate, would keep loops over this function from being vectorised.
+    let shifted = x * LOG2_E + WHOLE;
+    let k = shifted - WHOLE;
+    let power = shifted.to_bits().wrapping_sub(WHOLE.to_bits()) as i32;
     let r = (x - k * LN_2_HIGH) - k * LN_2_LOW;
     let p = 1.987_569_1e-4;
     let p = p * r + 1.398_2e-3;
@@ -83,7 +88,7 @@ pub fn exp(x: f32) -> f32 {
     let p = p * r + 5.000_000_3e-1;
     let e = p * (r * r) + r + 1.0;
     // 2^power as a product of two normal numbers: power reaches 128.
-    let half = power / 2;
+    let half = power >> 1;
     e * exact_power_of_two(half) * exact_power_of_two(power - half)
 }
 

@@ -13,6 +13,7 @@ mod table;
 mod verify;
 mod weights;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::fmt::Display;
 use std::io::{self, Write};
@@ -72,6 +73,12 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
     }
+}
+
+/// Arguments that do not fit what a file turned out to hold; the exit code is that of wrong arguments.
+fn wrong(message: impl Display) -> anyhow::Error {
+    clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n\nFor more information, try '--help'.\n"))
+        .into()
 }
 
 /// Prints a line. A reader that has gone away (`| head`) is no reason to stop: files are still to be written.

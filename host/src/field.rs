@@ -3,6 +3,7 @@
 //! A field turns prepared photographs into latents and latents into a target's picture. The renderer knows no more
 //! about it than this trait; the weight-free field ([`photo`]) is the first, networks are further ones.
 
+pub mod family;
 pub mod finite;
 pub mod genvs;
 mod learned;
@@ -55,7 +56,7 @@ pub enum FieldError<E: std::error::Error> {
 pub struct Rendered {
     /// Red, green, blue in `[0, 1]` and opacity.
     pub colours: Vec<[f32; 4]>,
-    /// Depth along the principal axis in world units; 0 where nothing is met.
+    /// Depth along the principal axis in world units, 0 where nothing is met; empty for fields that know no depth.
     pub depths: Vec<f32>,
     /// Width of the picture.
     pub width: u32,
@@ -76,6 +77,29 @@ pub struct LeftOut {
     pub of: u64,
     /// What that can cost.
     pub cost: &'static str,
+}
+
+/// How a field went from noise to pictures.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Denoising {
+    /// The sampler.
+    pub sampler: &'static str,
+    /// How many noise levels a picture's run has; null where they are chosen on the way.
+    pub levels: Option<u32>,
+    /// The error that a step may make where levels are chosen on the way, root mean square of values between -1 and 1.
+    pub tolerance: Option<f32>,
+    /// The largest and the smallest noise level.
+    pub noise: [f32; 2],
+    /// Noise that is added on the way, over the whole run.
+    pub churn: f32,
+    /// A run ends where no value will change by more than this; null where it goes to the end.
+    pub settled: Option<f32>,
+    /// The level at which a picture starts from the one before; null where each starts from noise alone.
+    pub reuse: Option<f32>,
+    /// Calls of the denoiser that were made, for all pictures together.
+    pub calls: u64,
+    /// Calls that were planned and not made.
+    pub saved_calls: u64,
 }
 
 /// A field on a device.
@@ -104,6 +128,11 @@ pub trait Field<D: Device> {
     /// What it left out so far.
     fn left_out(&self) -> Vec<LeftOut> {
         Vec::new()
+    }
+
+    /// How it went from noise to the pictures so far; `None` for fields that do not.
+    fn denoising(&self) -> Option<Denoising> {
+        None
     }
 
     /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures; `None`

@@ -14,6 +14,10 @@ fn main() -> ExitCode {
                 eprintln!("viewfuse: {interrupted}");
                 return ExitCode::from(130);
             }
+            if let Some(wrong) = error.downcast_ref::<clap::Error>() {
+                eprint!("{wrong}");
+                return ExitCode::from(2);
+            }
             eprintln!("viewfuse: {error:#}");
             ExitCode::from(1)
         }

@@ -8,6 +8,7 @@
 //! falls on all of them; still, times on a shared machine are noisy, and differences of a few percent mean nothing.
 
 pub mod difference;
+pub mod enlarged;
 pub mod front;
 pub mod plot;
 pub mod record;
@@ -15,7 +16,7 @@ pub mod settings;
 
 use crate::device::Device;
 use crate::few_shot::{FewShot, Target};
-use crate::field::{Field, LeftOut};
+use crate::field::{Denoising, Field, LeftOut};
 use crate::photographs::{Album, SourceImages};
 use crate::progress::Progress;
 use crate::render::{Frame, RenderError, RenderOptions, Stage, working_side};
@@ -55,6 +56,8 @@ pub struct Point {
     pub truth_psnr: Option<f64>,
     /// What the field left out in one round.
     pub left_out: Vec<LeftOut>,
+    /// How the field went from noise to the pictures of one round; `None` for fields that do not.
+    pub denoising: Option<Denoising>,
     /// Whether every round gave the same pictures, bit for bit.
     pub is_repeatable: bool,
 }
@@ -121,7 +124,7 @@ impl Subject<'_> {
                 exact = frames.iter().map(|frame| frame.colours.clone()).collect();
                 size = frames.first().map_or(size, |frame| frame.picture.dimensions().into());
             }
-            firsts.push(First::of(&frames, &exact, setting.field.left_out()));
+            firsts.push(First::of::<D, F>(&frames, &exact, &setting.field));
         }
         let mut times: Vec<Vec<[f64; 2]>> = vec![Vec::new(); settings.len()];
         for _ in 0..round_count {
@@ -203,24 +206,32 @@ struct First {
     difference: Difference,
     truth_psnr: Option<f64>,
     left_out: Vec<LeftOut>,
+    denoising: Option<Denoising>,
     fingerprint: u64,
     is_repeatable: bool,
 }
 
 impl First {
-    fn of(frames: &[Frame], exact: &[Vec<[f32; 4]>], left_out: Vec<LeftOut>) -> First {
+    fn of<D: Device, F: Field<D>>(frames: &[Frame], exact: &[Vec<[f32; 4]>], field: &F) -> First {
         let mut difference = Difference::default();
         for (frame, exact) in frames.iter().zip(exact) {
             difference.add(&frame.colours, exact);
         }
         let scores: Vec<f64> = frames.iter().filter_map(|frame| Some(frame.truth.as_ref()?.psnr)).collect();
         let truth_psnr = (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / scores.len() as f64);
-        First { difference, truth_psnr, left_out, fingerprint: fingerprint(frames), is_repeatable: true }
+        First {
+            difference,
+            truth_psnr,
+            left_out: field.left_out(),
+            denoising: field.denoising(),
+            fingerprint: fingerprint(frames),
+            is_repeatable: true,
+        }
     }
 
     /// `times[round]`: in all and for encoding.
     fn point(self, words: &str, times: &[[f64; 2]]) -> Point {
-        let First { difference, truth_psnr, left_out, is_repeatable, .. } = self;
+        let First { difference, truth_psnr, left_out, denoising, is_repeatable, .. } = self;
         let all = sorted(times.iter().map(|[all, _]| *all));
         let encode = sorted(times.iter().map(|[_, encode]| *encode));
         let end = |time: Option<&f64>| time.copied().unwrap_or(f64::NAN);
@@ -232,6 +243,7 @@ impl First {
             difference,
             truth_psnr,
             left_out,
+            denoising,
             is_repeatable,
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::device::KernelTime;
 use crate::few_shot::FewShot;
-use crate::field::LeftOut;
+use crate::field::{Denoising, LeftOut};
 use crate::render::{Frame, RenderOptions, StageCosts};
 use crate::scene::Scene;
 use serde::Serialize;
@@ -27,6 +27,8 @@ pub struct RunRecord {
     pub exact: bool,
     /// What the field left out, in all frames together.
     pub left_out: Vec<LeftOut>,
+    /// How the field went from noise to the pictures; null for fields that do not.
+    pub denoising: Option<Denoising>,
     /// The weighting scheme.
     pub weighting: String,
     /// Seed of every random number. The weight-free field draws none.
@@ -125,8 +127,9 @@ pub struct FrameRecord {
     pub psnr: Option<f64>,
     /// Structural similarity with the truth.
     pub ssim: Option<f64>,
-    /// World units of depth in one step of the 16-bit depth map, whose 0 means that nothing is met.
-    pub depth_step: f32,
+    /// World units of depth in one step of the 16-bit depth map, whose 0 means that nothing is met; null for fields that
+    /// know no depth.
+    pub depth_step: Option<f32>,
     /// Time for this frame alone.
     pub seconds: f64,
     /// The part of it that encoded sources which no frame before it used.
@@ -153,7 +156,7 @@ impl FrameRecord {
             left_out_weight: frame.omission.omitted_weight,
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
             ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
-            depth_step: depth_step(&frame.depths),
+            depth_step: (!frame.depths.is_empty()).then(|| depth_step(&frame.depths)),
             seconds: frame.time.as_secs_f64(),
             encode_seconds: frame.encode.as_secs_f64(),
         }

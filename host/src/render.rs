@@ -130,7 +130,8 @@ pub struct Frame {
     pub colours: Vec<[f32; 4]>,
     /// The picture.
     pub picture: RgbImage,
-    /// Depth along the principal axis in world units; 0 where nothing is met. Row-major.
+    /// Depth along the principal axis in world units, 0 where nothing is met, row-major; empty for fields that know no
+    /// depth.
     pub depths: Vec<f32>,
     /// The truth at the same size and its scores, where there is a photograph.
     pub truth: Option<Truth>,

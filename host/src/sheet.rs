@@ -24,8 +24,8 @@ pub struct Sheet {
     pub sources: Vec<SheetSource>,
     /// The rendered picture.
     pub prediction: RgbImage,
-    /// Its depth map as grey levels.
-    pub depth: RgbImage,
+    /// Its depth map as grey levels, where depths are known.
+    pub depth: Option<RgbImage>,
     /// The photograph at the target with PSNR in decibels and SSIM, where there is one.
     pub truth: Option<(RgbImage, f64, Option<f64>)>,
 }
@@ -57,7 +57,9 @@ impl Sheet {
             results.push(("truth".to_owned(), truth.clone()));
             results.push((format!("error  PSNR {psnr:.2} dB{ssim}"), error_map(&self.prediction, truth)));
         }
-        results.push(("depth (near is bright)".to_owned(), self.depth.clone()));
+        if let Some(depth) = &self.depth {
+            results.push(("depth (near is bright)".to_owned(), depth.clone()));
+        }
         // Small results are enlarged by a whole factor, so that every pixel stays visible.
         let zoom = (256 / self.prediction.height().max(1)).clamp(1, 4);
         let (result_width, result_height) = (self.prediction.width() * zoom, self.prediction.height() * zoom);

@@ -1,6 +1,7 @@
 //! What a render takes of memory.
 
 use super::BINARY;
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Stdio;
@@ -23,6 +24,30 @@ fn most_memory(folder: &Path, arguments: &str) -> u64 {
         }
         sleep(Duration::from_millis(2));
     }
+}
+
+/// Of the rays of a GeNVS so many are worked on at once as take little memory; what it takes is known before.
+#[test]
+#[cfg_attr(not(target_os = "linux"), ignore = "the system does not say what a process takes")]
+fn more_samples_take_no_more() {
+    let scene = toy();
+    let render = |samples: u32| {
+        let arguments = format!(
+            "render toy --targets 20 --sources 000000,000008,000016 --model genvs:small --steps 2 --samples {samples} \
+             --device cpu -o out"
+        );
+        most_memory(scene.path(), &arguments)
+    };
+    // All points of the rays with more samples would take at least 70 MB more.
+    let (few, many) = (render(32), render(512));
+    assert!(many < few + (24 << 10), "{few} KiB became {many} KiB");
+    let record = fs::read(scene.path().join("out/run.json")).expect("a run record");
+    let record: Value = serde_json::from_slice(&record).expect("JSON");
+    let estimate = record["memory_estimate"].as_u64().expect("an estimate") >> 10;
+    assert!(
+        few > estimate / 2 && many < 3 * estimate / 2 + (16 << 10),
+        "{few} to {many} KiB, {estimate} KiB estimated"
+    );
 }
 
 #[test]

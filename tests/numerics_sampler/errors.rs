@@ -90,17 +90,19 @@ fn at_ten_calls_a_multistep_sampler_has_a_tenth_of_heuns_error() {
     }
 }
 
-/// The default makes an error as small as that of the published run with 49 calls, to a factor of 2.
+/// The default's error, in ten calls, is at most eight times that of the published run with 49, and a tenth of what that makes
+/// in ten; the careful plan's is about that of the published run.
 #[test]
-fn the_default_is_about_as_good_as_the_published_run() {
+fn what_the_plans_make() {
     let Steps::Fixed { sampler, level_count } = Plan::fast(0).steps else { panic!("another kind of default") };
     let calls = sampler.call_count(level_count);
     for (name, mixture) in &problems()[..2] {
         let truth = truth(mixture, &start(80.0));
         let [own, published] = [error(sampler, calls, mixture, &truth), error(Sampler::Heun, 49, mixture, &truth)];
         println!("{name}: {} {own:.1e} at {calls} calls, heun {published:.1e} at 49", sampler.name());
-        assert!(own <= 0.01 && own <= 2.0 * published, "{name}");
-        for plan in [Plan::fast(5), Plan::careful(5)] {
+        let ten = error(Sampler::Heun, 11, mixture, &truth);
+        assert!(calls == 10 && own <= 0.04 && own <= 8.0 * published && own <= 0.1 * ten, "{name}");
+        for (plan, most) in [(Plan::fast(5), 0.05), (Plan::careful(5), 0.012)] {
             let (picture, sampled) = on_cpu(&plan, mixture);
             let whole = on_cpu(&Plan { settled: None, ..plan }, mixture);
             let (made, whole) = (distance(&picture, &truth), (distance(&whole.0, &truth), whole.1.call_count()));
@@ -111,7 +113,7 @@ fn the_default_is_about_as_good_as_the_published_run() {
                 whole.0,
                 whole.1
             );
-            assert!(made <= 0.012 && sampled.call_count() <= 18, "{name}");
+            assert!(made <= most && sampled.call_count() <= 18, "{name}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `viewfuse evaluate`.
 
-use super::model::{AnyField, ModelOptions};
+use super::model::{ModelOptions, Work};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::table::table;
 use super::{on_threads, say};
@@ -8,7 +8,7 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse::device::Device;
-use viewfuse::device::choice::{AnyDevice, Chosen};
+use viewfuse::device::choice::Chosen;
 use viewfuse::evaluate::{Mean, NEAREST_COPY, Score, evaluate, means};
 use viewfuse::few_shot::Selection;
 use viewfuse::field::Field;
@@ -55,26 +55,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     };
     let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
-    let options = arguments.picture.to_render_options(arguments.model.exact);
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
-    let field = arguments.model.open(arguments.seed)?;
+    let field = arguments.model.open(arguments.seed, None)?;
+    let options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
     let Chosen { device, reason } = arguments.device.open()?;
     let mut all: Vec<(String, Score)> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
     let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in arguments.scenes.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
-        let scores = on_threads(arguments.picture.threads, || -> anyhow::Result<Vec<Score>> {
-            let job = Job { scene, selection: &selection, weightings: &weightings, options: &options };
-            match (&device, &field) {
-                (AnyDevice::Cpu(cpu), AnyField::Photo(field)) => job.run(cpu, field, &progress),
-                (AnyDevice::Cpu(cpu), AnyField::PixelNerf(field)) => job.run(cpu, field.as_ref(), &progress),
-                (AnyDevice::Vulkan(vulkan), AnyField::Photo(field)) => job.run(vulkan.as_ref(), field, &progress),
-                (AnyDevice::Vulkan(vulkan), AnyField::PixelNerf(field)) => {
-                    job.run(vulkan.as_ref(), field.as_ref(), &progress)
-                }
-            }
-        })??;
+        let job = Job { scene, selection: &selection, weightings: &weightings, options: &options, progress: &progress };
+        let scores = on_threads(arguments.picture.threads, || field.on(&device, &job))??;
         drop(progress);
         print_table(&path.display().to_string(), &means(&scores))?;
         all.extend(scores.into_iter().map(|score| (path.display().to_string(), score)));
@@ -97,11 +88,14 @@ struct Job<'a> {
     selection: &'a Selection,
     weightings: &'a [Weighting],
     options: &'a RenderOptions,
+    progress: &'a Progress,
 }
 
-impl Job<'_> {
-    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F, progress: &Progress) -> anyhow::Result<Vec<Score>> {
-        let Job { scene, selection, weightings, options } = self;
+impl Work for Job<'_> {
+    type Output = anyhow::Result<Vec<Score>>;
+
+    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
+        let Job { scene, selection, weightings, options, progress } = self;
         Ok(evaluate(scene, selection, weightings, device, field, options, progress)?)
     }
 }

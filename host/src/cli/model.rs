@@ -1,128 +1,66 @@
 //! Which field makes the pictures, and how.
+//!
+//! ```text
+//! any         a field of any kind, and work with it
+//! name        what --model takes
+//! omission    what --compute takes
+//! genvs       from noise to a picture
+//! ```
 
+mod any;
+mod genvs;
+mod name;
+mod omission;
+
+pub(crate) use any::{AnyField, Work};
+pub(crate) use genvs::parse_level;
+
+use super::wrong;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
-use std::fmt;
-use std::path::PathBuf;
-use std::str::FromStr;
+use genvs::{RunOptions, parse_noise};
+use name::Model;
+use omission::{Omission, of_genvs, of_pixelnerf};
 use viewfuse::checkpoint::Checkpoint;
-use viewfuse::device::cpu::Cpu;
-use viewfuse::field::Field;
-use viewfuse::field::genvs;
+use viewfuse::field::family::Family;
+use viewfuse::field::genvs::sampling::Plan;
+use viewfuse::field::genvs::{Genvs, GenvsOptions, Omissions as GenvsOmissions, Rays};
 use viewfuse::field::photo::PhotoField;
-use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, made};
+use viewfuse::field::pixelnerf::{Omissions as PixelNerfOmissions, PixelNerf, PixelNerfOptions, Sampling};
+use viewfuse_core::schedule::NoiseSchedule;
 
-/// The field of a run.
-pub(crate) enum AnyField {
-    Photo(PhotoField),
-    PixelNerf(Box<PixelNerf>),
-}
+/// Heading of the options of any network.
+const NETWORK: &str = "Options of networks";
+/// Heading of the options of one family.
+const PIXELNERF: &str = "Options of PixelNeRF";
+/// Heading of the options of one family.
+pub(crate) const GENVS: &str = "Options of GeNVS";
 
-/// Where a network's parameters come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Model {
-    /// A checkpoint.
-    File(PathBuf),
-    /// Computed from the tensors' names; the width of a small member of the family, or the published size.
-    Formula(Option<u16>),
-    /// A solid body, for measuring.
-    Body(Option<u16>),
-    /// GeNVS, computed from the tensors' names: the small member of its family, or the published size.
-    Genvs { small: bool },
-}
-
-impl FromStr for Model {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Model, String> {
-        let (name, size) = match text.split_once(':') {
-            Some((name, size)) => (name, Some(size)),
-            None => (text, None),
-        };
-        let width = || match size.map(str::parse::<u16>) {
-            None => Ok(None),
-            Some(Ok(width)) if (8..=2048).contains(&width) && width % 8 == 0 => Ok(Some(width)),
-            Some(_) => Err(format!("'{text}': a width is a multiple of 8 from 8 to 2048")),
-        };
-        match name {
-            "formula" => Ok(Model::Formula(width()?)),
-            "body" => Ok(Model::Body(width()?)),
-            "genvs" => match size {
-                None => Ok(Model::Genvs { small: false }),
-                Some("small") => Ok(Model::Genvs { small: true }),
-                Some(_) => Err(format!("'{text}': there is genvs, of the published size, and genvs:small")),
-            },
-            _ => Ok(Model::File(PathBuf::from(text))),
-        }
-    }
-}
-
-impl fmt::Display for Model {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (name, width) = match self {
-            Model::File(path) => return write!(f, "{}", path.display()),
-            Model::Formula(width) => ("formula", width),
-            Model::Body(width) => ("body", width),
-            Model::Genvs { small } => return f.write_str(if *small { "genvs:small" } else { "genvs" }),
-        };
-        match width {
-            Some(width) => write!(f, "{name}:{width}"),
-            None => f.write_str(name),
-        }
-    }
-}
-
-impl Model {
-    /// The parameters.
-    pub(crate) fn checkpoint(&self) -> anyhow::Result<Checkpoint> {
-        let sizes = |width: &Option<u16>| match width {
-            Some(width) => Architecture::small(usize::from(*width)),
-            None => Architecture::published(),
-        };
-        Ok(match self {
-            Model::File(path) => Checkpoint::open(path)?,
-            Model::Formula(width) => made::by_formula(&sizes(width)),
-            Model::Body(width) => made::body(&sizes(width)),
-            Model::Genvs { small: true } => genvs::made::by_formula(&genvs::Architecture::small()),
-            Model::Genvs { small: false } => genvs::made::by_formula(&genvs::Architecture::published()),
-        })
-    }
-}
-
-/// Something that `--compute` turns on again.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Omission {
-    /// Encode views that no target uses
-    Views,
-    /// Latent layers at every point instead of once on the grid
-    Layers,
-    /// First-pass samples in empty space
-    Space,
-    /// Second-pass samples on empty rays
-    Rays,
-    /// Second-pass samples in empty parts of rays
-    Parts,
-    /// Second-pass samples behind surfaces
-    Hidden,
-}
+/// Names of options, and whether they were given.
+type Given = Vec<(&'static str, bool)>;
 
 /// Which network makes the pictures, and where it looks.
 #[derive(Args)]
 pub(crate) struct NetworkOptions {
-    /// PixelNeRF checkpoint (.pth, .pt, .safetensors); or formula[:WIDTH] or body[:WIDTH], networks without training for
-    /// measuring [default: the field that needs no network]
-    #[arg(long, value_name = "FILE")]
+    /// Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl); or one of the networks without training, for
+    /// measuring: formula[:WIDTH] and body[:WIDTH] are PixelNeRFs, genvs and genvs:small GeNVSs [default: the field that
+    /// needs no network]
+    #[arg(long, value_name = "FILE", help_heading = NETWORK)]
     model: Option<Model>,
-    /// Samples on a ray: first pass, second pass by weight, second pass around the depth
-    #[arg(long, value_name = "N,N,N", default_value = "64,16,16", value_parser = parse_samples, requires = "model")]
-    samples: [u32; 3],
+    /// Samples on a ray: of PixelNeRF in the first pass, in the second by weight, in the second around the depth; of GeNVS a
+    /// single number [default: 64,16,16 and 64]
+    #[arg(long, value_name = "N,N,N|N", value_parser = parse_samples, requires = "model", help_heading = NETWORK)]
+    samples: Option<Samples>,
     /// Where rays begin and end, world units [default: 8/13 and 18/13 of the cameras' distance from what they look at]
-    #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model")]
+    #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model", help_heading = NETWORK)]
     near_far: Option<[f32; 2]>,
     /// Second-pass samples around the depth that the published code takes (the sum of weights times depths, too near on
     /// rays that are not opaque), not around the mean depth
-    #[arg(long, requires = "model")]
+    #[arg(long, requires = "model", help_heading = PIXELNERF)]
     published_depth: bool,
+    /// Noise levels to start from and to end at [default: 80,0.002]
+    #[arg(long, value_name = "MAX,MIN", value_parser = parse_noise, requires = "model", help_heading = GENVS)]
+    noise: Option<NoiseSchedule>,
 }
 
 /// Which network makes the pictures, and what it leaves out.
@@ -130,32 +68,47 @@ pub(crate) struct NetworkOptions {
 pub(crate) struct ModelOptions {
     #[command(flatten)]
     network: NetworkOptions,
-    /// Leave nothing out: every view, layer and sample, whether the scene needs it or not
-    #[arg(long, conflicts_with_all = ["compute", "probe_step", "leave_out", "settled"])]
+    /// Leave nothing out: every view, layer and sample, whether the scene needs it or not; of GeNVS also every call of the
+    /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance say otherwise
+    #[arg(long, conflicts_with_all = ["compute", "probe_step", "leave_out", "settled"], help_heading = NETWORK)]
     pub(crate) exact: bool,
     /// Compute these although the scene does not need them
-    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model")]
+    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model", help_heading = NETWORK)]
     compute: Vec<Omission>,
-    /// Probe one ray in every square of this many pixels on a side for empty space
-    #[arg(long, value_name = "PIXELS", default_value_t = 4, value_parser = clap::value_parser!(u32).range(2..=64), requires = "model")]
-    probe_step: u32,
+    /// Probe one ray in every square of this many pixels on a side for empty space [default: 4]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(2..=64), requires = "model", help_heading = PIXELNERF)]
+    probe_step: Option<u32>,
+    #[command(flatten)]
+    run: RunOptions,
 }
 
-impl AnyField {
-    /// What the run record calls it.
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            AnyField::Photo(field) => Field::<Cpu>::name(field),
-            AnyField::PixelNerf(field) => Field::<Cpu>::name(field.as_ref()),
+/// What `--samples` says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Samples {
+    /// As GeNVS takes it.
+    One(u32),
+    /// As PixelNeRF takes it.
+    Three([u32; 3]),
+}
+
+/// A network that is not set up yet.
+struct Unset<'a> {
+    model: &'a Model,
+    checkpoint: Checkpoint,
+    family: Family,
+}
+
+impl Unset<'_> {
+    /// Arguments that were given for the other family are refused.
+    fn refuse(&self, given: Given) -> anyhow::Result<()> {
+        match given.into_iter().find(|(_, is_given)| *is_given) {
+            Some((option, _)) => Err(self.refused(&format!("{option} cannot be used"))),
+            None => Ok(()),
         }
     }
 
-    /// The least number of sources it can work with.
-    pub(crate) fn least_sources(&self) -> usize {
-        match self {
-            AnyField::Photo(field) => Field::<Cpu>::least_sources(field),
-            AnyField::PixelNerf(field) => Field::<Cpu>::least_sources(field.as_ref()),
-        }
+    fn refused(&self, what: &str) -> anyhow::Error {
+        wrong(format_args!("{what} with '--model {}', which is a {}", self.model, self.family))
     }
 }
 
@@ -165,11 +118,39 @@ impl NetworkOptions {
         self.model.as_ref().map(Model::to_string)
     }
 
-    /// Reads the field.
-    pub(crate) fn open(&self, seed: u64, omissions: Omissions) -> anyhow::Result<AnyField> {
-        let Some(model) = &self.model else { return Ok(AnyField::Photo(PhotoField::default())) };
+    /// Reads the field, as it is unless a person says otherwise.
+    pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
+        match self.unset()? {
+            None => Ok(AnyField::Photo(PhotoField::default())),
+            Some(network) => match network.family {
+                Family::PixelNerf => self.pixelnerf(&network, seed, PixelNerfOmissions::default()),
+                Family::Genvs => {
+                    let plan = Plan { schedule: self.schedule(), ..Plan::fast(seed) };
+                    self.genvs(network, plan, GenvsOmissions::default(), Given::new())
+                }
+            },
+        }
+    }
+
+    fn unset(&self) -> anyhow::Result<Option<Unset<'_>>> {
+        let Some(model) = &self.model else { return Ok(None) };
         let checkpoint = model.checkpoint()?;
-        let [coarse_count, importance_count, depth_count] = self.samples;
+        let family = Family::of(&checkpoint).context("--model")?;
+        Ok(Some(Unset { model, checkpoint, family }))
+    }
+
+    fn schedule(&self) -> NoiseSchedule {
+        self.noise.unwrap_or_else(NoiseSchedule::published)
+    }
+
+    fn pixelnerf(&self, network: &Unset<'_>, seed: u64, omissions: PixelNerfOmissions) -> anyhow::Result<AnyField> {
+        network.refuse(vec![("--noise", self.noise.is_some())])?;
+        let default = Sampling::default();
+        let [coarse_count, importance_count, depth_count] = match self.samples {
+            None => [default.coarse_count, default.importance_count, default.depth_count],
+            Some(Samples::Three(counts)) => counts,
+            Some(Samples::One(_)) => return Err(network.refused("--samples takes three numbers")),
+        };
         let sampling = Sampling {
             coarse_count,
             importance_count,
@@ -177,10 +158,37 @@ impl NetworkOptions {
             seed,
             near_far: self.near_far,
             published_depth: self.published_depth,
-            ..Sampling::default()
+            ..default
         };
-        let field = PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions }).context("--model")?;
+        let field = PixelNerf::new(&network.checkpoint, PixelNerfOptions { sampling, omissions }).context("--model")?;
         Ok(AnyField::PixelNerf(Box::new(field)))
+    }
+
+    /// `denoising` are options that only a denoiser understands.
+    fn genvs(
+        &self,
+        network: Unset<'_>,
+        plan: Plan,
+        omissions: GenvsOmissions,
+        denoising: Given,
+    ) -> anyhow::Result<AnyField> {
+        network.refuse(vec![("--published-depth", self.published_depth)])?;
+        let default = Rays::default();
+        let sample_count = match self.samples {
+            None => default.sample_count,
+            Some(Samples::One(count)) if count >= 2 => count,
+            Some(_) => return Err(network.refused("--samples takes one number, at least 2,")),
+        };
+        let rays = Rays { sample_count, near_far: self.near_far, ..default };
+        let model = network.model;
+        let field = Genvs::new(network.checkpoint, GenvsOptions { rays, plan, omissions }).context("--model")?;
+        let given = denoising.into_iter().chain([("--noise", self.noise.is_some())]).find(|(_, is_given)| *is_given);
+        match (given, &field.architecture().denoiser) {
+            (Some((option, _)), None) => {
+                Err(wrong(format_args!("{option} cannot be used with '--model {model}', which has no denoiser")))
+            }
+            _ => Ok(AnyField::Genvs(Box::new(field))),
+        }
     }
 }
 
@@ -190,31 +198,39 @@ impl ModelOptions {
         self.network.label()
     }
 
-    /// Reads the field.
-    pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
-        self.network.open(seed, self.omissions())
-    }
-
-    fn omissions(&self) -> Omissions {
+    /// Reads the field. A GeNVS starts each frame from the one before at level `reuse`, if there is one.
+    pub(crate) fn open(&self, seed: u64, reuse: Option<f32>) -> anyhow::Result<AnyField> {
+        let Some(network) = self.network.unset()? else { return Ok(AnyField::Photo(PhotoField::default())) };
+        if let Some(other) = self.compute.iter().find(|what| !what.is_of(network.family)) {
+            let name = other.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
+            return Err(network.refused(&format!("--compute {name} cannot be used")));
+        }
+        let mut denoising = self.run.given();
+        denoising.push(("--reuse", reuse.is_some()));
         let computes = |what| self.exact || self.compute.contains(&what);
-        Omissions {
-            unused_views: !computes(Omission::Views),
-            latent_layers: !computes(Omission::Layers),
-            empty_space: if computes(Omission::Space) { 0 } else { self.probe_step },
-            empty_rays: !computes(Omission::Rays),
-            empty_parts: !computes(Omission::Parts),
-            hidden_samples: !computes(Omission::Hidden),
+        match network.family {
+            Family::PixelNerf => {
+                network.refuse(denoising)?;
+                let probe_step = self.probe_step.unwrap_or(PixelNerfOmissions::default().empty_space);
+                self.network.pixelnerf(&network, seed, of_pixelnerf(computes, probe_step))
+            }
+            Family::Genvs => {
+                network.refuse(vec![("--probe-step", self.probe_step.is_some())])?;
+                let plan = self.run.plan(seed, self.network.schedule(), self.exact, computes(Omission::Calls));
+                self.network.genvs(network, plan, of_genvs(computes, reuse), denoising)
+            }
         }
     }
 }
 
-fn parse_samples(text: &str) -> Result<[u32; 3], String> {
+fn parse_samples(text: &str) -> Result<Samples, String> {
     let counts: Option<Vec<u32>> = text.split(',').map(|count| count.trim().parse().ok()).collect();
     match counts.as_deref() {
         Some(&[coarse, importance, depth]) if (1..=1024).contains(&coarse) && importance <= 1024 && depth <= 1024 => {
-            Ok([coarse, importance, depth])
+            Ok(Samples::Three([coarse, importance, depth]))
         }
-        _ => Err("three whole numbers up to 1024, the first at least 1, for example 64,16,16".to_owned()),
+        Some(&[count]) if (1..=1024).contains(&count) => Ok(Samples::One(count)),
+        _ => Err("one or three whole numbers up to 1024, the first at least 1, for example 64 or 64,16,16".to_owned()),
     }
 }
 
@@ -223,24 +239,5 @@ fn parse_near_far(text: &str) -> Result<[f32; 2], String> {
     match ends.as_deref() {
         Some(&[near, far]) if near >= 0.0 && near < far && far.is_finite() => Ok([near, far]),
         _ => Err("two distances, for example 0.8,1.8, the first at least 0 and less than the second".to_owned()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Model;
-
-    #[test]
-    fn models_by_name() {
-        for text in ["formula", "formula:64", "body", "body:16", "genvs", "genvs:small", "network-snapshot-005000.pkl"]
-        {
-            let model: Model = text.parse().expect(text);
-            assert_eq!(model.to_string(), text);
-            assert_eq!(matches!(model, Model::File(_)), text.ends_with(".pkl"));
-        }
-        for text in ["formula:7", "body:", "genvs:", "genvs:64", "genvs:Small"] {
-            let message = text.parse::<Model>().expect_err(text);
-            assert!(message.starts_with(&format!("'{text}': ")), "{message}");
-        }
     }
 }

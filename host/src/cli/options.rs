@@ -1,5 +1,7 @@
 //! Options that several commands share.
 
+use super::model::AnyField;
+use super::wrong;
 use clap::Args;
 use std::time::Duration;
 use viewfuse::device::choice::{self, Chosen, DeviceChoice};
@@ -11,7 +13,8 @@ use viewfuse_vulkan::VulkanError;
 /// How pictures are made.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
-    /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at most 512]
+    /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at most
+    /// 512, of a GeNVS at most the size that it was trained for]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
     /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
@@ -20,19 +23,23 @@ pub(crate) struct PictureOptions {
     /// Leave out the least relevant sources while their weights together stay at or below this
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
     leave_out: f32,
-    /// A ray ends where less than this share of the light still passes
-    #[arg(long, value_name = "SHARE", default_value_t = DEFAULT_SETTLED, value_parser = parse_share)]
-    settled: f32,
+    /// A ray ends where less than this share of the light still passes; rays of a GeNVS go on to the end [default: 1/256]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    settled: Option<f32>,
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(crate) threads: Option<u16>,
 }
 
 impl PictureOptions {
-    /// With `exact`, nothing is left out.
-    pub(crate) fn to_render_options(&self, exact: bool) -> RenderOptions {
-        let (leave_out, settled) = if exact { (0.0, 0.0) } else { (self.leave_out, self.settled) };
-        RenderOptions { size: self.size, background: self.background, leave_out, settled }
+    /// With `exact`, nothing is left out. What the field does not know must not have been given.
+    pub(crate) fn to_render_options(&self, exact: bool, field: &AnyField) -> anyhow::Result<RenderOptions> {
+        if self.settled.is_some() && !field.ends_rays() {
+            return Err(wrong("--settled cannot be used with a GeNVS, whose rays go on to the end"));
+        }
+        let settled = if exact || !field.ends_rays() { 0.0 } else { self.settled.unwrap_or(DEFAULT_SETTLED) };
+        let leave_out = if exact { 0.0 } else { self.leave_out };
+        Ok(RenderOptions { size: self.size, background: self.background, leave_out, settled })
     }
 }
 

@@ -3,19 +3,18 @@
 use super::model::{AnyField, NetworkOptions};
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
-use super::{on_threads, say};
+use super::{on_threads, say, wrong};
 use clap::Args;
 use comfy_table::CellAlignment;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse::device::Device;
 use viewfuse::device::choice::{AnyDevice, DeviceChoice, Several, open_several};
-use viewfuse::field::pixelnerf::Omissions;
 use viewfuse::field::{Field, FieldError, LeftOut};
 use viewfuse::files::{check_writable, write_whole};
 use viewfuse::pareto::front::{LARGEST_LOSS, SAME_LOOK};
 use viewfuse::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
-use viewfuse::pareto::settings::{of_photo, of_pixelnerf};
+use viewfuse::pareto::settings::{EXACT, of_genvs, of_photo, of_pixelnerf};
 use viewfuse::pareto::{Measured, Setting, Subject, plot};
 use viewfuse::photographs::Album;
 use viewfuse::progress::Progress;
@@ -28,6 +27,7 @@ use viewfuse_vulkan::GpuOptions;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, all together, and fewer samples, on every device\n  \
+    viewfuse pareto car/ --targets 5 --sources all/3 --model genvs:small --size 32x32 --only all -o out\n      samplers are not tried, and what is left out is\n  \
     viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the field that needs no network, on the CPU\n\n\
     Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared \
     with its pictures before rounding. The setting `all` leaves out what --leave-out and --settled say and every omission \
@@ -58,6 +58,9 @@ pub(crate) struct Arguments {
     /// Take the time of every setting this many times, after a round that is not timed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
+    /// Measure, besides exact, only settings whose words begin with this; may be given several times
+    #[arg(long, value_name = "WORDS")]
+    only: Vec<String>,
     /// Folder for the results; made if missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -66,10 +69,10 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting: Weighting = arguments.weights.parse()?;
     let scene = Scene::open(&arguments.scene)?;
-    let field = arguments.network.open(arguments.seed, Omissions::ALL)?;
+    let field = arguments.network.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.least_sources())?;
-    let options = arguments.picture.to_render_options(false);
+    let options = arguments.picture.to_render_options(false, &field)?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
@@ -78,7 +81,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let album = Album::open(&scene, job.sources.iter().copied().chain(truths), &progress)?;
     let subject = Subject { scene: &scene, album: &album, job: &job, weighting: &weighting };
-    let sweep = Sweep { subject, options: &options, round_count: arguments.repeat, progress: &progress };
+    let (only, round_count) = (&arguments.only, arguments.repeat);
+    let sweep = Sweep { subject, options: &options, only, round_count, progress: &progress };
     let mut record = ParetoRecord {
         viewfuse: env!("CARGO_PKG_VERSION"),
         scene: arguments.scene.display().to_string(),
@@ -143,26 +147,43 @@ enum Failure {
 struct Sweep<'a> {
     subject: Subject<'a>,
     options: &'a RenderOptions,
+    only: &'a [String],
     round_count: u32,
     progress: &'a Progress,
 }
 
 impl Sweep<'_> {
     fn on(&self, device: &AnyDevice, field: &AnyField) -> Result<Measured, Failure> {
-        match (device, field) {
-            (AnyDevice::Cpu(cpu), AnyField::Photo(field)) => self.measure(cpu, &of_photo(field, self.options)),
-            (AnyDevice::Cpu(cpu), AnyField::PixelNerf(field)) => self.measure(cpu, &of_pixelnerf(field, self.options)),
-            (AnyDevice::Vulkan(vulkan), AnyField::Photo(field)) => {
-                self.measure(vulkan.as_ref(), &of_photo(field, self.options))
-            }
-            (AnyDevice::Vulkan(vulkan), AnyField::PixelNerf(field)) => {
-                self.measure(vulkan.as_ref(), &of_pixelnerf(field, self.options))
+        match device {
+            AnyDevice::Cpu(cpu) => self.on_one(cpu, field),
+            AnyDevice::Vulkan(vulkan) => self.on_one(vulkan.as_ref(), field),
+        }
+    }
+
+    fn on_one<D: Device>(&self, device: &D, field: &AnyField) -> Result<Measured, Failure> {
+        match field {
+            AnyField::Photo(field) => self.measure(device, of_photo(field, self.options)),
+            AnyField::PixelNerf(field) => self.measure(device, of_pixelnerf(field, self.options)),
+            AnyField::Genvs(field) => {
+                self.measure(device, of_genvs(field, self.options, self.subject.job.targets.len()))
             }
         }
     }
 
-    fn measure<D: Device, F: Field<D>>(&self, device: &D, settings: &[Setting<F>]) -> Result<Measured, Failure> {
-        self.subject.measure(device, settings, self.round_count, self.progress).map_err(|error| match error {
+    fn measure<D: Device, F: Field<D>>(&self, device: &D, settings: Vec<Setting<F>>) -> Result<Measured, Failure> {
+        let begins = |setting: &Setting<F>, words: &String| setting.words.starts_with(words.as_str());
+        if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
+            let all: Vec<&str> = settings.iter().map(|setting| setting.words.as_str()).collect();
+            let message = format!("--only {none}: no setting begins with it; there are: {}", all.join("; "));
+            return Err(Failure::Other(wrong(message)));
+        }
+        let is_exact = |setting: &Setting<F>| setting.words == EXACT;
+        let is_asked = |setting: &Setting<F>| self.only.iter().any(|words| begins(setting, words));
+        let settings: Vec<Setting<F>> = settings
+            .into_iter()
+            .filter(|setting| self.only.is_empty() || is_exact(setting) || is_asked(setting))
+            .collect();
+        self.subject.measure(device, &settings, self.round_count, self.progress).map_err(|error| match error {
             RenderError::Field(FieldError::Device(_)) => Failure::Device(format!("{:#}", anyhow::Error::from(error))),
             error => Failure::Other(error.into()),
         })
@@ -172,7 +193,12 @@ impl Sweep<'_> {
 fn title(record: &ParetoRecord) -> String {
     let ParetoRecord { field, model, size: [width, height], sources, targets, .. } = record;
     let scene = record.scene.trim_end_matches('/').rsplit('/').next().unwrap_or_default();
-    let network = model.as_ref().map_or_else(|| (*field).to_owned(), |model| format!("{field} {model}"));
+    let network = match model {
+        None => (*field).to_owned(),
+        // The networks without training that are named after their field.
+        Some(model) if model.split(':').next() == Some(*field) => model.clone(),
+        Some(model) => format!("{field} {model}"),
+    };
     let targets = if targets.len() == 1 { "1 target".to_owned() } else { format!("{} targets", targets.len()) };
     format!("{scene}: {network}, {targets} of {width}x{height} from {} sources, {}", sources.len(), record.weighting)
 }
@@ -185,6 +211,8 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
         ["", "setting", "s/picture", "encoding", "gain", "PSNR dB\nto exact", "largest\ndifference"].to_vec();
     header.extend(if has_truth { &["PSNR dB\nto truth", "loss"][..] } else { &[] });
     let mut header: Vec<String> = header.into_iter().map(str::to_owned).collect();
+    let has_calls = device.points.iter().any(|point| point.denoising.is_some());
+    header.extend(has_calls.then(|| "calls".to_owned()));
     let left_out = device.points.first().map_or(&[][..], |point| &point.left_out);
     header.extend(left_out.iter().map(|LeftOut { what, .. }| what.replace(' ', "\n")));
     let mut rows = table(header);
@@ -192,7 +220,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
         column.set_cell_alignment(CellAlignment::Left);
     }
     device.points.iter().for_each(|point| {
-        rows.add_row(row(point, has_truth));
+        rows.add_row(row(point, has_truth, has_calls));
     });
     say(rows)?;
     if !left_out.is_empty() {
@@ -216,7 +244,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     }
 }
 
-fn row(point: &PointRecord, has_truth: bool) -> Vec<String> {
+fn row(point: &PointRecord, has_truth: bool, has_calls: bool) -> Vec<String> {
     let mut row = vec![
         if point.best { "*" } else { "" }.to_owned(),
         point.setting.clone(),
@@ -230,6 +258,9 @@ fn row(point: &PointRecord, has_truth: bool) -> Vec<String> {
         row.extend(
             [point.truth_psnr, point.truth_loss].map(|value| value.map_or(String::new(), |v| format!("{v:.2}"))),
         );
+    }
+    if has_calls {
+        row.push(point.denoising.map_or(String::new(), |denoising| denoising.calls.to_string()));
     }
     row.extend(point.left_out.iter().map(|LeftOut { left_out, of, .. }| match left_out {
         0 => String::new(),

@@ -1,6 +1,6 @@
 //! `viewfuse render`.
 
-use super::model::{AnyField, ModelOptions};
+use super::model::{GENVS, ModelOptions, Work, parse_level};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions, parse_count};
 use super::{on_threads, say};
 use clap::Args;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use viewfuse::device::Device;
-use viewfuse::device::choice::{AnyDevice, Chosen};
+use viewfuse::device::choice::Chosen;
 use viewfuse::few_shot::FewShot;
 use viewfuse::field::Field;
 use viewfuse::files::{check_writable, remove_if_there, write_png, write_whole};
@@ -28,7 +28,8 @@ use viewfuse::weighting::Weighting;
     viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
     viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with the error\n  \
     viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n\n\
-    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json), NAME_sheet.png for each target, and run.json.")]
+    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_sheet.png for each target, and \
+    run.json.")]
 pub(crate) struct Arguments {
     /// The scene's folder, or its transforms.json or *_par.txt
     scene: PathBuf,
@@ -48,6 +49,9 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     model: ModelOptions,
+    /// Start each frame from the one before, with noise of this level, as large as what may be different: for orbits
+    #[arg(long, value_name = "LEVEL", value_parser = parse_level, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
+    reuse: Option<f32>,
     #[command(flatten)]
     device: DeviceOptions,
     /// Seed of every random number (the field that needs no network draws none)
@@ -63,20 +67,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weighting: Weighting = arguments.weights.parse()?;
     let scene = Scene::open(&arguments.scene)?;
     let open_time = start.elapsed();
-    let field = arguments.model.open(arguments.seed)?;
+    let field = arguments.model.open(arguments.seed, arguments.reuse)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.orbit);
     let job = selection.resolve(&scene, field.least_sources())?;
-    let options = arguments.picture.to_render_options(arguments.model.exact);
+    let options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
     check_writable(&arguments.output.join("run.json"))?;
     let Chosen { device, reason } = arguments.device.open()?;
     let (scene, job, weighting, options) = (&scene, &job, &weighting, &options);
     let run = Run { arguments, scene, job, weighting, options, device_reason: reason, start, open_time };
-    on_threads(arguments.picture.threads, || match (&device, &field) {
-        (AnyDevice::Cpu(cpu), AnyField::Photo(field)) => run.render(cpu, field),
-        (AnyDevice::Cpu(cpu), AnyField::PixelNerf(field)) => run.render(cpu, field.as_ref()),
-        (AnyDevice::Vulkan(vulkan), AnyField::Photo(field)) => run.render(vulkan.as_ref(), field),
-        (AnyDevice::Vulkan(vulkan), AnyField::PixelNerf(field)) => run.render(vulkan.as_ref(), field.as_ref()),
-    })??;
+    on_threads(arguments.picture.threads, || field.on(&device, &run))??;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -91,8 +90,10 @@ struct Run<'a> {
     open_time: Duration,
 }
 
-impl Run<'_> {
-    fn render<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<()> {
+impl Work for Run<'_> {
+    type Output = anyhow::Result<()>;
+
+    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<()> {
         let names = source_names(self.scene, self.job);
         // An old record beside new pictures would lie: it goes before the first of them appears.
         let record_path = self.arguments.output.join("run.json");
@@ -131,6 +132,7 @@ impl Run<'_> {
             model: self.arguments.model.label(),
             exact: self.arguments.model.exact,
             left_out: field.left_out(),
+            denoising: field.denoising(),
             weighting: self.weighting.to_string(),
             seed: self.arguments.seed,
             size,
@@ -165,18 +167,26 @@ impl Run<'_> {
         say(format_args!("device: {}, {}", record.device, self.device_reason))?;
         Ok(())
     }
+}
 
+impl Run<'_> {
     /// Writes a frame's pictures.
     fn write(&self, sources: &SourceImages, names: &[String], frame: &Frame) -> anyhow::Result<()> {
         let folder = &self.arguments.output;
         let name = &frame.target.name;
         let (width, height) = frame.picture.dimensions();
         write_png(&folder.join(format!("{name}.png")), &DynamicImage::ImageRgb8(frame.picture.clone()))?;
-        let depth_step = depth_step(&frame.depths);
-        let depth_map: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_fn(width, height, |x, y| {
-            Luma([(frame.depths[(y * width + x) as usize] / depth_step).round() as u16])
-        });
-        write_png(&folder.join(format!("{name}_depth.png")), &DynamicImage::ImageLuma16(depth_map))?;
+        let depth_path = folder.join(format!("{name}_depth.png"));
+        if frame.depths.is_empty() {
+            // One of an earlier run would belong to another picture.
+            remove_if_there(&depth_path)?;
+        } else {
+            let depth_step = depth_step(&frame.depths);
+            let depth_map: ImageBuffer<Luma<u16>, Vec<u16>> = ImageBuffer::from_fn(width, height, |x, y| {
+                Luma([(frame.depths[(y * width + x) as usize] / depth_step).round() as u16])
+            });
+            write_png(&depth_path, &DynamicImage::ImageLuma16(depth_map))?;
+        }
         let sheet = self.sheet(sources, names, frame);
         write_png(&folder.join(format!("{name}_sheet.png")), &DynamicImage::ImageRgb8(sheet))?;
         Ok(())
@@ -203,7 +213,7 @@ impl Run<'_> {
             title: format!("{scene}  target {}  weights {}", frame.target.name, self.weighting),
             sources: names.iter().enumerate().map(source).collect(),
             prediction: frame.picture.clone(),
-            depth: depth_picture(&empty_as_nan, width, height),
+            depth: (!frame.depths.is_empty()).then(|| depth_picture(&empty_as_nan, width, height)),
             truth: frame.truth.as_ref().map(|truth| (truth.picture.clone(), truth.psnr, truth.ssim)),
         }
         .draw()

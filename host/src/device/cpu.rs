@@ -8,6 +8,7 @@ mod photo;
 mod points;
 mod product;
 mod rays;
+mod room;
 mod sampler;
 mod volumes;
 mod weighting;

@@ -25,7 +25,7 @@ pub use architecture::{
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{default_near_far, over_white};
-use super::{Field, FieldError, LeftOut, Rendered};
+use super::{Denoising, Field, FieldError, LeftOut, Rendered};
 use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::device::{Device, Memory};
 use crate::interrupt;
@@ -201,16 +201,30 @@ impl<D: Device> Field<D> for Genvs {
         self.architecture.image_side as u32
     }
 
+    fn denoising(&self) -> Option<Denoising> {
+        let Counts { planned_calls, calls, .. } = *self.counts();
+        let has_denoiser = self.architecture.denoiser.is_some();
+        has_denoiser.then(|| self.options.denoising(calls, planned_calls.saturating_sub(calls)))
+    }
+
     fn memory_estimate(&self, device: &D, source_sizes: &[[u32; 2]]) -> Option<u64> {
         Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
 
-    fn prepare(&self, device: &D, sources: &SourceImages, _progress: &Progress) -> Outcome<Prepared<D>, D> {
+    fn prepare(&self, device: &D, sources: &SourceImages, progress: &Progress) -> Outcome<Prepared<D>, D> {
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let near_far = self.options.rays.near_far.unwrap_or_else(|| default_near_far(&cameras));
         let images: Vec<SourceView> = sources.images.iter().map(padded).collect();
         let side = images.iter().map(|image| image.size.height.min(image.size.width)).min().unwrap_or(SIDE_STEP);
         self.counts().views += images.len() as u64;
+        if sources.background != [1.0; 3] {
+            progress.warn("this network's pictures are over white; truths over another background differ by that");
+        }
+        let trained = self.architecture.image_side as u32;
+        if images.iter().any(|image| image.size.height.max(image.size.width) != trained) {
+            progress
+                .warn(&format!("the network was trained on images of {trained} pixels on a side; these are smaller"));
+        }
         Ok(Prepared {
             parts: Parts::load(device, &self.checkpoint, &self.architecture, side)?,
             volumes: images.iter().map(|_| RefCell::new(None)).collect(),
@@ -282,7 +296,7 @@ impl<D: Device> Field<D> for Genvs {
             volumes: volumes.iter().filter_map(|volume| Some(&volume.as_ref()?.image)).collect(),
         };
         let mut scratch = Scratch::new(device);
-        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
+        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking)?;
         let sampled = {
             let earlier = prepared.earlier.borrow();
             let start = match (&*earlier, self.options.omissions.reuse) {
@@ -350,5 +364,5 @@ fn cropped(values: &[f32], size: Size, target: &Camera) -> Rendered {
         [red, green, blue, 1.0]
     };
     let colours: Vec<[f32; 4]> = pixels.map(colour).collect();
-    Rendered { depths: vec![0.0; colours.len()], colours, width, height }
+    Rendered { depths: Vec::new(), colours, width, height }
 }

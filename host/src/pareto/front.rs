@@ -84,6 +84,7 @@ mod tests {
             difference,
             truth_psnr,
             left_out: Vec::new(),
+            denoising: None,
             is_repeatable: true,
         }
     }

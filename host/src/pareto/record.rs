@@ -3,7 +3,7 @@
 use super::Point;
 use super::difference::Difference;
 use super::front::{best_points, fastest_of_same_look, fastest_without_loss, loss};
-use crate::field::LeftOut;
+use crate::field::{Denoising, LeftOut};
 use serde::Serialize;
 
 /// A sweep as written to `pareto.json`. Times are in seconds.
@@ -95,6 +95,8 @@ pub struct PointRecord {
     pub truth_loss: Option<f64>,
     /// What the field left out in one round.
     pub left_out: Vec<LeftOut>,
+    /// How the field went from noise to the pictures of one round; null for fields that do not.
+    pub denoising: Option<Denoising>,
     /// Whether every round gave the same pictures, bit for bit.
     pub repeatable: bool,
 }
@@ -118,6 +120,7 @@ impl DeviceRecord {
             truth_psnr: point.truth_psnr.and_then(finite),
             truth_loss: loss(points, point).and_then(finite),
             left_out: point.left_out.clone(),
+            denoising: point.denoising,
             repeatable: point.is_repeatable,
         };
         let words = |point: Option<&Point>| point.map(|point| point.setting.clone());
@@ -132,7 +135,8 @@ impl DeviceRecord {
 }
 
 /// The points of all devices as CSV, one a line. The ratio of equal pictures is `inf`, of pictures with a value that is
-/// none `NaN`. For everything that the field leaves out there are two columns: how much of it, and of how much.
+/// none `NaN`. Fields with a denoiser have a column for its calls in one round. For
+/// everything that the field leaves out there are two columns: how much of it, and of how much.
 ///
 /// # Errors
 /// Only if memory runs out.
@@ -156,6 +160,11 @@ pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
     .map(str::to_owned)
     .to_vec();
     let points = || record.devices.iter().flat_map(|device| device.points.iter().map(move |point| (device, point)));
+    // Fields that go from noise to a picture have another column, and all settings are of one field.
+    let has_calls = points().any(|(_, point)| point.denoising.is_some());
+    if has_calls {
+        header.push("calls".to_owned());
+    }
     for LeftOut { what, .. } in points().next().iter().flat_map(|(_, point)| &point.left_out) {
         let what = what.replace([' ', '-'], "_");
         header.extend([format!("{what}_left_out"), format!("{what}_of")]);
@@ -184,6 +193,9 @@ pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
             optional(point.truth_loss),
             u8::from(point.repeatable).to_string(),
         ];
+        if has_calls {
+            line.push(point.denoising.map_or(String::new(), |denoising| denoising.calls.to_string()));
+        }
         line.extend(point.left_out.iter().flat_map(|row| [row.left_out.to_string(), row.of.to_string()]));
         writer.write_record(&line)?;
     }

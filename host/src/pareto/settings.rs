@@ -1,5 +1,9 @@
 //! What is tried of each field. The first setting of a list leaves nothing out.
 
+mod genvs;
+
+pub use genvs::of_genvs;
+
 use super::Setting;
 use crate::field::photo::PhotoField;
 use crate::field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions, Sampling};

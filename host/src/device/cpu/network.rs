@@ -3,6 +3,7 @@
 
 use super::Cpu;
 use super::product::{Ending, Panels, Rows};
+use super::room::with_room;
 use super::winograd::Winograd;
 use crate::device::kernels::network::{Layer, LayerShape, NetworkKernels};
 use pulp::Arch;
@@ -77,21 +78,23 @@ impl NetworkKernels for Cpu {
         let rows = chunk_rows(pixel_count);
         // Windows of one pixel are what lies in the image already.
         let is_plain = [block.size, block.stride, block.enlarge, block.padding] == [1, 1, 1, 0];
-        outputs.par_chunks_mut(rows * out_pitch).enumerate().for_each_init(Vec::new, |patches, (chunk, outputs)| {
+        let run = |patches: &mut [f32], chunk: usize, outputs: &mut [f32]| {
             let first = chunk * rows;
             let row_count = rows.min(pixel_count - first);
             let (inputs, in_pitch) = if is_plain {
                 (&inputs[block.in_first as usize + first * block.in_pitch as usize..], block.in_pitch as usize)
             } else {
-                patches.clear();
-                for pixel in first..first + row_count {
-                    push_patch(patches, block, inputs, pixel as u32);
+                for (pixel, patch) in (first..).zip(patches.chunks_exact_mut(patch_len).take(row_count)) {
+                    read_patch(block, inputs, pixel as u32, patch);
                 }
-                (&patches[..], patch_len)
+                (&*patches, patch_len)
             };
             let ending = ending.from_row(first);
             panels.multiply(Rows { row_count, inputs, in_pitch, relu_inputs: 0, ending, outputs, out_pitch });
-        });
+        };
+        let len = if is_plain { 0 } else { rows * patch_len };
+        let chunks = outputs.par_chunks_mut(rows * out_pitch).enumerate();
+        chunks.for_each(|(chunk, outputs)| with_room(len, |patches| run(patches, chunk, outputs)));
         Ok(())
     }
 
@@ -128,12 +131,9 @@ impl NetworkKernels for Cpu {
         let ending = Ending { bias: &bias, addend: None, scale: 1.0, relu: block.relu_outputs };
         // A row of the input becomes some whole rows of the output.
         let outputs = window(outputs, block.out_first, pixels, pitch, channels);
-        let rows = outputs.par_chunks_mut(width * size * size * pitch).enumerate();
-        rows.for_each_init(Vec::new, |results: &mut Vec<f32>, (row, outputs)| {
-            results.resize(width * columns, 0.0);
+        let run = |results: &mut [f32], row: usize, outputs: &mut [f32]| {
             let in_pitch = block.in_pitch as usize;
             let inputs = &inputs[block.in_first as usize + row * width * in_pitch..];
-            let results = &mut results[..];
             let product = Rows {
                 row_count: width,
                 inputs,
@@ -150,7 +150,9 @@ impl NetworkKernels for Cpu {
                     outputs[place * pitch..place * pitch + channels].copy_from_slice(result);
                 }
             }
-        });
+        };
+        let rows = outputs.par_chunks_mut(width * size * size * pitch).enumerate();
+        rows.for_each(|(row, outputs)| with_room(width * columns, |results| run(results, row, outputs)));
         Ok(())
     }
 
@@ -235,21 +237,17 @@ fn chunk_rows(row_count: usize) -> usize {
     share.clamp(ROW_STEP, MOST_ROWS)
 }
 
-/// Appends what output pixel `pixel` sees, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels
-/// at a time.
-fn push_patch(patches: &mut Vec<f32>, block: &ConvolveBlock, inputs: &[f32], pixel: u32) {
-    let channels = block.in_channels as usize;
+/// What output pixel `pixel` sees, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at a time.
+fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f32]) {
     let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
-    for window_row in 0..block.size {
-        let row = out_row * block.stride + window_row * block.dilation;
-        for window_column in 0..block.size {
-            let column = out_column * block.stride + window_column * block.dilation;
-            match window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column) {
-                u32::MAX => patches.resize(patches.len() + channels, 0.0),
-                seen => {
-                    let first = (block.in_first + seen * block.in_pitch) as usize;
-                    patches.extend_from_slice(&inputs[first..first + channels]);
-                }
+    for (place, values) in (0..).zip(patch.chunks_exact_mut(block.in_channels as usize)) {
+        let row = out_row * block.stride + place / block.size * block.dilation;
+        let column = out_column * block.stride + place % block.size * block.dilation;
+        match window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column) {
+            u32::MAX => values.fill(0.0),
+            seen => {
+                let first = (block.in_first + seen * block.in_pitch) as usize;
+                values.copy_from_slice(&inputs[first..first + values.len()]);
             }
         }
     }

@@ -8,6 +8,7 @@
 //! parity cases hold it to a bound that is derived in [`crate::check::winograd_oracle`].
 
 use super::product::{Ending, Panels, Rows, load, store};
+use super::room::with_room;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
@@ -21,7 +22,7 @@ const PLACES: usize = REACH * REACH;
 /// Rows of a product's tile.
 const ROW_STEP: usize = 12;
 /// Most tiles that a core takes at once.
-const MOST_TILES: usize = 96;
+const MOST_TILES: usize = 48;
 
 /// Weights of a layer, transformed.
 pub struct Winograd {
@@ -70,8 +71,7 @@ impl Winograd {
         let (tiles, per_row) = (rows * tiles_across, SIDE * width);
         let zeros = vec![0.0; self.columns];
         let chunks = outputs.par_chunks_mut(rows * per_row * pitch).enumerate();
-        chunks.for_each_init(Vec::new, |space: &mut Vec<f32>, (chunk, outputs)| {
-            space.resize(PLACES * tiles * (self.channels + self.columns), 0.0);
+        let run = |space: &mut [f32], chunk: usize, outputs: &mut [f32]| {
             let (seen, products) = space.split_at_mut(PLACES * tiles * self.channels);
             let first_row = chunk * rows * SIDE;
             let row_count = (rows * SIDE).min(block.out_height as usize - first_row);
@@ -102,7 +102,9 @@ impl Winograd {
                 outputs,
                 pitch,
             });
-        });
+        };
+        let len = PLACES * tiles * (self.channels + self.columns);
+        chunks.for_each(|(chunk, outputs)| with_room(len, |space| run(space, chunk, outputs)));
     }
 }
 

@@ -1,6 +1,8 @@
 //! What a person can set about a GeNVS render, and what may be left out of it.
 
-use super::sampling::Plan;
+use super::super::Denoising;
+use super::sampling::{Plan, Steps};
+use viewfuse_core::sampler::Sampler;
 
 /// Samples on a ray, and where they go.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,26 @@ impl Default for GenvsOptions {
 }
 
 impl GenvsOptions {
+    /// What a run record says of them, with so many calls made and so many saved.
+    pub(super) fn denoising(&self, calls: u64, saved_calls: u64) -> Denoising {
+        let Plan { steps, schedule, churn, settled, .. } = self.plan;
+        let (sampler, levels, tolerance) = match steps {
+            Steps::Fixed { sampler, level_count } => (sampler, Some(level_count), None),
+            Steps::Chosen { tolerance, .. } => (Sampler::UniPc, None, Some(tolerance)),
+        };
+        Denoising {
+            sampler: sampler.name(),
+            levels,
+            tolerance,
+            noise: [0, 1].map(|index| schedule.level(index, 2)),
+            churn: churn.amount,
+            settled,
+            reuse: self.omissions.reuse,
+            calls,
+            saved_calls,
+        }
+    }
+
     /// With at least two samples on a ray.
     pub(super) fn checked(self) -> GenvsOptions {
         GenvsOptions { rays: Rays { sample_count: self.rays.sample_count.max(2), ..self.rays }, ..self }

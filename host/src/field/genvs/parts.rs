@@ -87,9 +87,8 @@ impl<D: Device> Parts<D> {
         views: &Views<'_, D>,
         target: &CameraBlock,
         looking: &Looking,
-        progress: &Progress,
     ) -> Outcome<Image<D>, D> {
-        render(device, scratch, &self.points, views, target, looking, progress)
+        render(device, scratch, &self.points, views, target, looking)
     }
 
     /// The network at points.

@@ -117,8 +117,7 @@ impl<'a, D: Device> Reference<'a, D> {
             volumes: volumes.iter().filter_map(|volume| Some(&volume.as_ref()?.image)).collect(),
         };
         let mut scratch = Scratch::new(*device);
-        let progress = Progress::hidden();
-        let image = prepared.parts.features(*device, &mut scratch, &views, target, &looking, &progress)?;
+        let image = prepared.parts.features(*device, &mut scratch, &views, target, &looking)?;
         device.download(&image.values).map_err(failed)
     }
 

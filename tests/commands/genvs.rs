@@ -1,0 +1,205 @@
+//! `viewfuse` with a GeNVS.
+
+use super::{BINARY, done, texts};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use viewfuse::checkpoint::Precision;
+use viewfuse::field::{genvs, pixelnerf};
+use viewfuse_tests::command::{
+    Outcome, assert_refused, assert_wrong_arguments, command, f32_bytes, names_in, safetensors, toy,
+};
+
+const RENDER: &str = "render toy --targets 20 --views 2 --size 16x16 --device cpu -o out";
+
+/// What a run with these options says of itself.
+fn record(folder: &Path, options: &str) -> Value {
+    done(folder, &format!("{RENDER} {options}"));
+    serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a run record")).expect("JSON")
+}
+
+fn picture(folder: &Path, options: &str) -> Vec<u8> {
+    done(folder, &format!("{RENDER} {options}"));
+    fs::read(folder.join("out/000020.png")).expect("a picture")
+}
+
+/// How much was left out, whether it was allowed to, and of how much, by what it is.
+fn left_out(record: &Value, what: &str) -> (u64, bool, u64) {
+    let lines = record["left_out"].as_array().expect("a list");
+    let line = lines.iter().find(|line| line["what"] == what).expect(what);
+    let count = |key: &str| line[key].as_u64().expect("a count");
+    (count("left_out"), line["switch"] == true, count("of"))
+}
+
+#[test]
+fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
+    let scene = toy();
+    let folder = scene.path();
+    // The depth map of an earlier run would belong to another picture.
+    done(folder, "render toy --targets 20 --size 16x16 --device cpu -o out");
+    let printed = done(
+        folder,
+        "render toy --targets 20 --views 3 --size 21x20 --model genvs:small --seed 5 --device cpu --steps 3 -o out",
+    );
+    assert!(printed.contains("1 view from 3 sources, error:alpha=1, genvs on cpu"), "{printed}");
+    assert_eq!(names_in(&folder.join("out")), ["000020.png", "000020_sheet.png", "run.json"]);
+    let picture = image::open(folder.join("out/000020.png")).expect("a picture").to_rgb8();
+    assert_eq!(picture.dimensions(), (21, 20));
+    let record: Value =
+        serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a record")).expect("JSON");
+    assert_eq!((&record["field"], &record["model"]), (&"genvs".into(), &"genvs:small".into()));
+    assert_eq!((&record["seed"], &record["size"]), (&5.into(), &[21, 20][..].into()));
+    assert_eq!((&record["settled"], &record["frames"][0]["depth_step"]), (&0.0.into(), &Value::Null));
+    assert!(record["memory_estimate"].as_u64().is_some_and(|bytes| bytes > 1 << 20), "{record}");
+    let denoising = &record["denoising"];
+    assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"ipndm".into(), &3.into()));
+    assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&3.into(), &0.into()));
+    assert_eq!((&denoising["tolerance"], &denoising["reuse"]), (&Value::Null, &Value::Null));
+    assert!(left_out(&record, "encoded views").1 && left_out(&record, "volume rows").1);
+}
+
+#[test]
+fn unless_told_otherwise_the_size_is_the_networks() {
+    let scene = toy();
+    done(scene.path(), "render toy --targets 20 --views 2 --model genvs:small --steps 1 --device cpu -o out");
+    let picture = image::open(scene.path().join("out/000020.png")).expect("a picture");
+    assert_eq!((picture.width(), picture.height()), (64, 64));
+}
+
+#[test]
+fn options_reach_the_run() {
+    let scene = toy();
+    let denoising =
+        |options: &str| record(scene.path(), &format!("--model genvs:small {options}"))["denoising"].clone();
+    let heun = denoising("--sampler heun --steps 3 --noise 10,0.5 --churn 2");
+    assert_eq!((&heun["sampler"], &heun["levels"], &heun["calls"]), (&"heun".into(), &3.into(), &5.into()));
+    assert_eq!((&heun["noise"], &heun["churn"]), (&[10.0, 0.5][..].into(), &2.0.into()));
+    let chosen = denoising("--tolerance 0.5");
+    assert_eq!((&chosen["sampler"], &chosen["levels"]), (&"unipc".into(), &Value::Null));
+    assert!(chosen["tolerance"] == 0.5 && chosen["calls"].as_u64().is_some_and(|calls| (3..30).contains(&calls)));
+    // An end when nothing changes any more is allowed, and may be forbidden.
+    assert!(denoising("--steps 3")["settled"].as_f64().is_some_and(|settled| settled > 0.0));
+    assert_eq!(denoising("--steps 3 --compute calls")["settled"], Value::Null);
+}
+
+#[test]
+fn exact_leaves_nothing_out() {
+    let scene = toy();
+    let exact = record(scene.path(), "--model genvs:small --exact --weights distance:power=3");
+    let denoising = &exact["denoising"];
+    assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"heun".into(), &25.into()));
+    assert_eq!((&denoising["calls"], &denoising["saved_calls"]), (&49.into(), &0.into()));
+    assert_eq!(left_out(&exact, "encoded views"), (0, false, 2));
+    assert_eq!(left_out(&exact, "volume rows"), (0, false, 128));
+    assert_eq!(left_out(&exact, "denoiser calls"), (0, false, 49));
+    let shorter = record(scene.path(), "--model genvs:small --exact --steps 2");
+    assert_eq!((&shorter["denoising"]["sampler"], &shorter["denoising"]["calls"]), (&"heun".into(), &3.into()));
+    let rows = record(scene.path(), "--model genvs:small --compute rows --steps 1");
+    assert_eq!(left_out(&rows, "volume rows"), (0, false, 128));
+    assert!(left_out(&rows, "encoded views").1 && left_out(&rows, "denoiser calls").1);
+}
+
+#[test]
+fn frames_start_from_the_ones_before() {
+    let scene = toy();
+    let orbit = |options: &str| {
+        let arguments = "render toy --orbit 3 --views 2 --size 16x16 --model genvs:small --compute calls --steps 6";
+        done(scene.path(), &format!("{arguments} {options} --device cpu -o out"));
+        let text = fs::read(scene.path().join("out/run.json")).expect("a run record");
+        let record: Value = serde_json::from_slice(&text).expect("JSON");
+        let first = fs::read(scene.path().join("out/orbit-000.png")).expect("a picture");
+        let last = fs::read(scene.path().join("out/orbit-002.png")).expect("a picture");
+        (record["denoising"].clone(), first, last)
+    };
+    let (alone, first, last) = orbit("");
+    assert_eq!((&alone["calls"], &alone["saved_calls"], &alone["reuse"]), (&18.into(), &0.into(), &Value::Null));
+    let (reused, same_first, other_last) = orbit("--reuse 2");
+    let saved = reused["saved_calls"].as_u64().expect("a count");
+    assert!(reused["reuse"] == 2.0 && saved > 0 && reused["calls"] == 18 - saved, "{reused}");
+    assert!(first == same_first && last != other_last);
+}
+
+#[test]
+fn the_seed_decides() {
+    let scene = toy();
+    let render = |options: &str| picture(scene.path(), &format!("--model genvs:small --steps 3 {options}"));
+    let first = render("");
+    assert!(first == render("--seed 0"), "two runs differ");
+    assert!(first == render("--threads 1"), "one thread gives another picture");
+    assert!(first != render("--seed 1"), "the seed counts for nothing");
+}
+
+/// Which network a file holds is said by its tensors, not by its name.
+#[test]
+fn files_of_either_network() {
+    let scene = toy();
+    let folder = scene.path();
+    let computed = genvs::made::by_formula(&genvs::Architecture::small());
+    computed.write_safetensors(&folder.join("one.safetensors"), Precision::Kept).expect("a file");
+    let computed = pixelnerf::made::by_formula(&pixelnerf::Architecture::small(8));
+    computed.write_safetensors(&folder.join("two.safetensors"), Precision::Kept).expect("a file");
+    let genvs = picture(folder, "--steps 2 --model one.safetensors");
+    assert!(genvs == picture(folder, "--steps 2 --model genvs:small"), "a file is not what was written");
+    let pixelnerf = record(folder, "--samples 8,4,4 --model two.safetensors");
+    assert_eq!((&pixelnerf["field"], &pixelnerf["denoising"]), (&"pixelnerf".into(), &Value::Null));
+    let without = genvs::Architecture { denoiser: None, ..genvs::Architecture::small() };
+    genvs::made::by_formula(&without)
+        .write_safetensors(&folder.join("three.safetensors"), Precision::Kept)
+        .expect("a file");
+    let plain = record(folder, "--model three.safetensors");
+    assert_eq!((&plain["field"], &plain["denoising"]), (&"genvs".into(), &Value::Null));
+    let arguments = "render toy --targets 20 --model three.safetensors --sampler heun -o new";
+    assert_wrong_arguments(BINARY, folder, arguments, &["--sampler cannot be used", "has no denoiser"]);
+    let other = safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]);
+    scene.write("other.safetensors", other);
+    let parts =
+        ["--model: other.safetensors: holds no network", "'encoder.model.' (PixelNeRF)", "'pixel_nerf_net.' (GeNVS)"];
+    assert_refused(BINARY, folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
+}
+
+#[test]
+fn evaluates_schemes() {
+    let scene = toy();
+    let schemes = "--weights mean --weights distance:power=3";
+    let network = "--model genvs:small --steps 2 --size 16x16 --device cpu";
+    let printed =
+        done(scene.path(), &format!("evaluate toy --targets 20 --sources 0,5 {schemes} {network} -o scores.csv"));
+    assert!(printed.contains("distance:power=3"), "{printed}");
+    let scores = fs::read_to_string(scene.path().join("scores.csv")).expect("scores");
+    assert_eq!(scores.lines().count(), 4, "{scores}");
+}
+
+#[test]
+fn sweeps_samplers_and_what_is_left_out() {
+    let scene = toy();
+    let folder = scene.path();
+    let arguments = "pareto toy --targets 20,21 --views 2 --model genvs:small --size 16x16 --samples 8 --repeat 1 --device cpu -o out";
+    let mut sweep = command(BINARY, folder, arguments);
+    for words in ["heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03", "all, half", "all, reuse"] {
+        sweep.args(["--only", words]);
+    }
+    let Outcome { code, stdout: printed, stderr } = Outcome::of(sweep);
+    assert_eq!((code, stderr.as_str()), (Some(0), ""));
+    assert_eq!(names_in(&folder.join("out")), ["pareto.csv", "pareto.json", "pareto.svg"]);
+    let record: Value =
+        serde_json::from_slice(&fs::read(folder.join("out/pareto.json")).expect("a record")).expect("JSON");
+    assert_eq!((&record["field"], &record["size"]), (&"genvs".into(), &[16, 16][..].into()));
+    let points = record["devices"][0]["points"].as_array().expect("points");
+    let words: Vec<&str> = points.iter().map(|point| point["setting"].as_str().expect("words")).collect();
+    let all = ["exact", "heun, 8", "ipndm, 6", "ipndm, 12", "tolerance 0.03"];
+    let all = all.into_iter().chain(["all, half the size", "all, reuse 20", "all, reuse 2"]);
+    assert_eq!(words, all.collect::<Vec<_>>());
+    assert!(words.iter().all(|setting| printed.contains(setting)), "{printed}");
+    let point = |setting: &str| &points[words.iter().position(|own| *own == setting).expect(setting)];
+    let psnr = |setting: &str| point(setting)["versus_exact"]["psnr"].as_f64().expect("not equal");
+    let calls = |setting: &str| point(setting)["denoising"]["calls"].as_u64().expect("a count");
+    // For both targets.
+    assert_eq!((calls("exact"), calls("heun, 8"), calls("ipndm, 6")), (98, 30, 12));
+    assert_eq!(point("exact")["versus_exact"]["root_mean_square"], 0.0);
+    assert!(psnr("ipndm, 6") < psnr("ipndm, 12") && psnr("all, half the size") < psnr("heun, 8"));
+    assert!(calls("all, reuse 2") < calls("all, reuse 20") && calls("all, reuse 20") < 20);
+    assert!(points.iter().all(|point| point["repeatable"] == true), "{printed}");
+    let table = fs::read_to_string(folder.join("out/pareto.csv")).expect("a table");
+    assert!(table.lines().next().is_some_and(|header| header.contains(",repeatable,calls,encoded_views_left_out,")));
+    assert_eq!(texts(&record["targets"]), ["000020", "000021"]);
+}
