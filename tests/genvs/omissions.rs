@@ -6,12 +6,18 @@ use crate::{
 };
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
-use viewfuse::field::genvs::sampling::Plan;
+use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Genvs, GenvsOptions, Omissions};
 use viewfuse::field::{Field, LeftOut};
 use viewfuse::progress::Progress;
 use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
+
+fn in_18_calls() -> Plan {
+    let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 18 };
+    Plan { steps, ..Plan::fast(0) }
+}
 
 fn line(field: &Genvs, what: &str) -> LeftOut {
     let lines = Field::<Cpu>::left_out(field);
@@ -84,7 +90,7 @@ fn an_earlier_frame_saves_calls() {
     let quiet = Progress::hidden();
     let frames = |reuse| {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
-        let field = made(GenvsOptions { plan: Plan { settled: None, ..Plan::fast(0) }, ..options });
+        let field = made(GenvsOptions { plan: Plan { settled: None, ..in_18_calls() }, ..options });
         let prepared = field.prepare(&Cpu, &sources, &quiet).expect("sources on the device");
         field.encode(&Cpu, &prepared, &[], &quiet).expect("volumes");
         let render = |camera| field.render(&Cpu, &prepared, &(), &Weights::mean(2), camera, 0.0, &quiet);
@@ -110,7 +116,7 @@ fn an_earlier_frame_saves_calls() {
 fn a_settled_picture_ends_early() {
     let (sources, target) = (sources(2), target(16));
     let with = |settled| {
-        let field = made(GenvsOptions { plan: Plan { settled, ..Plan::fast(0) }, ..exact() });
+        let field = made(GenvsOptions { plan: Plan { settled, ..in_18_calls() }, ..exact() });
         (picture(&field, &sources, &target), line(&field, "denoiser calls"))
     };
     let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).settled));
