@@ -64,9 +64,9 @@ impl Tensors {
     }
 }
 
-#[test]
-fn the_published_network() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/genvs_tensors.txt");
+/// The tensors of a list: a line a module, with the name and the shape of each of its tensors.
+fn listed(name: &str) -> Vec<TensorShape> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data").join(name);
     let text = std::fs::read_to_string(path).expect("the list");
     let mut listed = Vec::new();
     for line in text.lines() {
@@ -77,12 +77,23 @@ fn the_published_network() {
             listed.push(TensorShape { name: format!("{module}.{leaf}"), shape });
         }
     }
-    let published = Architecture::published();
-    for (ours, theirs) in published.tensors().iter().zip(&listed) {
+    listed
+}
+
+#[track_caller]
+fn assert_listed(architecture: &Architecture, name: &str) {
+    let listed = listed(name);
+    for (ours, theirs) in architecture.tensors().iter().zip(&listed) {
         assert_eq!(ours, theirs);
     }
-    assert_eq!(published.tensors().len(), listed.len());
-    assert_eq!((listed.len(), published.parameter_count()), (950, 102_783_749));
+    assert_eq!(architecture.tensors().len(), listed.len());
+}
+
+#[test]
+fn the_published_network() {
+    let published = Architecture::published();
+    assert_listed(&published, "genvs_tensors.txt");
+    assert_eq!((published.tensors().len(), published.parameter_count()), (950, 102_783_749));
 }
 
 #[test]
@@ -91,6 +102,7 @@ fn the_small_network() {
     let count = small.parameter_count();
     println!("the small network has {count} numbers");
     assert!((1_000_000..5_000_000).contains(&count), "{count}");
+    assert_listed(&small, "genvs_small_tensors.txt");
     // All kinds of tensors of the published one are there.
     let kinds = |architecture: &Architecture| {
         let leaf = |name: &str| name.split('.').rev().take(2).collect::<Vec<_>>().join(".");

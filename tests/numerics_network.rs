@@ -61,11 +61,14 @@ fn products_are_sums_of_products() {
 
 #[test]
 fn rectification_at_its_ends() {
-    for (x, expected) in [(2.0, 2.0), (-2.0, 0.0), (0.0, 0.0), (f32::NAN, 0.0), (f32::INFINITY, f32::INFINITY)] {
+    for (x, expected) in [(2.0, 2.0), (-2.0, 0.0), (0.0, 0.0), (f32::NEG_INFINITY, 0.0), (f32::INFINITY, f32::INFINITY)]
+    {
         assert_eq!(rectified(x, 1), expected);
     }
     assert_eq!(rectified(-2.0, 0), -2.0);
-    assert!(rectified(f32::NAN, 0).is_nan());
+    for relu in [0, 1] {
+        assert!(rectified(f32::NAN, relu).is_nan());
+    }
 }
 
 #[test]

@@ -229,15 +229,17 @@ fn softmax_at_its_ends() {
         (vec![f32::MIN, f32::MIN], vec![0.5, 0.5]),
         (vec![1.0e4; 4], vec![0.25; 4]),
         (vec![-1.0e4; 2], vec![0.5; 2]),
-        (vec![NAN, 3.0, 3.0], vec![0.0, 0.5, 0.5]),
-        (vec![-INFINITE, 3.0, NAN, 3.0], vec![0.0, 0.5, 0.0, 0.5]),
+        (vec![-INFINITE, 3.0, -INFINITE, 3.0], vec![0.0, 0.5, 0.0, 0.5]),
         (vec![-INFINITE; 3], vec![0.0; 3]),
-        (vec![NAN; 2], vec![0.0; 2]),
-        (vec![INFINITE, 1.0, INFINITE], vec![0.0; 3]),
     ];
     for (scores, expected) in one_of {
         for weights in softmax(&scores) {
             assert_eq!(weights, expected, "{scores:?}");
+        }
+    }
+    for scores in [vec![NAN, 3.0, 3.0], vec![3.0, -INFINITE, NAN], vec![NAN; 2], vec![INFINITE, 1.0, INFINITE]] {
+        for weights in softmax(&scores) {
+            assert!(weights.iter().any(|weight| weight.is_nan()), "{scores:?}: {weights:?}");
         }
     }
     for weights in softmax(&[1.0e4, 1.0e4 - 1.0]) {

@@ -10,12 +10,12 @@ mod sizes;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, made};
 use viewfuse::field::{Field, Rendered};
-use viewfuse::photographs::{SourceImage, SourceImages};
+use viewfuse::photographs::SourceImages;
 use viewfuse::progress::Progress;
 use viewfuse::sources::SourceWeights;
-use viewfuse::synthetic::{Orbit, render, toy};
-use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::lorry::{orbit, photographs, target};
 
 /// Width of the made networks.
 const WIDTH: usize = 16;
@@ -38,30 +38,9 @@ fn exact() -> PixelNerfOptions {
     leaving_out(Omissions::NONE)
 }
 
-/// Cameras at distance 1.3.
-fn orbit(side: u32) -> Orbit {
-    let pinhole = Pinhole::new([1.025 * side as f32; 2], [0.5 * side as f32; 2], side, side);
-    Orbit { radius: 1.3, pinhole: pinhole.expect("sound intrinsics") }
-}
-
 /// The lorry from some sides, on white.
 fn sources(count: u32) -> SourceImages {
-    let lorry = toy::lorry().expect("the lorry");
-    let image = |camera: Camera| {
-        let level = |value: u8| f32::from(value) / 255.0;
-        let texel = |pixel: &image::Rgba<u8>| {
-            let alpha = level(pixel[3]);
-            [level(pixel[0]) * alpha, level(pixel[1]) * alpha, level(pixel[2]) * alpha, alpha]
-        };
-        SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() }
-    };
-    let cameras = orbit(32).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
-}
-
-/// A camera that is none of the sources.
-fn target(side: u32) -> Camera {
-    orbit(side).camera(2.0, 0.35).expect("a camera off the pole")
+    photographs(count, 32)
 }
 
 fn picture_with(

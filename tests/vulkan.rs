@@ -10,6 +10,8 @@ mod arguments;
 mod candidate;
 #[path = "vulkan/child.rs"]
 mod child;
+#[path = "vulkan/genvs.rs"]
+mod genvs;
 #[path = "vulkan/layers.rs"]
 mod layers;
 #[path = "vulkan/limits.rs"]
@@ -63,6 +65,7 @@ fn main() -> ExitCode {
         layers::TESTS,
         picture::TESTS,
         pixelnerf::TESTS,
+        genvs::TESTS,
         sampling::TESTS,
         limits::TESTS,
     ]

@@ -156,8 +156,7 @@ pub struct FeatureBlock {
     pub sample_count: u32,
     /// Features of a sample.
     pub feature_count: u32,
-    /// What the length of a point is multiplied by: 1 over the focal length in halves of the image's height, in published
-    /// checkpoints, whose rays are measured on an image plane at that distance.
+    /// What the length of a point is multiplied by, to have it in the lengths that the network's densities are for.
     pub length_scale: f32,
     /// Length of the last sample, which has none behind it; 1e10 as published.
     pub last_length: f32,
@@ -167,7 +166,7 @@ pub struct FeatureBlock {
 }
 
 /// Weights of a ray's samples, one at a time and front to back: `weigh(sample, weight)`. `raw[sample][0]` is the network's
-/// density (rectified; NaN counts as 0, behind infinity nothing is seen, however short it is), `points[sample]` has its
+/// density (rectified; NaN, as an optical depth that is none, makes the weights from there on NaN), `points[sample]` has its
 /// length.
 ///
 /// With the optical depth `o_i` and the transmittance `T_i` in front of a sample, exclusive weights are `T_i - T_(i+1)` as
@@ -185,14 +184,17 @@ pub fn weigh_features(
     let mut index = 0;
     while index < block.sample_count as usize {
         let sample = first + index;
-        let density = max(raw.fetch(sample * (block.feature_count as usize + 1)), 0.0);
+        let given = raw.fetch(sample * (block.feature_count as usize + 1));
+        let density = max(given, 0.0);
         let is_last = index + 1 == block.sample_count as usize;
         let length = if is_last { block.last_length } else { points.fetch(sample).length * block.length_scale };
         let own = density * length;
-        passed += own;
+        passed += if given.is_nan() { given } else { own };
         let behind = exp(-passed);
         let stopped = before - behind;
-        weigh(sample, if block.inclusive != 0 { stopped * exp(-own) } else { stopped });
+        let weight = if block.inclusive != 0 { stopped * exp(-own) } else { stopped };
+        // The exponential of NaN is 0.
+        weigh(sample, if passed.is_nan() { passed } else { weight });
         before = behind;
         index += 1;
     }

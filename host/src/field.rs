@@ -29,6 +29,14 @@ pub enum FieldError<E: std::error::Error> {
     /// The silhouettes have no point of space in common.
     #[error("no point lies inside all silhouettes of the sources")]
     NoObject,
+    /// Rays are to end where they begin or before, or one of the two is no number.
+    #[error("rays from depth {near} to depth {far} have nothing between their ends")]
+    NoDepths {
+        /// Where they begin.
+        near: f32,
+        /// Where they end.
+        far: f32,
+    },
     /// The device failed.
     #[error("the device failed")]
     Device(#[source] E),

@@ -6,6 +6,7 @@ pub mod checkpoints;
 pub mod command;
 pub mod contract;
 pub mod emulator;
+pub mod lorry;
 pub mod mixture;
 pub mod module;
 pub mod scenes;

@@ -64,8 +64,8 @@ pub fn matrix_element(
 }
 
 /// The largest number of a row `scores[column]`, and the reciprocal of the sum of `e^(score - largest)`, at most 1: what
-/// [`softmax_value`] needs. Scores that are NaN count as minus infinity; a row of nothing else gives 0 for the second, and
-/// so do all weights of a row with plus infinity.
+/// [`softmax_value`] needs. A row of minus infinity alone gives 0 for the second, one with NaN or plus infinity NaN, so that
+/// it is found and not hidden.
 #[inline]
 pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_count: u32) -> [f32; 2] {
     let mut largest = -f32::MAX;
@@ -77,10 +77,12 @@ pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_c
     let mut sum = 0.0;
     column = 0;
     while column < column_count as usize {
-        sum += exp(scores.fetch(first + column) - largest);
+        let below = scores.fetch(first + column) - largest;
+        // The exponential of NaN is 0.
+        sum += if below <= 0.0 { exp(below) } else { f32::NAN };
         column += 1;
     }
-    [largest, if sum > 0.0 { 1.0 / sum } else { 0.0 }]
+    [largest, if sum == 0.0 { 0.0 } else { 1.0 / sum }]
 }
 
 /// Weight of a score in its row: `e^(score - largest)` times the row's factor.

@@ -87,7 +87,8 @@ pub fn part_moments(inputs: &(impl Fetch<f32> + ?Sized), block: &NormaliseBlock,
 }
 
 /// Mean of a group, and what its deviations are multiplied by: `1 / sqrt(variance + variance_floor)`, from the moments
-/// `parts[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives 0 for the factor.
+/// `parts[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives 0 for the factor; one
+/// whose squares overflow, or that holds a number that is none, NaN, so that it is found and not hidden.
 #[inline]
 pub fn merged_moments(parts: &(impl Fetch<[f32; 2]> + ?Sized), block: &NormaliseBlock, group: usize) -> [f32; 2] {
     // The first part changes nothing of the mean, however a device divides.
@@ -104,7 +105,11 @@ pub fn merged_moments(parts: &(impl Fetch<[f32; 2]> + ?Sized), block: &Normalise
         count = all;
         part += 1;
     }
-    let spread = max(deviations / count, 0.0) + block.variance_floor;
+    let spread = deviations / count + block.variance_floor;
+    // Not the other way round: NaN is no spread either.
+    if !(spread <= f32::MAX) {
+        return [mean, f32::NAN];
+    }
     [mean, if spread > 0.0 { 1.0 / sqrt(spread) } else { 0.0 }]
 }
 

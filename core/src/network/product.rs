@@ -1,6 +1,5 @@
 //! Matrix product with bias, addend and rectified input or output: a layer of a network for many points at once.
 
-use crate::math::max;
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
@@ -63,8 +62,8 @@ pub fn first_of_sum(
     if has_addend != 0 { first + addend.fetch(element) } else { first }
 }
 
-/// `x`, or 0 instead of a negative one (or NaN) if `relu` is not 0.
+/// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays: what overflowed in one layer is found behind the last.
 #[inline]
 pub fn rectified(x: f32, relu: u32) -> f32 {
-    if relu != 0 { max(x, 0.0) } else { x }
+    if relu != 0 && x <= 0.0 { 0.0 } else { x }
 }

@@ -40,7 +40,8 @@ pub fn pooled_element(inputs: &(impl Fetch<f32> + ?Sized), block: &PoolBlock, el
         let column = (out_column * block.stride + place % block.size).wrapping_sub(block.padding);
         if row < block.in_height && column < block.in_width {
             let input = inputs.fetch(((row * block.in_width + column) * channels + channel) as usize);
-            if input > largest {
+            // NaN is no smaller, and stays.
+            if !(input <= largest) {
                 largest = input;
             }
         }

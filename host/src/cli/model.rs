@@ -1,15 +1,18 @@
 //! Which field makes the pictures, and how.
 //!
 //! ```text
+//! any         a field of any kind, and work with it
 //! name        what --model takes
 //! omission    what --compute takes
 //! genvs       from noise to a picture
 //! ```
 
+mod any;
 mod genvs;
 mod name;
 mod omission;
 
+pub(crate) use any::{AnyField, Work};
 pub(crate) use genvs::parse_level;
 
 use super::wrong;
@@ -19,10 +22,6 @@ use genvs::{RunOptions, parse_noise};
 use name::Model;
 use omission::{Omission, of_genvs, of_pixelnerf};
 use viewfuse::checkpoint::Checkpoint;
-use viewfuse::device::Device;
-use viewfuse::device::choice::AnyDevice;
-use viewfuse::device::cpu::Cpu;
-use viewfuse::field::Field;
 use viewfuse::field::family::Family;
 use viewfuse::field::genvs::sampling::Plan;
 use viewfuse::field::genvs::{Genvs, GenvsOptions, Omissions as GenvsOmissions, Rays};
@@ -39,61 +38,6 @@ pub(crate) const GENVS: &str = "Options of GeNVS";
 
 /// Names of options, and whether they were given.
 type Given = Vec<(&'static str, bool)>;
-
-/// The field of a run.
-pub(crate) enum AnyField {
-    Photo(PhotoField),
-    PixelNerf(Box<PixelNerf>),
-    Genvs(Box<Genvs>),
-}
-
-/// Work that any device does with any field.
-pub(crate) trait Work {
-    type Output;
-
-    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> Self::Output;
-}
-
-impl AnyField {
-    /// Does a piece of work on a device.
-    pub(crate) fn on<W: Work>(&self, device: &AnyDevice, work: &W) -> W::Output {
-        match device {
-            AnyDevice::Cpu(cpu) => self.on_one(cpu, work),
-            AnyDevice::Vulkan(vulkan) => self.on_one(vulkan.as_ref(), work),
-        }
-    }
-
-    fn on_one<D: Device, W: Work>(&self, device: &D, work: &W) -> W::Output {
-        match self {
-            AnyField::Photo(field) => work.run(device, field),
-            AnyField::PixelNerf(field) => work.run(device, field.as_ref()),
-            AnyField::Genvs(field) => work.run(device, field.as_ref()),
-        }
-    }
-
-    /// What the run record calls it.
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            AnyField::Photo(field) => Field::<Cpu>::name(field),
-            AnyField::PixelNerf(field) => Field::<Cpu>::name(field.as_ref()),
-            AnyField::Genvs(field) => Field::<Cpu>::name(field.as_ref()),
-        }
-    }
-
-    /// The least number of sources it can work with.
-    pub(crate) fn least_sources(&self) -> usize {
-        match self {
-            AnyField::Photo(field) => Field::<Cpu>::least_sources(field),
-            AnyField::PixelNerf(field) => Field::<Cpu>::least_sources(field.as_ref()),
-            AnyField::Genvs(field) => Field::<Cpu>::least_sources(field.as_ref()),
-        }
-    }
-
-    /// Whether its rays end where little light still passes.
-    pub(crate) fn ends_rays(&self) -> bool {
-        !matches!(self, AnyField::Genvs(_))
-    }
-}
 
 /// Which network makes the pictures, and where it looks.
 #[derive(Args)]
@@ -182,7 +126,7 @@ impl NetworkOptions {
                 Family::PixelNerf => self.pixelnerf(&network, seed, PixelNerfOmissions::default()),
                 Family::Genvs => {
                     let plan = Plan { schedule: self.schedule(), ..Plan::fast(seed) };
-                    self.genvs(network, plan, GenvsOmissions::default())
+                    self.genvs(network, plan, GenvsOmissions::default(), Given::new())
                 }
             },
         }
@@ -220,7 +164,14 @@ impl NetworkOptions {
         Ok(AnyField::PixelNerf(Box::new(field)))
     }
 
-    fn genvs(&self, network: Unset<'_>, plan: Plan, omissions: GenvsOmissions) -> anyhow::Result<AnyField> {
+    /// `denoising` are options that only a denoiser understands.
+    fn genvs(
+        &self,
+        network: Unset<'_>,
+        plan: Plan,
+        omissions: GenvsOmissions,
+        denoising: Given,
+    ) -> anyhow::Result<AnyField> {
         network.refuse(vec![("--published-depth", self.published_depth)])?;
         let default = Rays::default();
         let sample_count = match self.samples {
@@ -229,8 +180,15 @@ impl NetworkOptions {
             Some(_) => return Err(network.refused("--samples takes one number, at least 2,")),
         };
         let rays = Rays { sample_count, near_far: self.near_far, ..default };
+        let model = network.model;
         let field = Genvs::new(network.checkpoint, GenvsOptions { rays, plan, omissions }).context("--model")?;
-        Ok(AnyField::Genvs(Box::new(field)))
+        let given = denoising.into_iter().chain([("--noise", self.noise.is_some())]).find(|(_, is_given)| *is_given);
+        match (given, &field.architecture().denoiser) {
+            (Some((option, _)), None) => {
+                Err(wrong(format_args!("{option} cannot be used with '--model {model}', which has no denoiser")))
+            }
+            _ => Ok(AnyField::Genvs(Box::new(field))),
+        }
     }
 }
 
@@ -247,18 +205,20 @@ impl ModelOptions {
             let name = other.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
             return Err(network.refused(&format!("--compute {name} cannot be used")));
         }
+        let mut denoising = self.run.given();
+        denoising.push(("--reuse", reuse.is_some()));
         let computes = |what| self.exact || self.compute.contains(&what);
         match network.family {
             Family::PixelNerf => {
-                network.refuse(self.run.given())?;
-                network.refuse(vec![("--reuse", reuse.is_some())])?;
+                network.refuse(denoising)?;
                 let probe_step = self.probe_step.unwrap_or(PixelNerfOmissions::default().empty_space);
                 self.network.pixelnerf(&network, seed, of_pixelnerf(computes, probe_step))
             }
             Family::Genvs => {
                 network.refuse(vec![("--probe-step", self.probe_step.is_some())])?;
                 let plan = self.run.plan(seed, self.network.schedule(), self.exact, computes(Omission::Calls));
-                self.network.genvs(network, plan, of_genvs(computes, reuse, self.run.half_volumes))
+                let omissions = of_genvs(computes, reuse, self.run.half_volumes);
+                self.network.genvs(network, plan, omissions, denoising)
             }
         }
     }

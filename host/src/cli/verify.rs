@@ -13,8 +13,8 @@ use viewfuse::verify::{Measure, Report, verify};
 #[command(after_help = "Example:\n  viewfuse verify fixtures/weighting.json fixtures/metrics.safetensors\n\n\
     Exit code 1 if a tolerance is exceeded.")]
 pub(crate) struct Arguments {
-    /// Files of reference values: weighting.json, metrics.safetensors, pixelnerf_srn.safetensors, genvs_srn.safetensors (its
-    /// attention weights)
+    /// Files of reference values: weighting.json, metrics.safetensors, pixelnerf_srn.safetensors,
+    /// genvs_srn.safetensors
     #[arg(required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]

@@ -133,7 +133,7 @@ impl Genvs {
         let mut volume = prepared.volumes[view].borrow_mut();
         if volume.is_none() {
             let SourceView { size, values, .. } = &prepared.images[view];
-            let mut encoded = prepared.parts.encode(device, values, *size)?;
+            let mut encoded = prepared.parts.encode(device, values, *size, view)?;
             let (row_count, whole_bytes) = (encoded.row_count(), encoded.byte_count());
             let mut filled_rows = 0;
             if self.options.omissions.half_volumes {
@@ -175,11 +175,19 @@ impl Genvs {
     }
 
     /// How rays go through volumes, for a target.
-    fn looking(&self, near_far: [f32; 2], target: &Camera) -> Looking {
+    ///
+    /// # Errors
+    /// [`FieldError::NoDepths`] if there is nothing between their ends: a volume of no depth has no nodes to look up.
+    fn looking<D: Device>(&self, near_far: [f32; 2], target: &Camera) -> Outcome<Looking, D> {
+        let [near, far] = near_far;
+        // Not the other way round: NaN is no depth either.
+        if !(near < far && (far - near).is_finite()) {
+            return Err(FieldError::NoDepths { near, far });
+        }
         let Rays { sample_count, jitter, length, inclusive, .. } = self.options.rays;
         let focal = 2.0 * target.pinhole.focal()[1] / target.pinhole.height() as f32;
         let ray_length = length.unwrap_or(1.0 / focal);
-        Looking { near_far, sample_count, jitter, seed: self.options.plan.seed, ray_length, inclusive }
+        Ok(Looking { near_far, sample_count, jitter, seed: self.options.plan.seed, ray_length, inclusive })
     }
 
     fn counts(&self) -> MutexGuard<'_, Counts> {
@@ -217,12 +225,20 @@ impl<D: Device> Field<D> for Genvs {
         Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
 
-    fn prepare(&self, device: &D, sources: &SourceImages, _progress: &Progress) -> Outcome<Prepared<D>, D> {
+    fn prepare(&self, device: &D, sources: &SourceImages, progress: &Progress) -> Outcome<Prepared<D>, D> {
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let near_far = self.options.rays.near_far.unwrap_or_else(|| default_near_far(&cameras));
         let images: Vec<SourceView> = sources.images.iter().map(padded).collect();
         let side = images.iter().map(|image| image.size.height.min(image.size.width)).min().unwrap_or(SIDE_STEP);
         self.counts().views += images.len() as u64;
+        if sources.background != [1.0; 3] {
+            progress.warn("this network's pictures are over white; truths over another background differ by that");
+        }
+        let trained = self.architecture.image_side as u32;
+        if images.iter().any(|image| image.size.height.max(image.size.width) != trained) {
+            progress
+                .warn(&format!("the network was trained on images of {trained} pixels on a side; these are smaller"));
+        }
         Ok(Prepared {
             parts: Parts::load(device, &self.checkpoint, &self.architecture, side)?,
             volumes: images.iter().map(|_| RefCell::new(None)).collect(),
@@ -274,6 +290,7 @@ impl<D: Device> Field<D> for Genvs {
         progress: &Progress,
     ) -> Outcome<Rendered, D> {
         let failed = FieldError::Device;
+        let looking = self.looking::<D>(prepared.near_far, target)?;
         self.encode_used(device, prepared, &(), weights)?;
         let used = self.used_views(prepared, weights);
         let cameras: Vec<CameraBlock> = used.iter().map(|view| prepared.images[*view].camera).collect();
@@ -284,7 +301,6 @@ impl<D: Device> Field<D> for Genvs {
             channels: COLOUR_CHANNELS as u32,
         };
         let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
-        let looking = self.looking(prepared.near_far, target);
         self.fill_seen(device, prepared, &used, &camera, &looking)?;
         let volumes: Vec<Ref<'_, Option<Volume<D>>>> =
             used.iter().map(|view| prepared.volumes[*view].borrow()).collect();
@@ -294,7 +310,7 @@ impl<D: Device> Field<D> for Genvs {
             volumes: volumes.iter().filter_map(|volume| volume.as_ref()).collect(),
         };
         let mut scratch = Scratch::new(device);
-        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
+        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking)?;
         let sampled = {
             let earlier = prepared.earlier.borrow();
             let start = match (&*earlier, self.options.omissions.reuse) {

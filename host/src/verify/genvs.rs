@@ -176,7 +176,10 @@ impl<D: Device> Comparison<'_, '_, D> {
             report.quantities.push(compared(format!("GeNVS feature image, {ours}"), &picked, &expected, 1.0e-4, false));
             names.push(name);
         }
-        Ok(names)
+        match names.len() {
+            1 => Err(self.file.wrong("feature_image_index", "has no feature_image_value of a weighting that we know")),
+            _ => Ok(names),
+        }
     }
 
     /// The condition of the file's denoiser runs.
@@ -202,7 +205,11 @@ impl<D: Device> Comparison<'_, '_, D> {
         let mut names = ["denoise_index", "denoise_sigma", "latents"].map(str::to_owned).to_vec();
         names.push(format!("feature_image_full.{WHOLE}"));
         let given: Vec<String> = self.file.tensors.names().into_iter().map(str::to_owned).collect();
-        for level in self.file.floats("denoise_sigma")? {
+        let levels = self.file.floats("denoise_sigma")?;
+        if levels.is_empty() {
+            return Err(self.file.wrong("denoise_sigma", "is empty"));
+        }
+        for level in levels {
             // The names have the levels as numbers of their own.
             let is_of_level = |name: &&String| {
                 let number = name.strip_prefix("denoise_value.").and_then(|number| number.parse::<f32>().ok());

@@ -89,7 +89,7 @@ impl NetworkKernels for Cpu {
                 }
                 (&*patches, patch_len)
             };
-            let ending = ending.from_row(first);
+            let ending = ending.rows_from(first);
             panels.multiply(Rows { row_count, inputs, in_pitch, relu_inputs: 0, ending, outputs, out_pitch });
         };
         let len = if is_plain { 0 } else { rows * patch_len };
@@ -218,7 +218,7 @@ pub(super) fn multiply(
             inputs: &inputs[first * in_pitch..],
             in_pitch,
             relu_inputs,
-            ending: ending.from_row(first),
+            ending: ending.rows_from(first),
             outputs,
             out_pitch: columns,
         });

@@ -101,7 +101,7 @@ pub(super) struct Ending<'a> {
 
 impl<'a> Ending<'a> {
     /// The ending of the rows from `row` on.
-    pub(super) fn from_row(self, row: usize) -> Ending<'a> {
+    pub(super) fn rows_from(self, row: usize) -> Ending<'a> {
         Ending { addend: self.addend.map(|(addend, pitch)| (&addend[row * pitch..], pitch)), ..self }
     }
 
@@ -127,8 +127,8 @@ impl<'a> Ending<'a> {
             return value;
         }
         let zero = simd.splat_f32s(0.0);
-        // NaN becomes 0, as in `rectified`.
-        simd.select_f32s(simd.greater_than_f32s(value, zero), value, zero)
+        // NaN stays, as in `rectified`.
+        simd.select_f32s(simd.less_than_or_equal_f32s(value, zero), zero, value)
     }
 }
 

@@ -7,6 +7,9 @@
 //! about five times that of the sum it replaces, at worst ten times (the transforms multiply by up to 8 and subtract);
 //! parity cases hold it to a bound that is derived in [`crate::check::winograd_oracle`].
 
+// Indices are as in the formulas; iterators over several arrays at once would hide them.
+#![allow(clippy::needless_range_loop)]
+
 use super::product::{Ending, Panels, Rows, load, store};
 use super::room::with_room;
 use pulp::{Arch, Simd, WithSimd};
@@ -90,7 +93,7 @@ impl Winograd {
                     out_pitch: self.columns,
                 });
             }
-            let ending = ending.from_row(first_row * width);
+            let ending = ending.rows_from(first_row * width);
             let tile = |index: usize| [index / tiles_across * SIDE, index % tiles_across * SIDE];
             let size = [row_count, width];
             Arch::new().dispatch(Put {

@@ -101,6 +101,11 @@ impl Architecture {
                 "images of {image_side} pixels on a side; the encoder takes multiples of {ENCODER_STRIDE}"
             )));
         }
+        // Numbers of a volume are counted in 32 bits.
+        let numbers = image_side as u64 * image_side as u64 * (encoder.feature_count * encoder.volume_depth) as u64;
+        if numbers > u64::from(u32::MAX) {
+            return Err(sizes.refuse(format!("a volume of {numbers} numbers, of which there may be {}", u32::MAX)));
+        }
         let architecture = Architecture { image_side, encoder, mlp_width, denoiser };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
         architecture.check_filters(&sizes)?;

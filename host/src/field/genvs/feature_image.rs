@@ -10,7 +10,6 @@ use crate::device::{Device, Layer, Rays};
 use crate::field::FieldError;
 use crate::field::finite::check_finite;
 use crate::interrupt;
-use crate::progress::Progress;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::fuse::FuseBlock;
@@ -105,20 +104,20 @@ pub(super) fn render<D: Device>(
     views: &Views<'_, D>,
     target: &CameraBlock,
     looking: &Looking,
-    progress: &Progress,
 ) -> Outcome<Image<D>, D> {
     let failed = FieldError::Device;
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
     let at_once = (device.busy_elements() / looking.sample_count as usize).max(LEAST_RAYS);
+    // What is looked up in all views is bound as a whole.
+    let a_ray = looking.sample_count as usize * network.features as usize * views.volumes.len();
+    let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);
     let pixels: Vec<u32> = (0..half.pixel_count()).collect();
     let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len())).map_err(failed)?;
     let cast = cast_block(target, half, looking);
     let mut features = Vec::with_capacity(pixels.len() * network.features as usize);
-    progress.expect(pixels.len().div_ceil(at_once));
     for pixels in pixels.chunks(at_once) {
         interrupt::check()?;
         features.extend(tile.render(pixels, &cast).map_err(failed)?);
-        progress.step();
     }
     check_finite(&features, "rendering the target's features", "feature image")?;
     let half_image = scratch.uploaded(half, &features).map_err(failed)?;

@@ -13,7 +13,7 @@ pub struct Rays {
     /// neighbouring frames have the same error.
     pub jitter: f32,
     /// Depths along the target's principal axis where rays begin and end; `None`: by the sources' distance from what they
-    /// look at.
+    /// look at. The first must be smaller.
     pub near_far: Option<[f32; 2]>,
     /// How long a ray is in the lengths that the network's densities are for; `None`: as published for SRN, 1 over the
     /// focal length in halves of the image's height.

@@ -55,8 +55,8 @@ impl<D: Device> Parts<D> {
     }
 
     /// A view's volume, without its rows.
-    pub(super) fn encode(&self, device: &D, values: &[f32], size: Size) -> Outcome<Volume<D>, D> {
-        check_finite(values, "encoding a source", "image")?;
+    pub(super) fn encode(&self, device: &D, values: &[f32], size: Size, view: usize) -> Outcome<Volume<D>, D> {
+        check_finite(values, &encoding(view), "image [row][column][3]")?;
         Volume::encode(device, &self.encoder, values, size).map_err(FieldError::Device)
     }
 
@@ -75,8 +75,7 @@ impl<D: Device> Parts<D> {
         device.channel_means(&block, &image.values, &mut means).map_err(failed)?;
         let means = device.download(&means).map_err(failed)?;
         if means.iter().any(|mean| !mean.is_finite()) {
-            let (stage, tensor) = (format!("encoding source {view}"), "volume [row][column][depth][feature]");
-            download_finite(device, &image.values, &stage, tensor)?;
+            download_finite(device, &image.values, &encoding(view), "volume [row][column][depth][feature]")?;
         }
         Ok(new_rows)
     }
@@ -89,9 +88,8 @@ impl<D: Device> Parts<D> {
         views: &Views<'_, D>,
         target: &CameraBlock,
         looking: &Looking,
-        progress: &Progress,
     ) -> Outcome<Image<D>, D> {
-        render(device, scratch, &self.points, views, target, looking, progress)
+        render(device, scratch, &self.points, views, target, looking)
     }
 
     /// The network at points.
@@ -144,4 +142,9 @@ impl<D: Device> Parts<D> {
         scratch.give(output);
         Ok(())
     }
+}
+
+/// The stage's name in errors.
+fn encoding(view: usize) -> String {
+    format!("encoding source {view}")
 }

@@ -33,17 +33,29 @@ impl<'a, D: Device> Reference<'a, D> {
         &self.field.architecture
     }
 
+    /// Computes a view's volume, all of its rows, unless it is there already.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn encode(&self, view: usize) -> Outcome<(), D> {
+        let Reference { field, device, prepared } = self;
+        field.encode_view(*device, prepared, view)?;
+        if let Some(volume) = prepared.volumes[view].borrow_mut().as_mut() {
+            prepared.parts.fill(*device, volume, 0..volume.row_count(), view)?;
+        }
+        device.finish().map_err(FieldError::Device)
+    }
+
     /// A view's volume, `[row][column][depth][feature]`, depth 0 the farthest.
     ///
     /// # Errors
     /// [`FieldError`].
     pub fn volume(&self, view: usize) -> Outcome<Vec<f32>, D> {
-        let Reference { field, device, prepared } = self;
-        field.encode_view(*device, prepared, view)?;
-        let mut volume = prepared.volumes[view].borrow_mut();
-        let Some(volume) = volume.as_mut() else { return Ok(Vec::new()) };
-        prepared.parts.fill(*device, volume, 0..volume.row_count(), view)?;
-        volume.values(*device).map_err(FieldError::Device)
+        self.encode(view)?;
+        match &*self.prepared.volumes[view].borrow() {
+            Some(volume) => volume.values(self.device).map_err(FieldError::Device),
+            None => Ok(Vec::new()),
+        }
     }
 
     /// Density (rectified) and features of points, `[point][1 + feature]`, from `looked_up[point][feature]`.
@@ -105,8 +117,7 @@ impl<'a, D: Device> Reference<'a, D> {
             volumes: volumes.iter().filter_map(|volume| volume.as_ref()).collect(),
         };
         let mut scratch = Scratch::new(*device);
-        let progress = Progress::hidden();
-        let image = prepared.parts.features(*device, &mut scratch, &views, target, &looking, &progress)?;
+        let image = prepared.parts.features(*device, &mut scratch, &views, target, &looking)?;
         device.download(&image.values).map_err(failed)
     }
 

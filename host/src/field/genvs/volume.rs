@@ -43,7 +43,8 @@ impl<D: Device> Volume<D> {
         let mut scratch = Scratch::new(device);
         let deep = encoder.encode(device, &mut scratch, values, size)?;
         let size = encoder.volume_size(size);
-        let image = scratch.image(size)?;
+        // Rows that no target looks at are never written.
+        let image = Scratch::new(device).image(size)?;
         Ok(Volume { size, nodes: Nodes::Whole { deep, image }, filled: 0..0 })
     }
 
@@ -147,7 +148,9 @@ impl<D: Device> Volume<D> {
     pub(super) fn rows_seen(&self, view: &CameraBlock, target: &CameraBlock, looking: &Looking) -> Range<u32> {
         let (width, height) = (target.width as f32, target.height as f32);
         let mut seen = f32::MAX..-f32::MAX;
-        for depth in looking.near_far {
+        let [near, far] = looking.near_far;
+        let astray = looking.jitter * 0.5 * (far - near) / (looking.sample_count - 1) as f32;
+        for depth in [near - astray, far + astray] {
             for (x, y) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
                 let point: Vec3 = target.centre_world() + target.towards(x, y) * depth;
                 let at = view.project(point);
@@ -157,9 +160,9 @@ impl<D: Device> Volume<D> {
                 seen = seen.start.min(at.y)..seen.end.max(at.y);
             }
         }
-        // Nodes lie at halves of the image's rows; half a node for rounding, and one for jitter.
+        // Nodes lie at halves of the image's rows: a look-up reads one before and one behind, and one more is for rounding.
         let scale = self.row_count() as f32 / view.height as f32;
-        let (first, last) = (seen.start * scale - 2.0, seen.end * scale + 2.0);
+        let (first, last) = (seen.start * scale - 2.0, seen.end * scale + 3.0);
         // Saturating: what lies outside has no rows.
         (first as u32).min(self.row_count())..(last as u32).min(self.row_count())
     }

@@ -18,7 +18,7 @@ const LEVELS: [u32; 5] = [6, 8, 10, 12, 18];
 /// Weight of the views that are left out.
 const LEAST: [f32; 2] = [0.05, 0.2];
 /// Levels with all left out.
-const FAST: [u32; 2] = [8, 12];
+const FAST: [u32; 2] = [6, 18];
 /// Errors of steps, where levels are chosen on the way.
 const TOLERANCES: [f32; 2] = [0.01, 0.03];
 /// The exact picture's samples on a ray are divided by this.
