@@ -90,7 +90,7 @@ fn assert_sound(picture: &Rendered) {
     assert_eq!(picture.colours.len(), (picture.width * picture.height) as usize);
     assert!(picture.colours.iter().flatten().all(|value| (0.0..=1.0).contains(value)), "a colour out of range");
     assert!(picture.colours.iter().all(|colour| colour[3] == 1.0), "not opaque");
-    assert_eq!(picture.depths, vec![0.0; picture.colours.len()]);
+    assert!(picture.depths.is_empty());
 }
 
 #[test]
