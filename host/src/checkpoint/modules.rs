@@ -8,8 +8,7 @@
 //! Modules can contain themselves, and one another many times over: names are bounded, and so is the work.
 
 use super::error::shortened;
-use super::pickle::{Id, Pickle, Value};
-use super::state_dict::class_of;
+use super::pickle::{Id, Object, Pickle, Value};
 use std::collections::HashSet;
 
 /// Bytes of a tensor's name.
@@ -187,4 +186,13 @@ impl<'a> Walk<'a> {
         }
         Ok(())
     }
+}
+
+/// The class of an object, for messages.
+pub(super) fn class_of(pickle: &Pickle, object: &Object) -> String {
+    // Classes of somebody's own are made through helpers whose first argument is the class.
+    let first = pickle.sequence(object.arguments).and_then(|arguments| arguments.first());
+    let helper = pickle.global(object.callable);
+    let class = first.and_then(|&first| pickle.global(first)).filter(|_| helper.is_some()).or(helper);
+    class.map_or("object".to_owned(), |(module, name)| format!("{}.{}", shortened(module), shortened(name)))
 }

@@ -284,19 +284,10 @@ fn no_tensors(pickle: &Pickle) -> String {
     match (entries(pickle, pickle.root()), pickle.object(pickle.root())) {
         (Some(table), _) => format!("holds no tensors where they are looked for: {}", keys_of(pickle, &table)),
         (None, Some(object)) => {
-            format!("holds an object ({}), not a table of named tensors; {RESAVE}", class_of(pickle, object))
+            format!("holds an object ({}), not a table of named tensors; {RESAVE}", modules::class_of(pickle, object))
         }
         (None, None) => format!("holds no table of named tensors; {RESAVE}"),
     }
-}
-
-/// The class of an object, for messages.
-pub(super) fn class_of(pickle: &Pickle, object: &Object) -> String {
-    // Classes of somebody's own are made through helpers whose first argument is the class.
-    let first = pickle.sequence(object.arguments).and_then(|arguments| arguments.first());
-    let helper = pickle.global(object.callable);
-    let class = first.and_then(|&first| pickle.global(first)).filter(|_| helper.is_some()).or(helper);
-    class.map_or("object".to_owned(), |(module, name)| format!("{}.{}", shortened(module), shortened(name)))
 }
 
 fn keys_of(pickle: &Pickle, root: &[(Id, Id)]) -> String {

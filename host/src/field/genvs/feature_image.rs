@@ -5,6 +5,7 @@
 
 use super::image::{Image, Scratch, Size, enlarge};
 use super::layers::Loader;
+use super::looking::Looking;
 use super::volume::Volume;
 use crate::device::{Device, Layer, Rays};
 use crate::field::FieldError;
@@ -23,23 +24,6 @@ const LEAST_RAYS: usize = 64;
 const LAST_LENGTH: f32 = 1.0e10;
 
 type Outcome<T, D> = Result<T, FieldError<<D as crate::device::Memory>::Error>>;
-
-/// How rays go through volumes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Looking {
-    /// Depths along a camera's principal axis between which its rays and its volume lie.
-    pub(super) near_far: [f32; 2],
-    /// Samples on a ray, at least 2; the first at `near`, the last at `far`.
-    pub(super) sample_count: u32,
-    /// How far samples stray at random, in halves of their distance: 0 or 1.
-    pub(super) jitter: f32,
-    /// Of the random numbers.
-    pub(super) seed: u64,
-    /// How long a ray is from `near` to `far` in the lengths that the network's densities are for.
-    pub(super) ray_length: f32,
-    /// Whether samples shade themselves, as published.
-    pub(super) inclusive: bool,
-}
 
 /// The views that a target uses.
 pub(super) struct Views<'a, D: Device> {

@@ -1,7 +1,8 @@
 //! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
 
-use super::feature_image::{Looking, Views};
+use super::feature_image::Views;
 use super::image::{Image, Scratch, Size};
+use super::looking::Looking;
 use super::sampling::{Plan, Start};
 use super::{Architecture, Genvs, Outcome, Prepared};
 use crate::device::Device;

@@ -2,8 +2,8 @@
 //! 16 bits.
 
 use super::encoder::Encoder;
-use super::feature_image::Looking;
 use super::image::{Image, Scratch, Size};
+use super::looking::Looking;
 use crate::device::Device;
 use std::ops::Range;
 use viewfuse_core::Vec3;
