@@ -14,7 +14,7 @@ mod verify;
 mod weights;
 
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -60,13 +60,15 @@ enum Command {
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
-    let arguments = Arguments::parse();
+    let mut command = Arguments::command();
+    let matches = command.get_matches_mut();
+    let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     viewfuse::interrupt::listen()?;
     match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),
         Command::Pareto(arguments) => pareto::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
