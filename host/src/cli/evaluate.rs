@@ -89,7 +89,8 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let field = arguments.model.open(arguments.seed, None)?;
     let options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
     let Chosen { device, reason } = arguments.device.open()?;
-    let mut all: Vec<(String, Score)> = Vec::new();
+    let mut all: Vec<Score> = Vec::new();
+    let mut scene_of: Vec<String> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
     let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in arguments.scenes.iter().zip(&scenes) {
@@ -98,15 +99,16 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         let scores = on_threads(arguments.picture.threads, || field.on(&device, &job))??;
         drop(progress);
         print_means(&path.display().to_string(), &means(&scores))?;
-        all.extend(scores.into_iter().map(|score| (path.display().to_string(), score)));
+        scene_of.extend(scores.iter().map(|_| path.display().to_string()));
+        all.extend(scores);
     }
     if arguments.scenes.len() > 1 {
-        let scores: Vec<Score> = all.iter().map(|(_, score)| score.clone()).collect();
-        print_means(&format!("all {} scenes", arguments.scenes.len()), &means(&scores))?;
+        print_means(&format!("all {} scenes", arguments.scenes.len()), &means(&all))?;
     }
     say(format_args!("device: {}, {reason}", device.name()))?;
     if let Some(path) = &arguments.output {
-        write_whole(path, &csv_of(all.iter().map(|(scene, score)| (scene.as_str(), score)))?)?;
+        let lines: Vec<_> = scene_of.into_iter().map(|scene| vec![scene]).zip(&all).collect();
+        write_whole(path, &csv_of(&["scene"], &lines)?)?;
         say(format_args!("{}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)

@@ -115,8 +115,10 @@ pub(super) fn run(
         for table in tables(finished.values(), by_count) {
             print_table(&protocol.to_string(), &table)?;
         }
-        let scores = finished.values().flat_map(|job| job.scores.iter().map(|score| (job.scene_name.as_str(), score)));
-        write_whole(&folder.path().join("scores.csv"), &csv_of(scores)?)?;
+        let first = |job: &Finished| vec![job.job.to_string(), job.scene_name.clone(), job.trial.to_string()];
+        let lines = finished.values().flat_map(|job| job.scores.iter().map(move |score| (first(job), score)));
+        let csv = csv_of(&["job", "scene", "trial"], &lines.collect::<Vec<_>>())?;
+        write_whole(&folder.path().join("scores.csv"), &csv)?;
     }
     let (there, all) = (finished.len(), plan.jobs.len());
     let part = if shard == Shard::ALL { String::new() } else { format!("shard {shard}: ") };

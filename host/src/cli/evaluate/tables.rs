@@ -60,26 +60,27 @@ fn line(row: &Row, metrics: &[Metric], has_reference: bool) -> Vec<String> {
             line.push(versus.map_or(String::new(), |versus| metric.interval_text(versus, true)));
         }
     }
-    line.push(row.seconds.map_or(String::new(), |seconds| format!("{seconds:.2}")));
+    line.push(row.seconds.map_or(String::new(), |seconds| format!("{seconds:.3}")));
     line
 }
 
-/// Every score with the scene's name, a line each. A metric that a picture lacks is empty.
-pub(super) fn csv_of<'a>(scores: impl Iterator<Item = (&'a str, &'a Score)> + Clone) -> anyhow::Result<Vec<u8>> {
+/// A score, with what stands before it on its line.
+pub(super) type Line<'a> = (Vec<String>, &'a Score);
+
+/// Every score, a line each, behind columns of other names. A metric that a picture lacks is empty.
+pub(super) fn csv_of(first_columns: &[&str], lines: &[Line<'_>]) -> anyhow::Result<Vec<u8>> {
     let mut metrics: Vec<&str> = vec![PSNR, SSIM];
-    for (_, score) in scores.clone() {
-        for (name, _) in &score.values {
-            if !metrics.contains(&name.as_str()) {
-                metrics.push(name);
-            }
+    for (name, _) in lines.iter().flat_map(|(_, score)| &score.values) {
+        if !metrics.contains(&name.as_str()) {
+            metrics.push(name);
         }
     }
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let header = ["scene", "scheme", "target", "sources"].into_iter().chain(metrics.iter().copied()).chain(["seconds"]);
+    let header = first_columns.iter().chain(&["scheme", "target", "sources"]).chain(&metrics).chain(&["seconds"]);
     writer.write_record(header)?;
-    for (scene, score) in scores {
-        let mut line =
-            vec![scene.to_owned(), score.scheme.clone(), score.target.clone(), score.source_count.to_string()];
+    for (first, score) in lines {
+        let mut line = first.clone();
+        line.extend([score.scheme.clone(), score.target.clone(), score.source_count.to_string()]);
         line.extend(metrics.iter().map(|name| score.value(name).map_or(String::new(), |value| format!("{value:.6}"))));
         line.push(format!("{:.6}", score.time.as_secs_f64()));
         writer.write_record(line)?;
