@@ -5,13 +5,16 @@ use crate::files::{WriteError, write_png, write_whole};
 use crate::photographs::SourceImages;
 use crate::render::Frame;
 use crate::weighting::Weighting;
-use image::{DynamicImage, RgbImage};
+use image::{DynamicImage, RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Name of the folder of pictures in that of the evaluation.
 pub const PICTURES: &str = "pictures";
+
+/// Longest side of a source as it is shown.
+const THUMBNAIL: u32 = 96;
 
 /// Why pictures cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -89,7 +92,7 @@ impl Gallery {
     pub fn add(&mut self, weighting: &Weighting, frame: &Frame, sources: &SourceImages) {
         let Some(truth) = &frame.truth else { return };
         if self.sources.is_empty() {
-            self.sources = (0..sources.images.len()).map(|source| sources.picture(source)).collect();
+            self.sources = (0..sources.images.len()).map(|source| thumbnail(sources.picture(source))).collect();
             self.truth = Some(truth.picture.clone());
         }
         let finite = |(name, value): (String, f64)| (name, Some(value).filter(|value| value.is_finite()));
@@ -136,6 +139,17 @@ impl Gallery {
         let json = serde_json::to_vec(&shown).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
         Ok(write_whole(&path, &json)?)
     }
+}
+
+/// At most [`THUMBNAIL`] pixels on a side.
+fn thumbnail(picture: RgbImage) -> RgbImage {
+    let (width, height) = picture.dimensions();
+    let longest = width.max(height);
+    if longest <= THUMBNAIL {
+        return picture;
+    }
+    let scaled = |side: u32| (side * THUMBNAIL / longest).max(1);
+    imageops::resize(&picture, scaled(width), scaled(height), imageops::FilterType::Triangle)
 }
 
 /// What there is to see in the folder of an evaluation, by number of job; nothing if it has no pictures.

@@ -20,6 +20,7 @@
 //! protocol, run_folder, gallery evaluations that can be compared, that go on after a kill, and what they show
 //! summary                       their tables
 //! pareto                        error against run time
+//! report                        all of that on one page
 //! check                         how closely devices agree with the mathematics
 //! ```
 //!
@@ -45,6 +46,7 @@ pub mod progress;
 pub mod protocol;
 pub mod record;
 pub mod render;
+pub mod report;
 pub mod rig;
 pub mod run_folder;
 pub mod scene;

@@ -18,6 +18,11 @@ impl Interval {
         let half_width = quantile(values.len().saturating_sub(1)) * (variance / count).sqrt();
         Interval { mean, half_width: Some(half_width).filter(|half| half.is_finite()) }
     }
+
+    /// Whether 0 lies outside: of a difference, whether it is more than chance. Without a width it is not known: `false`.
+    pub fn excludes_zero(&self) -> bool {
+        self.half_width.is_some_and(|half_width| self.mean.abs() > half_width)
+    }
 }
 
 /// The 0.975 quantile of Student's distribution; infinite for 0 degrees of freedom. To 4e-4 (Abramowitz and Stegun
