@@ -57,7 +57,7 @@ fn help_fits_and_gives_examples() {
     let here = Path::new(".");
     let version = done(here, "--version");
     assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
-    for name in ["", "render", "weights", "inspect", "evaluate", "pareto", "devices", "verify", "check"] {
+    for name in ["", "render", "weights", "inspect", "evaluate", "pareto", "report", "devices", "verify", "check"] {
         let help = done(here, &format!("{name} --help"));
         assert!(name.is_empty() || help.contains(&format!("viewfuse {name} ")), "an example of {name}:\n{help}");
         assert!(name.is_empty() || help.contains("Example"), "an example of {name}:\n{help}");

@@ -1,6 +1,7 @@
 //! Pictures side by side: the sources with their weights, every scheme's prediction, the truth.
 
-use super::{ReportError, data_address, read};
+use super::table::breakable;
+use super::{ReportError, counted, data_address, read};
 use crate::evaluate::PSNR;
 use crate::gallery::{PICTURES, Shown, ShownScheme};
 use crate::summary::Metric;
@@ -35,10 +36,10 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
     };
     Ok(html! {
         article.comparison {
-            h4 { (shown.scene) ", view " (shown.target) ", from " (super::counted(shown.sources.len(), "source")) }
+            h4 { (shown.scene) ", view " (shown.target) ", from " (counted(shown.sources.len(), "source")) }
             div.sources {
                 @for (index, (source, address)) in shown.sources.iter().zip(&sources).enumerate() {
-                    figure { img src=(address) alt={ "source " (source.name) }; figcaption { b { (index + 1) } " " (source.name) } }
+                    figure { img src=(address) alt={ "source " (source.name) }; figcaption { b { (index + 1) } br; (source.name) } }
                 }
             }
             div.predictions {
@@ -48,7 +49,7 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
                         img src=(address) alt={ "prediction with " (scheme.scheme) };
                         (bars(&scheme.weights, heaviest))
                         figcaption {
-                            (scheme.scheme)
+                            (breakable(&scheme.scheme))
                             @if let Some(psnr) = psnr(scheme) { br; (marked(psnr)) " dB" }
                         }
                     }

@@ -93,9 +93,9 @@ impl Sweep {
 fn points(device: &DeviceRecord) -> Markup {
     let ratio = |psnr: Option<f64>| psnr.map_or_else(|| "equal".to_owned(), |psnr| format!("{psnr:.1}"));
     html! {
-        div.scroll {
-            table.results {
-                caption { strong { (device.device) } " settings that are the best for their time" }
+        figure.table {
+            figcaption { strong { (device.device) } " settings that are the best for their time" }
+            div.scroll { table.results {
                 thead { tr {
                     th scope="col" { "setting" } th scope="col" { "s / picture" } th scope="col" { "gain" }
                     th scope="col" { "PSNR dB to exact" } th scope="col" { "PSNR dB to truth" }
@@ -111,7 +111,7 @@ fn points(device: &DeviceRecord) -> Markup {
                         }
                     }
                 }
-            }
+            } }
         }
     }
 }

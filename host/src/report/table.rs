@@ -10,17 +10,17 @@ pub(super) fn results(table: &Table) -> Markup {
     let has_reference = table.rows.iter().any(|row| row.scheme == REFERENCE);
     let sources: Vec<String> = table.source_counts.iter().map(usize::to_string).collect();
     html! {
-        div.scroll {
-            table.results {
-                caption {
-                    strong { (sources.join(", ")) " sources" } " "
-                    (counted(table.scene_count, "scene")) ", " (counted(table.target_count, "picture")) " of each scheme"
-                }
+        figure.table {
+            figcaption {
+                strong { (sources.join(", ")) " sources" } " "
+                (counted(table.scene_count, "scene")) ", " (counted(table.target_count, "picture")) " of each scheme"
+            }
+            div.scroll { table.results {
                 thead {
                     tr {
                         th scope="col" { "weighting" }
                         @for metric in &table.metrics {
-                            th scope="col" { (metric.label) " " (if metric.larger_is_better { "↑" } else { "↓" }) }
+                            th scope="col" { (metric.heading()) " " (if metric.larger_is_better { "↑" } else { "↓" }) }
                             @if has_reference { th.versus scope="col" { "over " (REFERENCE) } }
                         }
                         th scope="col" { "s / view" }
@@ -29,7 +29,7 @@ pub(super) fn results(table: &Table) -> Markup {
                 tbody {
                     @for row in &table.rows {
                         tr class=(if row.scheme == NEAREST_COPY { "copy" } else { "" }) {
-                            th scope="row" { (row.scheme) }
+                            th scope="row" { (breakable(&row.scheme)) }
                             @for (cell, metric) in row.cells.iter().zip(&table.metrics) {
                                 (value(cell.as_ref(), metric))
                                 @if has_reference { (versus(cell.as_ref(), metric)) }
@@ -38,7 +38,7 @@ pub(super) fn results(table: &Table) -> Markup {
                         }
                     }
                 }
-            }
+            } }
         }
     }
 }
@@ -72,6 +72,12 @@ fn versus(cell: Option<&Cell>, metric: &Metric) -> Markup {
 
 fn half_width(interval: &Interval, metric: &Metric) -> Markup {
     html! { @if let Some(half) = interval.half_width { span.half { " ± " (metric.text(half)) } } }
+}
+
+/// The name of a scheme, which may be broken behind a comma or a colon.
+pub(super) fn breakable(name: &str) -> Markup {
+    let pieces = name.split_inclusive([',', ':', '/']);
+    html! { @for (index, piece) in pieces.enumerate() { @if index > 0 { wbr; } (piece) } }
 }
 
 /// How to read tables of results.
