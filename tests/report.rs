@@ -18,7 +18,8 @@ use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, name
 use viewfuse_tests::scenes::Folder;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
-const SMALL: &str = "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
+const SMALL: &str =
+    "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
 
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
@@ -57,7 +58,8 @@ fn runs() -> Folder {
     let copy = |name: &str| {
         for kind in ["rgb", "pose"] {
             for file in names_in(&path.join("toy").join(kind)) {
-                fs::copy(path.join("toy").join(kind).join(&file), folder.file(&format!("{name}/{kind}/{file}"))).expect("a copy");
+                fs::copy(path.join("toy").join(kind).join(&file), folder.file(&format!("{name}/{kind}/{file}")))
+                    .expect("a copy");
             }
         }
         fs::copy(path.join("toy/intrinsics.txt"), folder.file(&format!("{name}/intrinsics.txt"))).expect("a copy");
@@ -66,8 +68,14 @@ fn runs() -> Folder {
     done(BINARY, path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
     done(BINARY, path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     done(BINARY, path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
-    folder.write("trained/record.json", json!({"steps": 12, "settings": {"rate": 0.001}, "scores": (0..20).collect::<Vec<_>>()}).to_string());
-    folder.write("trained/curve.svg", "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"48\"><path d=\"M0 0L90 48\"/></svg>");
+    folder.write(
+        "trained/record.json",
+        json!({"steps": 12, "settings": {"rate": 0.001}, "scores": (0..20).collect::<Vec<_>>()}).to_string(),
+    );
+    folder.write(
+        "trained/curve.svg",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"48\"><path d=\"M0 0L90 48\"/></svg>",
+    );
     folder
 }
 
@@ -85,7 +93,11 @@ fn the_page_holds_everything() {
     // No address but those that hold what they point to, and those on the page.
     for attribute in ["src=\"", "href=\"", "url("] {
         for rest in first.split(attribute).skip(1) {
-            assert!(rest.starts_with("data:") || rest.starts_with('#'), "{attribute}{}", rest.chars().take(60).collect::<String>());
+            assert!(
+                rest.starts_with("data:") || rest.starts_with('#'),
+                "{attribute}{}",
+                rest.chars().take(60).collect::<String>()
+            );
         }
     }
     assert!(!first.contains("<script") && first.contains("Content-Security-Policy"));
@@ -130,7 +142,10 @@ fn what_is_no_record_is_refused() {
     let path = folder.path();
     let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, path, arguments, parts);
     refused("report toy -o page.html", &["toy/run.json: cannot be read"]);
-    refused("report --pareto toy/intrinsics.txt -o page.html", &["toy/intrinsics.txt: is not a record of viewfuse pareto"]);
+    refused(
+        "report --pareto toy/intrinsics.txt -o page.html",
+        &["toy/intrinsics.txt: is not a record of viewfuse pareto"],
+    );
     refused("report --training toy -o page.html", &["toy/record.json: cannot be read"]);
     refused("report --training toy -o toy", &["toy: cannot be written: it is a folder"]);
     assert_wrong_arguments(BINARY, path, "report -o page.html", &["required"]);
@@ -156,7 +171,10 @@ fn assert_marks(table: &Value) {
     for (column, title) in header.iter().enumerate() {
         let larger_is_better = title.ends_with('↑');
         if !larger_is_better && !title.ends_with('↓') {
-            assert!(rows.iter().all(|row| row[column]["bold"].is_null() && row[column]["underlined"].is_null()), "{title}: {table}");
+            assert!(
+                rows.iter().all(|row| row[column]["bold"].is_null() && row[column]["underlined"].is_null()),
+                "{title}: {table}"
+            );
             continue;
         }
         let key = |row: &&Vec<Value>| {
@@ -169,7 +187,11 @@ fn assert_marks(table: &Value) {
         for row in &rows {
             let place = keys.iter().position(|own| *own == key(row)).expect("a place");
             let cell = &row[column];
-            assert_eq!((!cell["bold"].is_null(), !cell["underlined"].is_null()), (place == 0, place == 1), "{title}: {cell}");
+            assert_eq!(
+                (!cell["bold"].is_null(), !cell["underlined"].is_null()),
+                (place == 0, place == 1),
+                "{title}: {cell}"
+            );
         }
     }
 }
@@ -185,7 +207,11 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
     for view in views {
         let width = &view["width"];
         assert!(view["scrollWidth"].as_u64() <= width.as_u64(), "wider than its {width}: {}", view["scrollWidth"]);
-        assert_eq!((&view["wide"], &view["broken"], &view["resources"]), (&json!([]), &json!([]), &json!([])), "at {width}");
+        assert_eq!(
+            (&view["wide"], &view["broken"], &view["resources"]),
+            (&json!([]), &json!([]), &json!([])),
+            "at {width}"
+        );
         assert_eq!(view["images"], page.matches("<img ").count(), "at {width}");
         // Two metrics with a figure and one of differences each, and the sweep.
         assert_eq!((&view["scripts"], &view["figures"]), (&json!(0), &json!(5)), "at {width}");
@@ -195,7 +221,8 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
         tables.iter().for_each(|table| assert_marks(table));
     }
     // The cells are the table's that the command prints.
-    let printed = done(BINARY, folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    let printed =
+        done(BINARY, folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
     let words = |text: &str| text.replace('*', "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
@@ -232,7 +259,9 @@ fn light_and_dark(browser: &Browser) {
     done(BINARY, folder.path(), REPORT);
     let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
     fs::create_dir_all(&pictures).expect("a folder");
-    for (name, width, is_dark) in [("phone", 360, false), ("phone-dark", 360, true), ("desktop", 1280, false), ("desktop-dark", 1280, true)] {
+    for (name, width, is_dark) in
+        [("phone", 360, false), ("phone-dark", 360, true), ("desktop", 1280, false), ("desktop-dark", 1280, true)]
+    {
         let file = pictures.join(format!("{name}.png"));
         let picture = browser.picture(&folder.path().join("page.html"), &file, width, is_dark);
         assert_eq!(picture.width(), width, "{name}");
@@ -240,7 +269,9 @@ fn light_and_dark(browser: &Browser) {
         let background = picture.get_pixel(2, 2).0.map(u32::from);
         let brightness = (background[0] + background[1] + background[2]) / 3;
         assert!(if is_dark { brightness < 60 } else { brightness > 240 }, "{name}: {background:?}");
-        let far = |pixel: &image::Rgb<u8>| pixel.0.iter().zip(background).any(|(own, other)| u32::from(*own).abs_diff(other) > 120);
+        let far = |pixel: &image::Rgb<u8>| {
+            pixel.0.iter().zip(background).any(|(own, other)| u32::from(*own).abs_diff(other) > 120)
+        };
         assert!(picture.pixels().filter(|pixel| far(pixel)).count() > 1000, "{name} shows nothing");
     }
 }

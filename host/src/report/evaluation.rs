@@ -73,7 +73,7 @@ impl Evaluation {
                 }
                 @for lead in self.tables.iter().filter_map(lead) { (lead) }
                 @if !figures.is_empty() {
-                    div.figures { @for svg in &figures { figure { div.scroll { (PreEscaped(svg)) } } } }
+                    div.figures { @for svg in &figures { figure { div.scroll.drawn { (PreEscaped(svg)) } } } }
                     (figure::key(&self.tables))
                 }
                 @for results in &self.tables { (table::results(results)) }

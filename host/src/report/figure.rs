@@ -74,7 +74,7 @@ pub(super) fn key(tables: &[Table]) -> Markup {
                 @let RGBColor(red, green, blue) = style.colour;
                 @let colour = format!("#{red:02X}{green:02X}{blue:02X}");
                 li {
-                    span.scroll { svg width="12" height="12" viewBox="-6 -6 12 12" {
+                    span.drawn { svg width="12" height="12" viewBox="-6 -6 12 12" {
                         @match style.shape {
                             0 => circle r="4.5" fill=(colour) {},
                             1 => rect x="-4.5" y="-4.5" width="9" height="9" fill=(colour) {},

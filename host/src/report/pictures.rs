@@ -1,6 +1,5 @@
 //! Pictures side by side: the sources with their weights, every scheme's prediction, the truth.
 
-use super::table::breakable;
 use super::{ReportError, counted, data_address, read};
 use crate::evaluate::PSNR;
 use crate::gallery::{PICTURES, Shown, ShownScheme};
@@ -58,6 +57,12 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
             (weights(shown))
         }
     })
+}
+
+/// The name of a scheme, which may be broken where one of its parts ends.
+fn breakable(name: &str) -> Markup {
+    let pieces = name.split_inclusive([',', ':', '/']);
+    html! { @for (index, piece) in pieces.enumerate() { @if index > 0 { wbr; } (piece) } }
 }
 
 /// The weights of the sources as bars in their order, all schemes on the same scale.

@@ -29,7 +29,7 @@ pub(super) fn results(table: &Table) -> Markup {
                 tbody {
                     @for row in &table.rows {
                         tr class=(if row.scheme == NEAREST_COPY { "copy" } else { "" }) {
-                            th scope="row" { (breakable(&row.scheme)) }
+                            th scope="row" { (row.scheme) }
                             @for (cell, metric) in row.cells.iter().zip(&table.metrics) {
                                 (value(cell.as_ref(), metric))
                                 @if has_reference { (versus(cell.as_ref(), metric)) }
@@ -72,12 +72,6 @@ fn versus(cell: Option<&Cell>, metric: &Metric) -> Markup {
 
 fn half_width(interval: &Interval, metric: &Metric) -> Markup {
     html! { @if let Some(half) = interval.half_width { span.half { " ± " (metric.text(half)) } } }
-}
-
-/// The name of a scheme, which may be broken behind a comma or a colon.
-pub(super) fn breakable(name: &str) -> Markup {
-    let pieces = name.split_inclusive([',', ':', '/']);
-    html! { @for (index, piece) in pieces.enumerate() { @if index > 0 { wbr; } (piece) } }
 }
 
 /// How to read tables of results.
