@@ -9,6 +9,7 @@ mod model;
 mod options;
 mod pareto;
 mod render;
+mod scenes;
 mod table;
 mod verify;
 mod weights;
@@ -48,6 +49,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Measure error against run time over what can be left out, on each device.
     Pareto(pareto::Arguments),
+    /// Make scenes to learn from.
+    Scenes(scenes::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
@@ -68,6 +71,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Pareto(arguments) => pareto::run(&arguments),
+        Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
