@@ -100,6 +100,7 @@ fn scenes(data: &Path) -> anyhow::Result<[Vec<PathBuf>; 2]> {
         folder.push(suffix);
         let mut all: Vec<PathBuf> =
             std::fs::read_dir(&folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+        all.retain(|path| path.join("rgb").is_dir());
         all.sort();
         Ok(all)
     };

@@ -1,5 +1,6 @@
 //! Samples on rays: where they are, and what they add up to.
 
+use super::operations::{Apply, RectifiedDensity};
 use candle_core::{D, Result, Tensor};
 use viewfuse_core::rays::{RayPoint, TargetRay, place_point};
 
@@ -56,7 +57,8 @@ pub(crate) fn points(rays: &[TargetRay], depths: &[f32]) -> Vec<RayPoint> {
 /// Share of the light of a ray that each of its samples sends, `[ray][sample]`: from densities (rectified here) and lengths
 /// of that shape.
 pub(crate) fn weights(densities: &Tensor, lengths: &Tensor) -> Result<Tensor> {
-    let passed = (densities.relu()? * lengths)?.cumsum(D::Minus1)?;
+    let rectified = RectifiedDensity { shape: densities.dims().to_vec() };
+    let passed = (densities.contiguous()?.apply_op1(Apply(rectified))? * lengths)?.cumsum(D::Minus1)?;
     let behind = passed.neg()?.exp()?;
     let before = behind.narrow(1, 0, behind.dim(1)? - 1)?.pad_with_zeros(1, 1, 0)?;
     // In front of the first sample all light still passes.

@@ -5,8 +5,10 @@
 //! images of intermediate numbers through memory for every step that a processor can take in its caches.
 
 mod convolve;
+mod density;
 mod point_network;
 
+pub(crate) use density::RectifiedDensity;
 pub(crate) use convolve::{Convolution, DepthwiseConvolution, Window};
 pub(crate) use point_network::{PointNetwork, PointNetworkSizes, Points};
 

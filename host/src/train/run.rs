@@ -27,8 +27,8 @@ use std::time::Instant;
 pub struct Schedule {
     /// Steps of the run.
     pub steps: u32,
-    /// Learning rate after the first [`WARM_UP`] steps, over which it rises; from there it falls along a cosine to
-    /// [`LAST_RATE`] of it.
+    /// Learning rate after the first hundred steps, over which it rises; from there it falls along a cosine to
+    /// 3 % of it.
     pub rate: f64,
     /// Seed of every random number.
     pub seed: u64,
@@ -37,9 +37,9 @@ pub struct Schedule {
 }
 
 /// Steps over which the rate rises.
-pub const WARM_UP: u32 = 100;
+const WARM_UP: u32 = 100;
 /// Share of the rate that the run ends with.
-pub const LAST_RATE: f64 = 0.03;
+const LAST_RATE: f64 = 0.03;
 /// Steps from one point of the loss curve to the next.
 const LOSS_EVERY: u32 = 50;
 /// Seconds from one writing of the state to the next.
