@@ -62,6 +62,19 @@ pub struct Object {
     light: Light,
 }
 
+/// Distance from the world's origin to the farthest corner of the box around a part: less than that of the ball for
+/// long parts whose ends are near the origin.
+fn farthest_corner(part: &Part) -> f32 {
+    let half = part.shape.half_box();
+    let mut farthest = 0.0;
+    for corner in 0..8 {
+        let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+        let offset = part.placement.rotate_to_world(half * Vec3::new(sign(0), sign(1), sign(2)));
+        farthest = max(farthest, (part.placement.origin_world() + offset).length());
+    }
+    farthest
+}
+
 impl Object {
     /// The union of these parts. Where two surfaces coincide, the earlier part shows.
     ///
@@ -84,7 +97,7 @@ impl Object {
             if !(reach <= LARGEST_DISTANCE) {
                 return Err(ObjectError::Place { part: index });
             }
-            bounding_radius = max(bounding_radius, reach);
+            bounding_radius = max(bounding_radius, min(reach, farthest_corner(part)));
             bounding_radii.push(part.shape.bounding_radius());
         }
         Ok(Object { parts, bounding_radii, bounding_radius, light: Light::default() })

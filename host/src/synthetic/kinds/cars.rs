@@ -74,7 +74,8 @@ pub(super) fn car(draws: &mut Draws, build: &mut Build) {
         arch: length * draws.between(0.145, 0.175) * style.wheels,
         rounding: height * draws.between(0.04, 0.16),
         nose: width * draws.between(0.05, 0.3) * style.pointed,
-        lean: draws.between(0.15, 0.5),
+        // The roof keeps a good part of the width, however high it is.
+        lean: draws.between(0.15, 0.5).min(0.55 * width / (2.0 * height * (1.15 - style.belt))),
         body,
         glass,
         trim,
@@ -104,10 +105,13 @@ fn body_shell(car: &Car, build: &mut Build, draws: &mut Draws) {
     let z = |up: f32| car.z(up) + r * (1.0 - 2.0 * up).max(-1.0);
     let sill = draws.between(0.0, 0.06);
     let ends = [draws.between(0.04, 0.2), draws.between(0.02, 0.2)];
-    let mut corners = vec![[x(0.01), z(ends[0])], [x(0.08), z(sill)]];
+    let reach = car.arch + r + 0.01;
+    let low_rear = (car.x(style.rear_axle) - reach).min(x(0.08));
+    let low_front = (car.x(style.front_axle) + reach).max(x(0.93));
+    let mut corners = vec![[x(0.0), z(ends[0])], [low_rear, z(sill)]];
     arch(car, style.rear_axle, z(sill), &mut corners);
     arch(car, style.front_axle, z(sill), &mut corners);
-    corners.extend([[x(0.93), z(sill)], [x(0.99), z(ends[1])]]);
+    corners.extend([[low_front, z(sill)], [x(0.995), z(ends[1])]]);
     let bonnet = mix(style.nose_top, style.cowl_top, draws.between(0.45, 0.85));
     corners.extend([
         [x(1.0), z(mix(ends[1], style.nose_top, 0.6))],
@@ -115,7 +119,7 @@ fn body_shell(car: &Car, build: &mut Build, draws: &mut Draws) {
         [x(mix(style.cowl, 1.0, 0.6)), z(bonnet)],
         [x(style.cowl), z(style.cowl_top)],
         [x(style.deck), z(style.deck_top)],
-        [x(mix(0.01, 0.06, draws.unit())), z(style.tail_top)],
+        [x((style.deck - 0.01).min(mix(0.01, 0.06, draws.unit()))), z(style.tail_top)],
         [x(0.0), z(mix(ends[0], style.tail_top, draws.between(0.4, 0.8)))],
     ]);
     let width = Width {
