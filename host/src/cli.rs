@@ -10,13 +10,14 @@ mod options;
 mod pareto;
 mod render;
 mod scenes;
+mod report;
 mod table;
 mod train;
 mod verify;
 mod weights;
 
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -54,6 +55,8 @@ enum Command {
     Train(train::Arguments),
     /// Make scenes to learn from.
     Scenes(scenes::Arguments),
+    /// Write evaluations, run times and trainings as one HTML page.
+    Report(report::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
@@ -66,16 +69,19 @@ enum Command {
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
-    let arguments = Arguments::parse();
+    let mut command = Arguments::command();
+    let matches = command.get_matches_mut();
+    let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     viewfuse::interrupt::listen()?;
     match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Evaluate(arguments) => evaluate::run(&arguments),
+        Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),
         Command::Pareto(arguments) => pareto::run(&arguments),
         Command::Train(arguments) => train::run(&arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

@@ -3,9 +3,9 @@
 use crate::device::Device;
 use crate::few_shot::{Selection, SelectionError, target_of, view_list};
 use crate::field::Field;
-use crate::photographs::Album;
+use crate::photographs::{Album, SourceImages};
 use crate::progress::Progress;
-use crate::render::{RenderError, RenderOptions, Stage, Truth};
+use crate::render::{Frame, RenderError, RenderOptions, Stage, Truth};
 use crate::scene::Scene;
 use crate::weighting::Weighting;
 use std::time::{Duration, Instant};
@@ -32,6 +32,11 @@ pub enum EvaluateError<E: std::error::Error> {
     Render(#[from] RenderError<E>),
 }
 
+/// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures.
+pub const PSNR: &str = "psnr_db";
+/// Name of the structural similarity; pictures that are too small have none.
+pub const SSIM: &str = "ssim";
+
 /// The score of one scheme at one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Score {
@@ -41,12 +46,89 @@ pub struct Score {
     pub target: String,
     /// How many sources there were.
     pub source_count: usize,
-    /// Peak signal to noise ratio in decibels, of 8-bit values.
-    pub psnr: f64,
-    /// Structural similarity, if the picture is large enough.
-    pub ssim: Option<f64>,
+    /// Metrics by name, [`PSNR`] first.
+    pub values: Vec<(String, f64)>,
     /// Encoding and rendering for this target and scheme; encoding that targets share is divided among them.
     pub time: Duration,
+}
+
+impl Score {
+    /// A metric by name.
+    pub fn value(&self, name: &str) -> Option<f64> {
+        self.values.iter().find(|(own, _)| own == name).map(|(_, value)| *value)
+    }
+}
+
+/// Every metric of a prediction, by name.
+pub fn values_of(truth: &Truth) -> Vec<(String, f64)> {
+    let ssim = truth.ssim.map(|ssim| (SSIM.to_owned(), ssim));
+    [(PSNR.to_owned(), truth.psnr)].into_iter().chain(ssim).collect()
+}
+
+/// What renders and scores.
+pub struct Evaluator<'a, D, F> {
+    /// The schemes.
+    pub weightings: &'a [Weighting],
+    /// Where kernels run.
+    pub device: &'a D,
+    /// What makes the pictures.
+    pub field: &'a F,
+    /// How.
+    pub options: &'a RenderOptions,
+    /// Where progress and warnings are shown.
+    pub progress: &'a Progress,
+}
+
+impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
+    /// Scores every scheme on targets that share their sources, after copying the nearest source. `seen` gets each rendered
+    /// frame with its scheme and the sources at working size.
+    ///
+    /// # Errors
+    /// [`EvaluateError`].
+    pub fn score(
+        &self,
+        scene: &Scene,
+        album: &Album<'_>,
+        sources: &[usize],
+        targets: &[usize],
+        mut seen: impl FnMut(&Weighting, &Frame, &SourceImages),
+    ) -> Result<Vec<Score>, EvaluateError<D::Error>> {
+        let Evaluator { weightings, device, field, options, progress } = *self;
+        let score = |scheme: &str, target: usize, truth: &Truth, time: Duration| Score {
+            scheme: scheme.to_owned(),
+            target: scene.views[target].name.clone(),
+            source_count: sources.len(),
+            values: values_of(truth),
+            time,
+        };
+        let mut stage = Stage::prepare(scene, album, sources, device, field, options, progress)?;
+        let mut scores = Vec::new();
+        for &target in targets {
+            let nearest = nearest_source(scene, sources, target);
+            let size = stage.picture_size(target)?;
+            let (prediction, truth) = (stage.truth_at(nearest, size)?, stage.truth_at(target, size)?);
+            scores.push(score(NEAREST_COPY, target, &Truth::compare(&prediction, truth), Duration::ZERO));
+        }
+        // Views that a field encodes when a target first needs them: all schemes and targets share that.
+        let (first, mut shared) = (scores.len(), Duration::ZERO);
+        for weighting in weightings {
+            let start = Instant::now();
+            let latents = stage.encode(weighting, progress)?;
+            let encode_share = start.elapsed() / targets.len().max(1) as u32;
+            for &target in targets {
+                let frame = stage.frame(weighting, &latents, &target_of(scene, target), progress)?;
+                if let Some(truth) = &frame.truth {
+                    let time = encode_share + frame.time.saturating_sub(frame.encode);
+                    shared += frame.encode;
+                    scores.push(score(&weighting.to_string(), target, truth, time));
+                    seen(weighting, &frame, &stage.images);
+                }
+            }
+        }
+        let share = shared / (scores.len() - first).max(1) as u32;
+        scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
+        Ok(scores)
+    }
 }
 
 /// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one out) and
@@ -66,46 +148,12 @@ pub fn evaluate<D: Device, F: Field<D>>(
     let groups = source_groups(scene, selection, field.least_sources())?;
     let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
     let album = Album::open(scene, used, progress).map_err(RenderError::from)?;
+    let evaluator = Evaluator { weightings, device, field, options, progress };
     let mut scores = Vec::new();
     for (sources, targets) in &groups {
-        let mut stage = Stage::prepare(scene, &album, sources, device, field, options, progress)?;
-        for &target in targets {
-            let nearest = nearest_source(scene, sources, target);
-            let size = stage.picture_size(target)?;
-            let (prediction, truth) = (stage.truth_at(nearest, size)?, stage.truth_at(target, size)?);
-            scores.push(score(
-                NEAREST_COPY,
-                scene,
-                target,
-                sources.len(),
-                &Truth::compare(&prediction, truth),
-                Duration::ZERO,
-            ));
-        }
-        // Views that a field encodes when a target first needs them: all schemes and targets share that.
-        let (first, mut shared) = (scores.len(), Duration::ZERO);
-        for weighting in weightings {
-            let start = Instant::now();
-            let latents = stage.encode(weighting, progress)?;
-            let encode_share = start.elapsed() / targets.len().max(1) as u32;
-            for &target in targets {
-                let frame = stage.frame(weighting, &latents, &target_of(scene, target), progress)?;
-                if let Some(truth) = &frame.truth {
-                    let time = encode_share + frame.time.saturating_sub(frame.encode);
-                    shared += frame.encode;
-                    scores.push(score(&weighting.to_string(), scene, target, sources.len(), truth, time));
-                }
-            }
-        }
-        let share = shared / (scores.len() - first).max(1) as u32;
-        scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
+        scores.extend(evaluator.score(scene, &album, sources, targets, |_, _, _| {})?);
     }
     Ok(scores)
-}
-
-fn score(scheme: &str, scene: &Scene, target: usize, source_count: usize, truth: &Truth, time: Duration) -> Score {
-    let target = scene.views[target].name.clone();
-    Score { scheme: scheme.to_owned(), target, source_count, psnr: truth.psnr, ssim: truth.ssim, time }
 }
 
 /// Sets of sources, each with the targets that are rendered from it.
@@ -178,10 +226,10 @@ pub fn means(scores: &[Score]) -> Vec<Mean> {
         .map(|scheme| {
             let own: Vec<&Score> = scores.iter().filter(|score| score.scheme == scheme).collect();
             let count = own.len() as f64;
-            let similarities: Vec<f64> = own.iter().filter_map(|score| score.ssim).collect();
+            let similarities: Vec<f64> = own.iter().filter_map(|score| score.value(SSIM)).collect();
             Mean {
                 scheme: scheme.to_owned(),
-                psnr: own.iter().map(|score| score.psnr).sum::<f64>() / count,
+                psnr: own.iter().filter_map(|score| score.value(PSNR)).sum::<f64>() / count,
                 ssim: (!similarities.is_empty()).then(|| similarities.iter().sum::<f64>() / similarities.len() as f64),
                 seconds: own.iter().map(|score| score.time.as_secs_f64()).sum::<f64>() / count,
                 target_count: own.len(),

@@ -17,7 +17,10 @@
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
 //! evaluate, inspect, verify     the other jobs
+//! protocol, run_folder, gallery evaluations that can be compared, that go on after a kill, and what they show
+//! summary                       their tables
 //! pareto                        error against run time
+//! report                        all of that on one page
 //! check                         how closely devices agree with the mathematics
 //! train                         networks and weightings, learned from scenes
 //! ```
@@ -35,17 +38,22 @@ pub mod few_shot;
 pub mod field;
 pub mod files;
 pub mod formula;
+pub mod gallery;
 pub mod inspect;
 pub mod interrupt;
 pub mod pareto;
 pub mod photographs;
 pub mod progress;
+pub mod protocol;
 pub mod record;
 pub mod render;
+pub mod report;
 pub mod rig;
+pub mod run_folder;
 pub mod scene;
 pub mod sheet;
 pub mod sources;
+pub mod summary;
 pub mod synthetic;
 pub mod train;
 pub mod verify;

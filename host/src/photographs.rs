@@ -67,6 +67,17 @@ pub struct SourceImages {
     pub warning: Option<String>,
 }
 
+impl SourceImages {
+    /// A source over the background.
+    pub fn picture(&self, source: usize) -> RgbImage {
+        let SourceImage { camera, texels } = &self.images[source];
+        let behind = self.background;
+        let over = |t: &[f32; 4]| [0, 1, 2, 3].map(|c| t[c] + if c < 3 { (1.0 - t[3]) * behind[c] } else { 0.0 });
+        let texels: Vec<[f32; 4]> = texels.iter().map(over).collect();
+        to_rgb8(&texels, [camera.pinhole.width(), camera.pinhole.height()])
+    }
+}
+
 /// Most bytes of decoded photographs that are kept. Where a run needs more, each is decoded again whenever it is needed.
 const MOST_KEPT_BYTES: u64 = 512 << 20;
 

@@ -97,6 +97,14 @@ impl Scene {
         Ok(Scene { path: path.to_path_buf(), layout, views })
     }
 
+    /// What people call it: the name of its folder, however the path was written.
+    pub fn name(&self) -> String {
+        let whole = fs::canonicalize(&self.path).unwrap_or_else(|_| self.path.clone());
+        let folder = if whole.is_file() { whole.parent().map(Path::to_path_buf) } else { Some(whole) };
+        let name = folder.as_deref().and_then(Path::file_name);
+        name.map_or_else(|| self.path.display().to_string(), |name| name.to_string_lossy().into_owned())
+    }
+
     /// Decodes the photograph of the view with this index. An orientation tag in the file is not applied: the pose is
     /// that of the pixels as they are stored.
     ///

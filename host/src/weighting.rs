@@ -3,7 +3,7 @@
 use crate::attention::{AttentionError, AttentionModel};
 use crate::sources::{SourcePoses, SourceWeights};
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use viewfuse_core::attention::published_cross_attention;
 use viewfuse_core::pose::Pose;
@@ -27,6 +27,9 @@ pub const SCHEME_NAMES: [&str; 12] = [
 
 const GRAMMAR: &str = "mean, l1, frobenius, relative-frobenius, gaussian:beta=B, distance:power=1|2|3, \
      error:alpha=A[,angle=axis|full], cross-attention, attention:FILE";
+
+/// What stands before the file of learned attention.
+const ATTENTION: &str = "attention:";
 
 /// Why a text is not a weighting scheme.
 #[derive(Debug, thiserror::Error)]
@@ -83,6 +86,11 @@ impl Weighting {
     /// The scheme used where a person names none: error weighting with `alpha = 1`, the best of the paper's formulas.
     pub fn default_scheme() -> Weighting {
         Weighting { name: "error:alpha=1".to_owned(), kind: Kind::Formula(Scheme::ERROR) }
+    }
+
+    /// The file of its parameters, if it has one.
+    pub fn file(&self) -> Option<&Path> {
+        self.name.strip_prefix(ATTENTION).map(Path::new)
     }
 
     /// The weights of the sources for a target, in the order of the sources.

@@ -21,6 +21,7 @@ use clap::{Args, ValueEnum};
 use genvs::{RunOptions, parse_noise};
 use name::Model;
 use omission::{Omission, of_genvs, of_pixelnerf};
+use std::path::Path;
 use viewfuse::checkpoint::Checkpoint;
 use viewfuse::field::family::Family;
 use viewfuse::field::genvs::sampling::Plan;
@@ -118,6 +119,14 @@ impl NetworkOptions {
         self.model.as_ref().map(Model::to_string)
     }
 
+    /// The file of the network's parameters, if they come from one.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        match &self.model {
+            Some(Model::File(path)) => Some(path),
+            _ => None,
+        }
+    }
+
     /// Reads the field, as it is unless a person says otherwise.
     pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
         match self.unset()? {
@@ -196,6 +205,11 @@ impl ModelOptions {
     /// Where the network comes from, if there is one.
     pub(crate) fn label(&self) -> Option<String> {
         self.network.label()
+    }
+
+    /// The file of the network's parameters, if they come from one.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        self.network.file()
     }
 
     /// Reads the field. A GeNVS starts each frame from the one before at level `reuse`, if there is one.

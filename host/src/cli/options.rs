@@ -2,7 +2,8 @@
 
 use super::model::AnyField;
 use super::wrong;
-use clap::Args;
+use clap::{ArgMatches, Args, Command};
+use std::collections::BTreeMap;
 use std::time::Duration;
 use viewfuse::device::choice::{self, Chosen, DeviceChoice};
 use viewfuse::few_shot::Selection;
@@ -75,6 +76,19 @@ impl SourceOptions {
     pub(crate) fn to_selection(&self, targets: Option<&str>, orbit: Option<usize>) -> Selection {
         Selection { targets: targets.map(str::to_owned), orbit, sources: self.sources.clone(), view_count: self.views }
     }
+}
+
+/// Every option of the command that was given, by its long name, with its values as a person would write them, defaults
+/// included.
+pub(crate) fn values(command: &Command, matches: &ArgMatches) -> BTreeMap<String, String> {
+    let Some((name, matches)) = matches.subcommand() else { return BTreeMap::new() };
+    let arguments = command.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
+    let value = |argument: &clap::Arg| {
+        let values = matches.try_get_raw(argument.get_id().as_str()).ok()??;
+        let texts: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
+        Some((argument.get_long()?.to_owned(), texts.join(" ")))
+    };
+    arguments.filter_map(value).collect()
 }
 
 fn parse_size(text: &str) -> Result<[u32; 2], String> {

@@ -13,7 +13,7 @@ use viewfuse::device::choice::Chosen;
 use viewfuse::few_shot::FewShot;
 use viewfuse::field::Field;
 use viewfuse::files::{check_writable, remove_if_there, write_png, write_whole};
-use viewfuse::photographs::{SourceImages, to_rgb8};
+use viewfuse::photographs::SourceImages;
 use viewfuse::progress::Progress;
 use viewfuse::record::{
     FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
@@ -194,18 +194,10 @@ impl Run<'_> {
 
     fn sheet(&self, sources: &SourceImages, names: &[String], frame: &Frame) -> RgbImage {
         let (width, height) = frame.picture.dimensions();
-        let over_background = |texels: &[[f32; 4]]| -> Vec<[f32; 4]> {
-            let b = sources.background;
-            texels.iter().map(|t| [0, 1, 2, 3].map(|c| t[c] + if c < 3 { (1.0 - t[3]) * b[c] } else { 0.0 })).collect()
-        };
-        let source = |(index, name): (usize, &String)| {
-            let image = &sources.images[index];
-            let size = [image.camera.pinhole.width(), image.camera.pinhole.height()];
-            SheetSource {
-                name: name.clone(),
-                weight: frame.omission.weights.get(index as u32),
-                picture: to_rgb8(&over_background(&image.texels), size),
-            }
+        let source = |(index, name): (usize, &String)| SheetSource {
+            name: name.clone(),
+            weight: frame.omission.weights.get(index as u32),
+            picture: sources.picture(index),
         };
         let empty_as_nan: Vec<f32> = frame.depths.iter().map(|z| if *z > 0.0 { *z } else { f32::NAN }).collect();
         let scene = self.scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());

@@ -19,7 +19,7 @@ pub struct PlotError(String);
 
 const SIZE: (u32, u32) = (1100, 720);
 /// Told apart also by people who do not see all colours (Okabe and Ito).
-const COLOURS: [RGBColor; 6] = [
+pub(crate) const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
     RGBColor(0, 158, 115),

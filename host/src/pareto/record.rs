@@ -4,7 +4,7 @@ use super::Point;
 use super::difference::Difference;
 use super::front::{best_points, fastest_of_same_look, fastest_without_loss, loss};
 use crate::field::{Denoising, LeftOut};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A sweep as written to `pareto.json`. Times are in seconds.
 #[derive(Clone, Debug, Serialize)]
@@ -36,7 +36,7 @@ pub struct ParetoRecord {
 }
 
 /// A device's points.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DeviceRecord {
     /// The device.
     pub device: String,
@@ -52,7 +52,7 @@ pub struct DeviceRecord {
 
 /// A difference. JSON knows neither infinity nor NaN: where a value was none, `root_mean_square` is null; where pictures
 /// are equal it is 0 and `psnr` is null.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct DifferenceRecord {
     /// Root mean square over pixels and channels of range 1.
     pub root_mean_square: Option<f64>,
@@ -73,7 +73,7 @@ impl From<Difference> for DifferenceRecord {
 }
 
 /// A setting with what it gave.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PointRecord {
     /// The setting, in a few words.
     pub setting: String,
@@ -93,9 +93,11 @@ pub struct PointRecord {
     pub truth_psnr: Option<f64>,
     /// What that loses compared with the exact pictures.
     pub truth_loss: Option<f64>,
-    /// What the field left out in one round.
+    /// What the field left out in one round; not read back.
+    #[serde(skip_deserializing)]
     pub left_out: Vec<LeftOut>,
-    /// How the field went from noise to the pictures of one round; null for fields that do not.
+    /// How the field went from noise to the pictures of one round; null for fields that do not; not read back.
+    #[serde(skip_deserializing)]
     pub denoising: Option<Denoising>,
     /// Whether every round gave the same pictures, bit for bit.
     pub repeatable: bool,

@@ -1,0 +1,97 @@
+//! A report: evaluations, sweeps of run time and trainings on one HTML page that holds everything it shows.
+//!
+//! The page needs no network and no scripts, and says so to the browser (a content security policy that lets nothing in but
+//! its own styles and pictures). What people read off it are tables as papers print them (the best value of a column bold,
+//! the next underlined), figures as SVG, pictures, and the records of how it all came about.
+//!
+//! ```text
+//! evaluation   a folder of `evaluate --protocol`: its tables, pictures, record
+//! figure       a metric over the number of sources
+//! table        tables of results
+//! pictures     sources with weights, every scheme's prediction, the truth
+//! sweep        error against run time
+//! training     curves and records of `train`
+//! page         the whole
+//! ```
+
+mod evaluation;
+mod figure;
+mod page;
+mod pictures;
+mod sweep;
+mod table;
+mod training;
+
+pub use evaluation::Evaluation;
+pub use page::page;
+pub use sweep::Sweep;
+pub use training::Training;
+
+use crate::gallery::GalleryError;
+use crate::pareto::plot::PlotError;
+use crate::run_folder::FolderError;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use std::path::{Path, PathBuf};
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A folder is not that of an evaluation.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The pictures of an evaluation cannot be read.
+    #[error(transparent)]
+    Gallery(#[from] GalleryError),
+    /// A file cannot be read.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// A file is not what it should be.
+    #[error("{}: is not a record of viewfuse {command}: {cause}", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// The command that writes such.
+        command: &'static str,
+        /// What is wrong with it.
+        cause: serde_json::Error,
+    },
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] PlotError),
+    /// A figure cannot be drawn.
+    #[error("a figure cannot be drawn: {0}")]
+    Figure(String),
+}
+
+/// Everything that a page shows.
+#[derive(Debug, Default)]
+pub struct Report {
+    /// Its heading.
+    pub title: String,
+    /// Evaluations, in the order in which they are shown.
+    pub evaluations: Vec<Evaluation>,
+    /// Sweeps of run time.
+    pub sweeps: Vec<Sweep>,
+    /// Trainings.
+    pub trainings: Vec<Training>,
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
+    std::fs::read(path).map_err(|cause| ReportError::Read { path: path.to_path_buf(), cause })
+}
+
+/// Bytes as an address that holds them.
+fn data_address(kind: &str, bytes: &[u8]) -> String {
+    format!("data:{kind};base64,{}", STANDARD.encode(bytes))
+}
+
+/// `1 scene`, `2 scenes`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}

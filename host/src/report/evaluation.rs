@@ -1,0 +1,132 @@
+//! A folder of `evaluate --protocol` on the page.
+
+use super::{ReportError, counted, figure, pictures, table};
+use crate::gallery::{Shown, shown};
+use crate::protocol::Protocol;
+use crate::run_folder::{RunFolder, Settings, missing};
+use crate::summary::{REFERENCE, Table, tables};
+use maud::{Markup, PreEscaped, html};
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// An evaluation that is finished or under way.
+#[derive(Clone, Debug)]
+pub struct Evaluation {
+    folder: PathBuf,
+    settings: Settings,
+    devices: BTreeSet<String>,
+    missing: Vec<usize>,
+    tables: Vec<Table>,
+    shown: Vec<Shown>,
+}
+
+impl Evaluation {
+    /// Reads a folder.
+    ///
+    /// # Errors
+    /// [`ReportError`].
+    pub fn open(path: &Path) -> Result<Evaluation, ReportError> {
+        let folder = RunFolder::open(path)?;
+        let finished = folder.finished()?;
+        let settings = folder.settings().clone();
+        let by_count = matches!(settings.protocol.parse(), Ok(Protocol::Count { .. }));
+        Ok(Evaluation {
+            folder: path.to_path_buf(),
+            devices: finished.values().map(|job| job.device.clone()).collect(),
+            missing: missing(settings.job_count, &finished),
+            tables: if finished.is_empty() { Vec::new() } else { tables(finished.values(), by_count) },
+            shown: shown(path)?,
+            settings,
+        })
+    }
+
+    /// Its heading.
+    pub(super) fn title(&self) -> &'static str {
+        match self.settings.protocol.parse() {
+            Ok(Protocol::Random { .. }) => "Random sources and targets",
+            Ok(Protocol::Close { .. }) => "One source close to the target",
+            Ok(Protocol::Count { .. }) => "Number of sources",
+            Ok(Protocol::Fixed { .. }) => "Fixed views",
+            Err(_) => "Evaluation",
+        }
+    }
+
+    pub(super) fn section(&self, id: &str) -> Result<Markup, ReportError> {
+        let Settings { protocol, field, job_count, notes, scenes, options, .. } = &self.settings;
+        let network = options.get("model").map_or(String::new(), |model| format!(" {model}"));
+        let done = job_count - self.missing.len();
+        let figures = if self.tables.len() > 1 { figure::all(&self.tables)? } else { Vec::new() };
+        Ok(html! {
+            section id=(id) {
+                h2 { (self.title()) }
+                p.facts {
+                    span { code { (protocol) } }
+                    span { (counted(scenes.len(), "scene")) }
+                    span { "field: " (field) (network) }
+                    @for device in &self.devices { span { (device) } }
+                }
+                @if !self.missing.is_empty() {
+                    p.warning {
+                        strong { "Not finished: " } (done) " of " (counted(*job_count, "job")) "; the tables are of these. Missing: "
+                        (named(&self.missing)) "."
+                    }
+                }
+                @for note in notes { p.note { (note) } }
+                @for lead in self.tables.iter().filter_map(lead) { p.lead { (lead) } }
+                @if !figures.is_empty() {
+                    div.figures { @for svg in &figures { figure { div.scroll { (PreEscaped(svg)) } } } }
+                }
+                @for results in &self.tables { (table::results(results)) }
+                @if !self.tables.is_empty() { (table::legend()) }
+                @if !self.shown.is_empty() {
+                    h3 { "Pictures" }
+                    @for shown in &self.shown { (pictures::comparison(&self.folder, shown)?) }
+                }
+                (self.record())
+            }
+        })
+    }
+
+    fn record(&self) -> Markup {
+        let Settings { viewfuse, schemes, options, files, scenes, job_count, .. } = &self.settings;
+        let names: Vec<&str> = scenes.iter().map(|scene| scene.name.as_str()).collect();
+        let devices: Vec<&str> = self.devices.iter().map(String::as_str).collect();
+        let mut rows = vec![
+            ("folder".to_owned(), self.folder.display().to_string()),
+            ("viewfuse".to_owned(), viewfuse.clone()),
+            ("jobs".to_owned(), job_count.to_string()),
+            ("schemes".to_owned(), schemes.join("   ")),
+            ("scenes".to_owned(), names.join(", ")),
+            ("devices".to_owned(), devices.join(", ")),
+        ];
+        rows.extend(options.iter().map(|(name, value)| (format!("--{name}"), value.clone())));
+        rows.extend(files.iter().map(|(path, digest)| (format!("SHA-256 of {path}"), digest.clone())));
+        table::record("Run record", &rows)
+    }
+}
+
+/// The best scheme of a table in a sentence.
+fn lead(table: &Table) -> Option<String> {
+    let metric = table.metrics.first()?;
+    let best = table.rows.iter().find(|row| row.cells[0].as_ref().is_some_and(|cell| cell.place == 1))?;
+    let cell = best.cells[0].as_ref()?;
+    let gain = cell
+        .versus_reference
+        .as_ref()
+        .map_or(String::new(), |versus| format!(", {} over {REFERENCE}", metric.interval_text(versus, true)));
+    let sources: Vec<String> = table.source_counts.iter().map(usize::to_string).collect();
+    Some(format!(
+        "{} sources: {} leads with {} {}{gain}.",
+        sources.join(", "),
+        best.scheme,
+        metric.label,
+        metric.text(cell.value.mean)
+    ))
+}
+
+/// Numbers, the first few.
+fn named(numbers: &[usize]) -> String {
+    let first: Vec<String> = numbers.iter().take(12).map(usize::to_string).collect();
+    let more = numbers.len().saturating_sub(12);
+    if more > 0 { format!("{} and {more} more", first.join(", ")) } else { first.join(", ") }
+}
