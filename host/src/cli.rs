@@ -1,10 +1,12 @@
 //! The command line: what each command takes. What each does is in its own file.
 
 mod check;
+mod compare;
 mod convert;
 mod devices;
 mod evaluate;
 mod inspect;
+mod metrics_options;
 mod model;
 mod options;
 mod pareto;
@@ -48,6 +50,8 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Measure error against run time over what can be left out, on each device.
     Pareto(pareto::Arguments),
+    /// Score pictures against what they should be.
+    Compare(compare::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
@@ -68,6 +72,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Pareto(arguments) => pareto::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
