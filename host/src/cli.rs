@@ -11,7 +11,9 @@ mod model;
 mod options;
 mod pareto;
 mod render;
+mod scenes;
 mod table;
+mod train;
 mod verify;
 mod weights;
 
@@ -52,6 +54,10 @@ enum Command {
     Pareto(pareto::Arguments),
     /// Score pictures against what they should be.
     Compare(compare::Arguments),
+    /// Learn a network, or the weighting of views for one, from scenes.
+    Train(train::Arguments),
+    /// Make scenes to learn from.
+    Scenes(scenes::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
@@ -73,6 +79,8 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Evaluate(arguments) => evaluate::run(&arguments),
         Command::Pareto(arguments) => pareto::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

@@ -20,6 +20,7 @@
 //! evaluate, inspect, verify     the other jobs
 //! pareto                        error against run time
 //! check                         how closely devices agree with the mathematics
+//! train                         networks and weightings, learned from scenes
 //! ```
 //!
 //! The command line is the binary's (`main.rs`, `cli/`).
@@ -48,6 +49,7 @@ pub mod scene;
 pub mod sheet;
 pub mod sources;
 pub mod synthetic;
+pub mod train;
 pub mod verify;
 pub mod weighting;
 

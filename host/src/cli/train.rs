@@ -1,0 +1,116 @@
+//! `viewfuse train`.
+
+use super::{on_threads, say};
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use viewfuse::progress::Progress;
+use viewfuse::train::{Outcome, PixelNerfSettings, Schedule, train_pixelnerf};
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// A small PixelNeRF from scratch.
+    Pixelnerf(PixelNerfArguments),
+}
+
+/// What every run has.
+#[derive(Args)]
+struct RunOptions {
+    /// Data: ROOT/cars for ROOT/cars_train and ROOT/cars_val, or a folder that holds such folders
+    data: PathBuf,
+    /// Folder of the run: its state, the learned model, curves and a record. A run that is there already goes on
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Steps of the run
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: u32,
+    /// Learning rate; it rises over the first hundred steps and falls along a cosine
+    #[arg(long, value_name = "RATE", default_value_t = 1.0e-3)]
+    rate: f64,
+    /// Seed of every random number
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Steps from one validation to the next
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
+    validate_every: u32,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+impl RunOptions {
+    fn schedule(&self) -> Schedule {
+        let RunOptions { steps, rate, seed, validate_every, .. } = *self;
+        Schedule { steps, rate, seed, validate_every }
+    }
+}
+
+#[derive(Args)]
+struct PixelNerfArguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Width of the point network
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    width: usize,
+    /// Side of the pictures, pixels
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    side: u32,
+    /// Objects of a step
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    objects: usize,
+    /// Rays of each object
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    rays: usize,
+    /// Samples of a ray that decide where to look
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    coarse: usize,
+    /// Samples that are added where there is something
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    fine: usize,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    match &arguments.what {
+        What::Pixelnerf(arguments) => pixelnerf(arguments),
+    }
+}
+
+fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
+    let PixelNerfArguments { run, width, side, objects, rays, coarse, fine } = arguments;
+    let settings =
+        PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
+    let [train, validation] = scenes(&run.data)?;
+    let progress = Progress::new("training");
+    let train_it = || train_pixelnerf(&settings, &run.schedule(), [&train, &validation], &run.output, &progress);
+    let outcome = on_threads(run.threads, train_it)??;
+    drop(progress);
+    report(&outcome)
+}
+
+/// Scenes to learn from and to validate on.
+fn scenes(data: &Path) -> anyhow::Result<[Vec<PathBuf>; 2]> {
+    let list = |suffix: &str| -> anyhow::Result<Vec<PathBuf>> {
+        let mut folder = data.as_os_str().to_owned();
+        folder.push(suffix);
+        let mut all: Vec<PathBuf> =
+            std::fs::read_dir(&folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+        all.retain(|path| path.join("rgb").is_dir());
+        all.sort();
+        Ok(all)
+    };
+    Ok([list("_train")?, list("_val")?])
+}
+
+fn report(outcome: &Outcome) -> anyhow::Result<ExitCode> {
+    if let Some((step, score)) = outcome.scores.last() {
+        say(format_args!("{step} steps in {:.0} s, validation {score:.2}", outcome.seconds))?;
+    }
+    say(format_args!("{}", outcome.model.display()))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,255 @@
+//! Convolutions of images `[image][row][column][channel]`, as matrix products of windows laid out in rows.
+//!
+//! The library's own go the other way round in memory, have no gradient for what the published networks do with them
+//! (dilation beside stride, one filter a channel) or take many times as long.
+
+use super::{Operation, Real};
+use ndarray::linalg::general_mat_mul;
+use ndarray::{ArrayView2, ArrayViewMut2};
+use rayon::prelude::*;
+
+/// How windows lie on an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Window {
+    /// Side of a window.
+    pub(crate) size: usize,
+    /// Pixels from one to the next.
+    pub(crate) stride: usize,
+    /// How far they reach over the border, where zeros are.
+    pub(crate) padding: usize,
+    /// Pixels between neighbours in a window.
+    pub(crate) dilation: usize,
+}
+
+impl Window {
+    /// Of this side, every pixel, over the border so that the image keeps its size.
+    pub(crate) fn same(size: usize) -> Window {
+        Window { size, stride: 1, padding: size / 2, dilation: 1 }
+    }
+
+    /// How many there are on a side.
+    pub(crate) fn count(&self, side: usize) -> usize {
+        (side + 2 * self.padding - self.dilation * (self.size - 1) - 1) / self.stride + 1
+    }
+
+    fn is_a_pixel(&self) -> bool {
+        self.size == 1 && self.stride == 1 && self.padding == 0
+    }
+
+    /// Calls `visit(first number of a pixel, place in the window)` for what of an output's window lies on the image.
+    fn visit(&self, [height, width]: [usize; 2], row: usize, column: usize, mut visit: impl FnMut(usize, usize)) {
+        for place_row in 0..self.size {
+            let y = (row * self.stride + place_row * self.dilation).wrapping_sub(self.padding);
+            if y >= height {
+                continue;
+            }
+            for place_column in 0..self.size {
+                let x = (column * self.stride + place_column * self.dilation).wrapping_sub(self.padding);
+                if x < width {
+                    visit(y * width + x, place_row * self.size + place_column);
+                }
+            }
+        }
+    }
+}
+
+/// Inputs: images `[image][row][column][in]`, weights `[out][place][in]`. Result `[image][row][column][out]`.
+pub(crate) struct Convolution {
+    /// Images, rows, columns, channels of the input.
+    pub(crate) input: [usize; 4],
+    pub(crate) out_channels: usize,
+    pub(crate) window: Window,
+    /// Whether anybody asks for the gradient of the images.
+    pub(crate) differentiates_input: bool,
+}
+
+impl Convolution {
+    fn out_size(&self) -> [usize; 2] {
+        [self.window.count(self.input[1]), self.window.count(self.input[2])]
+    }
+
+    fn row_len(&self) -> usize {
+        self.window.size * self.window.size * self.input[3]
+    }
+
+    /// Windows of an image in rows `[pixel][place][channel]`.
+    fn unfold<T: Real>(&self, image: &[T]) -> Vec<T> {
+        let [_, height, width, channels] = self.input;
+        let [out_height, out_width] = self.out_size();
+        let row_len = self.row_len();
+        let mut rows = vec![T::zero(); out_height * out_width * row_len];
+        for (pixel, own) in rows.chunks_exact_mut(row_len).enumerate() {
+            self.window.visit([height, width], pixel / out_width, pixel % out_width, |from, place| {
+                own[place * channels..][..channels].copy_from_slice(&image[from * channels..][..channels]);
+            });
+        }
+        rows
+    }
+
+    /// The sum of the rows' numbers where they came from.
+    fn fold<T: Real>(&self, rows: &[T], image: &mut [T]) {
+        let [_, height, width, channels] = self.input;
+        let [_, out_width] = self.out_size();
+        for (pixel, own) in rows.chunks_exact(self.row_len()).enumerate() {
+            self.window.visit([height, width], pixel / out_width, pixel % out_width, |to, place| {
+                let from = &own[place * channels..][..channels];
+                image[to * channels..][..channels].iter_mut().zip(from).for_each(|(to, from)| *to += *from);
+            });
+        }
+    }
+}
+
+impl Operation<2> for Convolution {
+    const NAME: &'static str = "convolve";
+
+    fn shape(&self) -> Vec<usize> {
+        let [height, width] = self.out_size();
+        vec![self.input[0], height, width, self.out_channels]
+    }
+
+    fn forward<T: Real>(&self, [images, weights]: [&[T]; 2]) -> Vec<T> {
+        let [count, height, width, channels] = self.input;
+        let [out_height, out_width] = self.out_size();
+        let (pixels, row_len, outs) = (out_height * out_width, self.row_len(), self.out_channels);
+        let mut output = vec![T::zero(); count * pixels * outs];
+        let weights = matrix(weights, outs, row_len);
+        let each = images.par_chunks_exact(height * width * channels).zip(output.par_chunks_exact_mut(pixels * outs));
+        each.for_each(|(image, output)| {
+            let unfolded;
+            let rows = if self.window.is_a_pixel() {
+                image
+            } else {
+                unfolded = self.unfold(image);
+                &unfolded
+            };
+            product(matrix(rows, pixels, row_len), weights.t(), matrix_mut(output, pixels, outs));
+        });
+        output
+    }
+
+    fn backward<T: Real>(&self, [images, weights]: [&[T]; 2], gradient: &[T]) -> [Option<Vec<T>>; 2] {
+        let [count, height, width, channels] = self.input;
+        let [out_height, out_width] = self.out_size();
+        let (pixels, row_len, outs) = (out_height * out_width, self.row_len(), self.out_channels);
+        let image_len = height * width * channels;
+        let weights = matrix(weights, outs, row_len);
+        let mut of_images = vec![T::zero(); if self.differentiates_input { images.len() } else { 0 }];
+        let mut parts: Vec<&mut [T]> = of_images.chunks_exact_mut(image_len).collect();
+        parts.resize_with(count, Default::default);
+        let one = |(index, of_image): (usize, &mut [T])| {
+            let image = &images[index * image_len..][..image_len];
+            let gradient = matrix(&gradient[index * pixels * outs..][..pixels * outs], pixels, outs);
+            let mut of_weights = vec![T::zero(); outs * row_len];
+            let unfolded;
+            let rows = if self.window.is_a_pixel() {
+                image
+            } else {
+                unfolded = self.unfold(image);
+                &unfolded
+            };
+            product(gradient.t(), matrix(rows, pixels, row_len), matrix_mut(&mut of_weights, outs, row_len));
+            if self.differentiates_input {
+                let mut of_rows = vec![T::zero(); pixels * row_len];
+                product(gradient, weights, matrix_mut(&mut of_rows, pixels, row_len));
+                if self.window.is_a_pixel() {
+                    of_image.copy_from_slice(&of_rows);
+                } else {
+                    self.fold(&of_rows, of_image);
+                }
+            }
+            of_weights
+        };
+        let of_weights: Vec<Vec<T>> = parts.into_par_iter().enumerate().map(one).collect();
+        [self.differentiates_input.then_some(of_images), Some(sum(of_weights))]
+    }
+}
+
+/// One filter a channel. Inputs: images `[image][row][column][channel]`, weights `[place][channel]`.
+pub(crate) struct DepthwiseConvolution {
+    /// Images, rows, columns, channels of the input.
+    pub(crate) input: [usize; 4],
+    pub(crate) window: Window,
+}
+
+impl Operation<2> for DepthwiseConvolution {
+    const NAME: &'static str = "convolve_depthwise";
+
+    fn shape(&self) -> Vec<usize> {
+        let [count, height, width, channels] = self.input;
+        vec![count, self.window.count(height), self.window.count(width), channels]
+    }
+
+    fn forward<T: Real>(&self, [images, weights]: [&[T]; 2]) -> Vec<T> {
+        let [_, height, width, channels] = self.input;
+        let out_width = self.window.count(width);
+        let mut output = vec![T::zero(); self.shape().iter().product()];
+        let out_len = self.window.count(height) * out_width * channels;
+        let each = images.par_chunks_exact(height * width * channels).zip(output.par_chunks_exact_mut(out_len));
+        each.for_each(|(image, output)| {
+            for (pixel, own) in output.chunks_exact_mut(channels).enumerate() {
+                self.window.visit([height, width], pixel / out_width, pixel % out_width, |from, place| {
+                    let (from, by) = (&image[from * channels..][..channels], &weights[place * channels..][..channels]);
+                    own.iter_mut().zip(from.iter().zip(by)).for_each(|(own, (from, by))| *own += *from * *by);
+                });
+            }
+        });
+        output
+    }
+
+    fn backward<T: Real>(&self, [images, weights]: [&[T]; 2], gradient: &[T]) -> [Option<Vec<T>>; 2] {
+        let [_, height, width, channels] = self.input;
+        let out_width = self.window.count(width);
+        let (image_len, out_len) = (height * width * channels, self.window.count(height) * out_width * channels);
+        let mut of_images = vec![T::zero(); images.len()];
+        let each = of_images.par_chunks_exact_mut(image_len).zip(images.par_chunks_exact(image_len));
+        let one = |((of_image, image), gradient): ((&mut [T], &[T]), &[T])| {
+            let mut of_weights = vec![T::zero(); weights.len()];
+            for (pixel, own) in gradient.chunks_exact(channels).enumerate() {
+                self.window.visit([height, width], pixel / out_width, pixel % out_width, |at, place| {
+                    let (at, place) = (at * channels, place * channels);
+                    for channel in 0..channels {
+                        of_image[at + channel] += own[channel] * weights[place + channel];
+                        of_weights[place + channel] += own[channel] * image[at + channel];
+                    }
+                });
+            }
+            of_weights
+        };
+        let of_weights: Vec<Vec<T>> = each.zip(gradient.par_chunks_exact(out_len)).map(one).collect();
+        [Some(of_images), Some(sum(of_weights))]
+    }
+}
+
+/// The sum of lists, in their order: the same for any number of threads.
+pub(super) fn sum<T: Real>(lists: Vec<Vec<T>>) -> Vec<T> {
+    let mut lists = lists.into_iter();
+    let mut all = lists.next().unwrap_or_default();
+    for list in lists {
+        all.iter_mut().zip(&list).for_each(|(all, own)| *all += *own);
+    }
+    all
+}
+
+/// Numbers as rows and columns. Their count is that of the matrix by construction.
+pub(super) fn matrix<T>(values: &[T], rows: usize, columns: usize) -> ArrayView2<'_, T> {
+    ArrayView2::from_shape((rows, columns), values).expect("as many numbers as the matrix has")
+}
+
+/// As [`matrix`], to be written.
+pub(super) fn matrix_mut<T>(values: &mut [T], rows: usize, columns: usize) -> ArrayViewMut2<'_, T> {
+    ArrayViewMut2::from_shape((rows, columns), values).expect("as many numbers as the matrix has")
+}
+
+/// `output = left x right`.
+pub(super) fn product<T: Real>(left: ArrayView2<'_, T>, right: ArrayView2<'_, T>, mut output: ArrayViewMut2<'_, T>) {
+    general_mat_mul(T::one(), &left, &right, T::zero(), &mut output);
+}
+
+/// `output += left x right`.
+pub(super) fn add_product<T: Real>(
+    left: ArrayView2<'_, T>,
+    right: ArrayView2<'_, T>,
+    mut output: ArrayViewMut2<'_, T>,
+) {
+    general_mat_mul(T::one(), &left, &right, T::one(), &mut output);
+}
