@@ -14,6 +14,7 @@
 //! checkpoint                    files of network parameters: Checkpoint
 //! device                        where kernels run: Device, the CPU, Vulkan devices, which one
 //! field                         photographs -> picture: Field, the field that needs no weights file
+//! metrics                       how good pictures are, as numbers and through networks' eyes: Metrics
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
 //! evaluate, inspect, verify     the other jobs
@@ -41,6 +42,7 @@ pub mod formula;
 pub mod gallery;
 pub mod inspect;
 pub mod interrupt;
+pub mod metrics;
 pub mod pareto;
 pub mod photographs;
 pub mod progress;
