@@ -5,6 +5,7 @@
 //! ```text
 //! interrupt, progress, files    stopping cleanly, showing progress, outputs that appear whole
 //! scene                         a folder of posed photographs: Scene, View, Photograph
+//! dataset                       folders of many scenes: Dataset, Split
 //! synthetic                     scenes made by ourselves
 //! rig                           the cameras as a whole: focus, up, orbits
 //! sources                       how many sources there can be
@@ -33,6 +34,7 @@ pub mod attention;
 pub mod canvas;
 pub mod check;
 pub mod checkpoint;
+pub mod dataset;
 pub mod device;
 pub mod evaluate;
 pub mod few_shot;

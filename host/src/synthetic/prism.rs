@@ -46,18 +46,35 @@ impl Width {
     }
 }
 
-/// An edge of an outline: from a corner to the next.
+/// Edges that are looked at together: as many as the narrowest vector instructions take.
+const EDGES_TOGETHER: usize = 4;
+
+/// Edges of an outline, each from a corner to the next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Edge {
-    start: [f32; 2],
-    along: [f32; 2],
-    inverse_square: f32,
+struct Edges {
+    start_x: [f32; EDGES_TOGETHER],
+    start_z: [f32; EDGES_TOGETHER],
+    along_x: [f32; EDGES_TOGETHER],
+    along_z: [f32; EDGES_TOGETHER],
+    inverse_square: [f32; EDGES_TOGETHER],
+}
+
+impl Edges {
+    /// Edges without length, far away from everything.
+    const NOTHING: Edges = Edges {
+        start_x: [1.0e9; EDGES_TOGETHER],
+        start_z: [1.0e9; EDGES_TOGETHER],
+        along_x: [0.0; EDGES_TOGETHER],
+        along_z: [0.0; EDGES_TOGETHER],
+        inverse_square: [0.0; EDGES_TOGETHER],
+    };
 }
 
 /// An outline with a width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prism {
-    edges: [Edge; LARGEST_CORNER_COUNT],
+    edges: [Edges; LARGEST_CORNER_COUNT / EDGES_TOGETHER],
+    shortest_edge: f32,
     /// As asked for; [`Prism::is_sound`] refuses one that is too large.
     corner_count: usize,
     width: Width,
@@ -71,14 +88,19 @@ impl Prism {
     /// The prism over the outline with these corners (x and z, in either sense, each once), which rounding then widens
     /// on all sides. The outline must not cross itself.
     pub fn new(corners: &[[f32; 2]], width: Width) -> Prism {
-        let nothing = Edge { start: [0.0; 2], along: [0.0; 2], inverse_square: 0.0 };
-        let mut edges = [nothing; LARGEST_CORNER_COUNT];
+        let mut edges = [Edges::NOTHING; LARGEST_CORNER_COUNT / EDGES_TOGETHER];
+        let mut shortest_edge = f32::MAX;
         let mut reach = [0.0_f32; 2];
-        for (index, (edge, &start)) in edges.iter_mut().zip(corners).enumerate() {
+        for (index, &[x, z]) in corners.iter().enumerate().take(LARGEST_CORNER_COUNT) {
+            let (edges, lane) = (&mut edges[index / EDGES_TOGETHER], index % EDGES_TOGETHER);
             let end = corners[(index + 1) % corners.len()];
-            let along = [end[0] - start[0], end[1] - start[1]];
-            *edge = Edge { start, along, inverse_square: 1.0 / (along[0] * along[0] + along[1] * along[1]) };
-            reach = [max(reach[0], abs(start[0])), max(reach[1], abs(start[1]))];
+            let along = [end[0] - x, end[1] - z];
+            let squared_length = along[0] * along[0] + along[1] * along[1];
+            (edges.start_x[lane], edges.start_z[lane]) = (x, z);
+            [edges.along_x[lane], edges.along_z[lane]] = along;
+            edges.inverse_square[lane] = 1.0 / squared_length;
+            shortest_edge = min(shortest_edge, sqrt(squared_length));
+            reach = [max(reach[0], abs(x)), max(reach[1], abs(z))];
         }
         let half_box = Vec3::new(reach[0] + width.rounding, width.half_width, reach[1] + width.rounding);
         let end_slope = if width.nose > 0.0 { 2.0 * width.nose / (half_box.x - width.shoulder) } else { 0.0 };
@@ -86,7 +108,7 @@ impl Prism {
         // the largest singular value of the two, for the steepest change there is.
         let slope_squared = width.lean * width.lean + end_slope * end_slope;
         let steepest = 0.5 * (2.0 + slope_squared + sqrt(slope_squared * (slope_squared + 4.0)));
-        Prism { edges, corner_count: corners.len(), width, half_box, scale: 1.0 / sqrt(steepest) }
+        Prism { edges, shortest_edge, corner_count: corners.len(), width, half_box, scale: 1.0 / sqrt(steepest) }
     }
 
     /// Half of the extent along each axis of a box around the local origin that holds the prism.
@@ -122,20 +144,24 @@ impl Prism {
 
     /// Signed distance to the outline in its plane, negative inside.
     fn outline_distance(&self, x: f32, z: f32) -> f32 {
-        let mut nearest = f32::MAX;
-        let mut inside = false;
-        for edge in &self.edges[..self.corner_count.min(LARGEST_CORNER_COUNT)] {
-            let from = [x - edge.start[0], z - edge.start[1]];
-            let [along_x, along_z] = edge.along;
-            let t = clamp((from[0] * along_x + from[1] * along_z) * edge.inverse_square, 0.0, 1.0);
-            let off = [from[0] - along_x * t, from[1] - along_z * t];
-            nearest = min(nearest, off[0] * off[0] + off[1] * off[1]);
-            // Whether the level line through the point meets the edge on the point's right.
-            let spans = (from[1] >= 0.0) != (from[1] >= along_z);
-            let left = (along_x * from[1] > along_z * from[0]) == (along_z > 0.0);
-            inside ^= spans && left;
+        let mut nearest = [f32::MAX; EDGES_TOGETHER];
+        let mut crossings = [0_u32; EDGES_TOGETHER];
+        let count = self.corner_count.min(LARGEST_CORNER_COUNT).div_ceil(EDGES_TOGETHER);
+        for edges in &self.edges[..count] {
+            for lane in 0..EDGES_TOGETHER {
+                let (along_x, along_z) = (edges.along_x[lane], edges.along_z[lane]);
+                let (from_x, from_z) = (x - edges.start_x[lane], z - edges.start_z[lane]);
+                let t = clamp((from_x * along_x + from_z * along_z) * edges.inverse_square[lane], 0.0, 1.0);
+                let (off_x, off_z) = (from_x - along_x * t, from_z - along_z * t);
+                nearest[lane] = min(nearest[lane], off_x * off_x + off_z * off_z);
+                // Whether the level line from the point towards growing x meets the edge.
+                let spans = (from_z >= 0.0) != (from_z >= along_z);
+                let before = (along_x * from_z > along_z * from_x) == (along_z > 0.0);
+                crossings[lane] ^= u32::from(spans & before);
+            }
         }
-        if inside { -sqrt(nearest) } else { sqrt(nearest) }
+        let distance = sqrt(nearest.into_iter().fold(f32::MAX, min));
+        if crossings.into_iter().fold(0, |sum, crossing| sum ^ crossing) == 1 { -distance } else { distance }
     }
 
     /// Whether there are 3 to [`LARGEST_CORNER_COUNT`] corners, no edge is shorter than [`SHORTEST_EDGE`], every number
@@ -145,10 +171,7 @@ impl Prism {
         let slopes = lean >= 0.0 && nose >= 0.0 && (0.0..self.half_box.x).contains(&shoulder);
         let narrowest = half_width - lean * max(self.half_box.z - waist, 0.0) - nose;
         (3..=LARGEST_CORNER_COUNT).contains(&self.corner_count)
-            && self.edges[..self.corner_count].iter().all(|edge| {
-                let [x, z] = edge.along;
-                x * x + z * z >= SHORTEST_EDGE * SHORTEST_EDGE
-            })
+            && self.shortest_edge >= SHORTEST_EDGE
             && self.half_box.is_finite()
             && waist.is_finite()
             && self.scale > 0.0

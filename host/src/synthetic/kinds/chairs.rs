@@ -21,6 +21,8 @@ struct Chair {
     /// Half of the height of all.
     half_height: f32,
     frame: Finish,
+    /// Whether the seat is a disc. What stands below it then stands closer together.
+    round: bool,
 }
 
 /// Adds a chair.
@@ -37,11 +39,12 @@ pub(super) fn chair(draws: &mut Draws, build: &mut Build) {
         half_thickness: draws.between(0.012, 0.045),
         half_height,
         frame,
+        round: draws.chance(if stool { 0.7 } else { 0.12 }),
     };
     let cover_colour = if draws.chance(0.4) { frame_colour } else { contrast(draws, frame_colour) };
     let size = draws.between(0.02, 0.06);
     let cover = Finish { texture: pattern(draws, cover_colour, size), gloss: gloss(draws) };
-    seat(&chair, build, draws, cover, stool);
+    seat(&chair, build, draws, cover);
     base(&chair, build, draws);
     if !stool {
         back(&chair, build, draws, cover);
@@ -63,10 +66,10 @@ fn grained(draws: &mut Draws, colour: Vec3) -> Texture {
     Texture::Mottle { colours: [colour, colour * 0.65], cell: Vec3::new(0.02, 0.02, 0.15), seed: draws.below(1 << 20) }
 }
 
-fn seat(chair: &Chair, build: &mut Build, draws: &mut Draws, cover: Finish, stool: bool) {
+fn seat(chair: &Chair, build: &mut Build, draws: &mut Draws, cover: Finish) {
     let [depth, width] = chair.seat;
     let centre = [0.0, 0.0, chair.top - chair.half_thickness];
-    if draws.chance(if stool { 0.7 } else { 0.12 }) {
+    if chair.round {
         let radius = 0.5 * (depth + width);
         let rounding = 0.6 * chair.half_thickness;
         build.add(Shape::Cylinder { radius, half_height: chair.half_thickness, rounding }, place(centre), cover);
@@ -85,7 +88,7 @@ fn seat(chair: &Chair, build: &mut Build, draws: &mut Draws, cover: Finish, stoo
 
 /// What stands on the floor.
 fn base(chair: &Chair, build: &mut Build, draws: &mut Draws) {
-    let [depth, width] = chair.seat;
+    let [depth, width] = chair.seat.map(|half| if chair.round { 0.7 * half } else { half });
     let (floor, under) = (-chair.half_height, chair.top - 2.0 * chair.half_thickness);
     let thickness = draws.between(0.011, 0.026);
     let tips = if draws.chance(0.25) { plain(paint(draws), 0.2) } else { chair.frame };
@@ -110,13 +113,14 @@ fn base(chair: &Chair, build: &mut Build, draws: &mut Draws) {
         }
         // Two bent runners.
         2 => {
+            let closed = draws.chance(0.5);
             for side in [1.0, -1.0] {
                 let y = side * (width - thickness);
                 let (front, rear) = (depth - thickness, thickness - depth);
                 let low = floor + thickness;
                 build.rod(Vec3::new(front, y, under), Vec3::new(front, y, low), thickness, chair.frame);
                 build.rod(Vec3::new(front, y, low), Vec3::new(rear, y, low), thickness, chair.frame);
-                if draws.chance(0.5) {
+                if closed {
                     build.rod(Vec3::new(rear, y, low), Vec3::new(rear, y, under), thickness, chair.frame);
                 }
             }

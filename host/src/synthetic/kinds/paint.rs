@@ -30,17 +30,24 @@ pub(super) fn hue(turns: f32, saturation: f32, value: f32) -> Vec3 {
     Vec3::new(channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0))
 }
 
-/// Any paint: white and silver, black, vivid, dull.
+/// Any paint: white and silver, black, vivid, dull. Vivid ones are red, blue and yellow more often than others, as paints
+/// are.
 pub(super) fn paint(draws: &mut Draws) -> Vec3 {
-    let turns = draws.unit();
+    let turns = match draws.below(8) {
+        0 | 1 => draws.between(0.96, 1.05),
+        2 | 3 => draws.between(0.53, 0.68),
+        4 => draws.between(0.05, 0.17),
+        _ => draws.unit(),
+    };
+    let turns = if turns < 1.0 { turns } else { turns - 1.0 };
     let tint = draws.between(0.0, 0.12);
     match draws.below(20) {
-        0..3 => hue(turns, tint, draws.between(0.82, 1.0)),
-        3..5 => hue(turns, tint, draws.between(0.45, 0.8)),
-        5..8 => hue(turns, tint, draws.between(0.03, 0.22)),
-        8..15 => hue(turns, draws.between(0.7, 1.0), draws.between(0.55, 1.0)),
+        0..4 => hue(turns, tint, draws.between(0.85, 1.0)),
+        4..6 => hue(turns, tint, draws.between(0.45, 0.8)),
+        6..8 => hue(turns, tint, draws.between(0.03, 0.22)),
+        8..15 => hue(turns, draws.between(0.7, 1.0), draws.between(0.6, 1.0)),
         15..17 => hue(turns, draws.between(0.5, 0.95), draws.between(0.2, 0.5)),
-        _ => hue(turns, draws.between(0.2, 0.6), draws.between(0.4, 0.95)),
+        _ => hue(turns, draws.between(0.2, 0.6), draws.between(0.5, 1.0)),
     }
 }
 
@@ -89,8 +96,8 @@ pub(super) fn light(draws: &mut Draws) -> Light {
     let (sine, cosine) = sin_cos(TAU * draws.unit());
     let spread = draws.between(0.2, 1.1);
     let soft = draws.unit();
-    let below = draws.between(0.35, 0.8);
-    let above = mix(0.35, 0.85, soft);
+    let below = draws.between(0.45, 0.85);
+    let above = mix(0.45, 0.95, soft);
     Light {
         key: Vec3::new(spread * cosine, spread * sine, 1.0),
         key_light: mix(0.8, 0.15, soft) * draws.between(0.85, 1.15),
