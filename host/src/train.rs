@@ -9,18 +9,22 @@
 //! scenes       pictures and cameras in memory            TrainingScene
 //! draw         random numbers of a step                  Draw
 //! batch        sources and target rays of a step         Batch
-//! operations   gradients of our own kernels              Convolution, PointNetwork
+//! operations   gradients of our own kernels              Convolution, PointNetwork, Look
 //! images, compositing     parts of the graphs
-//! pixelnerf    a network as a graph                      PixelNerf
-//! parameters, adam        what is learned, and how
+//! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
+//! parameters, adam, average     what is learned, and how
+//! pixelnerf_learner, genvs_learner      losses
 //! run          steps, validation, continuing             run, Settings
 //! ```
 
 mod adam;
+mod average;
 mod batch;
 mod compositing;
 mod curve;
 mod draw;
+mod genvs;
+mod genvs_learner;
 mod images;
 mod operations;
 mod parameters;
@@ -30,6 +34,7 @@ mod run;
 mod scenes;
 mod state;
 
+pub use genvs_learner::{GenvsSettings, train_genvs};
 pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
 

@@ -4,8 +4,9 @@ use super::{on_threads, say};
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use viewfuse::dataset::{Dataset, Split};
 use viewfuse::progress::Progress;
-use viewfuse::train::{Outcome, PixelNerfSettings, Schedule, train_pixelnerf};
+use viewfuse::train::{GenvsSettings, Outcome, PixelNerfSettings, Schedule, train_genvs, train_pixelnerf};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -17,6 +18,8 @@ pub(crate) struct Arguments {
 enum What {
     /// A small PixelNeRF from scratch.
     Pixelnerf(PixelNerfArguments),
+    /// A small GeNVS from scratch: volumes, feature images and the denoiser, all at once.
+    Genvs(GenvsArguments),
 }
 
 /// What every run has.
@@ -75,9 +78,52 @@ struct PixelNerfArguments {
     fine: usize,
 }
 
+#[derive(Args)]
+struct GenvsArguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Channels of the denoiser's first level, a multiple of 4
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = width)]
+    width: usize,
+    /// Side of the pictures, pixels, a multiple of 16
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
+    side: u32,
+    /// Objects of a step
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = count)]
+    objects: usize,
+    /// Targets of each object
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count)]
+    targets: usize,
+    /// Samples of a ray: as many as renders will have
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
+    samples: u32,
+}
+
+fn width(text: &str) -> Result<usize, String> {
+    number(text, 4).map(|number| number as usize)
+}
+
+fn side(text: &str) -> Result<u32, String> {
+    number(text, 16)
+}
+
+fn count(text: &str) -> Result<usize, String> {
+    number(text, 1).map(|number| number as usize)
+}
+
+/// A whole number above zero, a multiple of `step`.
+fn number(text: &str, step: u32) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(number @ 1..=1024) if number % step == 0 => Ok(number),
+        _ if step == 1 => Err("a whole number from 1 to 1024 is needed".to_owned()),
+        _ => Err(format!("a multiple of {step} from {step} to 1024 is needed")),
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.what {
         What::Pixelnerf(arguments) => pixelnerf(arguments),
+        What::Genvs(arguments) => genvs(arguments),
     }
 }
 
@@ -93,18 +139,21 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     report(&outcome)
 }
 
+fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
+    let GenvsArguments { run, width, side, objects, targets, samples } = arguments;
+    let settings =
+        GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
+    let [train, validation] = scenes(&run.data)?;
+    let progress = Progress::new("training");
+    let train_it = || train_genvs(&settings, &run.schedule(), [&train, &validation], &run.output, &progress);
+    let outcome = on_threads(run.threads, train_it)??;
+    drop(progress);
+    report(&outcome)
+}
+
 /// Scenes to learn from and to validate on.
 fn scenes(data: &Path) -> anyhow::Result<[Vec<PathBuf>; 2]> {
-    let list = |suffix: &str| -> anyhow::Result<Vec<PathBuf>> {
-        let mut folder = data.as_os_str().to_owned();
-        folder.push(suffix);
-        let mut all: Vec<PathBuf> =
-            std::fs::read_dir(&folder)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
-        all.retain(|path| path.join("rgb").is_dir());
-        all.sort();
-        Ok(all)
-    };
-    Ok([list("_train")?, list("_val")?])
+    Ok([Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes])
 }
 
 fn report(outcome: &Outcome) -> anyhow::Result<ExitCode> {

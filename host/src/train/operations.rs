@@ -6,11 +6,18 @@
 
 mod convolve;
 mod density;
+mod linear;
+mod look;
+mod normalise;
 mod point_network;
+mod shift;
 
 pub(crate) use density::RectifiedDensity;
 pub(crate) use convolve::{Convolution, DepthwiseConvolution, Window};
+pub(crate) use look::{Look, LookSizes, Sight};
+pub(crate) use normalise::Normalise;
 pub(crate) use point_network::{PointNetwork, PointNetworkSizes, Points};
+pub(crate) use shift::Shift;
 
 use candle_core::{
     CpuStorage, CustomOp1, CustomOp2, CustomOp3, DType, Layout, Result, Shape, Storage, Tensor, WithDType,
@@ -23,10 +30,22 @@ pub(crate) trait Real: WithDType + LinalgScalar + PartialOrd + std::ops::AddAssi
     fn of(value: f32) -> Self {
         Self::from_f64(f64::from(value))
     }
+
+    /// `e^x`.
+    fn exponential(self) -> Self;
 }
 
-impl Real for f32 {}
-impl Real for f64 {}
+impl Real for f32 {
+    fn exponential(self) -> f32 {
+        viewfuse_core::math::exp(self)
+    }
+}
+
+impl Real for f64 {
+    fn exponential(self) -> f64 {
+        self.exp()
+    }
+}
 
 /// A function of `N` tensors, all contiguous and row-major, all of one type.
 pub(crate) trait Operation<const N: usize>: Send + Sync + 'static {

@@ -5,7 +5,7 @@ use super::batch::{Batch, BatchSize, Targets};
 use super::draw::{Draw, Purpose};
 use super::parameters::Parameters;
 use super::pixelnerf::{PixelNerf, SampleCounts};
-use super::run::{Learner, Outcome, Schedule, run};
+use super::run::{Learner, Outcome, Schedule, Validated, run};
 use super::scenes::TrainingScene;
 use crate::checkpoint::TensorShape;
 use crate::field::pixelnerf::architecture::Architecture;
@@ -93,7 +93,7 @@ impl Learner for PixelNerfLearner {
         (colours - &batch.truth)?.sqr()?.mean_all()
     }
 
-    fn validate(&self) -> Result<f64> {
+    fn validate(&self) -> Result<Validated> {
         // The same rays every time, whatever the run's seed.
         let draw = Draw { seed: 0, step: u32::MAX };
         let objects: Vec<usize> = (0..VALIDATION.objects.min(self.validation.len())).collect();
@@ -113,7 +113,7 @@ impl Learner for PixelNerfLearner {
             let colours = self.network.render(&batch, &batch.mean_weights()?, &draw, VALIDATION_SAMPLES)?;
             sum += decibels(&(colours - &batch.truth)?.sqr()?.mean_all()?)?;
         }
-        Ok(sum / objects.len() as f64)
+        Ok(Validated { score: sum / objects.len() as f64, remark: String::new() })
     }
 
     fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {

@@ -9,10 +9,11 @@
 
 use super::TrainError;
 use super::adam::Adam;
+use super::average::Average;
 use super::curve;
 use super::draw::Draw;
 use super::parameters::Parameters;
-use super::state::{self, Progressed};
+use super::state::{self, Learned, Progressed};
 use crate::checkpoint::{Checkpoint, Precision, TensorShape};
 use crate::files::write_whole;
 use crate::interrupt;
@@ -66,10 +67,23 @@ pub(crate) trait Learner {
     fn loss(&self, draw: &Draw) -> candle_core::Result<Tensor>;
 
     /// How good it is on what it does not learn from; higher is better.
-    fn validate(&self) -> candle_core::Result<f64>;
+    fn validate(&self) -> candle_core::Result<Validated>;
+
+    /// What a step leaves of the average of the parameters; with one, it is what is validated, and what the file holds.
+    fn averaging(&self) -> Option<f64> {
+        None
+    }
 
     /// The file that it becomes: tensors and metadata.
     fn checkpoint(&self) -> candle_core::Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)>;
+}
+
+/// What validation found.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Validated {
+    pub(crate) score: f64,
+    /// What else there is to say.
+    pub(crate) remark: String,
 }
 
 /// How a run ended.
@@ -93,13 +107,14 @@ pub(crate) fn run(
     progress: &Progress,
 ) -> Result<Outcome, TrainError> {
     let run = Run { learner, schedule, settings, score_name, folder };
-    let adam = Adam::new(learner.parameters())?;
-    let mut so_far = state::read(&run.state(), settings, learner.parameters(), &adam)?.unwrap_or_default();
+    let average = learner.averaging().map(|decay| Average::new(learner.parameters(), decay)).transpose()?;
+    let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
+    let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();
     while so_far.steps < schedule.steps {
         if interrupt::check().is_err() {
-            run.write(&so_far, &adam)?;
+            run.write(&so_far, &learned)?;
             interrupt::check()?;
         }
         let start = Instant::now();
@@ -109,7 +124,11 @@ pub(crate) fn run(
         if !value.is_finite() {
             return Err(TrainError::NotFinite { step, what: "loss".to_owned() });
         }
-        adam.step(learner.parameters(), &loss.backward()?, step, schedule.rate_at(step), MOST_GRADIENT)?;
+        let rate = schedule.rate_at(step);
+        learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MOST_GRADIENT)?;
+        if let Some(average) = &learned.average {
+            average.step(learner.parameters(), step)?;
+        }
         so_far.steps += 1;
         so_far.pending = (so_far.pending.0 + value, so_far.pending.1 + 1);
         if so_far.steps % LOSS_EVERY == 0 {
@@ -117,17 +136,18 @@ pub(crate) fn run(
             so_far.pending = (0.0, 0);
         }
         if so_far.steps % schedule.validate_every == 0 || so_far.steps == schedule.steps {
-            so_far.scores.push((so_far.steps, learner.validate()?));
-            progress.note(&run.status(&so_far));
+            let Validated { score, remark } = learned.as_written(|| learner.validate())?;
+            so_far.scores.push((so_far.steps, score));
+            progress.note(&run.status(&so_far, &remark));
         }
         so_far.seconds += start.elapsed().as_secs_f64();
         progress.step();
         if written.elapsed().as_secs_f64() > WRITE_EVERY {
-            run.write(&so_far, &adam)?;
+            run.write(&so_far, &learned)?;
             written = Instant::now();
         }
     }
-    run.write(&so_far, &adam)?;
+    run.write(&so_far, &learned)?;
     Ok(Outcome { model: run.model(), seconds: so_far.seconds, scores: so_far.scores })
 }
 
@@ -148,15 +168,19 @@ impl Run<'_> {
         self.folder.join("model.safetensors")
     }
 
-    fn status(&self, so_far: &Progressed) -> String {
+    fn status(&self, so_far: &Progressed, remark: &str) -> String {
         let loss = so_far.losses.last().map_or(f64::NAN, |(_, loss)| *loss);
         let score = so_far.scores.last().map_or(f64::NAN, |(_, score)| *score);
-        format!("step {}: loss {loss:.5}, {} {score:.3}, {:.0} s", so_far.steps, self.score_name, so_far.seconds)
+        let remark = if remark.is_empty() { String::new() } else { format!(", {remark}") };
+        format!(
+            "step {}: loss {loss:.5}, {} {score:.3}{remark}, {:.0} s",
+            so_far.steps, self.score_name, so_far.seconds
+        )
     }
 
     /// The state last: whoever goes on from it finds the rest.
-    fn write(&self, so_far: &Progressed, adam: &Adam) -> Result<(), TrainError> {
-        let (tensors, metadata) = self.learner.checkpoint()?;
+    fn write(&self, so_far: &Progressed, learned: &Learned<'_>) -> Result<(), TrainError> {
+        let (tensors, metadata) = learned.as_written(|| self.learner.checkpoint())?;
         Checkpoint::in_memory("trained", tensors, metadata).write_safetensors(&self.model(), Precision::Kept)?;
         write_whole(&self.folder.join("curve.svg"), curve::svg(so_far, self.score_name).as_bytes())?;
         let record = serde_json::json!({
@@ -170,6 +194,6 @@ impl Run<'_> {
             "scores": so_far.scores,
         });
         write_whole(&self.folder.join("record.json"), format!("{record:#}\n").as_bytes())?;
-        state::write(&self.state(), self.settings, so_far, self.learner.parameters(), adam)
+        state::write(&self.state(), self.settings, so_far, learned)
     }
 }

@@ -2,9 +2,10 @@
 
 use super::TrainError;
 use super::adam::Adam;
+use super::average::Average;
 use super::parameters::Parameters;
 use crate::files::write_whole;
-use candle_core::{DType, Device, Tensor};
+use candle_core::{DType, Device, Tensor, Var};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
@@ -28,18 +29,34 @@ pub(crate) struct Progressed {
 
 const SETTINGS: &str = "settings";
 const PROGRESSED: &str = "progressed";
-/// Of the names of tensors.
-const PREFIXES: [&str; 3] = ["parameter", "mean", "square"];
 
-fn tensors(parameters: &Parameters, adam: &Adam) -> Vec<(String, Tensor)> {
-    let mut all = Vec::new();
-    for (name, variable) in parameters.iter() {
-        all.push((format!("{}.{name}", PREFIXES[0]), variable.as_tensor().clone()));
-        for (prefix, moment) in PREFIXES[1..].iter().zip(&adam.moments[name]) {
-            all.push((format!("{prefix}.{name}"), moment.as_tensor().clone()));
+/// What a run changes.
+pub(crate) struct Learned<'a> {
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) adam: Adam,
+    pub(crate) average: Option<Average>,
+}
+
+impl Learned<'_> {
+    /// Does something while the parameters are what the run's model is: their average where there is one.
+    pub(crate) fn as_written<R>(&self, work: impl FnOnce() -> candle_core::Result<R>) -> candle_core::Result<R> {
+        match &self.average {
+            Some(average) => average.during(self.parameters, work),
+            None => work(),
         }
     }
-    all
+
+    /// Every tensor by its name in the file.
+    fn tensors(&self) -> Vec<(String, &Var)> {
+        let mut all = Vec::new();
+        for (name, variable) in self.parameters.iter() {
+            let [mean, square] = &self.adam.moments[name];
+            let average = self.average.as_ref().map(|average| ("average", &average.values[name]));
+            let own = [("parameter", variable), ("mean", mean), ("square", square)];
+            all.extend(own.into_iter().chain(average).map(|(prefix, own)| (format!("{prefix}.{name}"), own)));
+        }
+        all
+    }
 }
 
 /// Writes the state.
@@ -47,12 +64,11 @@ pub(crate) fn write(
     path: &Path,
     settings: &serde_json::Value,
     progressed: &Progressed,
-    parameters: &Parameters,
-    adam: &Adam,
+    learned: &Learned<'_>,
 ) -> Result<(), TrainError> {
     let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
     let mut bytes: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
-    for (name, tensor) in tensors(parameters, adam) {
+    for (name, tensor) in learned.tensors() {
         let values = tensor.flatten_all()?.to_dtype(DType::F64)?.to_vec1::<f64>()?;
         // The numbers are of 32 bits in every run; the wider ones are the tests'.
         let values: Vec<u8> = values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
@@ -76,8 +92,7 @@ pub(crate) fn write(
 pub(crate) fn read(
     path: &Path,
     settings: &serde_json::Value,
-    parameters: &Parameters,
-    adam: &Adam,
+    learned: &Learned<'_>,
 ) -> Result<Option<Progressed>, TrainError> {
     let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
     let bytes = match std::fs::read(path) {
@@ -108,11 +123,8 @@ pub(crate) fn read(
             view.data().chunks_exact(4).map(|bytes| f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
         Ok(Tensor::from_vec(numbers.collect::<Vec<f32>>(), like.shape(), &Device::Cpu)?.to_dtype(like.dtype())?)
     };
-    for (name, variable) in parameters.iter() {
-        variable.set(&value(format!("{}.{name}", PREFIXES[0]), variable)?)?;
-        for (prefix, moment) in PREFIXES[1..].iter().zip(&adam.moments[name]) {
-            moment.set(&value(format!("{prefix}.{name}"), moment)?)?;
-        }
+    for (name, variable) in learned.tensors() {
+        variable.set(&value(name, variable)?)?;
     }
     Ok(Some(progressed))
 }

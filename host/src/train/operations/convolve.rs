@@ -7,6 +7,10 @@ use super::{Operation, Real};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{ArrayView2, ArrayViewMut2};
 use rayon::prelude::*;
+use std::ops::Range;
+
+/// Numbers of unfolded windows that are there at once.
+const MOST_UNFOLDED: usize = 1 << 16;
 
 /// How windows lie on an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,26 +76,39 @@ impl Convolution {
         self.window.size * self.window.size * self.input[3]
     }
 
-    /// Windows of an image in rows `[pixel][place][channel]`.
-    fn unfold<T: Real>(&self, image: &[T]) -> Vec<T> {
+    /// Rows of the output that are computed together, so that their windows stay in a core's caches.
+    fn strips(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let [height, width] = self.out_size();
+        let rows = (MOST_UNFOLDED / (width * self.row_len())).clamp(1, height);
+        (0..height).step_by(rows).map(move |start| start..(start + rows).min(height))
+    }
+
+    /// Windows of some rows of an image, in rows `[pixel][place][channel]`.
+    fn unfold<'a, T: Real>(&self, image: &'a [T], strip: &Range<usize>, room: &'a mut Vec<T>) -> &'a [T] {
         let [_, height, width, channels] = self.input;
-        let [out_height, out_width] = self.out_size();
+        let [_, out_width] = self.out_size();
         let row_len = self.row_len();
-        let mut rows = vec![T::zero(); out_height * out_width * row_len];
-        for (pixel, own) in rows.chunks_exact_mut(row_len).enumerate() {
-            self.window.visit([height, width], pixel / out_width, pixel % out_width, |from, place| {
+        if self.window.is_a_pixel() {
+            return &image[strip.start * width * channels..strip.end * width * channels];
+        }
+        room.clear();
+        room.resize(strip.len() * out_width * row_len, T::zero());
+        for (pixel, own) in room.chunks_exact_mut(row_len).enumerate() {
+            let (row, column) = (strip.start + pixel / out_width, pixel % out_width);
+            self.window.visit([height, width], row, column, |from, place| {
                 own[place * channels..][..channels].copy_from_slice(&image[from * channels..][..channels]);
             });
         }
-        rows
+        room
     }
 
     /// The sum of the rows' numbers where they came from.
-    fn fold<T: Real>(&self, rows: &[T], image: &mut [T]) {
+    fn fold<T: Real>(&self, rows: &[T], strip: &Range<usize>, image: &mut [T]) {
         let [_, height, width, channels] = self.input;
         let [_, out_width] = self.out_size();
         for (pixel, own) in rows.chunks_exact(self.row_len()).enumerate() {
-            self.window.visit([height, width], pixel / out_width, pixel % out_width, |to, place| {
+            let (row, column) = (strip.start + pixel / out_width, pixel % out_width);
+            self.window.visit([height, width], row, column, |to, place| {
                 let from = &own[place * channels..][..channels];
                 image[to * channels..][..channels].iter_mut().zip(from).for_each(|(to, from)| *to += *from);
             });
@@ -115,14 +132,13 @@ impl Operation<2> for Convolution {
         let weights = matrix(weights, outs, row_len);
         let each = images.par_chunks_exact(height * width * channels).zip(output.par_chunks_exact_mut(pixels * outs));
         each.for_each(|(image, output)| {
-            let unfolded;
-            let rows = if self.window.is_a_pixel() {
-                image
-            } else {
-                unfolded = self.unfold(image);
-                &unfolded
-            };
-            product(matrix(rows, pixels, row_len), weights.t(), matrix_mut(output, pixels, outs));
+            let mut room = Vec::new();
+            for strip in self.strips() {
+                let rows = self.unfold(image, &strip, &mut room);
+                let own = &mut output[strip.start * out_width * outs..strip.end * out_width * outs];
+                let count = strip.len() * out_width;
+                product(matrix(rows, count, row_len), weights.t(), matrix_mut(own, count, outs));
+            }
         });
         output
     }
@@ -138,23 +154,25 @@ impl Operation<2> for Convolution {
         parts.resize_with(count, Default::default);
         let one = |(index, of_image): (usize, &mut [T])| {
             let image = &images[index * image_len..][..image_len];
-            let gradient = matrix(&gradient[index * pixels * outs..][..pixels * outs], pixels, outs);
+            let gradient = &gradient[index * pixels * outs..][..pixels * outs];
             let mut of_weights = vec![T::zero(); outs * row_len];
-            let unfolded;
-            let rows = if self.window.is_a_pixel() {
-                image
-            } else {
-                unfolded = self.unfold(image);
-                &unfolded
-            };
-            product(gradient.t(), matrix(rows, pixels, row_len), matrix_mut(&mut of_weights, outs, row_len));
-            if self.differentiates_input {
-                let mut of_rows = vec![T::zero(); pixels * row_len];
-                product(gradient, weights, matrix_mut(&mut of_rows, pixels, row_len));
+            let (mut room, mut of_rows) = (Vec::new(), Vec::new());
+            for strip in self.strips() {
+                let count = strip.len() * out_width;
+                let gradient = &gradient[strip.start * out_width * outs..strip.end * out_width * outs];
+                let gradient = matrix(gradient, count, outs);
+                let rows = matrix(self.unfold(image, &strip, &mut room), count, row_len);
+                add_product(gradient.t(), rows, matrix_mut(&mut of_weights, outs, row_len));
+                if !self.differentiates_input {
+                    continue;
+                }
+                of_rows.resize(count * row_len, T::zero());
+                product(gradient, weights, matrix_mut(&mut of_rows, count, row_len));
                 if self.window.is_a_pixel() {
-                    of_image.copy_from_slice(&of_rows);
+                    of_image[strip.start * out_width * row_len..strip.end * out_width * row_len]
+                        .copy_from_slice(&of_rows);
                 } else {
-                    self.fold(&of_rows, of_image);
+                    self.fold(&of_rows, &strip, of_image);
                 }
             }
             of_weights

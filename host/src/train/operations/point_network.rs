@@ -4,7 +4,8 @@
 //! the way back it is computed again. In steps of the library's the same work moves 90 times the activations through
 //! memory.
 
-use super::convolve::{add_product, matrix, matrix_mut, product, sum};
+use super::convolve::sum;
+use super::linear::{layer_gradient, linear, linear_back, rectified};
 use super::{Operation, Real};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -356,55 +357,4 @@ impl Operation<3> for PointNetwork {
         let trains = !self.is_frozen;
         [trains.then_some(of_grids), Some(of_weights), trains.then(|| sum(of_parameters))]
     }
-}
-
-/// `rows x weights^T + biases`.
-fn linear<T: Real>(rows: &[T], layer: &[T], inner: usize, outer: usize) -> Vec<T> {
-    let (weights, biases) = layer.split_at(inner * outer);
-    let count = rows.len() / inner;
-    let mut output = Vec::with_capacity(count * outer);
-    (0..count).for_each(|_| output.extend_from_slice(biases));
-    add_product(matrix(rows, count, inner), matrix(weights, outer, inner).t(), matrix_mut(&mut output, count, outer));
-    output
-}
-
-/// The way back through a rectification and the layer behind it: adds to the gradient of what goes in, and to that of the
-/// layer.
-fn linear_back<T: Real>(
-    before: &[T],
-    layer: &[T],
-    gradient: &[T],
-    inner: usize,
-    outer: usize,
-    of_before: &mut [T],
-    of_layer: Option<&mut [T]>,
-) {
-    let count = before.len() / inner;
-    if let Some(of_layer) = of_layer {
-        layer_gradient(&rectified(before), gradient, inner, outer, of_layer);
-    }
-    let mut own = vec![T::zero(); before.len()];
-    let weights = matrix(&layer[..inner * outer], outer, inner);
-    product(matrix(gradient, count, outer), weights, matrix_mut(&mut own, count, inner));
-    for ((to, own), before) in of_before.iter_mut().zip(own).zip(before) {
-        if *before > T::zero() {
-            *to += own;
-        }
-    }
-}
-
-/// Adds to a layer's gradient.
-fn layer_gradient<T: Real>(rows: &[T], gradient: &[T], inner: usize, outer: usize, of_layer: &mut [T]) {
-    let count = rows.len() / inner;
-    let (of_weights, of_biases) = of_layer.split_at_mut(inner * outer);
-    let gradient = matrix(gradient, count, outer);
-    add_product(gradient.t(), matrix(rows, count, inner), matrix_mut(of_weights, outer, inner));
-    for row in gradient.rows() {
-        of_biases.iter_mut().zip(row).for_each(|(to, own)| *to += *own);
-    }
-}
-
-fn rectified<T: Real>(values: &[T]) -> Vec<T> {
-    // NaN stays: the loss must show it.
-    values.iter().map(|value| if *value < T::zero() { T::zero() } else { *value }).collect()
 }
