@@ -12,12 +12,14 @@
 //! operations   gradients of our own kernels              Convolution, PointNetwork, Look
 //! images, compositing     parts of the graphs
 //! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
+//! attention    weighting of views as a graph             Attention
 //! parameters, adam, average     what is learned, and how
-//! pixelnerf_learner, genvs_learner      losses
+//! pixelnerf_learner, genvs_learner, weighting_learner      losses
 //! run          steps, validation, continuing             run, Settings
 //! ```
 
 mod adam;
+mod attention;
 mod average;
 mod batch;
 mod compositing;
@@ -33,10 +35,13 @@ mod pixelnerf_learner;
 mod run;
 mod scenes;
 mod state;
+mod weighting_learner;
 
+pub use attention::Embedding;
 pub use genvs_learner::{GenvsSettings, train_genvs};
 pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
+pub use weighting_learner::{WeightingSettings, train_weighting};
 
 use crate::checkpoint::CheckpointError;
 use crate::files::WriteError;

@@ -1,12 +1,16 @@
 //! `viewfuse train`.
 
 use super::{on_threads, say};
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use viewfuse::checkpoint::Checkpoint;
 use viewfuse::dataset::{Dataset, Split};
 use viewfuse::progress::Progress;
-use viewfuse::train::{GenvsSettings, Outcome, PixelNerfSettings, Schedule, train_genvs, train_pixelnerf};
+use viewfuse::train::{
+    Embedding, GenvsSettings, Outcome, PixelNerfSettings, Schedule, WeightingSettings, train_genvs, train_pixelnerf,
+    train_weighting,
+};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -20,6 +24,8 @@ enum What {
     Pixelnerf(PixelNerfArguments),
     /// A small GeNVS from scratch: volumes, feature images and the denoiser, all at once.
     Genvs(GenvsArguments),
+    /// The weighting of views for a network that stays as it is.
+    Weighting(WeightingArguments),
 }
 
 /// What every run has.
@@ -120,10 +126,39 @@ fn number(text: &str, step: u32) -> Result<u32, String> {
     }
 }
 
+#[derive(Args)]
+struct WeightingArguments {
+    /// The network: a checkpoint that `train pixelnerf` or `train genvs` wrote
+    #[arg(value_name = "FILE")]
+    model: PathBuf,
+    #[command(flatten)]
+    run: RunOptions,
+    /// How poses become vectors
+    #[arg(long, value_enum, default_value = "fourier")]
+    embedding: EmbeddingName,
+    /// Side of the pictures, pixels
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
+    side: u32,
+    /// Objects of a step, each with one target
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = count)]
+    objects: usize,
+    /// Rays of each target; with a GeNVS a target is a whole picture
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count)]
+    rays: usize,
+}
+
+/// See [`Embedding`].
+#[derive(Clone, Copy, ValueEnum)]
+enum EmbeddingName {
+    Fourier,
+    Flat,
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.what {
         What::Pixelnerf(arguments) => pixelnerf(arguments),
         What::Genvs(arguments) => genvs(arguments),
+        What::Weighting(arguments) => weighting(arguments),
     }
 }
 
@@ -146,6 +181,23 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
     let [train, validation] = scenes(&run.data)?;
     let progress = Progress::new("training");
     let train_it = || train_genvs(&settings, &run.schedule(), [&train, &validation], &run.output, &progress);
+    let outcome = on_threads(run.threads, train_it)??;
+    drop(progress);
+    report(&outcome)
+}
+
+fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
+    let WeightingArguments { model, run, embedding, side, objects, rays } = arguments;
+    let embedding = match embedding {
+        EmbeddingName::Fourier => Embedding::Fourier,
+        EmbeddingName::Flat => Embedding::Flat,
+    };
+    let settings = WeightingSettings { embedding, side: *side, objects: *objects, rays: *rays };
+    let [train, validation] = scenes(&run.data)?;
+    let checkpoint = Checkpoint::open(model)?;
+    let progress = Progress::new("training");
+    let (schedule, scenes) = (run.schedule(), [&train[..], &validation[..]]);
+    let train_it = || train_weighting(&settings, &checkpoint, &schedule, scenes, &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;
     drop(progress);
     report(&outcome)

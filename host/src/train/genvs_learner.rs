@@ -144,6 +144,33 @@ pub(super) fn loss(
     error + (colour_error * FEATURES_WEIGHT)?
 }
 
+/// Mean PSNR over scenes of what one call makes of noise of the largest level, and of the colours that the features tell of,
+/// with the weights that `weigh` gives the views: the same views and noise every time, whatever the run's seed.
+pub(super) fn scores(
+    network: &Genvs,
+    scenes: &[TrainingScene],
+    views: ViewCounts,
+    sample_count: u32,
+    weigh: &dyn Fn(&Views) -> Result<Tensor>,
+) -> Result<[f64; 2]> {
+    let count = VALIDATION_OBJECTS.min(scenes.len());
+    let samples = CoarseBlock { seed: [0, 0], sample_count, jitter: 0.0 };
+    let largest = NoiseSchedule::published().level(0, 2);
+    let [mut score, mut colour_score] = [0.0, 0.0];
+    for (index, object) in scenes[..count].iter().enumerate() {
+        let draw = Draw { seed: 0, step: u32::MAX - index as u32 };
+        let views = Views::of(&[object], &draw, views, network.parameters.dtype())?;
+        let volumes = network.volumes(&views.pictures)?.detach();
+        let features = network.features(&volumes, &weigh(&views)?, &views, &samples)?;
+        let noise = Noisy::new(&views.truth.zeros_like()?, &[largest], &draw)?;
+        let picture = network.denoised(&noise.pictures, &features, &noise.at)?;
+        let score_of = |picture: &Tensor| decibels(&((picture - &views.truth)? * 0.5)?.sqr()?.mean_all()?);
+        score += score_of(&picture.clamp(-1.0, 1.0)?)?;
+        colour_score += score_of(&colours(&features)?.clamp(-1.0, 1.0)?)?;
+    }
+    Ok([score, colour_score].map(|sum| sum / count as f64))
+}
+
 impl Learner for GenvsLearner {
     fn parameters(&self) -> &Parameters {
         &self.network.parameters
@@ -163,23 +190,10 @@ impl Learner for GenvsLearner {
     }
 
     fn validate(&self) -> Result<Validated> {
-        let count = VALIDATION_OBJECTS.min(self.validation.len());
-        let samples = CoarseBlock { seed: [0, 0], sample_count: self.settings.samples, jitter: 0.0 };
-        let largest = NoiseSchedule::published().level(0, 2);
-        let [mut score, mut colour_score] = [0.0, 0.0];
-        for (index, object) in self.validation[..count].iter().enumerate() {
-            // The same views and noise every time, whatever the run's seed.
-            let draw = Draw { seed: 0, step: u32::MAX - index as u32 };
-            let views = Views::of(&[object], &draw, VALIDATION_VIEWS, self.network.parameters.dtype())?;
-            let volumes = self.network.volumes(&views.pictures)?.detach();
-            let features = self.network.features(&volumes, &views.mean_weights()?, &views, &samples)?;
-            let noise = Noisy::new(&views.truth.zeros_like()?, &[largest], &draw)?;
-            let picture = self.network.denoised(&noise.pictures, &features, &noise.at)?;
-            let score_of = |picture: &Tensor| decibels(&((picture - &views.truth)? * 0.5)?.sqr()?.mean_all()?);
-            score += score_of(&picture.clamp(-1.0, 1.0)?)?;
-            colour_score += score_of(&colours(&features)?.clamp(-1.0, 1.0)?)?;
-        }
-        let [score, colour_score] = [score, colour_score].map(|sum| sum / count as f64);
+        let [score, colour_score] =
+            scores(&self.network, &self.validation, VALIDATION_VIEWS, self.settings.samples, &|views| {
+                views.mean_weights()
+            })?;
         Ok(Validated { score, remark: format!("of the features {colour_score:.3} dB") })
     }
 

@@ -12,8 +12,8 @@ mod normalise;
 mod point_network;
 mod shift;
 
-pub(crate) use density::RectifiedDensity;
 pub(crate) use convolve::{Convolution, DepthwiseConvolution, Window};
+pub(crate) use density::RectifiedDensity;
 pub(crate) use look::{Look, LookSizes, Sight};
 pub(crate) use normalise::Normalise;
 pub(crate) use point_network::{PointNetwork, PointNetworkSizes, Points};

@@ -190,8 +190,10 @@ impl PixelNerf {
     /// The colours of a batch's rays, `[object and ray][3]` in `[0, 1]`, over white, with weights `[object][view]` of the
     /// views. The first pass, which decides where the second looks, is not differentiated.
     pub(crate) fn render(&self, batch: &Batch, weights: &Tensor, draw: &Draw, counts: SampleCounts) -> Result<Tensor> {
-        let grids = self.grids(&batch.pictures)?;
-        let parameters = self.point_parameters()?;
+        let (mut grids, mut parameters) = (self.grids(&batch.pictures)?, self.point_parameters()?);
+        if self.is_frozen {
+            (grids, parameters) = (grids.detach(), parameters.detach());
+        }
         let seen = Seen { cameras: &batch.cameras, grids: &grids, weights, parameters: &parameters };
         let (plain_grids, plain_weights, plain_parameters) = (grids.detach(), weights.detach(), parameters.detach());
         let plain = Seen {

@@ -79,6 +79,27 @@ pub(super) fn decibels(mean_square: &Tensor) -> Result<f64> {
     Ok(-10.0 * f64::from(mean_square.to_dtype(DType::F32)?.to_scalar::<f32>()?).log10())
 }
 
+/// Mean PSNR over some rays of scenes, with the weights that `weigh` gives the views: the same rays and sources every time,
+/// whatever the run's seed.
+pub(super) fn score(
+    network: &PixelNerf,
+    scenes: &[TrainingScene],
+    source_count: usize,
+    targets: Targets,
+    weigh: &dyn Fn(&Batch) -> Result<Tensor>,
+) -> Result<f64> {
+    let count = VALIDATION.objects.min(scenes.len());
+    let mut sum = 0.0;
+    for object in 0..count {
+        let draw = Draw { seed: 0, step: u32::MAX - object as u32 };
+        let dtype = network.parameters.dtype();
+        let batch = Batch::of(scenes, &[object], &draw, VALIDATION.rays, source_count, targets, dtype)?;
+        let colours = network.render(&batch, &weigh(&batch)?, &draw, VALIDATION_SAMPLES)?;
+        sum += decibels(&(colours - &batch.truth)?.sqr()?.mean_all()?)?;
+    }
+    Ok(sum / count as f64)
+}
+
 impl Learner for PixelNerfLearner {
     fn parameters(&self) -> &Parameters {
         &self.network.parameters
@@ -94,26 +115,9 @@ impl Learner for PixelNerfLearner {
     }
 
     fn validate(&self) -> Result<Validated> {
-        // The same rays every time, whatever the run's seed.
-        let draw = Draw { seed: 0, step: u32::MAX };
-        let objects: Vec<usize> = (0..VALIDATION.objects.min(self.validation.len())).collect();
-        let mut sum = 0.0;
-        for (index, object) in objects.iter().enumerate() {
-            let draw = Draw { step: draw.step - index as u32, ..draw };
-            let dtype = self.network.parameters.dtype();
-            let batch = Batch::of(
-                &self.validation,
-                &[*object],
-                &draw,
-                VALIDATION.rays,
-                VALIDATION_SOURCES,
-                Targets::Many,
-                dtype,
-            )?;
-            let colours = self.network.render(&batch, &batch.mean_weights()?, &draw, VALIDATION_SAMPLES)?;
-            sum += decibels(&(colours - &batch.truth)?.sqr()?.mean_all()?)?;
-        }
-        Ok(Validated { score: sum / objects.len() as f64, remark: String::new() })
+        let score =
+            score(&self.network, &self.validation, VALIDATION_SOURCES, Targets::Many, &|batch| batch.mean_weights())?;
+        Ok(Validated { score, remark: String::new() })
     }
 
     fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {

@@ -21,7 +21,9 @@ pub(crate) struct Views {
     pub(crate) cameras: Vec<Vec<CameraBlock>>,
     /// Pictures of the sources `[object and view][row][column][3]`, in `[-1, 1]`.
     pub(crate) pictures: Tensor,
-    /// `[object][target]`.
+    /// Of the targets, `[object][target]`.
+    pub(crate) target_cameras: Vec<Vec<Camera>>,
+    /// The same as kernels take them.
     pub(crate) targets: Vec<Vec<CameraBlock>>,
     /// `[object and target][row][column][3]`, in `[-1, 1]`.
     pub(crate) truth: Tensor,
@@ -47,7 +49,7 @@ impl Views {
     pub(crate) fn of(objects: &[&TrainingScene], draw: &Draw, counts: ViewCounts, dtype: DType) -> Result<Views> {
         let ViewCounts { sources, targets } = counts;
         let (mut pictures, mut truth) = (Vec::new(), Vec::new());
-        let mut lists = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut lists = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, scene) in objects.iter().enumerate() {
             let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), sources + targets);
             let (own, others) = order.split_at(sources);
@@ -58,16 +60,18 @@ impl Views {
             lists.1.push(cameras);
             lists.2.push(own.iter().map(|&view| scene.blocks[view]).collect());
             lists.3.push(others.iter().map(|&view| scene.blocks[view]).collect());
+            lists.4.push(others.iter().map(|&view| scene.cameras[view]).collect());
         }
         let side = objects[0].pictures[0].width() as usize;
         let images = |values: Vec<f32>, count| {
             Tensor::from_vec(values, (objects.len() * count, side, side, 3), &Device::Cpu)?.to_dtype(dtype)
         };
-        let (near_far, sources_of, cameras, targets_of) = lists;
+        let (near_far, sources_of, cameras, targets_of, target_cameras) = lists;
         Ok(Views {
             sources: sources_of,
             cameras,
             pictures: images(pictures, sources)?,
+            target_cameras,
             targets: targets_of,
             truth: images(truth, targets)?,
             near_far,
