@@ -95,10 +95,10 @@ struct GenvsArguments {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
     side: u32,
     /// Objects of a step
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = count)]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
     objects: usize,
     /// Targets of each object
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count)]
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
     targets: usize,
     /// Samples of a ray: as many as renders will have
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]

@@ -3,18 +3,31 @@
 use super::operations::{Apply, Convolution, Window};
 use candle_core::{Result, Tensor};
 
-/// A convolution with weights as checkpoints have them, `[out][in][row][column]`.
+/// A convolution with weights as checkpoints have them, `[out][in][row][column]`, without bias.
 pub(crate) fn convolve(
     images: &Tensor,
     weights: &Tensor,
     window: Window,
     differentiates_input: bool,
 ) -> Result<Tensor> {
-    let input = dims4(images)?;
+    let biases = Tensor::zeros(weights.dim(0)?, weights.dtype(), weights.device())?;
+    convolve_with(images, [weights, &biases], window, differentiates_input, false)
+}
+
+/// A convolution with weights `[out][in][row][column]` and biases `[out]` or, each image its own, `[image][out]`, rectified
+/// or not.
+pub(crate) fn convolve_with(
+    images: &Tensor,
+    [weights, biases]: [&Tensor; 2],
+    window: Window,
+    differentiates_input: bool,
+    rectifies: bool,
+) -> Result<Tensor> {
     let weights = weights.permute((0, 2, 3, 1))?.contiguous()?;
-    let out_channels = weights.dim(0)?;
-    let operation = Convolution { input, out_channels, window, differentiates_input };
-    images.contiguous()?.apply_op2(&weights, Apply(operation))
+    let (input, out_channels) = (dims4(images)?, weights.dim(0)?);
+    let has_own_biases = biases.rank() == 2;
+    let operation = Convolution { input, out_channels, window, has_own_biases, rectifies, differentiates_input };
+    images.contiguous()?.apply_op3(&weights, &biases.contiguous()?, Apply(operation))
 }
 
 /// The largest of windows of 3x3, every second one, of images that are nowhere negative.

@@ -10,14 +10,12 @@ mod linear;
 mod look;
 mod normalise;
 mod point_network;
-mod shift;
 
 pub(crate) use convolve::{Convolution, DepthwiseConvolution, Window};
 pub(crate) use density::RectifiedDensity;
 pub(crate) use look::{Look, LookSizes, Sight};
 pub(crate) use normalise::Normalise;
 pub(crate) use point_network::{PointNetwork, PointNetworkSizes, Points};
-pub(crate) use shift::Shift;
 
 use candle_core::{
     CpuStorage, CustomOp1, CustomOp2, CustomOp3, DType, Layout, Result, Shape, Storage, Tensor, WithDType,
@@ -58,8 +56,8 @@ pub(crate) trait Operation<const N: usize>: Send + Sync + 'static {
     /// The result.
     fn forward<T: Real>(&self, inputs: [&[T]; N]) -> Vec<T>;
 
-    /// Gradients of the inputs (`None` where nobody asks), given that of the result.
-    fn backward<T: Real>(&self, inputs: [&[T]; N], gradient: &[T]) -> [Option<Vec<T>>; N];
+    /// Gradients of the inputs (`None` where nobody asks), given the result and its gradient.
+    fn backward<T: Real>(&self, inputs: [&[T]; N], output: &[T], gradient: &[T]) -> [Option<Vec<T>>; N];
 }
 
 /// An operation as the library takes it.
@@ -70,6 +68,13 @@ fn slice<'a, T: WithDType>(storage: &'a CpuStorage, layout: &Layout) -> Result<&
     match layout.contiguous_offsets() {
         Some((start, end)) => Ok(&all[start..end]),
         None => candle_core::bail!("an operation of our own was given a tensor that is not contiguous"),
+    }
+}
+
+fn on_cpu<'a>(storage: &'a Storage, name: &str) -> Result<&'a CpuStorage> {
+    match storage {
+        Storage::Cpu(storage) => Ok(storage),
+        _ => candle_core::bail!("{name} runs on the CPU only"),
     }
 }
 
@@ -98,32 +103,24 @@ fn forward<const N: usize, O: Operation<N>>(
 fn backward<const N: usize, O: Operation<N>>(
     operation: &O,
     inputs: [&Tensor; N],
-    gradient: &Tensor,
+    [output, gradient]: [&Tensor; 2],
 ) -> Result<[Option<Tensor>; N]> {
     fn typed<const N: usize, O: Operation<N>, T: Real>(
         operation: &O,
         inputs: [&Tensor; N],
-        gradient: &Tensor,
+        [output, gradient]: [&Tensor; 2],
     ) -> Result<[Option<Tensor>; N]> {
         let gradient = gradient.contiguous()?;
         let guards = inputs.map(Tensor::storage_and_layout);
+        let (output_guard, output_layout) = output.storage_and_layout();
         let (gradient_guard, gradient_layout) = gradient.storage_and_layout();
-        let on_cpu = |storage: &'_ Storage| -> Result<()> {
-            match storage {
-                Storage::Cpu(_) => Ok(()),
-                _ => candle_core::bail!("{} runs on the CPU only", O::NAME),
-            }
-        };
         let mut slices: [&[T]; N] = [&[]; N];
         for (own, (guard, layout)) in slices.iter_mut().zip(&guards) {
-            on_cpu(guard)?;
-            if let Storage::Cpu(storage) = &**guard {
-                *own = slice(storage, layout)?;
-            }
+            *own = slice(on_cpu(guard, O::NAME)?, layout)?;
         }
-        on_cpu(&gradient_guard)?;
-        let Storage::Cpu(storage) = &*gradient_guard else { candle_core::bail!("{} runs on the CPU only", O::NAME) };
-        let gradients = operation.backward(slices, slice(storage, gradient_layout)?);
+        let output = slice(on_cpu(&output_guard, O::NAME)?, output_layout)?;
+        let gradient = slice(on_cpu(&gradient_guard, O::NAME)?, gradient_layout)?;
+        let gradients = operation.backward(slices, output, gradient);
         let mut tensors = [const { None }; N];
         for ((tensor, values), input) in tensors.iter_mut().zip(gradients).zip(inputs) {
             *tensor = values.map(|values| Tensor::from_vec(values, input.shape(), input.device())).transpose()?;
@@ -131,8 +128,8 @@ fn backward<const N: usize, O: Operation<N>>(
         Ok(tensors)
     }
     match gradient.dtype() {
-        DType::F32 => typed::<N, O, f32>(operation, inputs, gradient),
-        DType::F64 => typed::<N, O, f64>(operation, inputs, gradient),
+        DType::F32 => typed::<N, O, f32>(operation, inputs, [output, gradient]),
+        DType::F64 => typed::<N, O, f64>(operation, inputs, [output, gradient]),
         _ => candle_core::bail!("{} takes numbers of 32 or 64 bits", O::NAME),
     }
 }
@@ -146,8 +143,8 @@ impl<O: Operation<1>> CustomOp1 for Apply<O> {
         forward(&self.0, [(storage, layout)])
     }
 
-    fn bwd(&self, input: &Tensor, _: &Tensor, gradient: &Tensor) -> Result<Option<Tensor>> {
-        let [first] = backward(&self.0, [input], gradient)?;
+    fn bwd(&self, input: &Tensor, output: &Tensor, gradient: &Tensor) -> Result<Option<Tensor>> {
+        let [first] = backward(&self.0, [input], [output, gradient])?;
         Ok(first)
     }
 }
@@ -161,8 +158,14 @@ impl<O: Operation<2>> CustomOp2 for Apply<O> {
         forward(&self.0, [(s1, l1), (s2, l2)])
     }
 
-    fn bwd(&self, a: &Tensor, b: &Tensor, _: &Tensor, gradient: &Tensor) -> Result<(Option<Tensor>, Option<Tensor>)> {
-        let [first, second] = backward(&self.0, [a, b], gradient)?;
+    fn bwd(
+        &self,
+        a: &Tensor,
+        b: &Tensor,
+        output: &Tensor,
+        gradient: &Tensor,
+    ) -> Result<(Option<Tensor>, Option<Tensor>)> {
+        let [first, second] = backward(&self.0, [a, b], [output, gradient])?;
         Ok((first, second))
     }
 }
@@ -189,10 +192,10 @@ impl<O: Operation<3>> CustomOp3 for Apply<O> {
         a: &Tensor,
         b: &Tensor,
         c: &Tensor,
-        _: &Tensor,
+        output: &Tensor,
         gradient: &Tensor,
     ) -> Result<(Option<Tensor>, Option<Tensor>, Option<Tensor>)> {
-        let [first, second, third] = backward(&self.0, [a, b, c], gradient)?;
+        let [first, second, third] = backward(&self.0, [a, b, c], [output, gradient])?;
         Ok((first, second, third))
     }
 }

@@ -3,7 +3,7 @@
 
 use super::super::images::dims4;
 use super::super::operations::Window;
-use super::layers::{Layers, shifted};
+use super::layers::{Layers, convolved};
 use crate::field::genvs::{Block, Denoiser, DenoiserStep, Resampling};
 use candle_core::{D, Result, Tensor};
 use std::f64::consts::FRAC_1_SQRT_2;
@@ -26,10 +26,10 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
     let mut residual = inputs.clone();
     for step in sizes.down() {
         match step {
-            DenoiserStep::Convolution(own) => x = layers.convolved(&own.name, &x, Window::same(3))?,
+            DenoiserStep::Convolution(own) => x = layers.convolved(&own.name, &x, Window::same(3), false)?,
             DenoiserStep::Block(own) => x = block(layers, &own, &x, &embedded)?,
             DenoiserStep::Residual(own) => {
-                residual = halved(&layers.convolved(&own.name, &residual, Window::same(3))?)?;
+                residual = halved(&layers.convolved(&own.name, &residual, Window::same(3), false)?)?;
                 x = ((residual + x)? * FRAC_1_SQRT_2)?;
                 residual = x.clone();
                 kept.pop();
@@ -45,7 +45,7 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
         x = block(layers, &own, &x, &embedded)?;
     }
     let (norm, convolution) = sizes.exit();
-    layers.convolved(&convolution.name, &layers.normalised(&norm, &x, true)?, Window::same(3))
+    layers.convolved(&convolution.name, &layers.normalised(&norm, &x, true)?, Window::same(3), false)
 }
 
 fn block(layers: Layers<'_>, sizes: &Block, image: &Tensor, embedded: &Tensor) -> Result<Tensor> {
@@ -56,17 +56,16 @@ fn block(layers: Layers<'_>, sizes: &Block, image: &Tensor, embedded: &Tensor) -
         Resampling::Up => doubled(&image),
     };
     let inside = resampled(layers.normalised(&name("norm0"), image, true)?)?;
-    let inside = layers.plain(&name("conv0"), &inside, Window::same(3))?;
-    let bias = layers.get(&name("conv0.bias"))?;
-    let inside = shifted(&inside, &layers.linear(&name("affine"), embedded)?.broadcast_add(&bias)?, false)?;
+    let biases = layers.linear(&name("affine"), embedded)?.broadcast_add(&layers.get(&name("conv0.bias"))?)?;
+    let inside = convolved(&inside, [&layers.get(&name("conv0.weight"))?, &biases], Window::same(3), false)?;
     let inside = layers.normalised(&name("norm1"), &inside, true)?;
-    let inside = layers.convolved(&name("conv1"), &inside, Window::same(3))?;
+    let inside = layers.convolved(&name("conv1"), &inside, Window::same(3), false)?;
     let beside = match sizes.has_skip() {
         // Pixels are mixed where there are fewer of them: neither doubling nor halving knows of channels.
         true if sizes.resampling == Resampling::Up => {
-            resampled(layers.convolved(&name("skip"), image, Window::same(1))?)?
+            resampled(layers.convolved(&name("skip"), image, Window::same(1), false)?)?
         }
-        true => layers.convolved(&name("skip"), &resampled(image.clone())?, Window::same(1))?,
+        true => layers.convolved(&name("skip"), &resampled(image.clone())?, Window::same(1), false)?,
         false => image.clone(),
     };
     let sum = ((inside + beside)? * FRAC_1_SQRT_2)?;
@@ -79,7 +78,7 @@ fn attended(layers: Layers<'_>, sizes: &Block, image: &Tensor) -> Result<Tensor>
     let [count, height, width, channels] = dims4(image)?;
     let normalised = layers.normalised(&name("norm2"), image, false)?;
     // Published: query, key and value of a channel lie together.
-    let triples = layers.convolved(&name("qkv"), &normalised, Window::same(1))?;
+    let triples = layers.convolved(&name("qkv"), &normalised, Window::same(1), false)?;
     let triples = triples.reshape((count, height * width, channels, 3))?;
     let part = |index: usize| triples.narrow(3, index, 1)?.squeeze(3)?.contiguous();
     let (queries, keys, values) = (part(0)?, part(1)?, part(2)?);
@@ -87,7 +86,7 @@ fn attended(layers: Layers<'_>, sizes: &Block, image: &Tensor) -> Result<Tensor>
     let shares = scores.broadcast_sub(&scores.max_keepdim(D::Minus1)?.detach())?.exp()?;
     let shares = shares.broadcast_div(&shares.sum_keepdim(D::Minus1)?)?;
     let attended = shares.matmul(&values)?.reshape((count, height, width, channels))?;
-    let attended = layers.convolved(&name("proj"), &attended, Window::same(1))?;
+    let attended = layers.convolved(&name("proj"), &attended, Window::same(1), false)?;
     (attended + image)? * FRAC_1_SQRT_2
 }
 

@@ -3,21 +3,20 @@
 
 use super::super::images::{dims4, max_pool};
 use super::super::operations::Window;
-use super::layers::{Layers, shifted};
+use super::layers::{Layers, convolved};
 use crate::field::genvs::{ASPP_RATES, Encoder};
 use crate::field::resnet::needs_downsample;
 use candle_core::{Result, Tensor};
 
 /// Volumes `[image][row][column][depth and feature]` of pictures `[image][row][column][3]` in `[-1, 1]`.
 pub(super) fn volumes(layers: Layers<'_>, sizes: &Encoder, pictures: &Tensor) -> Result<Tensor> {
-    let half =
-        layers.plain("encoder.conv1", pictures, Window { size: 7, stride: 2, padding: 3, dilation: 1 })?.relu()?;
+    let half = layers.plain("encoder.conv1", pictures, Window { size: 7, stride: 2, padding: 3, dilation: 1 }, true)?;
     let [quarter, eighth, sixteenth, deepest] = trunk(layers, sizes, &half)?;
     let pyramid = pyramid(layers, &deepest)?;
     let x = stage(layers, "decoder.modified_up.stage1", &Tensor::cat(&[&sixteenth, &deepest, &pyramid], 3)?)?;
     let x = rise(layers, "decoder.modified_up", [1, 2], &x, &eighth)?;
     let x = rise(layers, "decoder.modified_up", [2, 3], &x, &quarter)?;
-    let near = layers.plain("decoder.block1.0", &quarter, Window::same(1))?.relu()?;
+    let near = layers.plain("decoder.block1.0", &quarter, Window::same(1), true)?;
     let x = layers.separable("decoder.block2.0", &Tensor::cat(&[&x, &near], 3)?, 1)?;
     let x = rise(layers, "volume_head.up", [1, 1], &x, &half)?;
     let x = rise(layers, "volume_head.up", [2, 2], &x, pictures)?;
@@ -28,8 +27,7 @@ pub(super) fn volumes(layers: Layers<'_>, sizes: &Encoder, pictures: &Tensor) ->
         given.reshape((feature_count, volume_depth, ()))?.transpose(0, 1)?.contiguous()
     };
     let weights = reordered("weight")?.reshape((feature_count * volume_depth, (), 1, 1))?;
-    let volumes = super::super::images::convolve(&x, &weights, Window::same(1), true)?;
-    shifted(&volumes, &reordered("bias")?.flatten_all()?, true)
+    convolved(&x, [&weights, &reordered("bias")?.flatten_all()?], Window::same(1), true)
 }
 
 /// The four levels.
@@ -44,12 +42,12 @@ fn trunk(layers: Layers<'_>, sizes: &Encoder, stem: &Tensor) -> Result<[Tensor; 
             // The fourth level would halve the image once more; its windows have gaps instead.
             let dilation = if level == 4 { 2 } else { 1 };
             let window = Window { padding: dilation, dilation, ..Window::same(3) };
-            let inside = layers.plain(&format!("{name}.conv1"), &image, Window { stride, ..window })?.relu()?;
-            let inside = layers.plain(&format!("{name}.conv2"), &inside, window)?;
+            let inside = layers.plain(&format!("{name}.conv1"), &image, Window { stride, ..window }, true)?;
+            let inside = layers.plain(&format!("{name}.conv2"), &inside, window, false)?;
             let beside = match block == 0 && needs_downsample(level, channels, sizes.channels) {
                 true => {
                     let window = Window { stride, ..Window::same(1) };
-                    layers.plain(&format!("{name}.downsample.0"), &image, window)?
+                    layers.plain(&format!("{name}.downsample.0"), &image, window, false)?
                 }
                 false => image,
             };
@@ -68,15 +66,15 @@ fn trunk(layers: Layers<'_>, sizes: &Encoder, stem: &Tensor) -> Result<[Tensor; 
 fn pyramid(layers: Layers<'_>, image: &Tensor) -> Result<Tensor> {
     let pyramid = "decoder.aspp.0";
     let [count, height, width, _] = dims4(image)?;
-    let mut wide = vec![layers.plain(&format!("{pyramid}.convs.0.0"), image, Window::same(1))?.relu()?];
+    let mut wide = vec![layers.plain(&format!("{pyramid}.convs.0.0"), image, Window::same(1), true)?];
     for (branch, dilation) in (1..).zip(ASPP_RATES) {
         wide.push(layers.separable(&format!("{pyramid}.convs.{branch}.0"), image, dilation)?);
     }
     let mean = image.mean_keepdim((1, 2))?;
-    let pooled = layers.plain(&format!("{pyramid}.convs.4.1"), &mean, Window::same(1))?.relu()?;
+    let pooled = layers.plain(&format!("{pyramid}.convs.4.1"), &mean, Window::same(1), true)?;
     let channels = pooled.dim(3)?;
     wide.push(pooled.broadcast_as((count, height, width, channels))?.contiguous()?);
-    let mixed = layers.plain(&format!("{pyramid}.project.0"), &Tensor::cat(&wide, 3)?, Window::same(1))?.relu()?;
+    let mixed = layers.plain(&format!("{pyramid}.project.0"), &Tensor::cat(&wide, 3)?, Window::same(1), true)?;
     layers.separable("decoder.aspp.1", &mixed, 1)
 }
 
@@ -88,7 +86,7 @@ fn rise(layers: Layers<'_>, name: &str, [up, next]: [usize; 2], image: &Tensor, 
 
 /// Three convolutions.
 fn stage(layers: Layers<'_>, name: &str, image: &Tensor) -> Result<Tensor> {
-    let first = layers.rectified(&format!("{name}.0"), image, Window::same(3))?;
-    let second = layers.rectified(&format!("{name}.2"), &first, Window::same(3))?;
-    layers.rectified(&format!("{name}.4"), &second, Window::same(3))
+    let first = layers.convolved(&format!("{name}.0"), image, Window::same(3), true)?;
+    let second = layers.convolved(&format!("{name}.2"), &first, Window::same(3), true)?;
+    layers.convolved(&format!("{name}.4"), &second, Window::same(3), true)
 }

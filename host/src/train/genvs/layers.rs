@@ -1,7 +1,7 @@
 //! Layers by their names in a checkpoint, as both networks of GeNVS use them.
 
-use super::super::images::{convolve, dims4};
-use super::super::operations::{Apply, DepthwiseConvolution, Normalise, Shift, Window};
+use super::super::images::{convolve_with, dims4};
+use super::super::operations::{Apply, DepthwiseConvolution, Normalise, Window};
 use super::super::parameters::Parameters;
 use crate::field::genvs::group_count;
 use candle_core::{Result, Tensor};
@@ -26,20 +26,17 @@ impl Layers<'_> {
         Ok(if self.is_frozen { parameter.detach() } else { parameter.clone() })
     }
 
-    /// A convolution without bias. Pictures, the first thing that is looked at, need no gradient.
-    pub(super) fn plain(&self, name: &str, images: &Tensor, window: Window) -> Result<Tensor> {
+    /// A convolution without bias, rectified or not.
+    pub(super) fn plain(&self, name: &str, images: &Tensor, window: Window, rectifies: bool) -> Result<Tensor> {
         let weights = self.get(&format!("{name}.weight"))?;
-        convolve(images, &weights, window, images.track_op() || images.is_variable())
+        let biases = Tensor::zeros(weights.dim(0)?, weights.dtype(), weights.device())?;
+        convolved(images, [&weights, &biases], window, rectifies)
     }
 
-    /// A convolution with bias.
-    pub(super) fn convolved(&self, name: &str, images: &Tensor, window: Window) -> Result<Tensor> {
-        shifted(&self.plain(name, images, window)?, &self.get(&format!("{name}.bias"))?, false)
-    }
-
-    /// A convolution with bias, rectified.
-    pub(super) fn rectified(&self, name: &str, images: &Tensor, window: Window) -> Result<Tensor> {
-        shifted(&self.plain(name, images, window)?, &self.get(&format!("{name}.bias"))?, true)
+    /// A convolution with bias, rectified or not.
+    pub(super) fn convolved(&self, name: &str, images: &Tensor, window: Window, rectifies: bool) -> Result<Tensor> {
+        let [weights, biases] = [self.get(&format!("{name}.weight"))?, self.get(&format!("{name}.bias"))?];
+        convolved(images, [&weights, &biases], window, rectifies)
     }
 
     /// A filter for every channel, then single pixels mixed, rectified.
@@ -49,7 +46,7 @@ impl Layers<'_> {
         let window = Window { padding: dilation, dilation, ..Window::same(3) };
         let operation = DepthwiseConvolution { input: dims4(images)?, window };
         let inside = images.contiguous()?.apply_op2(&weights, Apply(operation))?;
-        self.plain(&format!("{name}.1"), &inside, Window::same(1))?.relu()
+        self.plain(&format!("{name}.1"), &inside, Window::same(1), true)
     }
 
     /// Every pixel as a square of four, rectified.
@@ -59,10 +56,11 @@ impl Layers<'_> {
         let outs = weights.dim(1)?;
         // To [row][column][out][in]: a convolution of single pixels.
         let weights = weights.permute((2, 3, 1, 0))?.reshape((4 * outs, channels, 1, 1))?;
-        let squares =
-            convolve(images, &weights, Window::same(1), true)?.reshape(vec![count, height, width, 2, 2, outs])?;
-        let image = squares.permute(vec![0, 1, 3, 2, 4, 5])?.reshape((count, 2 * height, 2 * width, outs))?;
-        shifted(&image, &self.get(&format!("{name}.bias"))?, true)
+        let biases = self.get(&format!("{name}.bias"))?;
+        let biases = Tensor::cat(&[&biases; 4], 0)?;
+        let squares = convolved(images, [&weights, &biases], Window::same(1), true)?;
+        let squares = squares.reshape(vec![count, height, width, 2, 2, outs])?;
+        squares.permute(vec![0, 1, 3, 2, 4, 5])?.reshape((count, 2 * height, 2 * width, outs))
     }
 
     /// A group norm, with SiLU behind it or not.
@@ -80,8 +78,7 @@ impl Layers<'_> {
     }
 }
 
-/// Images with shifts `[channel]` or `[image][channel]` added.
-pub(super) fn shifted(images: &Tensor, shifts: &Tensor, rectifies: bool) -> Result<Tensor> {
-    let operation = Shift { input: dims4(images)?, is_own: shifts.rank() == 2, rectifies };
-    images.contiguous()?.apply_op2(&shifts.contiguous()?, Apply(operation))
+/// A convolution with these weights and biases. Pictures, the first thing that is looked at, need no gradient.
+pub(super) fn convolved(images: &Tensor, layer: [&Tensor; 2], window: Window, rectifies: bool) -> Result<Tensor> {
+    convolve_with(images, layer, window, images.track_op(), rectifies)
 }

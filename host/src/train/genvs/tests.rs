@@ -3,7 +3,7 @@
 use super::super::average::Average;
 use super::super::draw::Draw;
 use super::super::genvs_learner::loss;
-use super::super::operations::{Apply, Look, LookSizes, Normalise, Operation, Shift, Sight};
+use super::super::operations::{Apply, Convolution, Look, LookSizes, Normalise, Operation, Sight, Window};
 use super::super::parameters::Parameters;
 use super::{Genvs, Views, each};
 use crate::checkpoint::TensorShape;
@@ -159,13 +159,17 @@ fn variable(shape: &[usize], seed: u32) -> Var {
 }
 
 #[test]
-fn shifts_and_norms_have_their_slopes() {
+fn convolutions_and_norms_have_their_slopes() {
     let input = [2, 3, 4, 8];
-    let (images, shared, own) = (variable(&input, 10), variable(&[8], 11), variable(&[2, 8], 12));
-    for (shifts, is_own, rectifies) in [(&shared, false, true), (&own, true, true), (&own, true, false)] {
-        let operation = || Apply(Shift { input, is_own, rectifies });
-        assert_slopes(&[("images", &images), ("shifts", shifts)], 1.0e-6, 1.0e-6, || {
-            mixed(&images.apply_op2(shifts, operation())?)
+    let images = variable(&input, 10);
+    let (filters, shared, own) = (variable(&[5, 9, 8], 9), variable(&[5], 11), variable(&[2, 5], 12));
+    for (biases, has_own_biases, rectifies) in [(&shared, false, true), (&own, true, true), (&own, true, false)] {
+        let operation = || {
+            let (window, out_channels) = (Window::same(3), 5);
+            Apply(Convolution { input, out_channels, window, has_own_biases, rectifies, differentiates_input: true })
+        };
+        assert_slopes(&[("images", &images), ("filters", &filters), ("biases", biases)], 1.0e-6, 1.0e-6, || {
+            mixed(&images.apply_op3(&filters, biases, operation())?)
         });
     }
     let (weights, biases) = (variable(&[8], 13), variable(&[8], 14));

@@ -57,12 +57,17 @@ impl Window {
     }
 }
 
-/// Inputs: images `[image][row][column][in]`, weights `[out][place][in]`. Result `[image][row][column][out]`.
+/// Inputs: images `[image][row][column][in]`, weights `[out][place][in]`, biases `[out]` of all images or `[image][out]` of
+/// each. Result `[image][row][column][out]`.
 pub(crate) struct Convolution {
     /// Images, rows, columns, channels of the input.
     pub(crate) input: [usize; 4],
     pub(crate) out_channels: usize,
     pub(crate) window: Window,
+    /// Whether each image has its own biases.
+    pub(crate) has_own_biases: bool,
+    /// Whether negative results become 0.
+    pub(crate) rectifies: bool,
     /// Whether anybody asks for the gradient of the images.
     pub(crate) differentiates_input: bool,
 }
@@ -116,7 +121,7 @@ impl Convolution {
     }
 }
 
-impl Operation<2> for Convolution {
+impl Operation<3> for Convolution {
     const NAME: &'static str = "convolve";
 
     fn shape(&self) -> Vec<usize> {
@@ -124,26 +129,32 @@ impl Operation<2> for Convolution {
         vec![self.input[0], height, width, self.out_channels]
     }
 
-    fn forward<T: Real>(&self, [images, weights]: [&[T]; 2]) -> Vec<T> {
+    fn forward<T: Real>(&self, [images, weights, biases]: [&[T]; 3]) -> Vec<T> {
         let [count, height, width, channels] = self.input;
         let [out_height, out_width] = self.out_size();
         let (pixels, row_len, outs) = (out_height * out_width, self.row_len(), self.out_channels);
         let mut output = vec![T::zero(); count * pixels * outs];
         let weights = matrix(weights, outs, row_len);
         let each = images.par_chunks_exact(height * width * channels).zip(output.par_chunks_exact_mut(pixels * outs));
-        each.for_each(|(image, output)| {
+        each.enumerate().for_each(|(index, (image, output))| {
+            let biases = &biases[if self.has_own_biases { index * outs } else { 0 }..][..outs];
             let mut room = Vec::new();
             for strip in self.strips() {
                 let rows = self.unfold(image, &strip, &mut room);
                 let own = &mut output[strip.start * out_width * outs..strip.end * out_width * outs];
+                own.chunks_exact_mut(outs).for_each(|own| own.copy_from_slice(biases));
                 let count = strip.len() * out_width;
-                product(matrix(rows, count, row_len), weights.t(), matrix_mut(own, count, outs));
+                add_product(matrix(rows, count, row_len), weights.t(), matrix_mut(own, count, outs));
+                if self.rectifies {
+                    // NaN stays: the loss must show it.
+                    own.iter_mut().for_each(|own| *own = if *own < T::zero() { T::zero() } else { *own });
+                }
             }
         });
         output
     }
 
-    fn backward<T: Real>(&self, [images, weights]: [&[T]; 2], gradient: &[T]) -> [Option<Vec<T>>; 2] {
+    fn backward<T: Real>(&self, [images, weights, _]: [&[T]; 3], output: &[T], gradient: &[T]) -> [Option<Vec<T>>; 3] {
         let [count, height, width, channels] = self.input;
         let [out_height, out_width] = self.out_size();
         let (pixels, row_len, outs) = (out_height * out_width, self.row_len(), self.out_channels);
@@ -154,12 +165,21 @@ impl Operation<2> for Convolution {
         parts.resize_with(count, Default::default);
         let one = |(index, of_image): (usize, &mut [T])| {
             let image = &images[index * image_len..][..image_len];
-            let gradient = &gradient[index * pixels * outs..][..pixels * outs];
-            let mut of_weights = vec![T::zero(); outs * row_len];
-            let (mut room, mut of_rows) = (Vec::new(), Vec::new());
+            let (mut of_weights, mut of_biases) = (vec![T::zero(); outs * row_len], vec![T::zero(); outs]);
+            let (mut room, mut of_rows, mut passed) = (Vec::new(), Vec::new(), Vec::new());
             for strip in self.strips() {
                 let count = strip.len() * out_width;
-                let gradient = &gradient[strip.start * out_width * outs..strip.end * out_width * outs];
+                let own = (index * pixels + strip.start * out_width) * outs;
+                let (mut gradient, output) = (&gradient[own..][..count * outs], &output[own..][..count * outs]);
+                if self.rectifies {
+                    passed.clear();
+                    let pass = |(gradient, output): (&T, &T)| if *output > T::zero() { *gradient } else { T::zero() };
+                    passed.extend(gradient.iter().zip(output).map(pass));
+                    gradient = &passed;
+                }
+                for row in gradient.chunks_exact(outs) {
+                    of_biases.iter_mut().zip(row).for_each(|(to, own)| *to += *own);
+                }
                 let gradient = matrix(gradient, count, outs);
                 let rows = matrix(self.unfold(image, &strip, &mut room), count, row_len);
                 add_product(gradient.t(), rows, matrix_mut(&mut of_weights, outs, row_len));
@@ -169,16 +189,17 @@ impl Operation<2> for Convolution {
                 of_rows.resize(count * row_len, T::zero());
                 product(gradient, weights, matrix_mut(&mut of_rows, count, row_len));
                 if self.window.is_a_pixel() {
-                    of_image[strip.start * out_width * row_len..strip.end * out_width * row_len]
-                        .copy_from_slice(&of_rows);
+                    let to = strip.start * out_width * row_len..strip.end * out_width * row_len;
+                    of_image[to].copy_from_slice(&of_rows);
                 } else {
                     self.fold(&of_rows, &strip, of_image);
                 }
             }
-            of_weights
+            (of_weights, of_biases)
         };
-        let of_weights: Vec<Vec<T>> = parts.into_par_iter().enumerate().map(one).collect();
-        [self.differentiates_input.then_some(of_images), Some(sum(of_weights))]
+        let (of_weights, of_biases): (Vec<Vec<T>>, Vec<Vec<T>>) = parts.into_par_iter().enumerate().map(one).unzip();
+        let of_biases = if self.has_own_biases { of_biases.concat() } else { sum(of_biases) };
+        [self.differentiates_input.then_some(of_images), Some(sum(of_weights)), Some(of_biases)]
     }
 }
 
@@ -214,7 +235,7 @@ impl Operation<2> for DepthwiseConvolution {
         output
     }
 
-    fn backward<T: Real>(&self, [images, weights]: [&[T]; 2], gradient: &[T]) -> [Option<Vec<T>>; 2] {
+    fn backward<T: Real>(&self, [images, weights]: [&[T]; 2], _: &[T], gradient: &[T]) -> [Option<Vec<T>>; 2] {
         let [_, height, width, channels] = self.input;
         let out_width = self.window.count(width);
         let (image_len, out_len) = (height * width * channels, self.window.count(height) * out_width * channels);

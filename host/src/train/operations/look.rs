@@ -305,14 +305,14 @@ impl Operation<3> for Look {
         seen.concat()
     }
 
-    fn backward<T: Real>(&self, inputs: [&[T]; 3], gradient: &[T]) -> [Option<Vec<T>>; 3] {
+    fn backward<T: Real>(&self, inputs: [&[T]; 3], _: &[T], gradient: &[T]) -> [Option<Vec<T>>; 3] {
         let object_len = self.rays() * self.sizes.features;
         let kept = |len: usize| vec![T::zero(); if self.is_frozen { 0 } else { len }];
         // One object after another, so that sums are in one order.
         let one = |object: usize| {
             let mut of_volumes = kept(self.views() * self.sizes.volume_len());
             let mut of_weights = vec![T::zero(); self.views()];
-            let mut of_parameters = kept(inputs[2].len());
+            let mut of_parameters = kept(self.sizes.parameter_count());
             let gradient = &gradient[object * object_len..][..object_len];
             for chunk in self.chunks() {
                 let own = &gradient[chunk.start * self.sizes.features..chunk.end * self.sizes.features];

@@ -78,7 +78,7 @@ impl Operation<3> for Normalise {
         output
     }
 
-    fn backward<T: Real>(&self, [images, weights, biases]: [&[T]; 3], gradient: &[T]) -> [Option<Vec<T>>; 3] {
+    fn backward<T: Real>(&self, [images, weights, biases]: [&[T]; 3], _: &[T], gradient: &[T]) -> [Option<Vec<T>>; 3] {
         let channels = self.input[3];
         let mut of_images = vec![T::zero(); images.len()];
         let len = self.image_len();

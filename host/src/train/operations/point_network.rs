@@ -331,7 +331,7 @@ impl Operation<3> for PointNetwork {
         raws.concat()
     }
 
-    fn backward<T: Real>(&self, inputs: [&[T]; 3], gradient: &[T]) -> [Option<Vec<T>>; 3] {
+    fn backward<T: Real>(&self, inputs: [&[T]; 3], _: &[T], gradient: &[T]) -> [Option<Vec<T>>; 3] {
         let points = &*self.points;
         let grid_len = points.view_count * self.node_count * self.node_len();
         // One object after another, so that sums are in one order.
