@@ -20,6 +20,8 @@ mod memory;
 mod pareto;
 #[path = "commands/render.rs"]
 mod render;
+#[path = "commands/scenes.rs"]
+mod scenes;
 #[path = "commands/tables.rs"]
 mod tables;
 #[path = "commands/verify.rs"]
@@ -59,7 +61,20 @@ fn help_fits_and_gives_examples() {
     let here = Path::new(".");
     let version = done(here, "--version");
     assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
-    for name in ["", "render", "weights", "inspect", "evaluate", "pareto", "compare", "devices", "verify", "check"] {
+    let commands = [
+        "",
+        "render",
+        "weights",
+        "inspect",
+        "evaluate",
+        "pareto",
+        "compare",
+        "scenes make",
+        "devices",
+        "verify",
+        "check",
+    ];
+    for name in commands {
         let help = done(here, &format!("{name} --help"));
         assert!(name.is_empty() || help.contains(&format!("viewfuse {name} ")), "an example of {name}:\n{help}");
         assert!(name.is_empty() || help.contains("Example"), "an example of {name}:\n{help}");

@@ -26,10 +26,10 @@ use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::pose::PoseError;
 
 /// Counts up when the same settings come to give other pictures.
-const MAKING: u32 = 1;
+const MAKING: u32 = 2;
 
 /// Rays per pixel along each axis: fewer than the sample scene has, for there are many more pictures.
-const RAYS_PER_SIDE: u32 = 3;
+pub const RAYS_PER_SIDE: u32 = 3;
 
 /// Most objects in a folder: their names have six digits, and the folders' stretches of indices do not overlap.
 pub const LARGEST_OBJECT_COUNT: u32 = 1_000_000;

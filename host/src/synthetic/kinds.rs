@@ -19,7 +19,7 @@ use build::Build;
 use draws::Draws;
 use std::fmt;
 use std::str::FromStr;
-use viewfuse_core::math::min;
+use viewfuse_core::Vec3;
 
 /// Farthest that an object reaches from the origin, in world units.
 pub const LARGEST_RADIUS: f32 = 0.55;
@@ -85,6 +85,6 @@ fn mix(a: f32, b: f32, t: f32) -> f32 {
 
 /// Half sizes of a box with these proportions and this diagonal.
 fn half_sizes(proportions: [f32; 3], diagonal: f32) -> [f32; 3] {
-    let length = viewfuse_core::Vec3::from_array(proportions).length();
-    proportions.map(|side| 0.5 * min(diagonal, 1.0) * side / length)
+    let length = Vec3::from_array(proportions).length();
+    proportions.map(|side| 0.5 * diagonal * side / length)
 }

@@ -35,6 +35,7 @@ impl Patch {
 
 /// A pattern of two colours, or one colour alone. Sizes are in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "as with shapes: few, and in one piece of memory")]
 pub enum Texture {
     /// One colour.
     Plain {

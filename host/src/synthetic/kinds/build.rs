@@ -6,7 +6,7 @@ use crate::synthetic::prism::{Prism, Width};
 use crate::synthetic::shape::Shape;
 use crate::synthetic::texture::Finish;
 use viewfuse_core::Vec3;
-use viewfuse_core::math::{angle_from_components, max, min};
+use viewfuse_core::math::{angle_from_components, max, min, sqrt};
 
 /// The parts so far.
 #[derive(Default)]
@@ -35,7 +35,7 @@ impl Build {
         let along = to - from;
         let middle = (from + to) * 0.5;
         // The local z axis is turned first about world z, then down.
-        let level = (along.x * along.x + along.y * along.y).sqrt();
+        let level = sqrt(along.x * along.x + along.y * along.y);
         let turn = signed_angle(along.y, along.x);
         let placement = Placement::at(middle.x, middle.y, middle.z)
             .turned_about_z(turn)

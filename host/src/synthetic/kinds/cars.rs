@@ -15,7 +15,7 @@ use crate::synthetic::prism::Width;
 use crate::synthetic::texture::Finish;
 use core::f32::consts::PI;
 use style::{Style, Top};
-use viewfuse_core::math::sin_cos;
+use viewfuse_core::math::{sin_cos, sqrt};
 
 /// Corners of a wheel arch.
 const ARCH_CORNER_COUNT: usize = 6;
@@ -233,7 +233,7 @@ fn windows(car: &Car, build: &mut Build, draws: &mut Draws, cabin: Width, frame:
         }
         let at = |t: f32, by: f32| {
             let along = [upper[0] - lower[0], upper[1] - lower[1]];
-            let length = viewfuse_core::math::sqrt(along[0] * along[0] + along[1] * along[1]);
+            let length = sqrt(along[0] * along[0] + along[1] * along[1]);
             let off = by * outwards / length;
             [mix(lower[0], upper[0], t) + along[1] * off, mix(lower[1], upper[1], t) - along[0] * off]
         };
