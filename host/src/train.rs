@@ -34,6 +34,8 @@ mod pixelnerf;
 mod pixelnerf_learner;
 mod run;
 mod scenes;
+#[cfg(test)]
+mod slopes;
 mod state;
 mod weighting_learner;
 

@@ -2,6 +2,9 @@
 //! the statistics they begin with (mean 0, variance 1), so that training and rendering compute the same, and one point
 //! network for both passes.
 
+#[cfg(test)]
+mod tests;
+
 use super::TrainError;
 use super::batch::Batch;
 use super::compositing::{coarse_depths, fine_depths, points, weights as sample_weights};
@@ -223,7 +226,7 @@ impl PixelNerf {
         }
         let (raw, lengths) = self.sampled(&seen, batch, &depths)?;
         let weights = sample_weights(&density(&raw, &lengths)?, &lengths)?;
-        let colours = candle_logistic(&raw.narrow(1, 0, 3)?)?.reshape((lengths.dim(0)?, lengths.dim(1)?, 3))?;
+        let colours = logistic(&raw.narrow(1, 0, 3)?)?.reshape((lengths.dim(0)?, lengths.dim(1)?, 3))?;
         let sum = weights.unsqueeze(1)?.matmul(&colours)?.squeeze(1)?;
         // What is not stopped is white.
         sum.broadcast_add(&(1.0 - weights.sum_keepdim(1)?)?)
@@ -254,7 +257,7 @@ fn density(raw: &Tensor, lengths: &Tensor) -> Result<Tensor> {
 }
 
 /// `1 / (1 + e^-x)`.
-fn candle_logistic(values: &Tensor) -> Result<Tensor> {
+fn logistic(values: &Tensor) -> Result<Tensor> {
     (values.neg()?.exp()? + 1.0)?.recip()
 }
 

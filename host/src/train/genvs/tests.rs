@@ -5,19 +5,18 @@ use super::super::draw::Draw;
 use super::super::genvs_learner::loss;
 use super::super::operations::{Apply, Convolution, Look, LookSizes, Normalise, Operation, Sight, Window};
 use super::super::parameters::Parameters;
+use super::super::slopes::{assert_close, assert_slopes, mixed, noise, orbit, photographs, tensor, variable};
 use super::{Genvs, Views, each};
 use crate::checkpoint::TensorShape;
 use crate::device::cpu::Cpu;
 use crate::field::genvs::reference::Reference;
 use crate::field::genvs::{Architecture, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, made, ray_length};
 use crate::field::learned::default_near_far;
-use crate::photographs::{SourceImage, SourceImages};
-use crate::synthetic::{Orbit, render, toy};
+use crate::photographs::SourceImages;
 use candle_core::{DType, Device, Result, Tensor, Var};
 use std::sync::Arc;
-use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
+use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::depths::CoarseBlock;
-use viewfuse_core::random::normal;
 use viewfuse_core::rays::cast_ray;
 use viewfuse_core::schedule::Preconditioning;
 
@@ -25,33 +24,8 @@ use viewfuse_core::schedule::Preconditioning;
 /// sqrt(n) 2^-24 of their size, n being 576 for most: 60 * 24 * 6e-8.
 const ROUNDING: f64 = 8.6e-5;
 
-fn orbit(side: u32) -> Orbit {
-    let pinhole = Pinhole::new([1.025 * side as f32; 2], [0.5 * side as f32; 2], side, side).expect("intrinsics");
-    Orbit { radius: 1.3, pinhole }
-}
-
-fn photographs(count: u32, side: u32) -> SourceImages {
-    let lorry = toy::lorry().expect("the lorry");
-    let texel = |pixel: &image::Rgba<u8>| {
-        let [red, green, blue, alpha] = pixel.0.map(|value| f32::from(value) / 255.0);
-        [red * alpha, green * alpha, blue * alpha, alpha]
-    };
-    let image = |camera: Camera| SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() };
-    let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
-}
-
 fn target(side: u32, angle: f32) -> CameraBlock {
     orbit(side).camera(angle, 0.35).expect("a camera off the pole").block(0)
-}
-
-fn tensor(values: Vec<f32>, shape: &[usize], dtype: DType) -> Tensor {
-    Tensor::from_vec(values, shape, &Device::Cpu).and_then(|tensor| tensor.to_dtype(dtype)).expect("a tensor")
-}
-
-fn noise(shape: &[usize], seed: u32) -> Tensor {
-    let count: usize = shape.iter().product();
-    tensor((0..count as u32).map(|index| normal([seed, 7], index, 0)).collect(), shape, DType::F64)
 }
 
 /// Photographs as both objects, and a target of each, as a step's views.
@@ -69,21 +43,10 @@ fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -
         cameras: vec![cameras.iter().map(|camera| camera.block(0)).collect(); object_count],
         near_far: vec![default_near_far(&cameras); object_count],
         sources: vec![cameras; object_count],
+        // Where nothing is weighted by pose, no pose of a target is asked for.
+        target_cameras: Vec::new(),
         targets: vec![targets.to_vec(); object_count],
         truth: tensor(truth, &[object_count * targets.len(), side, side, 3], DType::F64),
-    }
-}
-
-/// That every actual number is the expected one but for a share of the largest.
-fn assert_close(actual: &[f32], expected: &Tensor, share: f64) {
-    let expected = expected.flatten_all().and_then(|all| all.to_vec1::<f64>()).expect("numbers");
-    assert_eq!(actual.len(), expected.len());
-    let largest = expected.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let spread = expected.iter().fold(0.0_f64, |most, value| most.max((value - expected[0]).abs()));
-    assert!(spread > 0.01 * largest, "everything is {largest}");
-    for (index, (actual, expected)) in actual.iter().zip(&expected).enumerate() {
-        let error = (f64::from(*actual) - expected).abs();
-        assert!(error <= share * largest, "number {index}: {actual} instead of {expected}, of at most {largest}");
     }
 }
 
@@ -117,45 +80,6 @@ fn the_graph_is_the_renderers() {
         let said = reference.denoised(&plain(&noisy), &plain(&features), [64, 64], level).expect("a picture");
         assert_close(&said, &denoised, 2.0 * ROUNDING);
     }
-}
-
-/// That the gradient of each variable is the slope along a random direction of it, by central differences. `error` is a
-/// share of the slope, or of the largest slope where that is more than a thousand times as large.
-fn assert_slopes(variables: &[(&str, &Var)], step: f64, error: f64, value: impl Fn() -> Result<Tensor>) {
-    let number = |tensor: Tensor| tensor.to_scalar::<f64>().expect("a number");
-    let gradients = value().and_then(|value| value.backward()).expect("gradients");
-    let slopes: Vec<(f64, f64)> = variables
-        .iter()
-        .enumerate()
-        .map(|(index, (name, variable))| {
-            let direction = noise(variable.dims(), 100 + index as u32);
-            let gradient = gradients.get(variable).unwrap_or_else(|| panic!("{name} has no gradient"));
-            let slope = (gradient * &direction).and_then(|products| products.sum_all()).map(number).expect("a slope");
-            let kept = variable.copy().expect("a copy");
-            let at = |distance: f64| {
-                let moved = (&kept + (&direction * distance).expect("a direction")).expect("a place");
-                variable.set(&moved).and_then(|()| value()).map(number).expect("a value")
-            };
-            let difference = (at(step) - at(-step)) / (2.0 * step);
-            variable.set(&kept).expect("the same shape");
-            (slope, difference)
-        })
-        .collect();
-    let largest = slopes.iter().fold(0.0_f64, |most, (_, difference)| most.max(difference.abs()));
-    assert!(largest > 0.0, "nothing changes anything");
-    for ((name, _), (slope, difference)) in variables.iter().zip(&slopes) {
-        let allowed = error * difference.abs().max(1.0e-3 * largest);
-        assert!((slope - difference).abs() <= allowed, "{name}: gradient {slope}, slope {difference}");
-    }
-}
-
-/// A number that every number of a tensor matters for, each in its own way.
-fn mixed(tensor: &Tensor) -> Result<Tensor> {
-    (tensor * noise(tensor.dims(), 1))?.sum_all()
-}
-
-fn variable(shape: &[usize], seed: u32) -> Var {
-    Var::from_tensor(&noise(shape, seed)).expect("a variable")
 }
 
 #[test]
