@@ -2,6 +2,8 @@
 
 #[path = "commands/check.rs"]
 mod check;
+#[path = "commands/compare.rs"]
+mod compare;
 #[path = "commands/convert.rs"]
 mod convert;
 #[path = "commands/devices.rs"]
@@ -18,6 +20,8 @@ mod memory;
 mod pareto;
 #[path = "commands/render.rs"]
 mod render;
+#[path = "commands/scenes.rs"]
+mod scenes;
 #[path = "commands/tables.rs"]
 mod tables;
 #[path = "commands/verify.rs"]
@@ -57,7 +61,21 @@ fn help_fits_and_gives_examples() {
     let here = Path::new(".");
     let version = done(here, "--version");
     assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
-    for name in ["", "render", "weights", "inspect", "evaluate", "pareto", "report", "devices", "verify", "check"] {
+    let commands = [
+        "",
+        "render",
+        "weights",
+        "inspect",
+        "evaluate",
+        "pareto",
+        "report",
+        "compare",
+        "scenes make",
+        "devices",
+        "verify",
+        "check",
+    ];
+    for name in commands {
         let help = done(here, &format!("{name} --help"));
         assert!(name.is_empty() || help.contains(&format!("viewfuse {name} ")), "an example of {name}:\n{help}");
         assert!(name.is_empty() || help.contains("Example"), "an example of {name}:\n{help}");

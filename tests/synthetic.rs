@@ -1,8 +1,16 @@
 //! Tests of the synthetic scenes: geometry against closed forms in `f64`, pictures against the checked-in sample,
 //! folders against what was asked for.
 
+#[path = "synthetic/cameras.rs"]
+mod cameras;
+#[path = "synthetic/collections.rs"]
+mod collections;
 #[path = "synthetic/folders.rs"]
 mod folders;
+#[path = "synthetic/kinds.rs"]
+mod kinds;
+#[path = "synthetic/prisms.rs"]
+mod prisms;
 
 use folders::assert_poses;
 use std::fs;

@@ -20,6 +20,8 @@ mod limits;
 mod loader;
 #[path = "vulkan/memory.rs"]
 mod memory;
+#[path = "vulkan/metrics.rs"]
+mod metrics;
 #[path = "vulkan/picture.rs"]
 mod picture;
 #[path = "vulkan/pixelnerf.rs"]
@@ -66,6 +68,7 @@ fn main() -> ExitCode {
         picture::TESTS,
         pixelnerf::TESTS,
         genvs::TESTS,
+        metrics::TESTS,
         sampling::TESTS,
         limits::TESTS,
     ]

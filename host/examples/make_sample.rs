@@ -4,6 +4,7 @@
 
 use anyhow::{Context, bail};
 use std::path::PathBuf;
+use viewfuse::synthetic::render::RAYS_PER_SIDE;
 use viewfuse::synthetic::toy::{lorry, test_cameras, training_cameras};
 use viewfuse::synthetic::write_scene;
 
@@ -15,7 +16,7 @@ fn main() -> anyhow::Result<()> {
     let object = lorry().context("the toy lorry")?;
     let mut cameras = training_cameras()?;
     cameras.extend(test_cameras()?);
-    write_scene(&folder, &object, &cameras)?;
+    write_scene(&folder, &object, &cameras, RAYS_PER_SIDE)?;
     println!("{}: {} views", folder.display(), cameras.len());
     Ok(())
 }

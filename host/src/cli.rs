@@ -1,16 +1,20 @@
 //! The command line: what each command takes. What each does is in its own file.
 
 mod check;
+mod compare;
 mod convert;
 mod devices;
 mod evaluate;
 mod inspect;
+mod metrics_options;
 mod model;
 mod options;
 mod pareto;
 mod render;
 mod report;
+mod scenes;
 mod table;
+mod train;
 mod verify;
 mod weights;
 
@@ -49,6 +53,12 @@ enum Command {
     Evaluate(evaluate::Arguments),
     /// Measure error against run time over what can be left out, on each device.
     Pareto(pareto::Arguments),
+    /// Score pictures against what they should be.
+    Compare(compare::Arguments),
+    /// Learn a network, or the weighting of views for one, from scenes.
+    Train(train::Arguments),
+    /// Make scenes to learn from.
+    Scenes(scenes::Arguments),
     /// Write evaluations, run times and trainings as one HTML page.
     Report(report::Arguments),
     /// Write a checkpoint as safetensors.
@@ -73,6 +83,9 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),
         Command::Pareto(arguments) => pareto::run(&arguments),
+        Command::Compare(arguments) => compare::run(&arguments),
+        Command::Train(arguments) => train::run(&arguments),
+        Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),

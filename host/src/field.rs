@@ -6,10 +6,10 @@
 pub mod family;
 pub mod finite;
 pub mod genvs;
-mod learned;
+pub(crate) mod learned;
 pub mod photo;
 pub mod pixelnerf;
-mod resnet;
+pub(crate) mod resnet;
 
 use crate::checkpoint::CheckpointError;
 use crate::device::Device;

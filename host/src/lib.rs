@@ -5,6 +5,7 @@
 //! ```text
 //! interrupt, progress, files    stopping cleanly, showing progress, outputs that appear whole
 //! scene                         a folder of posed photographs: Scene, View, Photograph
+//! dataset                       folders of many scenes: Dataset, Split
 //! synthetic                     scenes made by ourselves
 //! rig                           the cameras as a whole: focus, up, orbits
 //! sources                       how many sources there can be
@@ -14,6 +15,7 @@
 //! checkpoint                    files of network parameters: Checkpoint
 //! device                        where kernels run: Device, the CPU, Vulkan devices, which one
 //! field                         photographs -> picture: Field, the field that needs no weights file
+//! metrics                       how good pictures are, as numbers and through networks' eyes: Metrics
 //! render                        the way of the data from scene to picture, in one function
 //! canvas, sheet, record         contact sheets, camera maps, run records
 //! evaluate, inspect, verify     the other jobs
@@ -22,6 +24,7 @@
 //! pareto                        error against run time
 //! report                        all of that on one page
 //! check                         how closely devices agree with the mathematics
+//! train                         networks and weightings, learned from scenes
 //! ```
 //!
 //! The command line is the binary's (`main.rs`, `cli/`).
@@ -31,6 +34,7 @@ pub mod attention;
 pub mod canvas;
 pub mod check;
 pub mod checkpoint;
+pub mod dataset;
 pub mod device;
 pub mod evaluate;
 pub mod few_shot;
@@ -40,6 +44,7 @@ pub mod formula;
 pub mod gallery;
 pub mod inspect;
 pub mod interrupt;
+pub mod metrics;
 pub mod pareto;
 pub mod photographs;
 pub mod progress;
@@ -54,6 +59,7 @@ pub mod sheet;
 pub mod sources;
 pub mod summary;
 pub mod synthetic;
+pub mod train;
 pub mod verify;
 pub mod weighting;
 

@@ -41,6 +41,13 @@ impl Progress {
         }
     }
 
+    /// Shows a line of news above the bar, on standard error; nothing where nothing is shown at all.
+    pub fn note(&self, news: &str) {
+        if self.told.is_some() {
+            self.bar.suspend(|| eprintln!("{news}"));
+        }
+    }
+
     /// A piece is done.
     pub fn step(&self) {
         self.bar.inc(1);

@@ -157,7 +157,7 @@ pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError>
             let metadata = SafeTensors::read_metadata(&bytes).ok().and_then(|(_, header)| header.metadata().clone());
             let said = |key: &str| metadata.as_ref()?.get(key).map(String::as_str);
             let mut covered = attention::verify(path, &tensors, &mut report)?;
-            covered.extend(metrics::verify(path, &tensors, &mut report)?);
+            covered.extend(metrics::verify(path, &tensors, device, &mut report)?);
             covered.extend(pixelnerf::verify(path, &tensors, said("width"), device, &mut report)?);
             covered.extend(genvs::verify(path, &tensors, said("member"), device, &mut report)?);
             let mut rest: Vec<&str> =

@@ -5,6 +5,9 @@ use serde_json::{Value, json};
 use viewfuse_tests::command::{run, safetensors};
 use viewfuse_tests::scenes::Folder;
 
+/// Scores and distances by the official codes; see `tests/data/metrics.md`.
+const REFERENCE: &[u8] = include_bytes!("../data/metrics/reference.safetensors");
+
 /// Weights of two sources with these errors: proportional to `1 / (e + 1e-6)`.
 fn weights(errors: [f64; 2]) -> [f64; 2] {
     let shares = errors.map(|error| 1.0 / (error + 1.0e-6));
@@ -100,4 +103,47 @@ fn metrics_right_and_wrong() {
     let outcome = run(BINARY, folder.path(), "verify metrics.safetensors weighting.json");
     assert_eq!(outcome.code, Some(1));
     assert!(outcome.stdout.contains("0 of 1 quantities") && outcome.stdout.contains("8 of 8 quantities"));
+}
+
+/// Networks by formula with the heads that are published, and sets of points.
+#[test]
+fn scores_of_the_official_codes() {
+    let folder = Folder::new();
+    folder.write("metrics.safetensors", REFERENCE);
+    let printed = done(folder.path(), "verify metrics.safetensors --device cpu");
+    assert!(printed.contains("7 of 7 quantities within tolerance"), "{printed}");
+    assert!(!printed.contains("not computed"), "{printed}");
+}
+
+/// Every number of the file counts: a head's, a point's, a score.
+#[test]
+fn scores_that_are_not_the_official_codes() {
+    let folder = Folder::new();
+    for (tensor, change, quantity) in [
+        ("lpips_lin2.model.1.weight", 1.0, "LPIPS (alex)"),
+        ("dists_beta", 1.0, "DISTS"),
+        ("dists", 1.0e-6, "DISTS"),
+        ("frechet_x", 1.0, "Frechet distance"),
+        ("frechet_lowrank", 0.01, "Frechet distance, few points"),
+        ("ssim_gaussian", 1.0e-6, "SSIM (Gaussian)"),
+    ] {
+        folder.write("metrics.safetensors", changed(tensor, change));
+        assert_exceeded(&folder, "metrics.safetensors", quantity);
+    }
+}
+
+/// The reference with the last number of a tensor increased.
+fn changed(tensor: &str, change: f64) -> Vec<u8> {
+    let mut bytes = REFERENCE.to_vec();
+    let header_len = u64::from_le_bytes(bytes[..8].try_into().expect("eight bytes")) as usize;
+    let header: Value = serde_json::from_slice(&bytes[8..8 + header_len]).expect("a header");
+    let end = 8 + header_len + header[tensor]["data_offsets"][1].as_u64().expect("an offset") as usize;
+    if header[tensor]["dtype"] == "F64" {
+        let number = bytes[..end].last_chunk_mut::<8>().expect("a number");
+        *number = (f64::from_le_bytes(*number) + change).to_le_bytes();
+    } else {
+        let number = bytes[..end].last_chunk_mut::<4>().expect("a number");
+        *number = (f32::from_le_bytes(*number) + change as f32).to_le_bytes();
+    }
+    bytes
 }

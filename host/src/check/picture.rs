@@ -14,6 +14,7 @@ use crate::photographs::longest_side;
 use crate::progress::Progress;
 use crate::render::{Frame, RenderError, RenderOptions, render};
 use crate::scene::Scene;
+use crate::synthetic::render::RAYS_PER_SIDE;
 use crate::synthetic::{toy, write_scene};
 use crate::weighting::Weighting;
 use image::RgbImage;
@@ -122,7 +123,7 @@ fn synthetic() -> Result<TempDir, AnyError> {
         Ok(Camera { pinhole: camera.pinhole.resized(SYNTHETIC_SIDE, SYNTHETIC_SIDE)?, ..camera })
     };
     let cameras: Vec<Camera> = cameras.map(smaller).collect::<Result<_, _>>()?;
-    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras)?;
+    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE)?;
     Ok(folder)
 }
 

@@ -19,10 +19,12 @@ pub mod reference;
 pub mod sampling;
 mod volume;
 
+pub(crate) use architecture::MLP;
 pub use architecture::{
     ASPP_RATES, Architecture, Block, COLOUR_CHANNELS, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Encoder,
     Level, Resampling, group_count,
 };
+pub(crate) use feature_image::{LAST_LENGTH, cast_block, ray_length};
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{default_near_far, over_white};

@@ -4,7 +4,7 @@
 //! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined by weights
 //! where the published network takes their mean.
 
-mod architecture;
+pub(crate) mod architecture;
 mod encoder;
 pub mod made;
 mod memory;

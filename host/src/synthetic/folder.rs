@@ -9,8 +9,9 @@
 //! Numbers are written with the fewest digits that read back as the same `f32`. The folder is filled under a temporary
 //! name beside its own and then renamed: a run that is killed leaves no folder that looks finished.
 
+use crate::interrupt::{self, Interrupted};
 use crate::synthetic::object::Object;
-use crate::synthetic::render::render;
+use crate::synthetic::render::render_with;
 use image::ImageEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use std::fs;
@@ -55,6 +56,9 @@ pub enum WriteError {
         /// Index of the first camera that does not fit.
         view: usize,
     },
+    /// The work was stopped.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
     /// The file system refused.
     #[error("{path}: cannot be written", path = .path.display())]
     Io {
@@ -74,11 +78,12 @@ pub enum WriteError {
 }
 
 /// Renders `object` from every camera and writes the scene to `folder`, which must not exist; its parent is created
-/// where it is missing. Views are named by the index of their camera.
+/// where it is missing. Views are named by the index of their camera. A pixel is the mean of `rays_per_side` squared rays
+/// ([`render_with`]). Looks between the views whether a stop was asked for.
 ///
 /// # Errors
 /// [`WriteError`], always with the path.
-pub fn write_scene(folder: &Path, object: &Object, cameras: &[Camera]) -> Result<(), WriteError> {
+pub fn write_scene(folder: &Path, object: &Object, cameras: &[Camera], rays_per_side: u32) -> Result<(), WriteError> {
     let pinhole = shared_pinhole(folder, cameras)?;
     let name = folder.file_name().ok_or_else(|| WriteError::NoName { path: folder.to_owned() })?;
     // `symlink_metadata`: a dangling link is something that stands there, too.
@@ -93,7 +98,16 @@ pub fn write_scene(folder: &Path, object: &Object, cameras: &[Camera]) -> Result
     let temporary = tempfile::Builder::new().prefix(".unfinished-").tempdir_in(parent).map_err(io_error(parent))?;
     // A temporary folder is closed to others; the scene, a folder inside it, has the ordinary permissions.
     let unfinished = temporary.path().join(name);
-    fill(&unfinished, object, cameras, &pinhole)?;
+    for path in [&unfinished, &unfinished.join("pose"), &unfinished.join("rgb")] {
+        fs::create_dir(path).map_err(io_error(path))?;
+    }
+    write_text(&unfinished.join("intrinsics.txt"), &intrinsics_text(&pinhole))?;
+    for (index, camera) in cameras.iter().enumerate() {
+        interrupt::check()?;
+        write_text(&unfinished.join(format!("pose/{index:06}.txt")), &pose_text(camera))?;
+        let picture = render_with(object, camera, rays_per_side);
+        write_picture(&unfinished.join(format!("rgb/{index:06}.png")), &picture)?;
+    }
     fs::rename(&unfinished, folder).map_err(io_error(folder))
 }
 
@@ -108,19 +122,6 @@ fn shared_pinhole(folder: &Path, cameras: &[Camera]) -> Result<Pinhole, WriteErr
         Some(view) => Err(WriteError::Intrinsics { path: folder.to_owned(), view }),
         None => Ok(first.pinhole),
     }
-}
-
-fn fill(folder: &Path, object: &Object, cameras: &[Camera], pinhole: &Pinhole) -> Result<(), WriteError> {
-    let (poses, pictures) = (folder.join("pose"), folder.join("rgb"));
-    for path in [folder, &poses, &pictures] {
-        fs::create_dir(path).map_err(io_error(path))?;
-    }
-    write_text(&folder.join("intrinsics.txt"), &intrinsics_text(pinhole))?;
-    for (index, camera) in cameras.iter().enumerate() {
-        write_text(&poses.join(format!("{index:06}.txt")), &pose_text(camera))?;
-        write_picture(&pictures.join(format!("{index:06}.png")), &render(object, camera))?;
-    }
-    Ok(())
 }
 
 /// The four lines of `intrinsics.txt`, with the full stops that the layout's own files have.

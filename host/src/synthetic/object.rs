@@ -1,5 +1,6 @@
 //! Objects: primitives, placed and painted. Their union is the minimum of their distances.
 
+use crate::synthetic::light::Light;
 use crate::synthetic::placement::Placement;
 use crate::synthetic::shape::Shape;
 use crate::synthetic::texture::Finish;
@@ -39,6 +40,9 @@ pub enum ObjectError {
         /// Which part.
         part: usize,
     },
+    /// A lamp's direction or strength is not usable.
+    #[error("the light has an unusable direction or strength")]
+    Light,
     /// A part's place is not finite or farther away than [`LARGEST_DISTANCE`].
     #[error("part {part} is not within {LARGEST_DISTANCE} of the origin")]
     Place {
@@ -55,6 +59,20 @@ pub struct Object {
     bounding_radii: Vec<f32>,
     /// Of all together, around the world's origin.
     bounding_radius: f32,
+    light: Light,
+}
+
+/// Distance from the world's origin to the farthest corner of the box around a part: less than that of the ball for
+/// long parts whose ends are near the origin.
+fn farthest_corner(part: &Part) -> f32 {
+    let half = part.shape.half_box();
+    let mut farthest = 0.0;
+    for corner in 0..8 {
+        let sign = |axis: u32| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+        let offset = part.placement.rotate_to_world(half * Vec3::new(sign(0), sign(1), sign(2)));
+        farthest = max(farthest, (part.placement.origin_world() + offset).length());
+    }
+    farthest
 }
 
 impl Object {
@@ -79,10 +97,23 @@ impl Object {
             if !(reach <= LARGEST_DISTANCE) {
                 return Err(ObjectError::Place { part: index });
             }
-            bounding_radius = max(bounding_radius, reach);
+            bounding_radius = max(bounding_radius, min(reach, farthest_corner(part)));
             bounding_radii.push(part.shape.bounding_radius());
         }
-        Ok(Object { parts, bounding_radii, bounding_radius })
+        Ok(Object { parts, bounding_radii, bounding_radius, light: Light::default() })
+    }
+
+    /// The same object under other lamps.
+    ///
+    /// # Errors
+    /// [`ObjectError::Light`].
+    pub fn under(self, light: Light) -> Result<Object, ObjectError> {
+        if light.is_sound() { Ok(Object { light, ..self }) } else { Err(ObjectError::Light) }
+    }
+
+    /// The lamps that it stands under.
+    pub fn light(&self) -> &Light {
+        &self.light
     }
 
     /// The parts, in the order given.
@@ -101,7 +132,7 @@ impl Object {
     }
 
     /// Signed distance (world units) from a world point to the object, limited to `most`; a lower bound of it inside
-    /// overlapping parts and beside ellipsoids. Parts farther than `most` cost next to nothing.
+    /// overlapping parts and beside ellipsoids and prisms. Parts farther than `most` cost next to nothing.
     pub fn distance(&self, point_world: Vec3, most: f32) -> f32 {
         let mut nearest = most;
         for (part, radius) in self.bounded_parts() {

@@ -2,13 +2,14 @@
 //!
 //! ```text
 //! light = albedo * (around * openness + lamps) + gloss * highlight
-//! lamps = KEY_LIGHT * lit * max(n . key, 0) + FILL_LIGHT * max(n . fill, 0)
+//! lamps = key_light * lit * max(n . key, 0) + fill_light * max(n . fill, 0)
 //! ```
 //!
 //! The lamps are fixed to the world and infinitely far away. The key lamp casts shadows (`lit` is 0 or 1; supersampling
 //! softens their rims); the light from around is brighter from above (world z) and dimmed in nooks. Only the highlight
 //! (Blinn and Phong's, J. Blinn 1977) depends on where one looks from: views differ, but mildly, as with real toys.
 
+use crate::synthetic::light::Light;
 use crate::synthetic::object::Object;
 use crate::synthetic::texture::{display_from_light, light_from_display};
 use crate::synthetic::trace::{Hit, is_blocked};
@@ -16,14 +17,6 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::Ray;
 use viewfuse_core::math::{clamp, max};
 
-/// Towards the key lamp, in world coordinates (z up), not yet of unit length.
-const KEY: Vec3 = Vec3::new(0.45, 0.55, 1.0);
-/// Towards the fill lamp: low and from the other side.
-const FILL: Vec3 = Vec3::new(-0.7, -0.6, 0.35);
-const KEY_LIGHT: f32 = 0.62;
-const FILL_LIGHT: f32 = 0.2;
-/// Light from straight below and straight above.
-const AROUND_LIGHT: [f32; 2] = [0.25, 0.46];
 /// Shadow rays start this far above the surface, in world units: past the normal's error, below a pixel.
 const LIFT: f32 = 1.0e-3;
 /// The texture is read this far below the surface, in world units, so that a face that coincides with the border of two
@@ -37,16 +30,17 @@ pub fn shade(object: &Object, ray: &Ray, hit: &Hit) -> Vec3 {
     let part = &object.parts()[hit.part];
     let normal = part.placement.rotate_to_world(hit.normal_local);
     let point = ray.at(hit.distance);
-    let key = KEY / KEY.length();
-    let fill = FILL / FILL.length();
+    let Light { key, fill, .. } = *object.light();
+    let key = key / key.length();
+    let fill = fill / fill.length();
 
     let above = 0.5 + 0.5 * normal.z;
-    let around = AROUND_LIGHT[0] * (1.0 - above) + AROUND_LIGHT[1] * above;
+    let around = object.light().around[0] * (1.0 - above) + object.light().around[1] * above;
     let towards_key = max(normal.dot(key), 0.0);
     let in_shadow =
         towards_key > 0.0 && is_blocked(object, &Ray { origin_world: point + normal * LIFT, direction_world: key });
-    let key_light = if in_shadow { 0.0 } else { KEY_LIGHT * towards_key };
-    let fill_light = FILL_LIGHT * max(normal.dot(fill), 0.0);
+    let key_light = if in_shadow { 0.0 } else { object.light().key_light * towards_key };
+    let fill_light = object.light().fill_light * max(normal.dot(fill), 0.0);
 
     let half = key - ray.direction_world;
     let half_length = half.length();

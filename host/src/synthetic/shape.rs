@@ -1,15 +1,20 @@
 //! Primitives and their signed distances.
 //!
 //! Every primitive is centred at its own origin; those with an axis stand along local z. The distance is negative
-//! inside. It is exact outside for all but the ellipsoid, whose value is a lower bound of the distance; sphere tracing
-//! needs no more than a lower bound. Formulas: J. C. Hart, "Sphere tracing", The Visual Computer 12 (1996).
+//! inside. It is exact outside for all but the ellipsoid and the prism, whose value is a lower bound of the distance;
+//! sphere tracing needs no more than a lower bound. Formulas: J. C. Hart, "Sphere tracing", The Visual Computer 12 (1996).
 
+use crate::synthetic::prism::Prism;
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, max, min, sqrt};
 
 /// A primitive in its own coordinates. Lengths are in world units, and sizes are those of the finished shape: rounding
 /// an edge takes material away and never adds any.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "an object has tens of parts, and a ray walks over them in one piece of memory"
+)]
 pub enum Shape {
     /// A ball.
     Sphere {
@@ -51,11 +56,13 @@ pub enum Shape {
         /// Radius of cylinder and balls.
         radius: f32,
     },
+    /// A side view with corners, given a width.
+    Prism(Prism),
 }
 
 impl Shape {
-    /// Signed distance (world units) from `point_local` to the surface; for the ellipsoid a lower bound of it in
-    /// magnitude, off by at most the ratio of its smallest and largest radius.
+    /// Signed distance (world units) from `point_local` to the surface; for the ellipsoid and the prism a lower
+    /// bound of it in magnitude, for the ellipsoid off by at most the ratio of its smallest and largest radius.
     pub fn distance(&self, point_local: Vec3) -> f32 {
         let p = point_local;
         match *self {
@@ -81,6 +88,7 @@ impl Shape {
                 let along = max(abs(p.z) - half_length, 0.0);
                 Vec3::new(p.x, p.y, along).length() - radius
             }
+            Shape::Prism(ref prism) => prism.distance(p),
         }
     }
 
@@ -95,6 +103,22 @@ impl Shape {
             }
             Shape::Torus { ring_radius, tube_radius } => ring_radius + tube_radius,
             Shape::Capsule { half_length, radius } => half_length + radius,
+            Shape::Prism(ref prism) => prism.half_box().length(),
+        }
+    }
+
+    /// Half of the extent along each axis of a box around the local origin that holds the shape.
+    pub fn half_box(&self) -> Vec3 {
+        match *self {
+            Shape::Sphere { radius } => Vec3::splat(radius),
+            Shape::Ellipsoid { radii } => radii,
+            Shape::Block { half_size, .. } => half_size,
+            Shape::Cylinder { radius, half_height, .. } => Vec3::new(radius, radius, half_height),
+            Shape::Torus { ring_radius, tube_radius } => {
+                Vec3::new(ring_radius + tube_radius, ring_radius + tube_radius, tube_radius)
+            }
+            Shape::Capsule { half_length, radius } => Vec3::new(radius, radius, half_length + radius),
+            Shape::Prism(ref prism) => prism.half_box(),
         }
     }
 
@@ -112,6 +136,7 @@ impl Shape {
             }
             Shape::Torus { ring_radius, tube_radius } => size(ring_radius) && size(tube_radius),
             Shape::Capsule { half_length, radius } => size(radius) && (0.0..=f32::MAX).contains(&half_length),
+            Shape::Prism(ref prism) => prism.is_sound(),
         }
     }
 }

@@ -14,8 +14,28 @@ pub const SMALLEST_CELL: f32 = 1.0e-5;
 /// Most slices of each colour: far more than a picture can show.
 pub const LARGEST_PAIR_COUNT: u32 = 1 << 12;
 
+/// How many boxes [`Texture::Patches`] has.
+pub const PATCH_COUNT: usize = 10;
+
+/// A box of one colour, in local coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// Its lowest corner.
+    pub from: Vec3,
+    /// Its highest corner.
+    pub to: Vec3,
+    /// Its colour.
+    pub colour: Vec3,
+}
+
+impl Patch {
+    /// A box that holds no point.
+    pub const NOTHING: Patch = Patch { from: Vec3::ONE, to: Vec3::ZERO, colour: Vec3::ZERO };
+}
+
 /// A pattern of two colours, or one colour alone. Sizes are in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "as with shapes: few, and in one piece of memory")]
 pub enum Texture {
     /// One colour.
     Plain {
@@ -56,6 +76,13 @@ pub enum Texture {
         /// Which of the random patterns.
         seed: u32,
     },
+    /// Boxes of other colours in one colour: lines, panels, numbers.
+    Patches {
+        /// Outside of all boxes.
+        ground: Vec3,
+        /// The boxes; a later one covers an earlier one.
+        patches: [Patch; PATCH_COUNT],
+    },
     /// Smooth random mixture of the two colours.
     Mottle {
         /// The extremes.
@@ -89,6 +116,10 @@ impl Finish {
             Texture::Slices { colours, pair_count } => both(colours) && pair_count <= LARGEST_PAIR_COUNT,
             Texture::Spots { colours, cell, radius, .. } => {
                 both(colours) && size(cell) && radius > 0.0 && radius <= 0.5
+            }
+            Texture::Patches { ground, ref patches } => {
+                let finite = |patch: &Patch| patch.from.is_finite() && patch.to.is_finite() && patch.colour.is_finite();
+                ground.is_finite() && patches.iter().all(finite)
             }
             Texture::Mottle { colours, cell, .. } => both(colours) && size(cell.x) && size(cell.y) && size(cell.z),
         };
@@ -125,6 +156,10 @@ impl Texture {
                 let centre = corner + Vec3::splat(radius) + place * (1.0 - 2.0 * radius);
                 let offset = scaled - centre;
                 colours[usize::from(offset.dot(offset) < radius * radius)]
+            }
+            Texture::Patches { ground, ref patches } => {
+                let holds = |patch: &&Patch| p.cmpge(patch.from).all() && p.cmple(patch.to).all();
+                patches.iter().rev().find(holds).map_or(ground, |patch| patch.colour)
             }
             Texture::Mottle { colours, cell, seed } => {
                 let amount = value_noise(p / cell, seed);

@@ -7,7 +7,7 @@
 use crate::synthetic::object::{Object, Part};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Ray;
-use viewfuse_core::math::{max, min, sqrt};
+use viewfuse_core::math::{abs, max, min, sqrt};
 
 /// A ray has arrived when it is this near to the surface, in world units: 0.001 pixels in the sample scene, and a
 /// hundred times the rounding error of a coordinate.
@@ -19,6 +19,9 @@ const LARGEST_STEP_COUNT: u32 = 256;
 /// Half of the distance between the points that a normal is computed from, in world units: smaller than any edge's
 /// radius, and large enough for a rounding error below 0.001 in the normal.
 const NORMAL_STEP: f32 = 4.0e-4;
+
+/// How much larger a part's box is taken, in world units: a ray that passes it by is far from arriving.
+const BOX_MARGIN: f32 = 1.0e-3;
 
 /// Where a ray meets an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,6 +65,9 @@ fn march(part: &Part, bounding_radius: f32, ray: &Ray, limit: f32) -> Option<f32
     let leave = min(leave, limit);
     let origin = part.placement.rotate_to_local(offset);
     let direction = part.placement.rotate_to_local(ray.direction_world);
+    if !meets_box(origin, direction, part.shape.half_box()) {
+        return None;
+    }
     let mut t = enter;
     for _ in 0..LARGEST_STEP_COUNT {
         if t >= leave {
@@ -88,6 +94,25 @@ fn ball_interval(origin: Vec3, direction: Vec3, radius: f32) -> Option<(f32, f32
     }
     let half = sqrt(discriminant);
     if middle + half > 0.0 { Some((max(middle - half, 0.0), middle + half)) } else { None }
+}
+
+/// Whether a line passes through a box around the coordinates' origin, taken a little larger than told. Long and flat
+/// parts fill little of their balls.
+fn meets_box(origin: Vec3, direction: Vec3, half_box: Vec3) -> bool {
+    let (mut enter, mut leave) = (f32::MIN, f32::MAX);
+    for axis in 0..3 {
+        let (start, step, half) = (origin[axis], direction[axis], half_box[axis] + BOX_MARGIN);
+        if step == 0.0 {
+            if abs(start) > half {
+                return false;
+            }
+            continue;
+        }
+        let (a, b) = ((-half - start) / step, (half - start) / step);
+        enter = max(enter, min(a, b));
+        leave = min(leave, max(a, b));
+    }
+    enter <= leave
 }
 
 /// Gradient of the distance from four values at the corners of a tetrahedron, scaled to unit length.

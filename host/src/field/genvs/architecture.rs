@@ -26,7 +26,7 @@ pub(super) const IMAGE_SIDE: &str = "viewfuse.image_side";
 const ENCODER_STRIDE: usize = 16;
 
 /// What the names of the tensors of the network at points begin with; a number follows.
-pub(super) const MLP: &str = "pixel_nerf_net.mlp.layers";
+pub(crate) const MLP: &str = "pixel_nerf_net.mlp.layers";
 
 /// Sizes of a member of the family.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -63,6 +63,18 @@ impl Architecture {
             image_side: 64,
             mlp_width: 32,
             denoiser: Some(Denoiser::small(COLOUR_CHANNELS + encoder.feature_count)),
+            encoder,
+        }
+    }
+
+    /// A member narrow enough to be trained on a single core: a denoiser whose first level has `width` channels (a multiple
+    /// of 4), an encoder that has twice as many behind its trunk, and volumes of half as many depths as the small one's.
+    pub fn narrow(image_side: usize, width: usize) -> Architecture {
+        let encoder = Encoder::narrow(2 * width);
+        Architecture {
+            image_side,
+            mlp_width: 32,
+            denoiser: Some(Denoiser::narrow(image_side, COLOUR_CHANNELS + encoder.feature_count, width)),
             encoder,
         }
     }

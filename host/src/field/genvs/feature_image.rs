@@ -21,7 +21,7 @@ use viewfuse_core::rays::CastBlock;
 /// Rays that the CPU takes at once: their points' activations stay in its caches.
 const LEAST_RAYS: usize = 64;
 /// Length of the last sample as published: whatever is there is opaque.
-const LAST_LENGTH: f32 = 1.0e10;
+pub(crate) const LAST_LENGTH: f32 = 1.0e10;
 
 type Outcome<T, D> = Result<T, FieldError<<D as crate::device::Memory>::Error>>;
 
@@ -97,7 +97,7 @@ pub(super) fn render<D: Device>(
     let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);
     let pixels: Vec<u32> = (0..half.pixel_count()).collect();
     let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len())).map_err(failed)?;
-    let cast = cast_block(target, half, looking);
+    let cast = cast_block(target, looking.near_far, looking.sample_count);
     let mut features = Vec::with_capacity(pixels.len() * network.features as usize);
     for pixels in pixels.chunks(at_once) {
         interrupt::check()?;
@@ -111,21 +111,28 @@ pub(super) fn render<D: Device>(
     Ok(image)
 }
 
-/// Rays through a grid whose corners are the picture's corners (published: `linspace(-1, 1)` over half the pixels).
-fn cast_block(target: &CameraBlock, half: Size, looking: &Looking) -> CastBlock {
+/// Rays through a grid whose corners are the picture's corners (published: `linspace(-1, 1)` over half the pixels), with
+/// this many samples between two depths along the target's principal axis. Rows and columns of the target are even.
+pub(crate) fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_count: u32) -> CastBlock {
+    let [width, height] = [target.width / 2, target.height / 2];
     let scale = |nodes: u32, pixels: u32| nodes.saturating_sub(1).max(1) as f32 / pixels as f32;
-    let (across, down) = (scale(half.width, target.width), scale(half.height, target.height));
+    let (across, down) = (scale(width, target.width), scale(height, target.height));
     let [focal_x, focal_y, principal_x, principal_y] = target.intrinsics;
     let camera = CameraBlock {
         intrinsics: [focal_x * across, focal_y * down, principal_x * across, principal_y * down],
-        width: half.width,
-        height: half.height,
+        width,
+        height,
         ..*target
     };
     // Samples are the middles of equal parts: the parts of the first and the last reach half their length further.
-    let [near, far] = looking.near_far;
-    let beyond = 0.5 * (far - near) / (looking.sample_count - 1) as f32;
+    let beyond = 0.5 * (far - near) / (sample_count - 1) as f32;
     CastBlock { camera, near: near - beyond, far: far + beyond, pixel_centre: 0.0, along_axis: 1 }
+}
+
+/// How long a ray is from its first to its last sample in the lengths that the network's densities are for, unless a person
+/// says otherwise: as published for SRN, 1 over the focal length in halves of the image's height.
+pub(crate) fn ray_length(target: &CameraBlock) -> f32 {
+    target.height as f32 / (2.0 * target.intrinsics[1])
 }
 
 /// Buffers for some rays.

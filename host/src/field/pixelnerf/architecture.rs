@@ -8,6 +8,7 @@ pub use crate::field::resnet::Level;
 
 use crate::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
 use crate::field::resnet;
+use std::collections::BTreeMap;
 
 /// Most octaves: sines of more are noise in `f32`.
 const MOST_OCTAVES: usize = 20;
@@ -199,6 +200,15 @@ impl Architecture {
             || name.ends_with(".num_batches_tracked")
             || name.starts_with("encoder.model.fc.")
             || BUFFERS.contains(&name)
+    }
+
+    /// What a checkpoint's metadata say of it that its tensors do not tell.
+    pub fn metadata(&self) -> BTreeMap<String, String> {
+        let number = |key: &str, value: f32| (key.to_owned(), value.to_string());
+        BTreeMap::from([
+            number("viewfuse.frequency", self.frequency),
+            number("viewfuse.pixel_centre", self.pixel_centre),
+        ])
     }
 
     /// Numbers of all parameters that it needs.

@@ -119,6 +119,11 @@ impl Denoiser {
         Denoiser::with_multipliers([64, in_channels, 32, 2], &[1, 2, 2])
     }
 
+    /// With these channels at the first level, twice as many at every further one, and a block a level.
+    pub(super) fn narrow(image_side: usize, in_channels: usize, base_channels: usize) -> Denoiser {
+        Denoiser::with_multipliers([image_side, in_channels, base_channels, 1], &[1, 2, 4])
+    }
+
     /// Levels of multiples of the first one's channels, and attention where images have 16 pixels on a side.
     fn with_multipliers(
         [image_side, in_channels, base_channels, block_count]: [usize; 4],

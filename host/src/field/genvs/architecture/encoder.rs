@@ -61,6 +61,12 @@ impl Encoder {
         }
     }
 
+    /// The small one with a narrower decoder, whose images are large, and half as many depths.
+    pub(super) fn narrow(decoder_channels: usize) -> Encoder {
+        let small = Encoder::small();
+        Encoder { decoder_channels, volume_depth: small.volume_depth / 2, ..small }
+    }
+
     /// Channels of the volume as an image.
     pub fn volume_channels(&self) -> usize {
         self.feature_count * self.volume_depth

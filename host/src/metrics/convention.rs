@@ -1,0 +1,114 @@
+//! What published tables mean by their scores.
+//!
+//! | | PSNR, SSIM | LPIPS | DISTS, FID |
+//! |---|---|---|---|
+//! | `plain` | of the pictures, rounded to 8 bits | AlexNet | of the pictures |
+//! | `pixelnerf` | the same | VGG16 | not scored |
+//! | `viewattention` | of prediction and photograph, each stretched to its own least and largest level | AlexNet, of the stretched prediction and the photograph as it is | likewise |
+//!
+//! SSIM is everywhere that of scikit-image with a uniform window of 7x7. Read off `eval/calc_metrics.py` of
+//! sxyu/pixel-nerf, and `eval.py`, `eval_fid_lpips_dists.py` and `utils.py` of alexberian/ViewAttention, whose GeNVS is the
+//! only one with published code for scores; the GeNVS paper's own is not published, so there is no convention of that name.
+//!
+//! Two things are not copied: both codes cut off levels where `plain` rounds (a prediction of 0.9 steps is 0 there), and
+//! that cannot be told from a picture of 8 bits; and stretching computes with whole numbers here, where `f32` sometimes
+//! lands a step lower.
+
+use super::lpips::LpipsTrunk;
+use image::RgbImage;
+use std::borrow::Cow;
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+
+/// What scores mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Convention {
+    /// Of the pictures as they are.
+    #[default]
+    Plain,
+    /// As the published evaluation of pixelNeRF.
+    PixelNerf,
+    /// As the published evaluation of "Pay Attention to Where You Looked".
+    ViewAttention,
+}
+
+impl Convention {
+    /// All of them.
+    pub const ALL: [Convention; 3] = [Convention::Plain, Convention::PixelNerf, Convention::ViewAttention];
+
+    /// The network of its LPIPS.
+    pub fn lpips_trunk(self) -> LpipsTrunk {
+        match self {
+            Convention::Plain | Convention::ViewAttention => LpipsTrunk::Alex,
+            Convention::PixelNerf => LpipsTrunk::Vgg,
+        }
+    }
+
+    /// A picture as PSNR and SSIM see it.
+    pub fn shown(self, picture: &RgbImage) -> Cow<'_, RgbImage> {
+        match self {
+            Convention::Plain | Convention::PixelNerf => Cow::Borrowed(picture),
+            Convention::ViewAttention => Cow::Owned(stretched(picture)),
+        }
+    }
+}
+
+impl Display for Convention {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Convention::Plain => "plain",
+            Convention::PixelNerf => "pixelnerf",
+            Convention::ViewAttention => "viewattention",
+        })
+    }
+}
+
+/// There is no such convention.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there are the conventions plain, pixelnerf and viewattention, not '{0}'")]
+pub struct NoConvention(pub String);
+
+impl FromStr for Convention {
+    type Err = NoConvention;
+
+    fn from_str(text: &str) -> Result<Convention, NoConvention> {
+        let found = Convention::ALL.into_iter().find(|convention| convention.to_string() == text);
+        found.ok_or_else(|| NoConvention(text.to_owned()))
+    }
+}
+
+/// The least level of all channels becomes 0, the largest 255; what lies between is cut off to whole levels. A picture of
+/// one level is black.
+fn stretched(picture: &RgbImage) -> RgbImage {
+    let levels = || picture.as_raw().iter().map(|level| u32::from(*level));
+    let (least, largest) = (levels().min().unwrap_or(0), levels().max().unwrap_or(0));
+    let span = (largest - least).max(1);
+    let mut picture = picture.clone();
+    picture.iter_mut().for_each(|level| *level = ((u32::from(*level) - least) * 255 / span) as u8);
+    picture
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_lead_back() {
+        for convention in Convention::ALL {
+            assert_eq!(convention.to_string().parse(), Ok(convention));
+        }
+        let error = "genvs".parse::<Convention>().expect_err("there is none").to_string();
+        assert!(error.contains("viewattention") && error.contains("'genvs'"), "{error}");
+    }
+
+    #[test]
+    fn stretching() {
+        let picture = |levels: Vec<u8>| RgbImage::from_raw(1, 2, levels).expect("two pixels");
+        let shown = |levels| Convention::ViewAttention.shown(&picture(levels)).into_owned().into_raw();
+        // Across channels, and cut off: 30 / 140 * 255 is 54.6.
+        assert_eq!(shown(vec![10, 40, 80, 150, 10, 10]), [0, 54, 127, 255, 0, 0]);
+        assert_eq!(shown(vec![0, 1, 254, 255, 17, 3]), [0, 1, 254, 255, 17, 3]);
+        assert_eq!(shown(vec![9; 6]), [0; 6]);
+        assert_eq!(Convention::Plain.shown(&picture(vec![9; 6])).as_raw(), &[9; 6]);
+    }
+}

@@ -1,0 +1,65 @@
+//! Adam (Kingma and Ba, ICLR 2015), whose moments can be written down and read again: the library's own keeps them to
+//! itself, and a run that is continued would end elsewhere.
+
+use super::parameters::Parameters;
+use candle_core::backprop::GradStore;
+use candle_core::{Result, Tensor, Var};
+use std::collections::BTreeMap;
+
+/// Decay of the means of gradients and of their squares.
+const DECAYS: [f64; 2] = [0.9, 0.999];
+/// Added to the root of the mean square.
+const FLOOR: f64 = 1.0e-8;
+
+/// Moments of every parameter.
+#[derive(Clone, Debug)]
+pub(crate) struct Adam {
+    /// Name to mean gradient and mean squared gradient.
+    pub(crate) moments: BTreeMap<String, [Var; 2]>,
+}
+
+impl Adam {
+    /// All zero.
+    pub(crate) fn new(parameters: &Parameters) -> Result<Adam> {
+        let zeros = |variable: &Var| Var::from_tensor(&variable.zeros_like()?);
+        let moments = parameters
+            .iter()
+            .map(|(name, variable)| Ok((name.to_owned(), [zeros(variable)?, zeros(variable)?])))
+            .collect::<Result<_>>()?;
+        Ok(Adam { moments })
+    }
+
+    /// One step, number `step` counted from 0. Gradients are scaled down together where their norm exceeds `most`.
+    pub(crate) fn step(
+        &self,
+        parameters: &Parameters,
+        gradients: &GradStore,
+        step: u32,
+        rate: f64,
+        most: f64,
+    ) -> Result<()> {
+        let mut squares = 0.0;
+        for (_, variable) in parameters.iter() {
+            if let Some(gradient) = gradients.get(variable) {
+                squares += gradient.sqr()?.sum_all()?.to_dtype(candle_core::DType::F64)?.to_scalar::<f64>()?;
+            }
+        }
+        let scale = if squares.sqrt() > most { most / squares.sqrt() } else { 1.0 };
+        let [first, second] = DECAYS.map(|decay| 1.0 - decay.powi(step as i32 + 1));
+        for (name, variable) in parameters.iter() {
+            let (Some(gradient), Some([mean, square])) = (gradients.get(variable), self.moments.get(name)) else {
+                continue;
+            };
+            let gradient = (gradient * scale)?;
+            mean.set(&blended(mean, &gradient, DECAYS[0])?)?;
+            square.set(&blended(square, &gradient.sqr()?, DECAYS[1])?)?;
+            let root = ((square.as_tensor() / second)?.sqrt()? + FLOOR)?;
+            variable.set(&(variable.as_tensor() - ((mean.as_tensor() * (rate / first))? / root)?)?)?;
+        }
+        Ok(())
+    }
+}
+
+fn blended(old: &Tensor, new: &Tensor, decay: f64) -> Result<Tensor> {
+    (old * decay)? + (new * (1.0 - decay))?
+}

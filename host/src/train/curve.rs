@@ -1,0 +1,62 @@
+//! The curves of a run as a picture (SVG): loss on a logarithmic axis on the left, score in validation on the right.
+
+use super::state::Progressed;
+use plotters::prelude::*;
+use std::ops::Range;
+
+const SIZE: (u32, u32) = (900, 480);
+const LOSS: RGBColor = RGBColor(0, 114, 178);
+const SCORE: RGBColor = RGBColor(213, 94, 0);
+const FONT: &str = "sans-serif";
+
+/// Draws the curves; a run without points has empty axes.
+pub(crate) fn svg(so_far: &Progressed, score_name: &str) -> String {
+    let mut picture = String::new();
+    // Drawing into memory does not fail; a curve is no reason to lose a run.
+    if draw(&mut picture, so_far, score_name).is_err() {
+        picture.clear();
+    }
+    picture
+}
+
+fn draw(picture: &mut String, so_far: &Progressed, score_name: &str) -> Result<(), Box<dyn std::error::Error>> {
+    let root = SVGBackend::with_string(picture, SIZE).into_drawing_area();
+    root.fill(&WHITE)?;
+    let last = so_far.steps.max(1);
+    let logarithm = |(step, loss): &(u32, f64)| (*step, loss.max(1.0e-12).log10());
+    let losses: Vec<(u32, f64)> = so_far.losses.iter().map(logarithm).collect();
+    let mut chart = ChartBuilder::on(&root)
+        .margin(12)
+        .x_label_area_size(40)
+        .y_label_area_size(64)
+        .right_y_label_area_size(60)
+        .build_cartesian_2d(0..last, span(&losses))?
+        .set_secondary_coord(0..last, span(&so_far.scores));
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .x_desc("step")
+        .y_desc("loss")
+        .y_label_formatter(&|power| format!("{:.2e}", 10_f64.powf(*power)))
+        .axis_desc_style((FONT, 14).into_font().color(&LOSS))
+        .draw()?;
+    let style = (FONT, 14).into_font().color(&SCORE);
+    chart.configure_secondary_axes().y_desc(score_name).axis_desc_style(style).draw()?;
+    chart.draw_series(LineSeries::new(losses, LOSS))?;
+    let scores = so_far.scores.iter().copied();
+    chart.draw_secondary_series(LineSeries::new(scores.clone(), SCORE.stroke_width(2)))?;
+    chart.draw_secondary_series(scores.map(|at| Circle::new(at, 3, SCORE.filled())))?;
+    root.present()?;
+    Ok(())
+}
+
+/// From the least to the greatest, with some room; something where there is nothing.
+fn span(points: &[(u32, f64)]) -> Range<f64> {
+    let finite = || points.iter().map(|(_, value)| *value).filter(|value| value.is_finite());
+    let (least, most) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));
+    if least > most {
+        return 0.0..1.0;
+    }
+    let room = 0.05 * (most - least).max(0.1);
+    least - room..most + room
+}

@@ -1,0 +1,360 @@
+//! PixelNeRF's network at points as one operation: a view's blocks, the views fused, the blocks behind.
+//!
+//! Some dozens of points at a time go all the way through, so that what is between the layers stays in a core's caches; on
+//! the way back it is computed again. In steps of the library's the same work moves 90 times the activations through
+//! memory.
+
+use super::convolve::sum;
+use super::linear::{layer_gradient, linear, linear_back, rectified};
+use super::{Operation, Real};
+use rayon::prelude::*;
+use std::ops::Range;
+use std::sync::Arc;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_axes, waves};
+use viewfuse_core::rays::RayPoint;
+
+/// Points that go through together.
+const CHUNK: usize = 64;
+
+/// Sizes of the network.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct PointNetworkSizes {
+    /// Numbers that describe a point in a view.
+    pub(crate) embedded_len: usize,
+    /// Width of all layers.
+    pub(crate) width: usize,
+    /// Residual blocks.
+    pub(crate) block_count: usize,
+    /// Blocks in front of which latents are added; behind them the views are fused.
+    pub(crate) injected_count: usize,
+}
+
+impl PointNetworkSizes {
+    /// How many parameters there are, in this order: the entry, two layers a block, the exit; of each layer the weights
+    /// `[output][input]`, then the biases.
+    pub(crate) fn parameter_count(&self) -> usize {
+        self.layer(Part::Exit).end
+    }
+
+    /// Where a layer's parameters are.
+    fn layer(&self, part: Part) -> Range<usize> {
+        let w = self.width;
+        let (entry, layer) = (w * self.embedded_len + w, w * w + w);
+        match part {
+            Part::Entry => 0..entry,
+            Part::Block(block, which) => {
+                let start = entry + (2 * block + which) * layer;
+                start..start + layer
+            }
+            Part::Exit => {
+                let start = entry + 2 * self.block_count * layer;
+                start..start + 4 * w + 4
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Part {
+    Entry,
+    Block(usize, usize),
+    Exit,
+}
+
+/// Where points appear in the views of their object. `[object][view][point]`.
+pub(crate) struct Points {
+    pub(crate) object_count: usize,
+    pub(crate) view_count: usize,
+    /// Of one object.
+    pub(crate) point_count: usize,
+    embedded_len: usize,
+    embedded: Vec<f32>,
+    places: Vec<Place>,
+}
+
+/// Nodes of a view's grid around a point, how much of each, and whether the view has the point in front of it.
+#[derive(Clone, Copy)]
+struct Place {
+    nodes: [u32; 4],
+    shares: [f32; 4],
+    is_visible: bool,
+}
+
+impl Points {
+    /// `cameras[object][view]`, `points[object][point]`; grids of `grid` rows and columns.
+    pub(crate) fn new(
+        cameras: &[Vec<CameraBlock>],
+        points: &[Vec<RayPoint>],
+        embed: &EmbedBlock,
+        grid: [usize; 2],
+        pixel_centre: f32,
+    ) -> Points {
+        let (view_count, point_count) = (cameras[0].len(), points[0].len());
+        let embedded_len = embed.row_len() as usize;
+        // Channels of one: nodes are counted, not numbers.
+        let [height, width] = grid.map(|side| side as u32);
+        let block = GatherBlock { channel_count: 1, height, width, pixel_centre, ..GatherBlock::default() };
+        let row = |object: usize, view: usize, point: usize| {
+            let (camera, point) = (&cameras[object][view], &points[object][point]);
+            let mut row = Vec::with_capacity(embedded_len);
+            let position = in_view_axes(camera, point.position);
+            row.extend(position);
+            for octave in 0..embed.frequency_count {
+                let pairs = position.map(|coordinate| waves(coordinate, octave, embed));
+                row.extend(pairs.map(|(sine, _)| sine));
+                row.extend(pairs.map(|(_, cosine)| cosine));
+            }
+            row.extend(in_view_axes(camera, point.direction));
+            let place = GridPlace::of(camera, point, &block);
+            let (x, y) = (place.share_x, place.share_y);
+            let shares = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
+            let is_visible = camera.project(point.position.into()).in_front;
+            (row, Place { nodes: place.nodes.map(|node| node as u32), shares, is_visible })
+        };
+        let row_count = cameras.len() * view_count * point_count;
+        let (embedded, places): (Vec<Vec<f32>>, Vec<Place>) = (0..row_count)
+            .into_par_iter()
+            .map(|index| {
+                let (object, rest) = (index / (view_count * point_count), index % (view_count * point_count));
+                row(object, rest / point_count, rest % point_count)
+            })
+            .unzip();
+        let embedded = embedded.concat();
+        Points { object_count: cameras.len(), view_count, point_count, embedded_len, embedded, places }
+    }
+
+    /// Rows `[view][point]` of some points of an object.
+    fn rows(&self, object: usize, points: &Range<usize>) -> impl Iterator<Item = usize> + use<> {
+        let (views, count, points) = (self.view_count, self.point_count, points.clone());
+        (0..views).flat_map(move |view| points.clone().map(move |point| (object * views + view) * count + point))
+    }
+}
+
+/// Inputs: latents as the blocks take them `[object and view][node][block][width]`, weights of the views
+/// `[object][view]`, parameters (see [`PointNetworkSizes::parameter_count`]). Result `[object and point][4]`.
+#[derive(Clone)]
+pub(crate) struct PointNetwork {
+    pub(crate) sizes: PointNetworkSizes,
+    pub(crate) points: Arc<Points>,
+    /// Nodes of a view's grid.
+    pub(crate) node_count: usize,
+    /// Whether anybody asks for the gradients of latents and parameters, or only for that of the weights.
+    pub(crate) is_frozen: bool,
+}
+
+/// What a chunk's way back needs of its way.
+struct Way<T> {
+    embedded: Vec<T>,
+    /// What flows into each block, and what is between its layers.
+    flows: Vec<Vec<T>>,
+    insides: Vec<Vec<T>>,
+    /// What flows out of the views' blocks.
+    of_views: Vec<T>,
+    /// What flows out of the last block.
+    last: Vec<T>,
+    raw: Vec<T>,
+}
+
+impl PointNetwork {
+    fn node_len(&self) -> usize {
+        self.sizes.injected_count * self.sizes.width
+    }
+
+    /// Weights of the views that have a point in front of them, with what they were divided by.
+    fn shares<T: Real>(&self, weights: &[T], object: usize, point: usize) -> (Vec<T>, T) {
+        let points = &*self.points;
+        let views = points.view_count;
+        let own = &weights[object * views..][..views];
+        let sees = |view: usize| points.places[(object * views + view) * points.point_count + point].is_visible;
+        let seen = (0..views).filter(|&view| sees(view)).count();
+        let all = (0..views).filter(|&view| sees(view)).fold(T::zero(), |all, view| all + own[view]);
+        if seen == views || !(all > T::zero()) {
+            return (own.to_vec(), T::one());
+        }
+        ((0..views).map(|view| if sees(view) { own[view] / all } else { T::zero() }).collect(), all)
+    }
+
+    fn run<T: Real>(&self, [grids, weights, parameters]: [&[T]; 3], object: usize, chunk: &Range<usize>) -> Way<T> {
+        let PointNetworkSizes { embedded_len, width, block_count, injected_count } = self.sizes;
+        let points = &*self.points;
+        let row_count = points.view_count * chunk.len();
+        let mut embedded = Vec::with_capacity(row_count * embedded_len);
+        for row in points.rows(object, chunk) {
+            embedded.extend(points.embedded[row * embedded_len..][..embedded_len].iter().map(|value| T::of(*value)));
+        }
+        let layer = |part| &parameters[self.sizes.layer(part)];
+        let mut flow = linear(&embedded, layer(Part::Entry), embedded_len, width);
+        let (mut flows, mut insides) = (Vec::new(), Vec::new());
+        let mut of_views = Vec::new();
+        for block in 0..block_count {
+            if block < injected_count {
+                for (row, own) in points.rows(object, chunk).zip(flow.chunks_exact_mut(width)) {
+                    let place = &points.places[row];
+                    let grid = &grids[row / points.point_count * self.node_count * self.node_len()..];
+                    for (node, share) in place.nodes.iter().zip(place.shares) {
+                        let share = T::of(share);
+                        let from = &grid[*node as usize * self.node_len() + block * width..][..width];
+                        own.iter_mut().zip(from).for_each(|(own, from)| *own += *from * share);
+                    }
+                }
+            } else if block == injected_count {
+                of_views = std::mem::take(&mut flow);
+                flow = self.fuse(&of_views, weights, object, chunk);
+            }
+            let inside = linear(&rectified(&flow), layer(Part::Block(block, 0)), width, width);
+            let more = linear(&rectified(&inside), layer(Part::Block(block, 1)), width, width);
+            let next = flow.iter().zip(&more).map(|(flow, more)| *flow + *more).collect();
+            flows.push(std::mem::replace(&mut flow, next));
+            insides.push(inside);
+        }
+        if injected_count == block_count {
+            of_views = std::mem::take(&mut flow);
+            flow = self.fuse(&of_views, weights, object, chunk);
+        }
+        let raw = linear(&rectified(&flow), layer(Part::Exit), width, 4);
+        Way { embedded, flows, insides, of_views, last: flow, raw }
+    }
+
+    fn fuse<T: Real>(&self, of_views: &[T], weights: &[T], object: usize, chunk: &Range<usize>) -> Vec<T> {
+        let width = self.sizes.width;
+        let mut fused = vec![T::zero(); chunk.len() * width];
+        for (index, (point, own)) in chunk.clone().zip(fused.chunks_exact_mut(width)).enumerate() {
+            for (view, share) in self.shares(weights, object, point).0.into_iter().enumerate() {
+                let from = &of_views[(view * chunk.len() + index) * width..][..width];
+                own.iter_mut().zip(from).for_each(|(own, from)| *own += *from * share);
+            }
+        }
+        fused
+    }
+
+    /// Adds a chunk's gradients.
+    fn back<T: Real>(
+        &self,
+        [grids, weights, parameters]: [&[T]; 3],
+        gradient: &[T],
+        object: usize,
+        chunk: &Range<usize>,
+        [of_grids, of_weights, of_parameters]: [&mut [T]; 3],
+    ) {
+        let PointNetworkSizes { embedded_len, width, block_count, injected_count } = self.sizes;
+        let points = &*self.points;
+        let way = self.run([grids, weights, parameters], object, chunk);
+        let layer = |part| &parameters[self.sizes.layer(part)];
+        let mut flow = vec![T::zero(); way.last.len()];
+        let trains = !self.is_frozen;
+        let exit = trains.then(|| &mut of_parameters[self.sizes.layer(Part::Exit)]);
+        linear_back(&way.last, layer(Part::Exit), gradient, width, 4, &mut flow, exit);
+        for block in (0..block_count).rev() {
+            if block + 1 == injected_count {
+                flow = self.unfuse(&way.of_views, weights, &flow, object, chunk, of_weights);
+                if !trains {
+                    return;
+                }
+            }
+            let mut inside = vec![T::zero(); flow.len()];
+            let (first, second) = (Part::Block(block, 0), Part::Block(block, 1));
+            let own = trains.then(|| &mut of_parameters[self.sizes.layer(second)]);
+            linear_back(&way.insides[block], layer(second), &flow, width, width, &mut inside, own);
+            let own = trains.then(|| &mut of_parameters[self.sizes.layer(first)]);
+            linear_back(&way.flows[block], layer(first), &inside, width, width, &mut flow, own);
+            if block < injected_count {
+                for (row, own) in points.rows(object, chunk).zip(flow.chunks_exact(width)) {
+                    let place = &points.places[row];
+                    let view = row / points.point_count % points.view_count;
+                    let grid = &mut of_grids[view * self.node_count * self.node_len()..];
+                    for (node, share) in place.nodes.iter().zip(place.shares) {
+                        let share = T::of(share);
+                        let to = &mut grid[*node as usize * self.node_len() + block * width..][..width];
+                        to.iter_mut().zip(own).for_each(|(to, own)| *to += *own * share);
+                    }
+                }
+            }
+        }
+        let entry = &mut of_parameters[self.sizes.layer(Part::Entry)];
+        layer_gradient(&way.embedded, &flow, embedded_len, width, entry);
+    }
+
+    /// The way back through the fusion of views.
+    fn unfuse<T: Real>(
+        &self,
+        of_views: &[T],
+        weights: &[T],
+        fused: &[T],
+        object: usize,
+        chunk: &Range<usize>,
+        of_weights: &mut [T],
+    ) -> Vec<T> {
+        let width = self.sizes.width;
+        let mut flow = vec![T::zero(); of_views.len()];
+        for (index, (point, own)) in chunk.clone().zip(fused.chunks_exact(width)).enumerate() {
+            let (shares, all) = self.shares(weights, object, point);
+            let mut dots = Vec::with_capacity(shares.len());
+            for (view, share) in shares.iter().enumerate() {
+                let at = (view * chunk.len() + index) * width;
+                let (to, from) = (&mut flow[at..][..width], &of_views[at..][..width]);
+                to.iter_mut().zip(own).for_each(|(to, own)| *to = *own * *share);
+                dots.push(own.iter().zip(from).fold(T::zero(), |dot, (own, from)| dot + *own * *from));
+            }
+            let is_renormalised = shares.iter().zip(weights[object * shares.len()..].iter()).any(|(a, b)| a != b);
+            let mean = shares.iter().zip(&dots).fold(T::zero(), |mean, (share, dot)| mean + *share * *dot);
+            for (view, dot) in dots.into_iter().enumerate() {
+                if !is_renormalised {
+                    of_weights[view] += dot;
+                } else if self.points.places[(object * shares.len() + view) * self.points.point_count + point]
+                    .is_visible
+                {
+                    of_weights[view] += (dot - mean) / all;
+                }
+            }
+        }
+        flow
+    }
+
+    fn chunks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
+        let count = self.points.point_count;
+        (0..count).step_by(CHUNK).map(move |start| start..(start + CHUNK).min(count))
+    }
+}
+
+impl Operation<3> for PointNetwork {
+    const NAME: &'static str = "point_network";
+
+    fn shape(&self) -> Vec<usize> {
+        vec![self.points.object_count * self.points.point_count, 4]
+    }
+
+    fn forward<T: Real>(&self, inputs: [&[T]; 3]) -> Vec<T> {
+        let chunks: Vec<(usize, Range<usize>)> =
+            (0..self.points.object_count).flat_map(|object| self.chunks().map(move |chunk| (object, chunk))).collect();
+        let raws: Vec<Vec<T>> = chunks.par_iter().map(|(object, chunk)| self.run(inputs, *object, chunk).raw).collect();
+        raws.concat()
+    }
+
+    fn backward<T: Real>(&self, inputs: [&[T]; 3], _: &[T], gradient: &[T]) -> [Option<Vec<T>>; 3] {
+        let points = &*self.points;
+        let grid_len = points.view_count * self.node_count * self.node_len();
+        // One object after another, so that sums are in one order.
+        let one = |object: usize| {
+            let mut of_grids = vec![T::zero(); if self.is_frozen { 0 } else { grid_len }];
+            let mut of_weights = vec![T::zero(); points.view_count];
+            let mut of_parameters = vec![T::zero(); if self.is_frozen { 0 } else { inputs[2].len() }];
+            for chunk in self.chunks() {
+                let rows = object * points.point_count + chunk.start..object * points.point_count + chunk.end;
+                let gradient = &gradient[4 * rows.start..4 * rows.end];
+                let gradients = [&mut of_grids[..], &mut of_weights[..], &mut of_parameters[..]];
+                self.back(inputs, gradient, object, &chunk, gradients);
+            }
+            (of_grids, of_weights, of_parameters)
+        };
+        let all: Vec<_> = (0..points.object_count).into_par_iter().map(one).collect();
+        let (mut of_grids, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
+        for (grids, weights, parameters) in all {
+            of_grids.extend(grids);
+            of_weights.extend(weights);
+            of_parameters.push(parameters);
+        }
+        let trains = !self.is_frozen;
+        [trains.then_some(of_grids), Some(of_weights), trains.then(|| sum(of_parameters))]
+    }
+}

@@ -1,0 +1,68 @@
+//! `viewfuse scenes make`: what it writes, and how it stops and goes on.
+
+use super::{BINARY, done};
+use std::fs;
+use viewfuse::scene::Scene;
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in};
+use viewfuse_tests::scenes::Folder;
+
+const FEW: &str = "scenes make chairs out --train 2 --val 1 --test 1 --views 2 --test-views 3 --size 64";
+
+#[test]
+fn scenes_appear_in_their_folders_and_are_read_again() {
+    let folder = Folder::new();
+    assert_eq!(done(folder.path(), FEW), "out: 4 new scenes, 0 were there\n");
+    assert_eq!(names_in(&folder.path().join("out")), ["chairs.json", "chairs_test", "chairs_train", "chairs_val"]);
+    assert_eq!(names_in(&folder.path().join("out/chairs_train")), ["000000", "000001"]);
+    assert!(done(folder.path(), "inspect out/chairs_train/000001").contains("2"));
+    assert_eq!(done(folder.path(), FEW), "out: 0 new scenes, 4 were there\n");
+    assert_eq!(done(folder.path(), &FEW.replace("--train 2", "--train 3")), "out: 1 new scenes, 4 were there\n");
+    let other = FEW.replace("--views 2", "--views 4");
+    assert_refused(BINARY, folder.path(), &other, &["out/chairs.json: what is there was made with other settings"]);
+    // Another kind has files of its own.
+    let toys = "scenes make toys out --train 1 --val 0 --test 0 --views 1 --size 64 --threads 1";
+    assert_eq!(done(folder.path(), toys), "out: 1 new scenes, 0 were there\n");
+}
+
+#[test]
+fn wrong_arguments_are_told() {
+    let folder = Folder::new();
+    let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
+    wrong("scenes make lorries out", &["lorries", "cars, chairs or toys"]);
+    wrong("scenes make cars out --size 100", &["64 or 128 is wanted"]);
+    wrong("scenes make cars out --views 0", &["--views"]);
+    wrong("scenes make cars out --train 2000000", &["--train"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on() {
+    use std::process::{Command, Stdio};
+    use std::time::{Duration, Instant};
+    let folder = Folder::new();
+    let scenes = folder.path().join("out/toys_train");
+    let arguments = |count: usize| format!("scenes make toys out --train {count} --val 0 --test 0 --views 4 --size 64");
+    let mut run = viewfuse_tests::command::command(BINARY, folder.path(), &arguments(50_000));
+    let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+    let start = Instant::now();
+    while !scenes.join("000000").exists() {
+        assert!(child.try_wait().expect("a process").is_none() && start.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+    let result = child.wait_with_output().expect("its output");
+    assert_eq!(result.status.code(), Some(130));
+    let said = String::from_utf8_lossy(&result.stderr);
+    assert_eq!(said, "viewfuse: interrupted; nothing half-written is left behind\n");
+    let names = names_in(&scenes);
+    assert!(!names.is_empty() && names.len() < 1000, "{} scenes", names.len());
+    for name in &names {
+        let scene = Scene::open(scenes.join(name)).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(scene.views.len(), 4, "{name} is not whole");
+        assert_eq!(fs::read_dir(scenes.join(name).join("rgb")).expect("pictures").count(), 4);
+    }
+    let there = names.iter().filter(|name| ["000000", "000001"].contains(&name.as_str())).count();
+    let goes_on = format!("out: {} new scenes, {there} were there\n", 2 - there);
+    assert_eq!(done(folder.path(), &arguments(2)), goes_on);
+}
