@@ -69,6 +69,8 @@ fn help_fits_and_gives_examples() {
         "evaluate",
         "pareto",
         "compare",
+        "report",
+        "train",
         "scenes make",
         "devices",
         "verify",

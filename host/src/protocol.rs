@@ -159,7 +159,7 @@ fn counted(
     for &count in counts {
         if order.len() < target_count + count {
             let (has, wanted) = (order.len(), target_count + count);
-            notes.push(format!("{}: {has} photographs, {wanted} are needed for {count} sources", scene.path.display()));
+            notes.push(format!("{}: {has} photographs, {wanted} are needed for {count} sources", scene.name()));
             continue;
         }
         let (targets, rest) = order.split_at(target_count);
@@ -197,7 +197,7 @@ fn close(
         let sources: Vec<usize> = near.into_iter().take(1).chain(far.into_iter().take(source_count - 1)).collect();
         add(ascending(&sources), vec![target]);
     }
-    let scene_name = scene.path.display();
+    let scene_name = scene.name();
     let mut notes = Vec::new();
     if !others.is_empty() {
         let (count, all, far) = (others.len(), views.len(), source_count - 1);

@@ -21,6 +21,8 @@ pub struct Metric {
     pub name: String,
     /// Its name in tables.
     pub label: String,
+    /// Its unit; empty for plain numbers.
+    pub unit: &'static str,
     /// Digits behind the point.
     pub decimals: usize,
     /// Whether more is better.
@@ -30,12 +32,17 @@ pub struct Metric {
 impl Metric {
     /// The metric of this name. Those that are not known here are distances: less is better.
     pub fn named(name: &str) -> Metric {
-        let (label, decimals, larger_is_better) = match name {
-            PSNR => ("PSNR dB".to_owned(), 2, true),
-            SSIM => ("SSIM".to_owned(), 3, true),
-            other => (other.replace('_', " "), 3, false),
+        let (label, unit, decimals, larger_is_better) = match name {
+            PSNR => ("PSNR".to_owned(), "dB", 2, true),
+            SSIM => ("SSIM".to_owned(), "", 3, true),
+            other => (other.replace('_', " "), "", 3, false),
         };
-        Metric { name: name.to_owned(), label, decimals, larger_is_better }
+        Metric { name: name.to_owned(), label, unit, decimals, larger_is_better }
+    }
+
+    /// What stands above its column.
+    pub fn heading(&self) -> String {
+        format!("{} {}", self.label, self.unit).trim_end().to_owned()
     }
 
     /// A value as text.

@@ -4,7 +4,7 @@ use super::{ReportError, counted, figure, pictures, table};
 use crate::gallery::{Shown, shown};
 use crate::protocol::Protocol;
 use crate::run_folder::{RunFolder, Settings, missing};
-use crate::summary::{REFERENCE, Table, tables};
+use crate::summary::{REFERENCE, Row, Table, tables};
 use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -71,16 +71,23 @@ impl Evaluation {
                         (named(&self.missing)) "."
                     }
                 }
-                @for note in notes { p.note { (note) } }
-                @for lead in self.tables.iter().filter_map(lead) { p.lead { (lead) } }
+                @for lead in self.tables.iter().filter_map(lead) { (lead) }
                 @if !figures.is_empty() {
-                    div.figures { @for svg in &figures { figure { div.scroll { (PreEscaped(svg)) } } } }
+                    div.figures { @for svg in &figures { figure { div.scroll.drawn { (PreEscaped(svg)) } } } }
+                    (figure::key(&self.tables))
                 }
                 @for results in &self.tables { (table::results(results)) }
                 @if !self.tables.is_empty() { (table::legend()) }
                 @if !self.shown.is_empty() {
                     h3 { "Pictures" }
+                    p.legend { "Bars are the weights of the sources, in their order, on one scale." }
                     @for shown in &self.shown { (pictures::comparison(&self.folder, shown)?) }
+                }
+                @if !notes.is_empty() {
+                    details {
+                        summary { "Notes" }
+                        ul.notes { @for note in notes { li { (note) } } }
+                    }
                 }
                 (self.record())
             }
@@ -105,23 +112,22 @@ impl Evaluation {
     }
 }
 
-/// The best scheme of a table in a sentence.
-fn lead(table: &Table) -> Option<String> {
+/// The best schemes of a table in a sentence.
+fn lead(table: &Table) -> Option<Markup> {
     let metric = table.metrics.first()?;
-    let best = table.rows.iter().find(|row| row.cells[0].as_ref().is_some_and(|cell| cell.place == 1))?;
-    let cell = best.cells[0].as_ref()?;
-    let gain = cell
-        .versus_reference
-        .as_ref()
-        .map_or(String::new(), |versus| format!(", {} over {REFERENCE}", metric.interval_text(versus, true)));
+    let first = |row: &&Row| row.cells[0].as_ref().is_some_and(|cell| cell.place == 1);
+    let best: Vec<&Row> = table.rows.iter().filter(first).collect();
+    let cell = best.first()?.cells[0].as_ref()?;
+    let names: Vec<&str> = best.iter().map(|row| row.scheme.as_str()).collect();
+    let gain = cell.versus_reference.as_ref().filter(|_| best.len() == 1);
     let sources: Vec<String> = table.source_counts.iter().map(usize::to_string).collect();
-    Some(format!(
-        "{} sources: {} leads with {} {}{gain}.",
-        sources.join(", "),
-        best.scheme,
-        metric.label,
-        metric.text(cell.value.mean)
-    ))
+    Some(html! {
+        p.lead {
+            "Best from " (sources.join(", ")) " sources: " strong { (names.join(", ")) } ", "
+            (metric.label) " " (metric.text(cell.value.mean)) " " (metric.unit)
+            @if let Some(gain) = gain { ", " (metric.interval_text(gain, true)) " over " (REFERENCE) } "."
+        }
+    })
 }
 
 /// Numbers, the first few.

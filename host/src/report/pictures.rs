@@ -1,6 +1,6 @@
 //! Pictures side by side: the sources with their weights, every scheme's prediction, the truth.
 
-use super::{ReportError, data_address, read};
+use super::{ReportError, counted, data_address, read};
 use crate::evaluate::PSNR;
 use crate::gallery::{PICTURES, Shown, ShownScheme};
 use crate::summary::Metric;
@@ -35,10 +35,10 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
     };
     Ok(html! {
         article.comparison {
-            h4 { (shown.scene) ", view " (shown.target) ", from " (super::counted(shown.sources.len(), "source")) }
+            h4 { (shown.scene) ", view " (shown.target) ", from " (counted(shown.sources.len(), "source")) }
             div.sources {
                 @for (index, (source, address)) in shown.sources.iter().zip(&sources).enumerate() {
-                    figure { img src=(address) alt={ "source " (source.name) }; figcaption { b { (index + 1) } " " (source.name) } }
+                    figure { img src=(address) alt={ "source " (source.name) }; figcaption { b { (index + 1) } br; (source.name) } }
                 }
             }
             div.predictions {
@@ -48,7 +48,7 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
                         img src=(address) alt={ "prediction with " (scheme.scheme) };
                         (bars(&scheme.weights, heaviest))
                         figcaption {
-                            (scheme.scheme)
+                            (breakable(&scheme.scheme))
                             @if let Some(psnr) = psnr(scheme) { br; (marked(psnr)) " dB" }
                         }
                     }
@@ -57,6 +57,12 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
             (weights(shown))
         }
     })
+}
+
+/// The name of a scheme, which may be broken where one of its parts ends.
+fn breakable(name: &str) -> Markup {
+    let pieces = name.split_inclusive([',', ':', '/']);
+    html! { @for (index, piece) in pieces.enumerate() { @if index > 0 { wbr; } (piece) } }
 }
 
 /// The weights of the sources as bars in their order, all schemes on the same scale.

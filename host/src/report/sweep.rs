@@ -2,7 +2,7 @@
 
 use super::{ReportError, counted, read, table};
 use crate::pareto::plot;
-use crate::pareto::record::DeviceRecord;
+use crate::pareto::record::{DeviceRecord, PointRecord};
 use maud::{Markup, PreEscaped, html};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
@@ -66,7 +66,7 @@ impl Sweep {
                     span { (counted(sources.len(), "source")) ", " (weighting) }
                 }
                 @for failure in failures { p.warning { strong { "Failed: " } (failure) } }
-                figure.wide { div.scroll { (PreEscaped(svg)) } figcaption {
+                figure.wide { div.scroll.drawn { (PreEscaped(svg)) } figcaption {
                     "Ringed and named: the settings that no other beats in both. " code { "equal" } " is the exact picture."
                 } }
                 @for device in devices { (points(device)) }
@@ -91,17 +91,19 @@ impl Sweep {
 
 /// The settings of a device that are the best for their time.
 fn points(device: &DeviceRecord) -> Markup {
+    let mut best: Vec<&PointRecord> = device.points.iter().filter(|point| point.best).collect();
+    best.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));
     let ratio = |psnr: Option<f64>| psnr.map_or_else(|| "equal".to_owned(), |psnr| format!("{psnr:.1}"));
     html! {
-        div.scroll {
-            table.results {
-                caption { strong { (device.device) } " settings that are the best for their time" }
+        figure.table {
+            figcaption { strong { (device.device) } " settings that are the best for their time" }
+            div.scroll { table.results {
                 thead { tr {
                     th scope="col" { "setting" } th scope="col" { "s / picture" } th scope="col" { "gain" }
                     th scope="col" { "PSNR dB to exact" } th scope="col" { "PSNR dB to truth" }
                 } }
                 tbody {
-                    @for point in device.points.iter().filter(|point| point.best) {
+                    @for point in best {
                         tr {
                             th scope="row" { (point.setting) }
                             td { (format!("{:.3}", point.seconds)) }
@@ -111,7 +113,7 @@ fn points(device: &DeviceRecord) -> Markup {
                         }
                     }
                 }
-            }
+            } }
         }
     }
 }

@@ -10,17 +10,17 @@ pub(super) fn results(table: &Table) -> Markup {
     let has_reference = table.rows.iter().any(|row| row.scheme == REFERENCE);
     let sources: Vec<String> = table.source_counts.iter().map(usize::to_string).collect();
     html! {
-        div.scroll {
-            table.results {
-                caption {
-                    strong { (sources.join(", ")) " sources" } " "
-                    (counted(table.scene_count, "scene")) ", " (counted(table.target_count, "picture")) " of each scheme"
-                }
+        figure.table {
+            figcaption {
+                strong { (sources.join(", ")) " sources" } " "
+                (counted(table.scene_count, "scene")) ", " (counted(table.target_count, "picture")) " of each scheme"
+            }
+            div.scroll { table.results {
                 thead {
                     tr {
                         th scope="col" { "weighting" }
                         @for metric in &table.metrics {
-                            th scope="col" { (metric.label) " " (if metric.larger_is_better { "↑" } else { "↓" }) }
+                            th scope="col" { (metric.heading()) " " (if metric.larger_is_better { "↑" } else { "↓" }) }
                             @if has_reference { th.versus scope="col" { "over " (REFERENCE) } }
                         }
                         th scope="col" { "s / view" }
@@ -38,7 +38,7 @@ pub(super) fn results(table: &Table) -> Markup {
                         }
                     }
                 }
-            }
+            } }
         }
     }
 }

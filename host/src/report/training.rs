@@ -58,7 +58,7 @@ fn flat(name: &str, value: &Value) -> Vec<(String, String)> {
     let below = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
     match value {
         Value::Object(all) => all.iter().flat_map(|(key, value)| flat(&below(key), value)).collect(),
-        Value::Array(items) if items.len() > 8 => {
+        Value::Array(items) if items.len() > 8 || items.iter().any(Value::is_array) => {
             let last = items.last().map_or_else(String::new, Value::to_string);
             vec![(name.to_owned(), format!("{} entries, the last {last}", items.len()))]
         }

@@ -30,7 +30,7 @@ use viewfuse::weighting::Weighting;
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
 const NO_SETTINGS: [&str; 7] = ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol"];
-/// Missing jobs that are named; of more, how many there are.
+/// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
 #[derive(Args)]
@@ -107,7 +107,10 @@ pub(super) fn run(
     };
     let done = on_threads(arguments.picture.threads, || field.on(&device, &work))??;
     drop(progress);
-    plan.notes.iter().try_for_each(|note| say(format_args!("note: {note}")))?;
+    plan.notes.iter().take(NAMED).try_for_each(|note| say(format_args!("note: {note}")))?;
+    if plan.notes.len() > NAMED {
+        say(format_args!("and {} more notes, all in {SETTINGS}", plan.notes.len() - NAMED))?;
+    }
     let finished = folder.finished()?;
     let missing = missing(plan.jobs.len(), &finished);
     if missing.is_empty() {

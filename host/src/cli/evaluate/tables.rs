@@ -33,7 +33,7 @@ pub(super) fn print_table(title: &str, results: &Table) -> io::Result<()> {
     let has_reference = results.rows.iter().any(|row| row.scheme == REFERENCE);
     let mut header = vec!["scheme".to_owned()];
     for metric in &results.metrics {
-        header.push(metric.label.clone());
+        header.push(metric.heading());
         header.extend(has_reference.then(|| format!("over {REFERENCE}")));
     }
     header.push("s / view".to_owned());
