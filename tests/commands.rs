@@ -70,6 +70,8 @@ fn help_fits_and_gives_examples() {
         "pareto",
         "report",
         "compare",
+        "report",
+        "train",
         "scenes make",
         "devices",
         "verify",

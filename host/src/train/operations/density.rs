@@ -25,7 +25,7 @@ impl Operation<1> for RectifiedDensity {
         values.iter().map(|value| if *value < T::zero() { T::zero() } else { *value }).collect()
     }
 
-    fn backward<T: Real>(&self, [values]: [&[T]; 1], gradient: &[T]) -> [Option<Vec<T>>; 1] {
+    fn backward<T: Real>(&self, [values]: [&[T]; 1], _: &[T], gradient: &[T]) -> [Option<Vec<T>>; 1] {
         let leak = T::from_f64(LEAK);
         let one = |(value, gradient): (&T, &T)| match (*value < T::zero(), *gradient < T::zero()) {
             (false, _) => *gradient,

@@ -180,6 +180,7 @@ impl PointNetwork {
         let points = &*self.points;
         let row_count = points.view_count * chunk.len();
         let mut embedded = Vec::with_capacity(row_count * embedded_len);
+        debug_assert_eq!((points.embedded_len, parameters.len()), (embedded_len, self.sizes.parameter_count()));
         for row in points.rows(object, chunk) {
             embedded.extend(points.embedded[row * embedded_len..][..embedded_len].iter().map(|value| T::of(*value)));
         }
