@@ -70,7 +70,6 @@ fn help_fits_and_gives_examples() {
         "pareto",
         "report",
         "compare",
-        "report",
         "train",
         "scenes make",
         "devices",
