@@ -207,6 +207,9 @@ fn data_sets_and_published_metrics() {
     );
     assert_refused(BINARY, folder, &run.replace("--split test", "--split val -o x"), &["cars", "val"]);
     assert_wrong_arguments(BINARY, folder, &format!("{run} --fid net.pth -o fid"), &["--fid", "viewfuse compare"]);
+    // A file that is no network leaves no folder behind, whose settings would then be wrong.
+    fs::write(folder.join("net.safetensors"), safetensors(&[("x", "F32", &[1], f32_bytes([1.0]))])).expect("a file");
+    assert_refused(BINARY, folder, &format!("{run} --lpips alex=net.safetensors -o lpips"), &["net.safetensors"]);
 }
 
 #[test]

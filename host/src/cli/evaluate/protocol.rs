@@ -93,12 +93,12 @@ pub(super) fn run(
         scenes: scenes.iter().map(SceneSettings::of).collect(),
     };
     let Chosen { device, reason } = arguments.device.open()?;
-    let folder = RunFolder::begin(folder, settings)?;
     let shard = arguments.protocol.shard.unwrap_or(Shard::ALL);
 
     let progress = Progress::new("evaluating");
     let work = Jobs {
-        folder: &folder,
+        path: folder,
+        settings: &settings,
         scenes: &scenes,
         plan: &plan,
         shard,
@@ -108,7 +108,7 @@ pub(super) fn run(
         metrics: &arguments.metrics,
         progress: &progress,
     };
-    let done = on_threads(arguments.picture.threads, || field.on(&device, &work))??;
+    let (folder, done) = on_threads(arguments.picture.threads, || field.on(&device, &work))??;
     drop(progress);
     plan.notes.iter().take(NAMED).try_for_each(|note| say(format_args!("note: {note}")))?;
     if plan.notes.len() > NAMED {
@@ -141,7 +141,8 @@ pub(super) fn run(
 
 /// The jobs of a shard that are not finished.
 struct Jobs<'a> {
-    folder: &'a RunFolder,
+    path: &'a Path,
+    settings: &'a Settings,
     scenes: &'a [Scene],
     plan: &'a Plan,
     shard: Shard,
@@ -153,12 +154,14 @@ struct Jobs<'a> {
 }
 
 impl Work for Jobs<'_> {
-    /// How many were done.
-    type Output = anyhow::Result<usize>;
+    /// The folder, and how many were done.
+    type Output = anyhow::Result<(RunFolder, usize)>;
 
-    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<usize> {
-        let Jobs { folder, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
-        let metrics = &metrics.open_for_pictures(device)?;
+    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<(RunFolder, usize)> {
+        let Jobs { path, settings, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
+        let metrics = &metrics.open(device)?;
+        // Only now, that nothing which a person gave can be wrong: a folder keeps its settings.
+        let folder = RunFolder::begin(path, settings.clone())?;
         let mut journal = folder.journal(shard)?;
         let finished = folder.finished()?;
         for (number, done) in &finished {
@@ -196,7 +199,7 @@ impl Work for Jobs<'_> {
             })?;
             count += 1;
         }
-        Ok(count)
+        Ok((folder, count))
     }
 }
 
@@ -206,7 +209,7 @@ impl Jobs<'_> {
         let same = |job: &Job| done.scene == job.scene && done.sources == names(&self.scenes[job.scene], &job.sources);
         match self.plan.jobs.get(number) {
             Some(job) if same(job) => Ok(()),
-            _ => Err(FolderError::OtherJob { path: self.folder.path().to_path_buf(), job: number }),
+            _ => Err(FolderError::OtherJob { path: self.path.to_path_buf(), job: number }),
         }
     }
 }
