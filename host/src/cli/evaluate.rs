@@ -8,7 +8,7 @@
 mod protocol;
 mod tables;
 
-use super::metrics_options::PictureMetricOptions;
+use super::metrics_options::MetricOptions;
 use super::model::{ModelOptions, Work};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::{on_threads, say};
@@ -21,7 +21,7 @@ use tables::{csv_of, print_means};
 use viewfuse::dataset::{Dataset, DatasetError, Split};
 use viewfuse::device::Device;
 use viewfuse::device::choice::Chosen;
-use viewfuse::evaluate::{Score, evaluate, means};
+use viewfuse::evaluate::{Evaluator, Score, means};
 use viewfuse::few_shot::Selection;
 use viewfuse::field::Field;
 use viewfuse::files::{check_writable, write_whole};
@@ -39,10 +39,10 @@ use viewfuse::weighting::{SCHEME_NAMES, Weighting};
     With --protocol, the same command again goes on with a folder after a kill, and prints the tables once every job is \
     there, whichever shards did them. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
 pub(crate) struct Arguments {
-    /// One or more scenes; with --split data sets, such as data/cars for the scenes in data/cars_test
+    /// One or more scenes; with --split data sets
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
-    /// The scenes are those of this split of data sets: train, val or test
+    /// Take the scenes of a data set: those for train, val or test
     #[arg(long, value_name = "SPLIT")]
     split: Option<Split>,
     /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
@@ -56,11 +56,11 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     protocol: ProtocolOptions,
     #[command(flatten)]
-    metrics: PictureMetricOptions,
-    #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
     model: ModelOptions,
+    #[command(flatten)]
+    metrics: MetricOptions,
     /// Seed of every random number: of a protocol's draws, and of networks
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -72,11 +72,11 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// The scenes' folders.
-    fn scene_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
+    /// Where the scenes are.
+    fn paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let Some(split) = self.split else { return Ok(self.scenes.clone()) };
-        let of = |path: &PathBuf| Ok(Dataset::open(path, split)?.scenes);
-        Ok(self.scenes.iter().map(of).collect::<Result<Vec<_>, _>>()?.concat())
+        let sets: Vec<Dataset> = self.scenes.iter().map(|path| Dataset::open(path, split)).collect::<Result<_, _>>()?;
+        Ok(sets.into_iter().flat_map(|set| set.scenes).collect())
     }
 }
 
@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let mut all: Vec<Score> = Vec::new();
     let mut scene_of: Vec<String> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
-    let paths = arguments.scene_paths()?;
+    let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in paths.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
@@ -126,8 +126,8 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         scene_of.extend(scores.iter().map(|_| path.display().to_string()));
         all.extend(scores);
     }
-    if scenes.len() > 1 {
-        print_means(&format!("all {} scenes", scenes.len()), &means(&all))?;
+    if paths.len() > 1 {
+        print_means(&format!("all {} scenes", paths.len()), &means(&all))?;
     }
     say(format_args!("device: {}, {reason}", device.name()))?;
     if let Some(path) = &arguments.output {
@@ -144,7 +144,7 @@ struct Job<'a> {
     selection: &'a Selection,
     weightings: &'a [Weighting],
     options: &'a RenderOptions,
-    metrics: &'a PictureMetricOptions,
+    metrics: &'a MetricOptions,
     progress: &'a Progress,
 }
 
@@ -152,8 +152,9 @@ impl Work for Job<'_> {
     type Output = anyhow::Result<Vec<Score>>;
 
     fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
-        let Job { scene, selection, weightings, options, metrics, progress } = self;
-        let metrics = metrics.open(device)?;
-        Ok(evaluate(scene, selection, weightings, device, field, options, Some(&metrics), progress)?)
+        let Job { scene, selection, weightings, options, metrics, progress } = *self;
+        let metrics = &metrics.open_for_pictures(device)?;
+        let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
+        Ok(evaluator.score_all(scene, selection)?)
     }
 }
