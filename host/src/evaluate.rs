@@ -3,11 +3,13 @@
 use crate::device::Device;
 use crate::few_shot::{Selection, SelectionError, target_of, view_list};
 use crate::field::Field;
+use crate::metrics::{MetricError, Metrics};
 use crate::photographs::{Album, SourceImages};
 use crate::progress::Progress;
 use crate::render::{Frame, RenderError, RenderOptions, Stage, Truth};
 use crate::scene::Scene;
 use crate::weighting::Weighting;
+use image::RgbImage;
 use std::time::{Duration, Instant};
 
 /// Name of the row that copies the nearest source instead of rendering.
@@ -30,6 +32,9 @@ pub enum EvaluateError<E: std::error::Error> {
     /// A render failed.
     #[error(transparent)]
     Render(#[from] RenderError<E>),
+    /// A picture could not be scored.
+    #[error(transparent)]
+    Metric(#[from] MetricError<E>),
 }
 
 /// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures.
@@ -66,7 +71,7 @@ pub fn values_of(truth: &Truth) -> Vec<(String, f64)> {
 }
 
 /// What renders and scores.
-pub struct Evaluator<'a, D, F> {
+pub struct Evaluator<'a, D: Device, F> {
     /// The schemes.
     pub weightings: &'a [Weighting],
     /// Where kernels run.
@@ -75,6 +80,8 @@ pub struct Evaluator<'a, D, F> {
     pub field: &'a F,
     /// How.
     pub options: &'a RenderOptions,
+    /// What scores pictures; without, PSNR and SSIM do.
+    pub metrics: Option<&'a Metrics<D>>,
     /// Where progress and warnings are shown.
     pub progress: &'a Progress,
 }
@@ -93,13 +100,15 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         targets: &[usize],
         mut seen: impl FnMut(&Weighting, &Frame, &SourceImages),
     ) -> Result<Vec<Score>, EvaluateError<D::Error>> {
-        let Evaluator { weightings, device, field, options, progress } = *self;
-        let score = |scheme: &str, target: usize, truth: &Truth, time: Duration| Score {
-            scheme: scheme.to_owned(),
-            target: scene.views[target].name.clone(),
-            source_count: sources.len(),
-            values: values_of(truth),
-            time,
+        let Evaluator { weightings, device, field, options, progress, .. } = *self;
+        let score = |scheme: &str, target: usize, prediction: &RgbImage, truth: &Truth, time: Duration| {
+            Ok::<_, MetricError<D::Error>>(Score {
+                scheme: scheme.to_owned(),
+                target: scene.views[target].name.clone(),
+                source_count: sources.len(),
+                values: self.values(prediction, truth)?,
+                time,
+            })
         };
         let mut stage = Stage::prepare(scene, album, sources, device, field, options, progress)?;
         let mut scores = Vec::new();
@@ -107,7 +116,8 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
             let nearest = nearest_source(scene, sources, target);
             let size = stage.picture_size(target)?;
             let (prediction, truth) = (stage.truth_at(nearest, size)?, stage.truth_at(target, size)?);
-            scores.push(score(NEAREST_COPY, target, &Truth::compare(&prediction, truth), Duration::ZERO));
+            let truth = Truth::compare(&prediction, truth);
+            scores.push(score(NEAREST_COPY, target, &prediction, &truth, Duration::ZERO)?);
         }
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
@@ -120,7 +130,7 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
                 if let Some(truth) = &frame.truth {
                     let time = encode_share + frame.time.saturating_sub(frame.encode);
                     shared += frame.encode;
-                    scores.push(score(&weighting.to_string(), target, truth, time));
+                    scores.push(score(&weighting.to_string(), target, &frame.picture, truth, time)?);
                     seen(weighting, &frame, &stage.images);
                 }
             }
@@ -128,6 +138,17 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
         Ok(scores)
+    }
+}
+
+impl<D: Device, F> Evaluator<'_, D, F> {
+    /// Every metric of a prediction, by name.
+    fn values(&self, prediction: &RgbImage, truth: &Truth) -> Result<Vec<(String, f64)>, MetricError<D::Error>> {
+        let Some(metrics) = self.metrics else { return Ok(values_of(truth)) };
+        let scores = metrics.compare(self.device, prediction, &truth.picture)?;
+        // PSNR has its unit in its name here.
+        let name = |own: &str| if own == "psnr" { PSNR.to_owned() } else { own.to_owned() };
+        Ok(scores.into_iter().map(|score| (name(score.name), score.value)).collect())
     }
 }
 
@@ -143,12 +164,13 @@ pub fn evaluate<D: Device, F: Field<D>>(
     device: &D,
     field: &F,
     options: &RenderOptions,
+    metrics: Option<&Metrics<D>>,
     progress: &Progress,
 ) -> Result<Vec<Score>, EvaluateError<D::Error>> {
     let groups = source_groups(scene, selection, field.least_sources())?;
     let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
     let album = Album::open(scene, used, progress).map_err(RenderError::from)?;
-    let evaluator = Evaluator { weightings, device, field, options, progress };
+    let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
     let mut scores = Vec::new();
     for (sources, targets) in &groups {
         scores.extend(evaluator.score(scene, &album, sources, targets, |_, _, _| {})?);

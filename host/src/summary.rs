@@ -3,9 +3,7 @@
 //! Every scene counts the same: the targets and trials of a scene are averaged first, then the scenes. The difference of
 //! two schemes is taken scene by scene before it is averaged: how hard a scene is cancels out.
 
-mod interval;
-
-pub use interval::Interval;
+use crate::metrics::interval::Interval;
 
 use crate::evaluate::{NEAREST_COPY, PSNR, SSIM};
 use crate::run_folder::Finished;
@@ -139,8 +137,8 @@ fn table(jobs: &[&Finished]) -> Table {
         let differences = |reference: &BTreeMap<usize, f64>| -> Vec<f64> {
             own.iter().filter_map(|(scene, value)| Some(value - reference.get(scene)?)).collect()
         };
-        let value = Interval::of(&own.values().copied().collect::<Vec<_>>());
-        let versus_reference = reference.map(|reference| Interval::of(&differences(reference)));
+        let value = Interval::of(&own.values().copied().collect::<Vec<_>>())?;
+        let versus_reference = reference.and_then(|reference| Interval::of(&differences(reference)));
         Some(Cell { value, versus_reference, place: 0 })
     };
     let row = |scheme: &&str| Row {

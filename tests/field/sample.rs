@@ -31,7 +31,7 @@ fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<Weighting> = schemes.iter().map(|name| scheme(name)).collect();
     let (field, options, quiet) = (PhotoField::default(), RenderOptions::default(), Progress::hidden());
-    let scores = evaluate(&scene, &selection, &weightings, &Cpu, &field, &options, &quiet).expect("scores");
+    let scores = evaluate(&scene, &selection, &weightings, &Cpu, &field, &options, None, &quiet).expect("scores");
     for score in &scores {
         println!(
             "{:>16} at {}: {:.2} dB, SSIM {:.4}",
@@ -93,7 +93,7 @@ fn frame(leave_out: f32) -> (Frame, image::RgbImage) {
     let options = RenderOptions { size: Some([48, 48]), leave_out, ..RenderOptions::default() };
     let album = Album::open(&scene, 0..24, &Progress::hidden()).expect("photographs");
     let (field, quiet) = (PhotoField::default(), Progress::hidden());
-    let mut stage = Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &quiet).expect("a stage");
+    let mut stage = Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, None, &quiet).expect("a stage");
     let weighting = scheme("error:alpha=1");
     let latents = stage.encode(&weighting, &quiet).expect("latents");
     let frame = stage.frame(&weighting, &latents, &target_of(&scene, 20), &quiet).expect("a frame");

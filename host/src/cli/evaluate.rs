@@ -8,6 +8,7 @@
 mod protocol;
 mod tables;
 
+use super::metrics_options::PictureMetricOptions;
 use super::model::{ModelOptions, Work};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::{on_threads, say};
@@ -17,6 +18,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tables::{csv_of, print_means};
+use viewfuse::dataset::{Dataset, DatasetError, Split};
 use viewfuse::device::Device;
 use viewfuse::device::choice::Chosen;
 use viewfuse::evaluate::{Score, evaluate, means};
@@ -37,9 +39,12 @@ use viewfuse::weighting::{SCHEME_NAMES, Weighting};
     With --protocol, the same command again goes on with a folder after a kill, and prints the tables once every job is \
     there, whichever shards did them. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
 pub(crate) struct Arguments {
-    /// One or more scenes
+    /// One or more scenes; with --split data sets, such as data/cars for the scenes in data/cars_test
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
+    /// The scenes are those of this split of data sets: train, val or test
+    #[arg(long, value_name = "SPLIT")]
+    split: Option<Split>,
     /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
@@ -50,6 +55,8 @@ pub(crate) struct Arguments {
     weights: Vec<String>,
     #[command(flatten)]
     protocol: ProtocolOptions,
+    #[command(flatten)]
+    metrics: PictureMetricOptions,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -62,6 +69,15 @@ pub(crate) struct Arguments {
     /// Write every single score to this CSV file; with --protocol the folder of the evaluation
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// The scenes' folders.
+    fn scene_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
+        let Some(split) = self.split else { return Ok(self.scenes.clone()) };
+        let of = |path: &PathBuf| Ok(Dataset::open(path, split)?.scenes);
+        Ok(self.scenes.iter().map(of).collect::<Result<Vec<_>, _>>()?.concat())
+    }
 }
 
 /// `values` are all options and their values as a person would write them.
@@ -92,18 +108,26 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let mut all: Vec<Score> = Vec::new();
     let mut scene_of: Vec<String> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
-    let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
-    for (path, scene) in arguments.scenes.iter().zip(&scenes) {
+    let paths = arguments.scene_paths()?;
+    let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    for (path, scene) in paths.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
-        let job = Job { scene, selection: &selection, weightings: &weightings, options: &options, progress: &progress };
+        let job = Job {
+            scene,
+            selection: &selection,
+            weightings: &weightings,
+            options: &options,
+            metrics: &arguments.metrics,
+            progress: &progress,
+        };
         let scores = on_threads(arguments.picture.threads, || field.on(&device, &job))??;
         drop(progress);
         print_means(&path.display().to_string(), &means(&scores))?;
         scene_of.extend(scores.iter().map(|_| path.display().to_string()));
         all.extend(scores);
     }
-    if arguments.scenes.len() > 1 {
-        print_means(&format!("all {} scenes", arguments.scenes.len()), &means(&all))?;
+    if scenes.len() > 1 {
+        print_means(&format!("all {} scenes", scenes.len()), &means(&all))?;
     }
     say(format_args!("device: {}, {reason}", device.name()))?;
     if let Some(path) = &arguments.output {
@@ -120,6 +144,7 @@ struct Job<'a> {
     selection: &'a Selection,
     weightings: &'a [Weighting],
     options: &'a RenderOptions,
+    metrics: &'a PictureMetricOptions,
     progress: &'a Progress,
 }
 
@@ -127,7 +152,8 @@ impl Work for Job<'_> {
     type Output = anyhow::Result<Vec<Score>>;
 
     fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
-        let Job { scene, selection, weightings, options, progress } = self;
-        Ok(evaluate(scene, selection, weightings, device, field, options, progress)?)
+        let Job { scene, selection, weightings, options, metrics, progress } = self;
+        let metrics = metrics.open(device)?;
+        Ok(evaluate(scene, selection, weightings, device, field, options, Some(&metrics), progress)?)
     }
 }

@@ -3,7 +3,7 @@
 use super::wrong;
 use anyhow::Context;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use viewfuse::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse::device::Device;
 use viewfuse::metrics::Metrics;
@@ -16,9 +16,9 @@ use viewfuse::metrics::lpips::{Lpips, LpipsTrunk};
 /// Heading of these options.
 const METRICS: &str = "Options of metrics";
 
-/// What scores pictures besides PSNR and SSIM.
+/// What scores a picture besides PSNR and SSIM.
 #[derive(Args)]
-pub(crate) struct MetricOptions {
+pub(crate) struct PictureMetricOptions {
     /// Score with LPIPS: its network (alex, vgg or squeeze) and torchvision's state_dict of that; may be given once for each
     /// network. The published heads are built in
     #[arg(long, value_name = "NETWORK=FILE[,heads=FILE]", value_parser = parse_lpips, help_heading = METRICS)]
@@ -26,12 +26,19 @@ pub(crate) struct MetricOptions {
     /// Score with DISTS: torchvision's state_dict of VGG16. The published weights are built in
     #[arg(long, value_name = "FILE[,heads=FILE]", value_parser = parse_file, help_heading = METRICS)]
     dists: Option<NetworkFile>,
-    /// Score sets of pictures with FID and KID: the Inception of pytorch-fid (pt_inception-2015-12-05), or torchvision's
-    #[arg(long, value_name = "FILE", help_heading = METRICS)]
-    fid: Option<PathBuf>,
     /// Whose scores to compute: plain, pixelnerf or viewattention, as published evaluations did
     #[arg(long, value_name = "CONVENTION", default_value_t, help_heading = METRICS)]
     metrics_as: Convention,
+}
+
+/// What scores pictures and sets of them.
+#[derive(Args)]
+pub(crate) struct MetricOptions {
+    #[command(flatten)]
+    pictures: PictureMetricOptions,
+    /// Score sets of pictures with FID and KID: the Inception of pytorch-fid (pt_inception-2015-12-05), or torchvision's
+    #[arg(long, value_name = "FILE", help_heading = METRICS)]
+    fid: Option<PathBuf>,
 }
 
 /// A network's parameters, and perhaps other heads than the published ones.
@@ -55,6 +62,20 @@ impl NetworkFile {
 impl MetricOptions {
     /// Reads the networks and takes them to a device.
     pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
+        let inception = |path: &PathBuf| Inception::new(device, &Checkpoint::open(path)?).context("--fid");
+        Ok(Metrics { inception: self.fid.as_ref().map(inception).transpose()?, ..self.pictures.open(device)? })
+    }
+}
+
+impl PictureMetricOptions {
+    /// The files of networks.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &Path> {
+        let all = self.lpips.iter().map(|(_, files)| files).chain(&self.dists);
+        all.flat_map(|files| [Some(files.trunk.as_path()), files.heads.as_deref()].into_iter().flatten())
+    }
+
+    /// Reads the networks and takes them to a device.
+    pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
         let mut lpips: Vec<Lpips<D>> = Vec::new();
         for (kind, files) in &self.lpips {
             if lpips.iter().any(|other| other.kind() == *kind) {
@@ -67,12 +88,11 @@ impl MetricOptions {
             let [trunk, weights] = files.open(published_dists)?;
             Dists::new(device, &trunk, &weights).context("--dists")
         };
-        let inception = |path: &PathBuf| Inception::new(device, &Checkpoint::open(path)?).context("--fid");
         Ok(Metrics {
             convention: self.metrics_as,
             lpips,
             dists: self.dists.as_ref().map(dists).transpose()?,
-            inception: self.fid.as_ref().map(inception).transpose()?,
+            inception: None,
         })
     }
 }

@@ -34,6 +34,9 @@ pub struct Schedule {
     pub seed: u64,
     /// Steps from one validation to the next.
     pub validate_every: u32,
+    /// Seconds from one writing of the state to the next; changes no number.
+    #[serde(skip)]
+    pub write_every: f64,
 }
 
 /// Steps over which the rate rises.
@@ -42,8 +45,6 @@ const WARM_UP: u32 = 100;
 const LAST_RATE: f64 = 0.03;
 /// Steps from one point of the loss curve to the next.
 const LOSS_EVERY: u32 = 50;
-/// Seconds from one writing of the state to the next.
-const WRITE_EVERY: f64 = 60.0;
 /// Largest norm of a gradient.
 const MOST_GRADIENT: f64 = 1.0;
 
@@ -141,7 +142,7 @@ pub(crate) fn run(
         }
         so_far.seconds += start.elapsed().as_secs_f64();
         progress.step();
-        if written.elapsed().as_secs_f64() > WRITE_EVERY {
+        if written.elapsed().as_secs_f64() > schedule.write_every {
             run.write(&so_far, &learned)?;
             written = Instant::now();
         }

@@ -44,48 +44,31 @@ pub(super) fn assert_close(actual: &[f32], expected: &Tensor, share: f64) {
     }
 }
 
-/// That the gradient of each variable is the slope along a random direction of it, see [`assert_joint_slopes`].
+/// That the gradient of each variable is the slope along a random direction of it, by central differences. `error` is a
+/// share of the slope, or of the largest slope where that is more than a thousand times as large.
 pub(super) fn assert_slopes(variables: &[(&str, &Var)], step: f64, error: f64, value: impl Fn() -> Result<Tensor>) {
-    let groups: Vec<(&str, Vec<&Var>)> = variables.iter().map(|(name, own)| (*name, vec![*own])).collect();
-    assert_joint_slopes(&groups, step, error, value);
-}
-
-/// That gradients are slopes, by central differences: of each group of variables, along a random direction of all of them.
-/// `error` is a share of the slope, or of the largest slope where that is more than a thousand times as large.
-pub(super) fn assert_joint_slopes(
-    groups: &[(&str, Vec<&Var>)],
-    step: f64,
-    error: f64,
-    value: impl Fn() -> Result<Tensor>,
-) {
     let number = |tensor: Tensor| tensor.to_scalar::<f64>().expect("a number");
     let gradients = value().and_then(|value| value.backward()).expect("gradients");
-    let mut slopes = Vec::new();
-    for (group, (name, variables)) in (0..).zip(groups) {
-        let seeds = 100 + 1000 * group..;
-        let directions: Vec<Tensor> = seeds.zip(variables).map(|(seed, own)| noise(own.dims(), seed)).collect();
-        let kept: Vec<Tensor> = variables.iter().map(|own| own.copy().expect("a copy")).collect();
-        let mut slope = 0.0;
-        for (own, direction) in variables.iter().zip(&directions) {
-            let gradient = gradients.get(own).unwrap_or_else(|| panic!("one of {name} has no gradient"));
-            slope += (gradient * direction).and_then(|products| products.sum_all()).map(number).expect("a slope");
-        }
-        let place = |distance: f64| {
-            for ((own, kept), direction) in variables.iter().zip(&kept).zip(&directions) {
-                let moved = (direction * distance).and_then(|way| kept + way).expect("a place");
-                own.set(&moved).expect("the same shape");
-            }
-        };
-        let at = |distance: f64| {
-            place(distance);
-            value().map(number).expect("a value")
-        };
-        slopes.push((slope, (at(step) - at(-step)) / (2.0 * step)));
-        place(0.0);
-    }
+    let slopes: Vec<(f64, f64)> = variables
+        .iter()
+        .enumerate()
+        .map(|(index, (name, variable))| {
+            let direction = noise(variable.dims(), 100 + index as u32);
+            let gradient = gradients.get(variable).unwrap_or_else(|| panic!("{name} has no gradient"));
+            let slope = (gradient * &direction).and_then(|products| products.sum_all()).map(number).expect("a slope");
+            let kept = variable.copy().expect("a copy");
+            let at = |distance: f64| {
+                let moved = (&kept + (&direction * distance).expect("a direction")).expect("a place");
+                variable.set(&moved).and_then(|()| value()).map(number).expect("a value")
+            };
+            let difference = (at(step) - at(-step)) / (2.0 * step);
+            variable.set(&kept).expect("the same shape");
+            (slope, difference)
+        })
+        .collect();
     let largest = slopes.iter().fold(0.0_f64, |most, (_, difference)| most.max(difference.abs()));
     assert!(largest > 0.0, "nothing changes anything");
-    for ((name, _), (slope, difference)) in groups.iter().zip(&slopes) {
+    for ((name, _), (slope, difference)) in variables.iter().zip(&slopes) {
         let allowed = error * difference.abs().max(1.0e-3 * largest);
         assert!((slope - difference).abs() <= allowed, "{name}: gradient {slope}, slope {difference}");
     }

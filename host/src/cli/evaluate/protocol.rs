@@ -2,6 +2,7 @@
 
 use super::Arguments;
 use super::tables::{csv_of, print_table};
+use crate::cli::metrics_options::PictureMetricOptions;
 use crate::cli::model::Work;
 use crate::cli::{on_threads, say};
 use anyhow::Context;
@@ -64,7 +65,7 @@ pub(super) fn run(
     check_writable(&folder.join(SETTINGS))?;
     let field = arguments.model.open(arguments.seed, None)?;
     let render_options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
-    let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    let scenes: Vec<Scene> = arguments.scene_paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
     let draws = Draws {
         seed: arguments.seed,
         trial_count: arguments.protocol.trials,
@@ -75,7 +76,8 @@ pub(super) fn run(
         options.remove(*option);
     });
     let mut files = BTreeMap::new();
-    for path in arguments.model.file().into_iter().chain(weightings.iter().filter_map(Weighting::file)) {
+    let models = arguments.model.file().into_iter().chain(weightings.iter().filter_map(Weighting::file));
+    for path in models.chain(arguments.metrics.files()) {
         let digest = sha256_of(path).with_context(|| path.display().to_string())?;
         files.insert(path.display().to_string(), digest);
     }
@@ -103,6 +105,7 @@ pub(super) fn run(
         picture_count: arguments.protocol.pictures,
         weightings,
         options: &render_options,
+        metrics: &arguments.metrics,
         progress: &progress,
     };
     let done = on_threads(arguments.picture.threads, || field.on(&device, &work))??;
@@ -145,6 +148,7 @@ struct Jobs<'a> {
     picture_count: usize,
     weightings: &'a [Weighting],
     options: &'a RenderOptions,
+    metrics: &'a PictureMetricOptions,
     progress: &'a Progress,
 }
 
@@ -159,7 +163,8 @@ impl Work for Jobs<'_> {
         for (number, done) in &finished {
             self.check(*number, done)?;
         }
-        let evaluator = Evaluator { weightings, device, field, options, progress };
+        let metrics = self.metrics.open(device)?;
+        let evaluator = Evaluator { weightings, device, field, options, metrics: Some(&metrics), progress };
         let mut count = 0;
         for (number, job) in plan.jobs.iter().enumerate() {
             if !shard.does(number) || finished.contains_key(&number) {
