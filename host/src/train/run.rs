@@ -12,14 +12,13 @@ use super::adam::Adam;
 use super::average::Average;
 use super::curve;
 use super::draw::Draw;
-use super::parameters::Parameters;
+use super::parameters::{Contents, Parameters};
 use super::state::{self, Learned, Progressed};
-use crate::checkpoint::{Checkpoint, Precision, TensorShape};
+use crate::checkpoint::{Checkpoint, Precision};
 use crate::files::write_whole;
 use crate::interrupt;
 use crate::progress::Progress;
 use candle_core::Tensor;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -76,7 +75,7 @@ pub(crate) trait Learner {
     }
 
     /// The file that it becomes: tensors and metadata.
-    fn checkpoint(&self) -> candle_core::Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)>;
+    fn checkpoint(&self) -> candle_core::Result<Contents>;
 }
 
 /// What validation found.
