@@ -24,6 +24,8 @@ mod render;
 mod scenes;
 #[path = "commands/tables.rs"]
 mod tables;
+#[path = "commands/train.rs"]
+mod train;
 #[path = "commands/verify.rs"]
 mod verify;
 
@@ -68,8 +70,8 @@ fn help_fits_and_gives_examples() {
         "inspect",
         "evaluate",
         "pareto",
-        "compare",
         "report",
+        "compare",
         "train",
         "scenes make",
         "devices",

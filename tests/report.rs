@@ -21,6 +21,9 @@ const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 const SMALL: &str =
     "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
 
+/// A test that needs the browser.
+type InBrowser = fn(&Browser);
+
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let mut trials = vec![
@@ -29,7 +32,7 @@ fn main() -> ExitCode {
         Trial::test("what_is_no_record_is_refused", || checked(what_is_no_record_is_refused)),
     ];
     let browser = Browser::find().map(Arc::new);
-    let tests: [(&str, fn(&Browser)); 3] = [
+    let tests: [(&str, InBrowser); 3] = [
         ("browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
         ("browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
         ("browser::light_and_dark", light_and_dark),

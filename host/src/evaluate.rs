@@ -3,11 +3,13 @@
 use crate::device::Device;
 use crate::few_shot::{Selection, SelectionError, target_of, view_list};
 use crate::field::Field;
+use crate::metrics::{MetricError, Metrics};
 use crate::photographs::{Album, SourceImages};
 use crate::progress::Progress;
-use crate::render::{Frame, RenderError, RenderOptions, Stage, Truth};
+use crate::render::{Frame, RenderError, RenderOptions, Stage};
 use crate::scene::Scene;
 use crate::weighting::Weighting;
+use image::RgbImage;
 use std::time::{Duration, Instant};
 
 /// Name of the row that copies the nearest source instead of rendering.
@@ -30,10 +32,14 @@ pub enum EvaluateError<E: std::error::Error> {
     /// A render failed.
     #[error(transparent)]
     Render(#[from] RenderError<E>),
+    /// A picture could not be scored.
+    #[error(transparent)]
+    Metric(#[from] MetricError<E>),
 }
 
-/// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures.
-pub const PSNR: &str = "psnr_db";
+/// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures. Names of metrics are
+/// those of [`Scored`](crate::metrics::Scored).
+pub const PSNR: &str = "psnr";
 /// Name of the structural similarity; pictures that are too small have none.
 pub const SSIM: &str = "ssim";
 
@@ -59,14 +65,8 @@ impl Score {
     }
 }
 
-/// Every metric of a prediction, by name.
-pub fn values_of(truth: &Truth) -> Vec<(String, f64)> {
-    let ssim = truth.ssim.map(|ssim| (SSIM.to_owned(), ssim));
-    [(PSNR.to_owned(), truth.psnr)].into_iter().chain(ssim).collect()
-}
-
 /// What renders and scores.
-pub struct Evaluator<'a, D, F> {
+pub struct Evaluator<'a, D: Device, F> {
     /// The schemes.
     pub weightings: &'a [Weighting],
     /// Where kernels run.
@@ -75,13 +75,15 @@ pub struct Evaluator<'a, D, F> {
     pub field: &'a F,
     /// How.
     pub options: &'a RenderOptions,
+    /// What scores them.
+    pub metrics: &'a Metrics<D>,
     /// Where progress and warnings are shown.
     pub progress: &'a Progress,
 }
 
 impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
     /// Scores every scheme on targets that share their sources, after copying the nearest source. `seen` gets each rendered
-    /// frame with its scheme and the sources at working size.
+    /// frame with its scheme, its values and the sources at working size.
     ///
     /// # Errors
     /// [`EvaluateError`].
@@ -91,14 +93,18 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         album: &Album<'_>,
         sources: &[usize],
         targets: &[usize],
-        mut seen: impl FnMut(&Weighting, &Frame, &SourceImages),
+        mut seen: impl FnMut(&Weighting, &Frame, &[(String, f64)], &SourceImages),
     ) -> Result<Vec<Score>, EvaluateError<D::Error>> {
-        let Evaluator { weightings, device, field, options, progress } = *self;
-        let score = |scheme: &str, target: usize, truth: &Truth, time: Duration| Score {
+        let Evaluator { weightings, device, field, options, metrics, progress } = *self;
+        let values = |prediction: &RgbImage, truth: &RgbImage| -> Result<Vec<(String, f64)>, MetricError<D::Error>> {
+            let scored = metrics.compare(device, prediction, truth)?;
+            Ok(scored.into_iter().map(|scored| (scored.name.to_owned(), scored.value)).collect())
+        };
+        let score = |scheme: &str, target: usize, values: Vec<(String, f64)>, time: Duration| Score {
             scheme: scheme.to_owned(),
             target: scene.views[target].name.clone(),
             source_count: sources.len(),
-            values: values_of(truth),
+            values,
             time,
         };
         let mut stage = Stage::prepare(scene, album, sources, device, field, options, progress)?;
@@ -107,7 +113,7 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
             let nearest = nearest_source(scene, sources, target);
             let size = stage.picture_size(target)?;
             let (prediction, truth) = (stage.truth_at(nearest, size)?, stage.truth_at(target, size)?);
-            scores.push(score(NEAREST_COPY, target, &Truth::compare(&prediction, truth), Duration::ZERO));
+            scores.push(score(NEAREST_COPY, target, values(&prediction, &truth)?, Duration::ZERO));
         }
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
@@ -120,8 +126,9 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
                 if let Some(truth) = &frame.truth {
                     let time = encode_share + frame.time.saturating_sub(frame.encode);
                     shared += frame.encode;
-                    scores.push(score(&weighting.to_string(), target, truth, time));
-                    seen(weighting, &frame, &stage.images);
+                    let values = values(&frame.picture, &truth.picture)?;
+                    seen(weighting, &frame, &values, &stage.images);
+                    scores.push(score(&weighting.to_string(), target, values, time));
                 }
             }
         }
@@ -129,31 +136,22 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
         Ok(scores)
     }
-}
 
-/// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one out) and
-/// the targets are all views; with them, the targets are all other views.
-///
-/// # Errors
-/// [`EvaluateError`].
-pub fn evaluate<D: Device, F: Field<D>>(
-    scene: &Scene,
-    selection: &Selection,
-    weightings: &[Weighting],
-    device: &D,
-    field: &F,
-    options: &RenderOptions,
-    progress: &Progress,
-) -> Result<Vec<Score>, EvaluateError<D::Error>> {
-    let groups = source_groups(scene, selection, field.least_sources())?;
-    let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
-    let album = Album::open(scene, used, progress).map_err(RenderError::from)?;
-    let evaluator = Evaluator { weightings, device, field, options, progress };
-    let mut scores = Vec::new();
-    for (sources, targets) in &groups {
-        scores.extend(evaluator.score(scene, &album, sources, targets, |_, _, _| {})?);
+    /// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one out)
+    /// and the targets are all views; with them, the targets are all other views.
+    ///
+    /// # Errors
+    /// [`EvaluateError`].
+    pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError<D::Error>> {
+        let groups = source_groups(scene, selection, self.field.least_sources())?;
+        let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
+        let album = Album::open(scene, used, self.progress).map_err(RenderError::from)?;
+        let mut scores = Vec::new();
+        for (sources, targets) in &groups {
+            scores.extend(self.score(scene, &album, sources, targets, |_, _, _, _| {})?);
+        }
+        Ok(scores)
     }
-    Ok(scores)
 }
 
 /// Sets of sources, each with the targets that are rendered from it.
@@ -207,6 +205,8 @@ pub struct Mean {
     pub psnr: f64,
     /// Mean SSIM over the targets that have one.
     pub ssim: Option<f64>,
+    /// Means of the other metrics over the targets that have them, by name.
+    pub further: Vec<(String, f64)>,
     /// Mean time.
     pub seconds: f64,
     /// Over how many targets.
@@ -226,11 +226,21 @@ pub fn means(scores: &[Score]) -> Vec<Mean> {
         .map(|scheme| {
             let own: Vec<&Score> = scores.iter().filter(|score| score.scheme == scheme).collect();
             let count = own.len() as f64;
-            let similarities: Vec<f64> = own.iter().filter_map(|score| score.value(SSIM)).collect();
+            let mean_of = |name: &str| {
+                let values: Vec<f64> = own.iter().filter_map(|score| score.value(name)).collect();
+                (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+            };
+            let mut names: Vec<&str> = Vec::new();
+            for (name, _) in own.iter().flat_map(|score| &score.values) {
+                if ![PSNR, SSIM].contains(&name.as_str()) && !names.contains(&name.as_str()) {
+                    names.push(name);
+                }
+            }
             Mean {
                 scheme: scheme.to_owned(),
-                psnr: own.iter().filter_map(|score| score.value(PSNR)).sum::<f64>() / count,
-                ssim: (!similarities.is_empty()).then(|| similarities.iter().sum::<f64>() / similarities.len() as f64),
+                psnr: mean_of(PSNR).unwrap_or(f64::NAN),
+                ssim: mean_of(SSIM),
+                further: names.into_iter().filter_map(|name| Some((name.to_owned(), mean_of(name)?))).collect(),
                 seconds: own.iter().map(|score| score.time.as_secs_f64()).sum::<f64>() / count,
                 target_count: own.len(),
             }

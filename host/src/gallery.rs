@@ -1,6 +1,5 @@
 //! Pictures of an evaluation for its report: of a job's first target the sources, every scheme's prediction, the truth.
 
-use crate::evaluate::values_of;
 use crate::files::{WriteError, write_png, write_whole};
 use crate::photographs::SourceImages;
 use crate::render::Frame;
@@ -89,18 +88,18 @@ pub struct Gallery {
 
 impl Gallery {
     /// Takes what is needed of a frame.
-    pub fn add(&mut self, weighting: &Weighting, frame: &Frame, sources: &SourceImages) {
+    pub fn add(&mut self, weighting: &Weighting, frame: &Frame, values: &[(String, f64)], sources: &SourceImages) {
         let Some(truth) = &frame.truth else { return };
         if self.sources.is_empty() {
             self.sources = (0..sources.images.len()).map(|source| thumbnail(sources.picture(source))).collect();
             self.truth = Some(truth.picture.clone());
         }
-        let finite = |(name, value): (String, f64)| (name, Some(value).filter(|value| value.is_finite()));
+        let finite = |(name, value): &(String, f64)| (name.clone(), Some(*value).filter(|value| value.is_finite()));
         let shown = ShownScheme {
             scheme: weighting.to_string(),
             file: String::new(),
             weights: frame.omission.weights.values()[..sources.images.len()].to_vec(),
-            values: values_of(truth).into_iter().map(finite).collect(),
+            values: values.iter().map(finite).collect(),
         };
         self.schemes.push((frame.picture.clone(), shown));
     }

@@ -91,6 +91,11 @@ pub struct Metrics<D: Device> {
 }
 
 impl<D: Device> Metrics<D> {
+    /// PSNR and SSIM of the pictures as they are.
+    pub fn plain() -> Metrics<D> {
+        Metrics { convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
+    }
+
     /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, and what networks there are, in the order of
     /// [`Scored::name`]'s list.
     ///

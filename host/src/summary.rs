@@ -3,11 +3,8 @@
 //! Every scene counts the same: the targets and trials of a scene are averaged first, then the scenes. The difference of
 //! two schemes is taken scene by scene before it is averaged: how hard a scene is cancels out.
 
-mod interval;
-
-pub use interval::Interval;
-
 use crate::evaluate::{NEAREST_COPY, PSNR, SSIM};
+use crate::metrics::interval::Interval;
 use crate::run_folder::Finished;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,7 +32,7 @@ impl Metric {
         let (label, unit, decimals, larger_is_better) = match name {
             PSNR => ("PSNR".to_owned(), "dB", 2, true),
             SSIM => ("SSIM".to_owned(), "", 3, true),
-            other => (other.replace('_', " "), "", 3, false),
+            other => (words(other), "", 3, false),
         };
         Metric { name: name.to_owned(), label, unit, decimals, larger_is_better }
     }
@@ -59,6 +56,12 @@ impl Metric {
             None => mean,
         }
     }
+}
+
+/// `LPIPS alex` for `lpips-alex`.
+fn words(name: &str) -> String {
+    let (metric, network) = name.split_once('-').unwrap_or((name, ""));
+    format!("{} {network}", metric.to_uppercase()).trim_end().to_owned()
 }
 
 /// All schemes under the same conditions.
@@ -136,11 +139,8 @@ fn table(jobs: &[&Finished]) -> Table {
     let cell = |scheme: &str, metric: &Metric| {
         let own = means.get(&(scheme, metric.name.as_str()))?;
         let reference = means.get(&(REFERENCE, metric.name.as_str())).filter(|_| scheme != REFERENCE);
-        let differences = |reference: &BTreeMap<usize, f64>| -> Vec<f64> {
-            own.iter().filter_map(|(scene, value)| Some(value - reference.get(scene)?)).collect()
-        };
-        let value = Interval::of(&own.values().copied().collect::<Vec<_>>());
-        let versus_reference = reference.map(|reference| Interval::of(&differences(reference)));
+        let value = Interval::of(&own.values().copied().collect::<Vec<_>>())?;
+        let versus_reference = reference.and_then(|reference| Interval::of_differences(own, reference));
         Some(Cell { value, versus_reference, place: 0 })
     };
     let row = |scheme: &&str| Row {

@@ -4,9 +4,10 @@ use image::{Rgba, RgbaImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::evaluate::{Mean, NEAREST_COPY, evaluate, means};
+use viewfuse::evaluate::{Evaluator, Mean, NEAREST_COPY, PSNR, SSIM, means};
 use viewfuse::few_shot::{Selection, target_of};
 use viewfuse::field::photo::PhotoField;
+use viewfuse::metrics::Metrics;
 use viewfuse::photographs::{Album, BackgroundChoice, PhotographsError, to_rgb8};
 use viewfuse::progress::Progress;
 use viewfuse::render::{Frame, RenderOptions, Stage};
@@ -31,14 +32,22 @@ fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<Weighting> = schemes.iter().map(|name| scheme(name)).collect();
     let (field, options, quiet) = (PhotoField::default(), RenderOptions::default(), Progress::hidden());
-    let scores = evaluate(&scene, &selection, &weightings, &Cpu, &field, &options, &quiet).expect("scores");
+    let evaluator = Evaluator {
+        weightings: &weightings,
+        device: &Cpu,
+        field: &field,
+        options: &options,
+        metrics: &Metrics::plain(),
+        progress: &quiet,
+    };
+    let scores = evaluator.score_all(&scene, &selection).expect("scores");
     for score in &scores {
         println!(
             "{:>16} at {}: {:.2} dB, SSIM {:.4}",
             score.scheme,
             score.target,
-            score.psnr,
-            score.ssim.unwrap_or(0.0)
+            score.value(PSNR).unwrap_or(0.0),
+            score.value(SSIM).unwrap_or(0.0)
         );
     }
     means(&scores)

@@ -185,6 +185,31 @@ fn parameters_of_the_same_name_are_told_apart() {
 }
 
 #[test]
+fn data_sets_and_published_metrics() {
+    let scene = toy();
+    let folder = scene.path();
+    for name in ["cars_test", "cars_train"] {
+        fs::create_dir(folder.join(name)).expect("a folder");
+    }
+    fs::rename(folder.join("toy"), folder.join("cars_test/lorry")).expect("another place");
+    let run = RUN.replace("--trials 6", "--trials 1").replace(" toy ", " cars --split test ");
+    done(BINARY, folder, &format!("{run} -o plain"));
+    done(BINARY, folder, &format!("{run} --metrics-as viewattention -o published"));
+    let [plain, published] = ["plain", "published"].map(|run| finished(&folder.join(run)).remove(0));
+    assert_eq!((&plain["scene_name"], &published["sources"]), (&Value::from("lorry"), &plain["sources"]));
+    // Pictures are stretched to their own range first: other numbers of the same pictures.
+    assert_ne!(plain["scores"][0]["values"], published["scores"][0]["values"]);
+    assert_refused(
+        BINARY,
+        folder,
+        &format!("{run} --metrics-as viewattention -o plain"),
+        &["metrics-as: viewattention here, plain there"],
+    );
+    assert_refused(BINARY, folder, &run.replace("--split test", "--split val -o x"), &["cars", "val"]);
+    assert_wrong_arguments(BINARY, folder, &format!("{run} --fid net.pth -o fid"), &["--fid", "viewfuse compare"]);
+}
+
+#[test]
 fn one_writer_a_shard() {
     let scene = toy();
     let folder = scene.path();

@@ -8,6 +8,7 @@
 mod protocol;
 mod tables;
 
+use super::metrics_options::MetricOptions;
 use super::model::{ModelOptions, Work};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::{on_threads, say};
@@ -17,9 +18,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tables::{csv_of, print_means};
+use viewfuse::dataset::{Dataset, DatasetError, Split};
 use viewfuse::device::Device;
 use viewfuse::device::choice::Chosen;
-use viewfuse::evaluate::{Score, evaluate, means};
+use viewfuse::evaluate::{Evaluator, Score, means};
 use viewfuse::few_shot::Selection;
 use viewfuse::field::Field;
 use viewfuse::files::{check_writable, write_whole};
@@ -37,9 +39,12 @@ use viewfuse::weighting::{SCHEME_NAMES, Weighting};
     With --protocol, the same command again goes on with a folder after a kill, and prints the tables once every job is \
     there, whichever shards did them. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
 pub(crate) struct Arguments {
-    /// One or more scenes
+    /// One or more scenes; with --split data sets
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
+    /// Take the scenes of a data set: those for train, val or test
+    #[arg(long, value_name = "SPLIT")]
+    split: Option<Split>,
     /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
@@ -54,6 +59,8 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     model: ModelOptions,
+    #[command(flatten)]
+    metrics: MetricOptions,
     /// Seed of every random number: of a protocol's draws, and of networks
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
@@ -62,6 +69,15 @@ pub(crate) struct Arguments {
     /// Write every single score to this CSV file; with --protocol the folder of the evaluation
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Where the scenes are.
+    fn paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
+        let Some(split) = self.split else { return Ok(self.scenes.clone()) };
+        let sets: Vec<Dataset> = self.scenes.iter().map(|path| Dataset::open(path, split)).collect::<Result<_, _>>()?;
+        Ok(sets.into_iter().flat_map(|set| set.scenes).collect())
+    }
 }
 
 /// `values` are all options and their values as a person would write them.
@@ -92,18 +108,26 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let mut all: Vec<Score> = Vec::new();
     let mut scene_of: Vec<String> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
-    let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
-    for (path, scene) in arguments.scenes.iter().zip(&scenes) {
+    let paths = arguments.paths()?;
+    let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    for (path, scene) in paths.iter().zip(&scenes) {
         let progress = Progress::new("evaluating");
-        let job = Job { scene, selection: &selection, weightings: &weightings, options: &options, progress: &progress };
+        let job = Job {
+            scene,
+            selection: &selection,
+            weightings: &weightings,
+            options: &options,
+            metrics: &arguments.metrics,
+            progress: &progress,
+        };
         let scores = on_threads(arguments.picture.threads, || field.on(&device, &job))??;
         drop(progress);
         print_means(&path.display().to_string(), &means(&scores))?;
         scene_of.extend(scores.iter().map(|_| path.display().to_string()));
         all.extend(scores);
     }
-    if arguments.scenes.len() > 1 {
-        print_means(&format!("all {} scenes", arguments.scenes.len()), &means(&all))?;
+    if paths.len() > 1 {
+        print_means(&format!("all {} scenes", paths.len()), &means(&all))?;
     }
     say(format_args!("device: {}, {reason}", device.name()))?;
     if let Some(path) = &arguments.output {
@@ -120,6 +144,7 @@ struct Job<'a> {
     selection: &'a Selection,
     weightings: &'a [Weighting],
     options: &'a RenderOptions,
+    metrics: &'a MetricOptions,
     progress: &'a Progress,
 }
 
@@ -127,7 +152,9 @@ impl Work for Job<'_> {
     type Output = anyhow::Result<Vec<Score>>;
 
     fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
-        let Job { scene, selection, weightings, options, progress } = self;
-        Ok(evaluate(scene, selection, weightings, device, field, options, progress)?)
+        let Job { scene, selection, weightings, options, metrics, progress } = *self;
+        let metrics = &metrics.open_for_pictures(device)?;
+        let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
+        Ok(evaluator.score_all(scene, selection)?)
     }
 }

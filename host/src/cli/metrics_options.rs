@@ -3,7 +3,7 @@
 use super::wrong;
 use anyhow::Context;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use viewfuse::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse::device::Device;
 use viewfuse::metrics::Metrics;
@@ -53,6 +53,23 @@ impl NetworkFile {
 }
 
 impl MetricOptions {
+    /// The files of all networks and heads.
+    pub(crate) fn files(&self) -> Vec<&Path> {
+        let networks = self.lpips.iter().map(|(_, files)| files).chain(&self.dists);
+        let files = networks.flat_map(|files| [Some(&files.trunk), files.heads.as_ref()]).flatten();
+        files.chain(&self.fid).map(PathBuf::as_path).collect()
+    }
+
+    /// As [`MetricOptions::open`], where pictures are scored one by one.
+    pub(crate) fn open_for_pictures<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
+        match self.fid {
+            Some(_) => {
+                Err(wrong("--fid compares sets of pictures, and here each is scored alone; see `viewfuse compare`"))
+            }
+            None => self.open(device),
+        }
+    }
+
     /// Reads the networks and takes them to a device.
     pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
         let mut lpips: Vec<Lpips<D>> = Vec::new();

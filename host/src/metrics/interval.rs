@@ -44,7 +44,7 @@ impl Interval {
     }
 
     /// Of the differences `a - b` on the scenes that both have; `None` if there is no such scene.
-    pub fn of_differences(a: &BTreeMap<String, f64>, b: &BTreeMap<String, f64>) -> Option<Interval> {
+    pub fn of_differences<S: Ord>(a: &BTreeMap<S, f64>, b: &BTreeMap<S, f64>) -> Option<Interval> {
         // Two infinite scores are two equal pictures.
         let difference = |a: f64, b: f64| if a == b { 0.0 } else { a - b };
         let differences = a.iter().filter_map(|(scene, score)| Some(difference(*score, *b.get(scene)?)));

@@ -2,8 +2,9 @@
 
 use super::ReportError;
 use crate::evaluate::NEAREST_COPY;
+use crate::metrics::interval::Interval;
 use crate::pareto::plot::COLOURS;
-use crate::summary::{Interval, REFERENCE, Table};
+use crate::summary::{REFERENCE, Table};
 use maud::{Markup, html};
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};

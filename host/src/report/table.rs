@@ -2,7 +2,8 @@
 
 use super::counted;
 use crate::evaluate::NEAREST_COPY;
-use crate::summary::{Cell, Interval, Metric, REFERENCE, Table};
+use crate::metrics::interval::Interval;
+use crate::summary::{Cell, Metric, REFERENCE, Table};
 use maud::{Markup, html};
 
 /// A table of results as papers print it.

@@ -2,6 +2,7 @@
 
 use super::Arguments;
 use super::tables::{csv_of, print_table};
+use crate::cli::metrics_options::MetricOptions;
 use crate::cli::model::Work;
 use crate::cli::{on_threads, say};
 use anyhow::Context;
@@ -64,7 +65,7 @@ pub(super) fn run(
     check_writable(&folder.join(SETTINGS))?;
     let field = arguments.model.open(arguments.seed, None)?;
     let render_options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
-    let scenes: Vec<Scene> = arguments.scenes.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    let scenes: Vec<Scene> = arguments.paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
     let draws = Draws {
         seed: arguments.seed,
         trial_count: arguments.protocol.trials,
@@ -75,7 +76,8 @@ pub(super) fn run(
         options.remove(*option);
     });
     let mut files = BTreeMap::new();
-    for path in arguments.model.file().into_iter().chain(weightings.iter().filter_map(Weighting::file)) {
+    let networks = arguments.model.file().into_iter().chain(arguments.metrics.files());
+    for path in networks.chain(weightings.iter().filter_map(Weighting::file)) {
         let digest = sha256_of(path).with_context(|| path.display().to_string())?;
         files.insert(path.display().to_string(), digest);
     }
@@ -103,6 +105,7 @@ pub(super) fn run(
         picture_count: arguments.protocol.pictures,
         weightings,
         options: &render_options,
+        metrics: &arguments.metrics,
         progress: &progress,
     };
     let done = on_threads(arguments.picture.threads, || field.on(&device, &work))??;
@@ -145,6 +148,7 @@ struct Jobs<'a> {
     picture_count: usize,
     weightings: &'a [Weighting],
     options: &'a RenderOptions,
+    metrics: &'a MetricOptions,
     progress: &'a Progress,
 }
 
@@ -153,13 +157,14 @@ impl Work for Jobs<'_> {
     type Output = anyhow::Result<usize>;
 
     fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<usize> {
-        let Jobs { folder, scenes, plan, shard, weightings, options, progress, .. } = *self;
+        let Jobs { folder, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
+        let metrics = &metrics.open_for_pictures(device)?;
         let mut journal = folder.journal(shard)?;
         let finished = folder.finished()?;
         for (number, done) in &finished {
             self.check(*number, done)?;
         }
-        let evaluator = Evaluator { weightings, device, field, options, progress };
+        let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
         let mut count = 0;
         for (number, job) in plan.jobs.iter().enumerate() {
             if !shard.does(number) || finished.contains_key(&number) {
@@ -171,11 +176,12 @@ impl Work for Jobs<'_> {
             let album = Album::open(scene, job.sources.iter().chain(&job.targets).copied(), progress)?;
             let mut gallery = Gallery::default();
             let first = job.targets.first().map_or("", |&target| &scene.views[target].name);
-            let scores = evaluator.score(scene, &album, &job.sources, &job.targets, |weighting, frame, images| {
-                if number < self.picture_count && frame.target.name == first {
-                    gallery.add(weighting, frame, images);
-                }
-            })?;
+            let scores =
+                evaluator.score(scene, &album, &job.sources, &job.targets, |weighting, frame, values, images| {
+                    if number < self.picture_count && frame.target.name == first {
+                        gallery.add(weighting, frame, values, images);
+                    }
+                })?;
             // Before the line that says that the job is done: it is not done again.
             gallery.write(folder.path(), number, &scene.name(), first, &sources)?;
             let (trial, device) = (job.trial, device.name());

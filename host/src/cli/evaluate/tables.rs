@@ -11,17 +11,31 @@ pub(super) fn print_means(title: &str, means: &[Mean]) -> io::Result<()> {
     let copy = means.iter().find(|mean| mean.scheme == NEAREST_COPY).map_or(f64::NAN, |mean| mean.psnr);
     let best_psnr = means.iter().map(|mean| mean.psnr).fold(f64::NEG_INFINITY, f64::max);
     let best_ssim = means.iter().filter_map(|mean| mean.ssim).fold(f64::NEG_INFINITY, f64::max);
-    let mut rows = table(["scheme", "PSNR dB", "over copy", "SSIM", "s / view"].map(str::to_owned));
+    let further: Vec<Metric> =
+        means.first().iter().flat_map(|mean| &mean.further).map(|(name, _)| Metric::named(name)).collect();
+    let mut header = ["scheme", "PSNR dB", "over copy", "SSIM"].map(str::to_owned).to_vec();
+    header.extend(further.iter().map(Metric::heading));
+    header.push("s / view".to_owned());
+    let mut rows = table(header);
     let marked = |text: String, is_best: bool| if is_best { format!("* {text}") } else { text };
     for mean in means {
         let is_copy = mean.scheme == NEAREST_COPY;
-        rows.add_row([
+        let value = |mean: &Mean, metric: &Metric| {
+            mean.further.iter().find(|(name, _)| *name == metric.name).map(|(_, value)| *value)
+        };
+        let least = |metric: &Metric| means.iter().filter_map(|mean| value(mean, metric)).fold(f64::INFINITY, f64::min);
+        let mut row = vec![
             mean.scheme.clone(),
             marked(format!("{:.2}", mean.psnr), mean.psnr == best_psnr),
             if is_copy { String::new() } else { format!("{:+.2}", mean.psnr - copy) },
             mean.ssim.map_or(String::new(), |ssim| marked(format!("{ssim:.3}"), ssim == best_ssim)),
-            if is_copy { String::new() } else { format!("{:.2}", mean.seconds) },
-        ]);
+        ];
+        // Distances: less is better.
+        row.extend(further.iter().map(|metric| {
+            value(mean, metric).map_or(String::new(), |own| marked(metric.text(own), own == least(metric)))
+        }));
+        row.push(if is_copy { String::new() } else { format!("{:.2}", mean.seconds) });
+        rows.add_row(row);
     }
     let count = means.first().map_or(0, |mean| mean.target_count);
     say(format_args!("{title}: {}", if count == 1 { "1 target".to_owned() } else { format!("{count} targets") }))?;
@@ -76,7 +90,8 @@ pub(super) fn csv_of(first_columns: &[&str], lines: &[Line<'_>]) -> anyhow::Resu
         }
     }
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let header = first_columns.iter().chain(&["scheme", "target", "sources"]).chain(&metrics).chain(&["seconds"]);
+    let titles: Vec<&str> = metrics.iter().map(|name| if *name == PSNR { "psnr_db" } else { name }).collect();
+    let header = first_columns.iter().chain(&["scheme", "target", "sources"]).chain(&titles).chain(&["seconds"]);
     writer.write_record(header)?;
     for (first, score) in lines {
         let mut line = first.clone();
