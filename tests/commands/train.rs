@@ -61,7 +61,7 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     let scene = "learn/toys_val/000000";
     done(
         path,
-        &format!("render {scene} --model whole/model.safetensors --sources 0,1,2 --target 5 --size 16x16 -o out"),
+        &format!("render {scene} --model whole/model.safetensors --sources 0,1,2 --targets 5 --size 16x16 -o out"),
     );
 
     // A run of other settings is not gone on with, and nothing of it is lost.

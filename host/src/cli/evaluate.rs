@@ -82,6 +82,7 @@ impl Arguments {
 
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
+    arguments.metrics.refuse_sets()?;
     let mut names: Vec<&str> = match arguments.weights.is_empty() {
         true => SCHEME_NAMES.to_vec(),
         false => arguments.weights.iter().map(String::as_str).collect(),
@@ -153,7 +154,7 @@ impl Work for Job<'_> {
 
     fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
         let Job { scene, selection, weightings, options, metrics, progress } = *self;
-        let metrics = &metrics.open_for_pictures(device)?;
+        let metrics = &metrics.open(device)?;
         let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
         Ok(evaluator.score_all(scene, selection)?)
     }

@@ -60,13 +60,13 @@ impl MetricOptions {
         files.chain(&self.fid).map(PathBuf::as_path).collect()
     }
 
-    /// As [`MetricOptions::open`], where pictures are scored one by one.
-    pub(crate) fn open_for_pictures<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
+    /// Where pictures are scored one by one, sets of them are not compared.
+    pub(crate) fn refuse_sets(&self) -> anyhow::Result<()> {
         match self.fid {
             Some(_) => {
                 Err(wrong("--fid compares sets of pictures, and here each is scored alone; see `viewfuse compare`"))
             }
-            None => self.open(device),
+            None => Ok(()),
         }
     }
 

@@ -158,7 +158,7 @@ impl Work for Jobs<'_> {
 
     fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<usize> {
         let Jobs { folder, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
-        let metrics = &metrics.open_for_pictures(device)?;
+        let metrics = &metrics.open(device)?;
         let mut journal = folder.journal(shard)?;
         let finished = folder.finished()?;
         for (number, done) in &finished {
