@@ -3,8 +3,9 @@
 
 use super::{BINARY, done};
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in};
@@ -84,6 +85,26 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
         let table = done(path, &format!("weights {scene} --sources 0,1,2 --target 5 --weights attention:{model}"));
         assert!(table.contains("attention:"), "{table}");
     }
+}
+
+#[test]
+fn ctrl_c_writes_the_state_first() {
+    let folder = scenes();
+    let path = folder.path();
+    let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
+    // The first state appears when the run is asked to end: nothing else writes it.
+    let mut run =
+        command(BINARY, path, &format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", ""));
+    let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+    let mut news = BufReader::new(child.stdout.take().expect("its output")).lines();
+    let first = news.next().expect("a line").expect("text");
+    assert!(first.starts_with("step 5: "), "{first}");
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+    let result = child.wait_with_output().expect("its output");
+    assert_eq!(result.status.code(), Some(130), "{}", String::from_utf8_lossy(&result.stderr));
+    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "run/record.json")).expect("a record");
+    assert!(record["steps"].as_u64() >= Some(5) && path.join("run/state.safetensors").exists(), "{record}");
 }
 
 #[test]
