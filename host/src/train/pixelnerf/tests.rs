@@ -71,7 +71,7 @@ fn the_graph_is_the_renderers() {
     let parameters = network.point_parameters().expect("parameters");
     let view_weights = tensor(weights.to_vec(), &[1, 3], DType::F64);
     let seen = Seen { cameras: &blocks, grids: &grids, weights: &view_weights, parameters: &parameters };
-    let raw = network.raw(&seen, &[places.clone()]).expect("samples");
+    let raw = network.raw(&seen, std::slice::from_ref(&places)).expect("samples");
     let colours = super::logistic(&raw.narrow(1, 0, 3).expect("colours")).expect("colours");
     let densities = raw.narrow(1, 3, 1).and_then(|raw| raw.relu()).expect("densities");
     let all = Tensor::cat(&[colours, densities], 1).expect("samples");
