@@ -24,6 +24,8 @@ mod render;
 mod scenes;
 #[path = "commands/tables.rs"]
 mod tables;
+#[path = "commands/train.rs"]
+mod train;
 #[path = "commands/verify.rs"]
 mod verify;
 

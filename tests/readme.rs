@@ -48,7 +48,9 @@ fn every_command_runs() {
             .expect("the command starts");
         assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
     }
-    for file in ["000021.png", "000021_depth.png", "000021_sheet.png", "run.json", "cameras.png", "scores.csv"] {
+    let pictures = ["000048.png", "000048_depth.png", "000048_sheet.png", "run.json", "toy/000021.png"];
+    for file in pictures.into_iter().chain(["cameras.png", "scores.csv", "weighting/model.safetensors", "report.html"])
+    {
         assert!(folder.path().join("out").join(file).exists(), "{file}");
     }
 }
@@ -73,6 +75,17 @@ fn what_it_links_to_is_there() {
     let text = readme();
     let links: Vec<&str> = text.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
     assert!(!links.is_empty());
+    // Within the page: what a heading is called there.
+    let headings: Vec<String> = text
+        .lines()
+        .filter_map(|line| {
+            Some(line.trim_start_matches('#').trim().to_lowercase().replace(' ', "-")).filter(|_| line.starts_with('#'))
+        })
+        .collect();
+    let (inside, links): (Vec<&str>, Vec<&str>) = links.into_iter().partition(|link| link.starts_with('#'));
+    for link in inside {
+        assert!(headings.iter().any(|heading| *heading == link[1..]), "{link}");
+    }
     for link in links {
         assert!(repository().join(link).exists(), "{link}");
     }

@@ -1,6 +1,7 @@
 //! Progress of long work: a bar on a terminal, nothing elsewhere.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -41,10 +42,11 @@ impl Progress {
         }
     }
 
-    /// Shows a line of news above the bar, on standard error; nothing where nothing is shown at all.
+    /// Prints a line of news on standard output, above the bar; nothing where nothing is shown at all. A reader that has gone
+    /// away is no reason to stop.
     pub fn note(&self, news: &str) {
         if self.told.is_some() {
-            self.bar.suspend(|| eprintln!("{news}"));
+            self.bar.suspend(|| writeln!(std::io::stdout().lock(), "{news}").ok());
         }
     }
 

@@ -136,6 +136,6 @@ pub enum TrainError {
     #[error("the training graph: {0}")]
     Graph(#[from] candle_core::Error),
     /// The person stopped the work.
-    #[error(transparent)]
+    #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }

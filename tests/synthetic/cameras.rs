@@ -16,8 +16,9 @@ fn assert_looks_at_origin(cameras: &[Camera]) {
         assert!((place.length() - DISTANCE).abs() < 1.0e-6, "view {index} is {} away", place.length());
         let along = camera.pose.forward_world().dot(-place) / DISTANCE;
         assert!(along > 0.999_999, "view {index} looks past the origin: {along}");
-        let ray = camera.ray(camera.pinhole.principal()[0], 0.0);
-        assert!(ray.direction_world.z > camera.pose.forward_world().z, "view {index} is upside down");
+        // World z of the image's axes to the right and downwards.
+        let [right, down, ..] = camera.pose.to_opencv()[2];
+        assert!(right.abs() < 1.0e-6 && down < 0.0, "view {index} is not upright: {right}, {down}");
     }
 }
 

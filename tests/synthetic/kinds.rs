@@ -22,7 +22,8 @@ fn every_object_is_sound_and_fits_into_its_pictures() {
             let object = object(kind, 1, index);
             let radius = object.bounding_radius();
             assert!((0.2..=LARGEST_RADIUS).contains(&radius), "{kind} {index} reaches {radius}");
-            assert!(object.parts().len() >= 3, "{kind} {index} has {} parts", object.parts().len());
+            // The plainest is a stool: a seat on a box.
+            assert!(object.parts().len() >= 2, "{kind} {index} has {} parts", object.parts().len());
         }
     }
 }

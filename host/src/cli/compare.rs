@@ -4,7 +4,7 @@ use super::metrics_options::MetricOptions;
 use super::options::DeviceOptions;
 use super::say;
 use super::table::table;
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use image::RgbImage;
 use std::path::{Path, PathBuf};
@@ -82,7 +82,9 @@ fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
 }
 
 fn opened(path: &Path) -> anyhow::Result<RgbImage> {
-    Ok(image::open(path).with_context(|| format!("{}: cannot be read", path.display()))?.into_rgb8())
+    // The decoder's message holds its causes already.
+    let picture = image::open(path).map_err(|cause| anyhow!("{}: cannot be read: {cause}", path.display()))?;
+    Ok(picture.into_rgb8())
 }
 
 fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyhow::Result<()> {

@@ -82,7 +82,7 @@ impl Arguments {
 
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
-    arguments.metrics.check_single()?;
+    arguments.metrics.refuse_sets()?;
     let mut names: Vec<&str> = match arguments.weights.is_empty() {
         true => SCHEME_NAMES.to_vec(),
         false => arguments.weights.iter().map(String::as_str).collect(),

@@ -60,8 +60,8 @@ impl MetricOptions {
         files.chain(&self.fid).map(PathBuf::as_path).collect()
     }
 
-    /// Refuses metrics of sets, where pictures are scored one by one.
-    pub(crate) fn check_single(&self) -> anyhow::Result<()> {
+    /// Where pictures are scored one by one, sets of them are not compared.
+    pub(crate) fn refuse_sets(&self) -> anyhow::Result<()> {
         match self.fid {
             Some(_) => {
                 Err(wrong("--fid compares sets of pictures, and here each is scored alone; see `viewfuse compare`"))

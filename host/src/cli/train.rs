@@ -13,6 +13,13 @@ use viewfuse::train::{
 };
 
 #[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse scenes make cars learn/ --train 400 --val 12 --views 30 --size 64\n  \
+    viewfuse train pixelnerf learn/cars -o runs/pixelnerf --steps 5000\n      a small PixelNeRF: an hour on one core\n  \
+    viewfuse train genvs learn/cars -o runs/genvs\n  \
+    viewfuse train weighting runs/pixelnerf/model.safetensors learn/cars -o runs/weighting --steps 1000\n      \
+    the paper's attention weighting for it\n\n\
+    The same command again goes on with a run that was stopped, and ends in the same numbers.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -48,6 +55,9 @@ struct RunOptions {
     /// Steps from one validation to the next
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
     validate_every: u32,
+    /// Seconds from one writing of the state to the next
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    write_every: f64,
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: Option<u16>,
@@ -55,8 +65,8 @@ struct RunOptions {
 
 impl RunOptions {
     fn schedule(&self) -> Schedule {
-        let RunOptions { steps, rate, seed, validate_every, .. } = *self;
-        Schedule { steps, rate, seed, validate_every }
+        let RunOptions { steps, rate, seed, validate_every, write_every, .. } = *self;
+        Schedule { steps, rate, seed, validate_every, write_every }
     }
 }
 

@@ -140,7 +140,7 @@ pub enum MakeError {
     #[error("a folder holds at most {LARGEST_OBJECT_COUNT} objects, not {0}")]
     Count(u32),
     /// The work was stopped.
-    #[error(transparent)]
+    #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }
 

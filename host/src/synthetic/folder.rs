@@ -57,7 +57,7 @@ pub enum WriteError {
         view: usize,
     },
     /// The work was stopped.
-    #[error(transparent)]
+    #[error("{0}")]
     Interrupted(#[from] Interrupted),
     /// The file system refused.
     #[error("{path}: cannot be written", path = .path.display())]

@@ -13,7 +13,7 @@ pub(crate) use views::{ViewCounts, Views};
 use super::TrainError;
 use super::images::enlarge;
 use super::operations::{Apply, Look, LookSizes, Sight};
-use super::parameters::{Parameters, fan_in, random};
+use super::parameters::{Contents, Parameters, fan_in, random};
 use crate::checkpoint::{Checkpoint, TensorShape};
 use crate::field::genvs::{Architecture, LAST_LENGTH, MLP, cast_block, ray_length};
 use candle_core::{DType, Device, Result, Tensor};
@@ -73,7 +73,7 @@ impl Genvs {
     }
 
     /// Its tensors, with what the file says of it beside them. Those that no picture depends on are zero.
-    pub(crate) fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {
+    pub(crate) fn checkpoint(&self) -> Result<Contents> {
         let mut tensors = self.parameters.values()?;
         let all = self.architecture.tensors();
         let unused = unused(&all);

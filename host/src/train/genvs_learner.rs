@@ -10,16 +10,14 @@
 use super::TrainError;
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views, each};
-use super::parameters::Parameters;
+use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
 use super::run::{Learner, Outcome, Schedule, Validated, run};
 use super::scenes::TrainingScene;
-use crate::checkpoint::TensorShape;
 use crate::field::genvs::Architecture;
 use crate::progress::Progress;
 use candle_core::{DType, Device, Result, Tensor};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
@@ -197,7 +195,7 @@ impl Learner for GenvsLearner {
         Ok(Validated { score, remark: format!("of the features {colour_score:.3} dB") })
     }
 
-    fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {
+    fn checkpoint(&self) -> Result<Contents> {
         self.network.checkpoint()
     }
 }

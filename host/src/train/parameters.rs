@@ -6,6 +6,9 @@ use candle_core::{DType, Device, Tensor, Var};
 use std::collections::BTreeMap;
 use viewfuse_core::random::{normal, threefry_2x32};
 
+/// What becomes a checkpoint: tensors with their values, and what the file says beside them.
+pub(crate) type Contents = (Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>);
+
 /// Named parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Parameters {

@@ -11,12 +11,11 @@ use super::compositing::{coarse_depths, fine_depths, points, weights as sample_w
 use super::draw::{Draw, Purpose};
 use super::images::{convolve, dims4, enlarge, max_pool};
 use super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, Window};
-use super::parameters::{Parameters, fan_in, random};
-use crate::checkpoint::{Checkpoint, TensorShape};
+use super::parameters::{Contents, Parameters, fan_in, random};
+use crate::checkpoint::Checkpoint;
 use crate::field::pixelnerf::architecture::Architecture;
 use crate::field::resnet::needs_downsample;
 use candle_core::{DType, Device, Result, Tensor};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
@@ -93,7 +92,7 @@ impl PixelNerf {
     }
 
     /// Its tensors, with what the file says of it beside them.
-    pub(crate) fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {
+    pub(crate) fn checkpoint(&self) -> Result<Contents> {
         let mut tensors = self.parameters.values()?;
         for tensor in self.architecture.tensors().into_iter().filter(|tensor| is_statistic(&tensor.name)) {
             let kept = if tensor.name.ends_with("mean") { 0.0 } else { 1.0 };

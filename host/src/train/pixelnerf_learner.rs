@@ -3,16 +3,14 @@
 use super::TrainError;
 use super::batch::{Batch, BatchSize, Targets};
 use super::draw::{Draw, Purpose};
-use super::parameters::Parameters;
+use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::run::{Learner, Outcome, Schedule, Validated, run};
 use super::scenes::TrainingScene;
-use crate::checkpoint::TensorShape;
 use crate::field::pixelnerf::architecture::Architecture;
 use crate::progress::Progress;
 use candle_core::{DType, Result, Tensor};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// What a run is made of beside its schedule and scenes.
@@ -120,7 +118,7 @@ impl Learner for PixelNerfLearner {
         Ok(Validated { score, remark: String::new() })
     }
 
-    fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {
+    fn checkpoint(&self) -> Result<Contents> {
         self.network.checkpoint()
     }
 }

@@ -12,14 +12,13 @@ use super::adam::Adam;
 use super::average::Average;
 use super::curve;
 use super::draw::Draw;
-use super::parameters::Parameters;
+use super::parameters::{Contents, Parameters};
 use super::state::{self, Learned, Progressed};
-use crate::checkpoint::{Checkpoint, Precision, TensorShape};
+use crate::checkpoint::{Checkpoint, Precision};
 use crate::files::write_whole;
 use crate::interrupt;
 use crate::progress::Progress;
 use candle_core::Tensor;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -35,6 +34,9 @@ pub struct Schedule {
     pub seed: u64,
     /// Steps from one validation to the next.
     pub validate_every: u32,
+    /// Seconds from one writing of the state to the next; changes no number.
+    #[serde(skip)]
+    pub write_every: f64,
 }
 
 /// Steps over which the rate rises.
@@ -43,8 +45,6 @@ const WARM_UP: u32 = 100;
 const LAST_RATE: f64 = 0.03;
 /// Steps from one point of the loss curve to the next.
 const LOSS_EVERY: u32 = 50;
-/// Seconds from one writing of the state to the next.
-const WRITE_EVERY: f64 = 60.0;
 /// Largest norm of a gradient.
 const MOST_GRADIENT: f64 = 1.0;
 
@@ -75,7 +75,7 @@ pub(crate) trait Learner {
     }
 
     /// The file that it becomes: tensors and metadata.
-    fn checkpoint(&self) -> candle_core::Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)>;
+    fn checkpoint(&self) -> candle_core::Result<Contents>;
 }
 
 /// What validation found.
@@ -142,7 +142,7 @@ pub(crate) fn run(
         }
         so_far.seconds += start.elapsed().as_secs_f64();
         progress.step();
-        if written.elapsed().as_secs_f64() > WRITE_EVERY {
+        if written.elapsed().as_secs_f64() > schedule.write_every {
             run.write(&so_far, &learned)?;
             written = Instant::now();
         }

@@ -7,12 +7,12 @@ use super::batch::{Batch, BatchSize, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views};
 use super::genvs_learner;
-use super::parameters::Parameters;
+use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::pixelnerf_learner;
 use super::run::{Learner, Outcome, Schedule, Validated, run};
 use super::scenes::TrainingScene;
-use crate::checkpoint::{Checkpoint, TensorShape};
+use crate::checkpoint::Checkpoint;
 use crate::field::family::Family;
 use crate::progress::Progress;
 use candle_core::{DType, Result, Tensor};
@@ -151,7 +151,7 @@ impl Learner for WeightingLearner {
         Ok(Validated { score: own, remark: format!("{:+.3} dB against equal weights", own - mean) })
     }
 
-    fn checkpoint(&self) -> Result<(Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>)> {
+    fn checkpoint(&self) -> Result<Contents> {
         Ok((self.attention.parameters.values()?, BTreeMap::new()))
     }
 }

@@ -12,8 +12,8 @@ use crate::device::cpu::Cpu;
 use crate::field::genvs::reference::Reference;
 use crate::field::genvs::{Architecture, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, made, ray_length};
 use crate::field::learned::default_near_far;
-use crate::photographs::SourceImages;
-use candle_core::{DType, Device, Result, Tensor, Var};
+use crate::photographs::{SourceImage, SourceImages};
+use candle_core::{DType, Result, Tensor, Var};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::depths::CoarseBlock;
@@ -159,9 +159,11 @@ fn the_loss_has_its_slopes() {
     let samples = CoarseBlock { seed: [1, 2], sample_count: 4, jitter: 1.0 };
     let weights = variable(&[2, 2], 30);
     let value = || loss(&network, &views, &weights, &samples, &Draw { seed: 1, step: 2 });
-    let mut all: Vec<(&str, &Var)> = network.parameters.iter().collect();
+    // Every seventh parameter: each costs the loss twice, and every operation has its own test.
+    let mut all: Vec<(&str, &Var)> = network.parameters.iter().step_by(7).collect();
     all.push(("weights", &weights));
-    assert_slopes(&all, 1.0e-7, 1.0e-3, value);
+    // A short step: between its ends no rectification may turn.
+    assert_slopes(&all, 1.0e-8, 1.0e-3, value);
 }
 
 #[test]

@@ -96,7 +96,7 @@ impl Operation<3> for Normalise {
                     if self.silu {
                         let value = normal * weights[channel] + biases[channel];
                         let share = logistic(value);
-                        slope = slope * (share + value * share * (T::one() - share));
+                        slope *= share + value * share * (T::one() - share);
                     }
                     of_weights[channel] += slope * normal;
                     of_biases[channel] += slope;

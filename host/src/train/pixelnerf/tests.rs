@@ -51,7 +51,7 @@ fn the_graph_is_the_renderers() {
     let network = network(32);
     let (tensors, metadata) = network.checkpoint().expect("tensors");
     let file = Checkpoint::in_memory("made", tensors, metadata);
-    let field = Field::new(file, PixelNerfOptions::default()).expect("a network");
+    let field = Field::new(&file, PixelNerfOptions::default()).expect("a network");
     let sources = photographs(3, 64);
     let reference = Reference::new(&field, &Cpu, &sources).expect("sources");
     let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
@@ -71,7 +71,7 @@ fn the_graph_is_the_renderers() {
     let parameters = network.point_parameters().expect("parameters");
     let view_weights = tensor(weights.to_vec(), &[1, 3], DType::F64);
     let seen = Seen { cameras: &blocks, grids: &grids, weights: &view_weights, parameters: &parameters };
-    let raw = network.raw(&seen, &[places.clone()]).expect("samples");
+    let raw = network.raw(&seen, std::slice::from_ref(&places)).expect("samples");
     let colours = super::logistic(&raw.narrow(1, 0, 3).expect("colours")).expect("colours");
     let densities = raw.narrow(1, 3, 1).and_then(|raw| raw.relu()).expect("densities");
     let all = Tensor::cat(&[colours, densities], 1).expect("samples");
@@ -90,7 +90,7 @@ fn point_network(is_frozen: bool) -> PointNetwork {
     let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
     let blocks: Vec<CameraBlock> = cameras.iter().map(|camera| camera.block(0)).collect();
     let near_far = default_near_far(&cameras);
-    let mut places = |angle: f32| {
+    let places = |angle: f32| {
         let rays = rays(8, angle, near_far, 6);
         points(&rays, &coarse_depths(&rays, 12, |_, _| 0.5))
     };

@@ -1,0 +1,130 @@
+//! `viewfuse train`: what a run leaves, and that it ends in the same numbers however often it is killed.
+#![cfg(unix)]
+
+use super::{BINARY, done};
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in};
+use viewfuse_tests::scenes::Folder;
+
+/// Small enough for a second a run.
+const PIXELNERF: &str = "train pixelnerf learn/toys --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
+    --validate-every 10 --write-every 0";
+const GENVS: &str =
+    "train genvs learn/toys --width 4 --objects 1 --samples 8 --steps 3 --validate-every 3 --write-every 0";
+
+fn scenes() -> Folder {
+    let folder = Folder::new();
+    done(folder.path(), "scenes make toys learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64");
+    folder
+}
+
+fn bytes(folder: &Path, name: &str) -> Vec<u8> {
+    fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// Starts a run and kills it without a warning as soon as it has written its state.
+fn kill(folder: &Path, arguments: &str, state: &str) {
+    let mut run = command(BINARY, folder, arguments);
+    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+    let start = Instant::now();
+    while !folder.join(state).exists() {
+        assert!(child.try_wait().expect("a process").is_none(), "the command ended early");
+        assert!(start.elapsed() < Duration::from_secs(300), "no state appears");
+        sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("a process to end");
+    child.wait().expect("an end");
+}
+
+#[test]
+fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
+    let folder = scenes();
+    let path = folder.path();
+    let said = done(path, &format!("{PIXELNERF} -o whole"));
+    assert!(said.contains("30 steps in") && said.ends_with("whole/model.safetensors\n"), "{said}");
+    assert_eq!(names_in(&path.join("whole")), ["curve.svg", "model.safetensors", "record.json", "state.safetensors"]);
+    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "whole/record.json")).expect("a record");
+    assert_eq!((&record["steps"], record["scores"].as_array().map(Vec::len)), (&30.into(), Some(3)));
+    assert!(String::from_utf8_lossy(&bytes(path, "whole/curve.svg")).starts_with("<svg"));
+
+    kill(path, &format!("{PIXELNERF} -o parts"), "parts/state.safetensors");
+    let half: serde_json::Value = serde_json::from_slice(&bytes(path, "parts/record.json")).expect("a record");
+    assert!(half["steps"].as_u64() < Some(30), "it was killed too late to tell anything");
+    // On another number of threads, too.
+    done(path, &format!("{PIXELNERF} -o parts --threads 1"));
+    assert_eq!(bytes(path, "parts/model.safetensors"), bytes(path, "whole/model.safetensors"));
+    // And what it learned is a model that renders.
+    let scene = "learn/toys_val/000000";
+    done(
+        path,
+        &format!("render {scene} --model whole/model.safetensors --sources 0,1,2 --targets 5 --size 16x16 -o out"),
+    );
+
+    // A run of other settings is not gone on with, and nothing of it is lost.
+    let before = bytes(path, "whole/state.safetensors");
+    let other = PIXELNERF.replace("--rays 12", "--rays 13");
+    assert_refused(BINARY, path, &format!("{other} -o whole"), &["whole/state.safetensors", "settings was", "rays"]);
+    assert_eq!(bytes(path, "whole/state.safetensors"), before);
+
+    // The weighting for it: the same again, with both embeddings; a scheme that evaluate knows.
+    for embedding in ["fourier", "flat"] {
+        let weighting = format!(
+            "train weighting whole/model.safetensors learn/toys --embedding {embedding} --objects 1 --rays 6 --steps 4 \
+             --validate-every 4 --write-every 0"
+        );
+        done(path, &format!("{weighting} -o {embedding}"));
+        kill(path, &format!("{weighting} -o {embedding}2"), &format!("{embedding}2/state.safetensors"));
+        done(path, &format!("{weighting} -o {embedding}2"));
+        let model = format!("{embedding}/model.safetensors");
+        assert_eq!(bytes(path, &format!("{embedding}2/model.safetensors")), bytes(path, &model));
+        let table = done(path, &format!("weights {scene} --sources 0,1,2 --target 5 --weights attention:{model}"));
+        assert!(table.contains("attention:"), "{table}");
+    }
+}
+
+#[test]
+fn ctrl_c_writes_the_state_first() {
+    let folder = scenes();
+    let path = folder.path();
+    let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
+    // The first state appears when the run is asked to end: nothing else writes it.
+    let mut run =
+        command(BINARY, path, &format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", ""));
+    let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
+    let mut news = BufReader::new(child.stdout.take().expect("its output")).lines();
+    let first = news.next().expect("a line").expect("text");
+    assert!(first.starts_with("step 5: "), "{first}");
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
+    assert!(sent.success());
+    let result = child.wait_with_output().expect("its output");
+    assert_eq!(result.status.code(), Some(130), "{}", String::from_utf8_lossy(&result.stderr));
+    let record: serde_json::Value = serde_json::from_slice(&bytes(path, "run/record.json")).expect("a record");
+    assert!(record["steps"].as_u64() >= Some(5) && path.join("run/state.safetensors").exists(), "{record}");
+}
+
+#[test]
+fn genvs_goes_on_too() {
+    let folder = scenes();
+    let path = folder.path();
+    done(path, &format!("{GENVS} -o whole"));
+    kill(path, &format!("{GENVS} -o parts"), "parts/state.safetensors");
+    done(path, &format!("{GENVS} -o parts"));
+    assert_eq!(bytes(path, "parts/model.safetensors"), bytes(path, "whole/model.safetensors"));
+}
+
+#[test]
+fn wrong_input_is_told() {
+    let folder = scenes();
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
+    refused("train pixelnerf learn/lorries -o out", &["lorries"]);
+    refused("train weighting learn/toys.json learn/toys -o out", &["learn/toys.json"]);
+    fs::write(folder.path().join("state.safetensors"), "nothing").expect("a file");
+    refused("train pixelnerf learn/toys -o .", &["./state.safetensors: is no state of a training run"]);
+    assert_wrong_arguments(BINARY, folder.path(), "train genvs learn/toys -o out --width 5", &["a multiple of 4"]);
+    assert!(!folder.path().join("out").exists());
+}
