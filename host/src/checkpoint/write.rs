@@ -7,7 +7,7 @@ use super::error::shortened;
 use super::place::element_count;
 use super::{Checkpoint, CheckpointError, Element};
 use crate::files::WholeFile;
-use crate::interrupt;
+use crate::interrupt::{self, Interrupted};
 use half::f16;
 use safetensors::tensor::TensorInfo;
 use serde::Serialize;
@@ -60,6 +60,23 @@ impl Checkpoint {
     /// [`CheckpointError`] if a tensor cannot be read, holds a NaN or an infinity or a number that the precision cannot
     /// hold, or if the file cannot be written, or if the work is stopped.
     pub fn write_safetensors(&self, path: &Path, precision: Precision) -> Result<Written, CheckpointError> {
+        self.write(path, precision, interrupt::check)
+    }
+
+    /// As [`Checkpoint::write_safetensors`], also when the work is to be stopped: what stops writes what it has.
+    ///
+    /// # Errors
+    /// [`CheckpointError`].
+    pub(crate) fn write_to_the_end(&self, path: &Path, precision: Precision) -> Result<Written, CheckpointError> {
+        self.write(path, precision, || Ok(()))
+    }
+
+    fn write(
+        &self,
+        path: &Path,
+        precision: Precision,
+        may_go_on: impl Fn() -> Result<(), Interrupted>,
+    ) -> Result<Written, CheckpointError> {
         let target = |element: Element| match precision {
             Precision::Half if element.is_float() => Element::F16,
             _ => element,
@@ -88,7 +105,7 @@ impl Checkpoint {
         let bytes = 8 + header.len() as u64 + tensors.iter().map(|(_, _, _, bytes)| bytes).sum::<u64>();
         let mut written = Written { tensors, bytes, relative_error: 0.0, tiny_count: 0, tiny_error: 0.0 };
         for index in 0..written.tensors.len() {
-            interrupt::check().map_err(CheckpointError::Interrupted)?;
+            may_go_on().map_err(CheckpointError::Interrupted)?;
             let (name, target) = (written.tensors[index].0.clone(), written.tensors[index].1);
             let mut done = 0;
             self.read(&name, |element, bytes| {

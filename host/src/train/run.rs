@@ -181,7 +181,7 @@ impl Run<'_> {
     /// The state last: whoever goes on from it finds the rest.
     fn write(&self, so_far: &Progressed, learned: &Learned<'_>) -> Result<(), TrainError> {
         let (tensors, metadata) = learned.as_written(|| self.learner.checkpoint())?;
-        Checkpoint::in_memory("trained", tensors, metadata).write_safetensors(&self.model(), Precision::Kept)?;
+        Checkpoint::in_memory("trained", tensors, metadata).write_to_the_end(&self.model(), Precision::Kept)?;
         write_whole(&self.folder.join("curve.svg"), curve::svg(so_far, self.score_name).as_bytes())?;
         let record = serde_json::json!({
             "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),
