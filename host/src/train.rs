@@ -1,8 +1,8 @@
 //! Training: networks from scratch, and the weighting of views for a network that stays as it is.
 //!
 //! Gradients are the library's (candle); what is ours are the networks' graphs, a few operations where the published
-//! networks do what the library cannot or does slowly ([`operations`]), and a run that can be killed at any moment and goes
-//! on where it was. Everything random is a function of the run's seed and the step ([`draw`]), and sums run in one order:
+//! networks do what the library cannot or does slowly (`operations`), and a run that can be killed at any moment and goes
+//! on where it was. Everything random is a function of the run's seed and the step (`draw`), and sums run in one order:
 //! a run that was interrupted ends in the same numbers as one that was not.
 //!
 //! ```text
