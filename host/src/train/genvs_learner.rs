@@ -13,7 +13,7 @@ use super::genvs::{Genvs, ViewCounts, Views, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
 use super::run::{Learner, Outcome, Schedule, Validated, run};
-use super::scenes::TrainingScene;
+use super::scenes::{Data, TrainingScene};
 use crate::field::genvs::Architecture;
 use crate::progress::Progress;
 use candle_core::{DType, Device, Result, Tensor};
@@ -69,21 +69,16 @@ pub fn train_genvs(
     folder: &Path,
     progress: &Progress,
 ) -> std::result::Result<Outcome, TrainError> {
-    if scenes.is_empty() || validation.is_empty() {
-        return Err(TrainError::NoScenes { purpose: if scenes.is_empty() { "learn from" } else { "validate on" } });
-    }
     let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
-    let open = |paths: &[PathBuf]| {
-        TrainingScene::open_all(paths, settings.side, most_sources + settings.targets.max(1), progress)
-    };
-    let (training, validation_scenes) = (open(scenes)?, open(validation)?);
+    let least_views = most_sources + settings.targets.max(1);
+    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let architecture = Architecture::narrow(settings.side as usize, settings.width);
     let network = Genvs::new(architecture, DType::F32, schedule.seed)?;
     let record = serde_json::json!({
         "model": "genvs", "settings": settings, "schedule": schedule,
         "scenes": scenes.len(), "first_scene": scenes[0], "validation_scenes": validation.len(),
     });
-    let learner = GenvsLearner { network, scenes: training, validation: validation_scenes, settings: *settings };
+    let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings: *settings };
     run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
 }
 

@@ -6,7 +6,7 @@ use super::draw::{Draw, Purpose};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::run::{Learner, Outcome, Schedule, Validated, run};
-use super::scenes::TrainingScene;
+use super::scenes::{Data, TrainingScene};
 use crate::field::pixelnerf::architecture::Architecture;
 use crate::progress::Progress;
 use candle_core::{DType, Result, Tensor};
@@ -56,19 +56,15 @@ pub fn train_pixelnerf(
     folder: &Path,
     progress: &Progress,
 ) -> std::result::Result<Outcome, TrainError> {
-    if scenes.is_empty() || validation.is_empty() {
-        return Err(TrainError::NoScenes { purpose: if scenes.is_empty() { "learn from" } else { "validate on" } });
-    }
     let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
-    let open = |paths: &[PathBuf]| TrainingScene::open_all(paths, settings.side, most_sources + 1, progress);
-    let (training, validation_scenes) = (open(scenes)?, open(validation)?);
+    let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
     let network = PixelNerf::new(architecture, DType::F32, schedule.seed)?;
     let record = serde_json::json!({
         "model": "pixelnerf", "settings": settings, "schedule": schedule,
         "scenes": scenes.len(), "first_scene": scenes[0], "validation_scenes": validation.len(),
     });
-    let learner = PixelNerfLearner { network, scenes: training, validation: validation_scenes, settings: *settings };
+    let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings: *settings };
     run(&learner, schedule, &record, "PSNR dB", folder, progress)
 }
 

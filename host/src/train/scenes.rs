@@ -11,6 +11,33 @@ use rayon::prelude::*;
 use std::path::PathBuf;
 use viewfuse_core::camera::{Camera, CameraBlock};
 
+/// What a run learns from, and what it is validated on.
+pub(crate) struct Data {
+    pub(crate) training: Vec<TrainingScene>,
+    pub(crate) validation: Vec<TrainingScene>,
+}
+
+impl Data {
+    /// Reads both lists, `[training, validation]`.
+    ///
+    /// # Errors
+    /// [`TrainError::NoScenes`] if one is empty, otherwise as [`TrainingScene::open_all`].
+    pub(crate) fn open(
+        lists: [&[PathBuf]; 2],
+        side: u32,
+        least_views: usize,
+        progress: &Progress,
+    ) -> Result<Data, TrainError> {
+        for (list, purpose) in lists.iter().zip(["learn from", "validate on"]) {
+            if list.is_empty() {
+                return Err(TrainError::NoScenes { purpose });
+            }
+        }
+        let [training, validation] = lists.map(|list| TrainingScene::open_all(list, side, least_views, progress));
+        Ok(Data { training: training?, validation: validation? })
+    }
+}
+
 /// One object with all its views.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrainingScene {

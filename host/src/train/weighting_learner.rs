@@ -11,7 +11,7 @@ use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::pixelnerf_learner;
 use super::run::{Learner, Outcome, Schedule, Validated, run};
-use super::scenes::TrainingScene;
+use super::scenes::{Data, TrainingScene};
 use crate::checkpoint::Checkpoint;
 use crate::field::family::Family;
 use crate::progress::Progress;
@@ -70,23 +70,24 @@ pub fn train_weighting(
     folder: &Path,
     progress: &Progress,
 ) -> std::result::Result<Outcome, TrainError> {
-    if scenes.is_empty() || validation.is_empty() {
-        return Err(TrainError::NoScenes { purpose: if scenes.is_empty() { "learn from" } else { "validate on" } });
-    }
     let network = match Family::of(checkpoint)? {
         Family::PixelNerf => Frozen::PixelNerf(PixelNerf::frozen(checkpoint, DType::F32)?),
         Family::Genvs => Frozen::Genvs(Genvs::frozen(checkpoint, DType::F32)?),
     };
     let least_views = SOURCE_COUNTS.into_iter().max().unwrap_or(1) + 1;
-    let open = |paths: &[PathBuf]| TrainingScene::open_all(paths, settings.side, least_views, progress);
-    let (training, validation_scenes) = (open(scenes)?, open(validation)?);
+    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let attention = Attention::new(settings.embedding, DType::F32, schedule.seed)?;
     let record = serde_json::json!({
         "model": "weighting", "network": checkpoint.path(), "settings": settings, "schedule": schedule,
         "scenes": scenes.len(), "first_scene": scenes[0], "validation_scenes": validation.len(),
     });
-    let learner =
-        WeightingLearner { attention, network, scenes: training, validation: validation_scenes, settings: *settings };
+    let learner = WeightingLearner {
+        attention,
+        network,
+        scenes: data.training,
+        validation: data.validation,
+        settings: *settings,
+    };
     run(&learner, schedule, &record, "PSNR dB", folder, progress)
 }
 
