@@ -7,11 +7,13 @@
 mod expected;
 
 use expected::Inputs;
+use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 use tempfile::TempDir;
+use viewfuse::attention::{AttentionModel, c_header};
 
 fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -76,7 +78,7 @@ fn library() -> &'static Path {
 }
 
 /// Compiles a C program against the header and the library, warnings as errors.
-fn compile(source: &Path, folder: &TempDir, flags: &[&str]) -> PathBuf {
+fn compile(source: &Path, folder: &TempDir, flags: &[&OsStr]) -> PathBuf {
     const WARNINGS: &str = "-Wall -Wextra -Wpedantic -Wconversion -Wsign-conversion -Wshadow -Wstrict-prototypes \
         -Wmissing-prototypes -Wcast-align -Wcast-qual -Wundef -Werror";
     let program = folder.path().join(source.file_stem().expect("a name"));
@@ -94,6 +96,29 @@ fn compile(source: &Path, folder: &TempDir, flags: &[&str]) -> PathBuf {
         .unwrap_or_else(|error| panic!("this test needs a C compiler; {compiler:?} does not start: {error}"));
     assert!(output.status.success(), "{}: {}", source.display(), String::from_utf8_lossy(&output.stderr));
     program
+}
+
+/// Attention that was learned drops into firmware: a header that the program writes, one call.
+#[test]
+fn learned_attention_gives_the_same_bits() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let learned = repository().join("host/models/pixelnerf_cars_attention.safetensors");
+    let AttentionModel::Fourier(embedding) = AttentionModel::open(&learned).expect("learned attention") else {
+        panic!("of the other embedding")
+    };
+    let header = c_header(&embedding, "pixelnerf_cars_attention.safetensors");
+    std::fs::write(folder.path().join("attention.h"), header).expect("a header");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("capi/attend.c");
+    let program = compile(&source, &folder, &["-I".as_ref(), folder.path().as_os_str()]);
+    let inputs = Inputs::new();
+    let (poses, expected) = inputs.attended(&embedding);
+    let output = run(&program, &poses);
+    assert!(output.status.success(), "{output:?}");
+    let printed = String::from_utf8(output.stdout).expect("text");
+    let bits: Vec<u32> = printed.lines().map(|line| u32::from_str_radix(line, 16).expect("bits")).collect();
+    assert_eq!(bits, expected);
+    // Not what equal weights would be.
+    assert!(expected.iter().any(|bits| (f32::from_bits(*bits) - 1.0 / 3.0).abs() > 1.0e-3), "{expected:?}");
 }
 
 fn compile_ours(name: &str, folder: &TempDir) -> PathBuf {
@@ -159,7 +184,7 @@ fn nothing_that_is_linked_can_panic() {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("capi/bits.c");
     // What nothing calls is dropped, as in every firmware; Apple's linker has its own word for it.
     let drop = if cfg!(target_vendor = "apple") { "-Wl,-dead_strip" } else { "-Wl,--gc-sections" };
-    let program = compile(&source, &folder, &[drop]);
+    let program = compile(&source, &folder, &[drop.as_ref()]);
     let output = Command::new("nm").arg(program).output().expect("nm, which comes with the linker");
     let symbols = String::from_utf8(output.stdout).expect("text");
     // Names are there to be found, and none is of a panic or of the formatting of its message.

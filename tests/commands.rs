@@ -26,6 +26,8 @@ mod scenes;
 mod tables;
 #[path = "commands/train.rs"]
 mod train;
+#[path = "commands/trained.rs"]
+mod trained;
 #[path = "commands/verify.rs"]
 mod verify;
 

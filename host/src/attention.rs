@@ -10,6 +10,10 @@
 //! | `query_layer.weight`, `key_layer.weight` | published learned cross attention |
 //! | `multihead_attention.*`, `weight_calculation_layer.*` | published relative-pose self attention |
 
+mod c_header;
+
+pub use c_header::c_header;
+
 use crate::sources::{SourcePoses, SourceWeights};
 use safetensors::{Dtype, SafeTensors};
 use std::path::{Path, PathBuf};

@@ -36,6 +36,7 @@ pub mod check;
 pub mod checkpoint;
 pub mod dataset;
 pub mod device;
+pub mod digest;
 pub mod evaluate;
 pub mod few_shot;
 pub mod field;

@@ -14,7 +14,7 @@ mod journal;
 mod settings;
 
 pub use journal::{Finished, Journal, Shard};
-pub use settings::{SceneSettings, Settings, sha256_of};
+pub use settings::{SceneSettings, Settings};
 
 use crate::files::{WriteError, write_whole};
 use std::collections::BTreeMap;

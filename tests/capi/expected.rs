@@ -76,6 +76,15 @@ impl Inputs {
         all.map(|number| format!("{:08x}\n", number.to_bits())).collect()
     }
 
+    /// Poses of three sources and of the target as bits, one number after the other, and the bits of the weights that
+    /// attention gives the sources.
+    pub(crate) fn attended(&self, embedding: &FourierEmbedding) -> (String, Vec<u32>) {
+        let poses = self.sources[..3].as_flattened().iter().chain(&self.target);
+        let weights = cross_attention(embedding, &self.sources_up_to::<8>(3), &pose(&self.target));
+        let bits = weights.values().iter().map(|weight| weight.to_bits()).collect();
+        (poses.map(|number| format!("{:08x}\n", number.to_bits())).collect(), bits)
+    }
+
     /// Name and bits of every line.
     pub(crate) fn expected(&self) -> Vec<(String, Vec<u32>)> {
         let mut lines = Lines::default();

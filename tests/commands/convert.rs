@@ -57,3 +57,21 @@ fn refusals() {
     std::fs::remove_file(folder.path().join("page.pth")).expect("removed");
     assert_eq!(files_below(folder.path()), before, "nothing is left behind");
 }
+
+#[test]
+fn learned_attention_becomes_a_header() {
+    let folder = Folder::new();
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    for (name, from) in [("learned", "attention"), ("flat", "attention_flat")] {
+        let from = models.join(format!("pixelnerf_cars_{from}.safetensors"));
+        std::fs::copy(from, folder.path().join(format!("{name}.safetensors"))).expect("a weighting");
+    }
+    let printed = done(folder.path(), "convert learned.safetensors new/attention.h");
+    assert!(printed.contains("new/attention.h: viewfuse_attention_parameters"), "{printed}");
+    let header = std::fs::read_to_string(folder.path().join("new/attention.h")).expect("a header");
+    assert!(header.starts_with("/* The attention weighting of learned.safetensors"), "{header:.200}");
+    assert_eq!(header.matches("f,").count(), 15232);
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
+    refused("convert flat.safetensors flat.h", &["flat.safetensors", "Fourier"]);
+    refused("convert learned.safetensors half.h --half", &["half.h", "--half"]);
+}

@@ -115,6 +115,38 @@ fn genvs_goes_on_too() {
     kill(path, &format!("{GENVS} -o parts"), "parts/state.safetensors");
     done(path, &format!("{GENVS} -o parts"));
     assert_eq!(bytes(path, "parts/model.safetensors"), bytes(path, "whole/model.safetensors"));
+
+    // From what it learned, a network goes on as it was: at a rate of zero it stays so, to the bit.
+    let model = "whole/model.safetensors";
+    let from = GENVS.replace("--width 4", &format!("--from {model} --rate 0"));
+    done(path, &format!("{from} -o more"));
+    assert_eq!(bytes(path, "more/model.safetensors"), bytes(path, model));
+    let small = from.replace("--samples 8", "--samples 8 --side 32");
+    assert_refused(BINARY, path, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "--side is 32"]);
+    assert_wrong_arguments(BINARY, path, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
+}
+
+#[test]
+fn data_are_told_by_what_is_in_them() {
+    let folder = scenes();
+    let path = folder.path();
+    let first = PIXELNERF.replace("--steps 30", "--steps 2");
+    done(path, &format!("{first} -o run"));
+    let from = first.replace("--width 16", "--from run/model.safetensors --rate 0");
+    done(path, &format!("{from} -o more"));
+    assert_eq!(bytes(path, "more/model.safetensors"), bytes(path, "run/model.safetensors"));
+
+    // A run goes on where its scenes lie elsewhere now, and does not where they are others under the same names.
+    fs::rename(path.join("learn"), path.join("moved")).expect("a folder");
+    done(path, &format!("{} -o run", first.replace("learn/", "moved/")));
+    done(path, "scenes make toys learn --train 2 --val 1 --test 0 --views 10 --test-views 10 --size 64 --seed 2");
+    assert_refused(BINARY, path, &format!("{first} -o run"), &["run/state.safetensors", "settings", "data was"]);
+    // Nor from another network of the same name.
+    let moved = from.replace("learn/", "moved/");
+    done(path, &format!("{moved} -o more"));
+    done(path, &format!("{} --seed 3 -o other", first.replace("learn/", "moved/")));
+    fs::rename(path.join("other/model.safetensors"), path.join("run/model.safetensors")).expect("a file");
+    assert_refused(BINARY, path, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
 }
 
 #[test]

@@ -12,6 +12,7 @@ python3-numpy, python3-safetensors, python3-pil). Examples:
 
     pixelnerf.py tests/data/toy --sources 0,8,16 --target 20 --size 32
     pixelnerf.py car/ --sources 0,8,16 --target 4 --rays 512       # the rate a ray is that of the whole picture
+    pixelnerf.py tests/data/car --model host/models/pixelnerf_cars.safetensors --sources 16,72,136 --target 48
     pixelnerf.py --check pixelnerf_srn.safetensors                 # against numbers of the official code
 """
 
@@ -26,11 +27,13 @@ import numpy as np
 import torch
 import torch.nn.functional as F
 from PIL import Image
+from safetensors import safe_open
 from safetensors.torch import load_file
 
-LEVELS = ((64, 3), (128, 4), (256, 6))  # channels and blocks of the trunk's levels
+# The published network: channels and blocks of the trunk's levels, sizes of the point networks. Other members of the family
+# are read off their tensors.
+LEVELS = ((64, 3), (128, 4), (256, 6))
 WIDTH, BLOCKS, INJECTED, OCTAVES, FREQUENCY = 512, 5, 3, 6, 1.5
-SIDE = 128  # of source images
 
 
 # Parameters
@@ -93,24 +96,45 @@ def architecture():
 
 
 def parameters(model):
-    if model != "formula":
-        return {name: tensor.float() for name, tensor in load_file(model).items()}
-    return {name: by_formula(name, shape, 6 if "lin_out.weight" in name else 1) for name, shape in architecture()}
+    """Tensors by name, and where in a pixel its centre is (0 as published)."""
+    if model == "formula":
+        gain = lambda name: 6 if "lin_out.weight" in name else 1
+        return {name: by_formula(name, shape, gain(name)) for name, shape in architecture()}, 0.0
+    with safe_open(model, "pt") as file:
+        pixel_centre = float((file.metadata() or {}).get("viewfuse.pixel_centre", 0))
+    return {name: tensor.float() for name, tensor in load_file(model).items()}, pixel_centre
 
 
 # Network
 
 
 class PixelNerf:
-    def __init__(self, tensors):
-        self.tensors = tensors
+    def __init__(self, tensors, pixel_centre):
+        self.tensors, self.pixel_centre = tensors, pixel_centre
+        latent = tensors["mlp_coarse.lin_z.0.weight"].shape[1]
+        self.levels, channels = [], tensors["encoder.model.conv1.weight"].shape[0]
+        while channels < latent:
+            level = f"encoder.model.layer{len(self.levels) + 1}"
+            self.levels.append(self.count(lambda block: f"{level}.{block}.conv1.weight"))
+            channels += tensors[f"{level}.0.conv1.weight"].shape[0]
+        self.blocks = self.count(lambda block: f"mlp_coarse.blocks.{block}.fc_0.weight")
+        self.injected = self.count(lambda block: f"mlp_coarse.lin_z.{block}.weight")
+        self.octaves = (tensors["mlp_coarse.lin_in.weight"].shape[1] - 6) // 6
+
+    def count(self, name):
+        return next(number for number in range(1000) if name(number) not in self.tensors)
+
+    def fine(self):
+        """The second pass's network; small ones have one for both."""
+        return "mlp_fine" if "mlp_fine.lin_in.weight" in self.tensors else "mlp_coarse"
 
     def encode(self, images):
-        """Latents (view, 512, 64, 64) of images (view, 3, 128, 128) in [-1, 1]."""
+        """Latents (view, channel, side / 2, side / 2) of images (view, 3, side, side) in [-1, 1]."""
+        self.side = images.shape[-1]
         x = F.relu(self.convolve(images, "conv1", "bn1", stride=2, padding=3))
         levels = [x]
         x = F.max_pool2d(x, 3, 2, 1)
-        for level, (_, count) in enumerate(LEVELS, 1):
+        for level, count in enumerate(self.levels, 1):
             for block in range(count):
                 x = self.basic_block(x, f"layer{level}.{block}", 2 if level > 1 and block == 0 else 1)
             levels.append(x)
@@ -140,14 +164,14 @@ class PixelNerf:
         views = len(self.rotation)
         rotated = torch.matmul(points.expand(views, -1, -1), self.rotation.transpose(1, 2))
         turned = torch.matmul(directions.expand(views, -1, -1), self.rotation.transpose(1, 2))
-        frequencies = FREQUENCY * 2.0 ** torch.arange(OCTAVES).repeat_interleave(2)
-        phases = torch.tensor([0.0, math.pi / 2]).repeat(OCTAVES)
+        frequencies = FREQUENCY * 2.0 ** torch.arange(self.octaves).repeat_interleave(2)
+        phases = torch.tensor([0.0, math.pi / 2]).repeat(self.octaves)
         waves = torch.sin(rotated[:, :, None] * frequencies[:, None] + phases[:, None]).flatten(2)
         seen = rotated + self.translation[:, None]
         pixels = seen[..., :2] / -seen[..., 2:] * torch.tensor([self.focal, -self.focal]) + self.centre
-        # Node i of the grid lies over pixel 2 i: as published, half a pixel off the nodes' own centres.
+        # Node i of the grid lies over the centre of pixel 2 i: as published, half a pixel off the nodes' own centres.
         rows, columns = self.latents.shape[-2:]
-        places = pixels * (2.0 / SIDE) * torch.tensor([columns / (columns - 1), rows / (rows - 1)]) - 1
+        places = (pixels - self.pixel_centre) * (2.0 / self.side) * torch.tensor([columns / (columns - 1), rows / (rows - 1)]) - 1
         latents = F.grid_sample(
             self.latents, places[:, :, None], mode="bilinear", padding_mode="border", align_corners=True
         )[..., 0].transpose(1, 2)
@@ -156,10 +180,10 @@ class PixelNerf:
 
     def point_network(self, network, x, latents):
         x = self.linear(f"{network}.lin_in", x)
-        for block in range(BLOCKS):
-            if block == INJECTED:
+        for block in range(self.blocks):
+            if block == self.injected:
                 x = (x * self.weights[:, None, None]).sum(0)
-            if block < INJECTED:
+            if block < self.injected:
                 x = x + self.linear(f"{network}.lin_z.{block}", latents)
             inside = self.linear(f"{network}.blocks.{block}.fc_0", F.relu(x))
             x = x + self.linear(f"{network}.blocks.{block}.fc_1", F.relu(inside))
@@ -230,7 +254,7 @@ def fine_depths(rays, coarse, weights, depth, pixels, counts, seed):
 
 
 def read_scene(folder, numbers):
-    """Images over white (view, 3, 128, 128) in [-1, 1], poses (view, 4, 4), focal length and centre of an SRN folder."""
+    """Images over white (view, 3, side, side) in [-1, 1], poses (view, 4, 4), focal length and centre of an SRN folder."""
     names = sorted((path.stem for path in (folder / "pose").glob("*.txt")), key=lambda name: (len(name), name))
     lines = (folder / "intrinsics.txt").read_text().split("\n")
     focal, x, y = (float(word) for word in lines[0].split()[:3])
@@ -241,19 +265,18 @@ def read_scene(folder, numbers):
         poses.append(torch.from_numpy(pose * np.array([1, -1, -1, 1], np.float32)))  # y up, z backward
         with Image.open(folder / "rgb" / f"{name}.png") as file:
             pixels = np.asarray(file.convert("RGBA"), np.float32) / 255
-        if pixels.shape[:2] != (SIDE, SIDE):
-            raise SystemExit(f"{name}.png has {pixels.shape[1]}x{pixels.shape[0]} pixels instead of {SIDE}x{SIDE}")
+        if pixels.shape[0] != pixels.shape[1]:
+            raise SystemExit(f"{name}.png has {pixels.shape[1]}x{pixels.shape[0]} pixels; square ones are needed")
         over_white = pixels[..., :3] * pixels[..., 3:] + 1 - pixels[..., 3:]
         images.append(torch.from_numpy(2 * over_white - 1).permute(2, 0, 1))
     return torch.stack(images), torch.stack(poses), focal, torch.tensor([x, y])
 
 
-def cast_rays(pose, focal, centre, size, near_far):
-    """Rays (pixel, 8) through the pixels' upper left corners, as published: origin, direction, near, far."""
-    scale = size / SIDE
+def cast_rays(pose, focal, centre, scale, size, pixel_centre, near_far):
+    """Rays (pixel, 8) through the pixels' centres, as published their upper left corners: origin, direction, near, far."""
     rows, columns = torch.meshgrid(torch.arange(size), torch.arange(size), indexing="ij")
-    across = (columns - centre[0] * scale) / (focal * scale)
-    below = (rows - centre[1] * scale) / (focal * scale)
+    across = (columns + pixel_centre - centre[0] * scale) / (focal * scale)
+    below = (rows + pixel_centre - centre[1] * scale) / (focal * scale)
     towards = torch.stack([across, -below, -torch.ones_like(across)], -1).reshape(-1, 3)
     directions = F.normalize(towards, dim=1) @ pose[:3, :3].T
     ends = torch.tensor(near_far).expand(len(directions), 2)
@@ -264,7 +287,7 @@ def cast_rays(pose, focal, centre, size, near_far):
 
 
 def render(options):
-    network = PixelNerf(parameters(options.model))
+    network = PixelNerf(*parameters(options.model))
     images, poses, focal, centre = read_scene(options.scene, [*options.sources, options.target])
     weights = torch.full((len(options.sources),), 1 / len(options.sources))
     if options.weights != "mean":
@@ -274,12 +297,13 @@ def render(options):
     start = time.perf_counter()
     network.encode(images[:-1])
     encode_time = time.perf_counter() - start
-    rays = cast_rays(poses[-1], focal, centre, options.size, options.near_far)
+    size = options.size or network.side
+    rays = cast_rays(poses[-1], focal, centre, size / network.side, size, network.pixel_centre, options.near_far)
     pixels = np.arange(len(rays))
     if options.rays and options.rays < len(rays):
         pixels = pixels[np.arange(options.rays) * len(rays) // options.rays]
     rays = rays[pixels]
-    picture = np.full((options.size**2, 3), np.nan, np.float32)
+    picture = np.full((size**2, 3), np.nan, np.float32)
     start = time.perf_counter()
     # As many rays at a time as make four batches of the second pass: depths and weights need little memory then.
     for some in np.array_split(np.arange(len(rays)), -(-len(rays) * sum(options.samples) // (4 * options.batch))):
@@ -288,7 +312,7 @@ def render(options):
         seen, colours, depth = network.look("mlp_coarse", some_rays, coarse, options.batch)
         if sum(options.samples[1:]) > 0:
             depths = fine_depths(some_rays, coarse, seen, depth, some_pixels, options.samples, options.seed)
-            _, colours, _ = network.look("mlp_fine", some_rays, depths, options.batch)
+            _, colours, _ = network.look(network.fine(), some_rays, depths, options.batch)
         picture[some_pixels] = colours
     render_time = time.perf_counter() - start
     result = {
@@ -305,7 +329,7 @@ def render(options):
     print(json.dumps(result))
     if options.output:
         levels = (np.nan_to_num(picture).clip(0, 1) * 255 + 0.5).astype(np.uint8)
-        Image.fromarray(levels.reshape(options.size, options.size, 3)).save(options.output)
+        Image.fromarray(levels.reshape(size, size, 3)).save(options.output)
     if options.compare:
         compare(options.compare, picture)
 
@@ -326,7 +350,7 @@ def compare(path, picture):
 def check(path):
     """Compares with numbers of the official code."""
     expected = load_file(path)
-    network = PixelNerf(parameters("formula"))
+    network = PixelNerf(*parameters("formula"))
     network.encode(expected["images"].float() / 255 * 2 - 1)
     focal, centre, worst = float(expected["focal"]), torch.tensor([64.0, 64.0]), 0.0
 
@@ -356,13 +380,13 @@ def check(path):
 def main():
     numbers = lambda kind: lambda text: [kind(word) for word in text.split(",")]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene", nargs="?", type=Path, help="SRN folder: rgb/, pose/, intrinsics.txt; 128x128")
+    parser.add_argument("scene", nargs="?", type=Path, help="SRN folder: rgb/, pose/, intrinsics.txt")
     parser.add_argument("--check", metavar="FILE", help="compare with reference values instead of rendering")
     parser.add_argument("--model", default="formula", help="formula, or a .safetensors checkpoint")
     parser.add_argument("--sources", type=numbers(int), default=[0, 8, 16], help="numbers of the source views")
     parser.add_argument("--target", type=int, default=20, help="number of the view to render")
     parser.add_argument("--weights", default="mean", help="mean, or one number a source")
-    parser.add_argument("--size", type=int, default=SIDE, help="side of the picture")
+    parser.add_argument("--size", type=int, help="side of the picture [default: that of the sources]")
     parser.add_argument("--rays", type=int, help="compute only this many pixels, evenly spread")
     parser.add_argument("--near-far", type=numbers(float), default=[0.8, 1.8])
     parser.add_argument("--samples", type=numbers(int), default=[64, 16, 16])

@@ -15,6 +15,7 @@ mod omission;
 pub(crate) use any::{AnyField, Work};
 pub(crate) use genvs::parse_level;
 
+use super::options::parse_share;
 use super::wrong;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
@@ -71,7 +72,7 @@ pub(crate) struct ModelOptions {
     network: NetworkOptions,
     /// Leave nothing out: every view, layer and sample, whether the scene needs it or not; of GeNVS also every call of the
     /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance say otherwise
-    #[arg(long, conflicts_with_all = ["compute", "probe_step", "leave_out", "settled"], help_heading = NETWORK)]
+    #[arg(long, conflicts_with_all = ["compute", "probe_step", "probe_error", "leave_out", "settled"], help_heading = NETWORK)]
     pub(crate) exact: bool,
     /// Compute these although the scene does not need them
     #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model", help_heading = NETWORK)]
@@ -79,6 +80,10 @@ pub(crate) struct ModelOptions {
     /// Probe one ray in every square of this many pixels on a side for empty space [default: 4]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(2..=64), requires = "model", help_heading = PIXELNERF)]
     probe_step: Option<u32>,
+    /// Let more of space count as empty while the probes' colours change by no more than this in the root of the mean
+    /// square, 1 being from black to white [default: 1/128]
+    #[arg(long, value_name = "ERROR", value_parser = parse_share, requires = "model", help_heading = PIXELNERF)]
+    probe_error: Option<f32>,
     #[command(flatten)]
     run: RunOptions,
 }
@@ -225,11 +230,16 @@ impl ModelOptions {
         match network.family {
             Family::PixelNerf => {
                 network.refuse(denoising)?;
-                let probe_step = self.probe_step.unwrap_or(PixelNerfOmissions::default().empty_space);
-                self.network.pixelnerf(&network, seed, of_pixelnerf(computes, probe_step))
+                let all = PixelNerfOmissions::default();
+                let probe_step = self.probe_step.unwrap_or(all.empty_space);
+                let probe_error = if self.exact { 0.0 } else { self.probe_error.unwrap_or(all.probe_error) };
+                self.network.pixelnerf(&network, seed, of_pixelnerf(computes, probe_step, probe_error))
             }
             Family::Genvs => {
-                network.refuse(vec![("--probe-step", self.probe_step.is_some())])?;
+                network.refuse(vec![
+                    ("--probe-step", self.probe_step.is_some()),
+                    ("--probe-error", self.probe_error.is_some()),
+                ])?;
                 let plan = self.run.plan(seed, self.network.schedule(), self.exact, computes(Omission::Calls));
                 let omissions = of_genvs(computes, reuse, self.run.half_volumes);
                 self.network.genvs(network, plan, omissions, denoising)

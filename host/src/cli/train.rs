@@ -27,9 +27,9 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// A small PixelNeRF from scratch.
+    /// A small PixelNeRF, from scratch or from a network that was learned before.
     Pixelnerf(PixelNerfArguments),
-    /// A small GeNVS from scratch: volumes, feature images and the denoiser, all at once.
+    /// A small GeNVS, from scratch or from a network that was learned before: volumes, feature images and the denoiser, all at once.
     Genvs(GenvsArguments),
     /// The weighting of views for a network that stays as it is.
     Weighting(WeightingArguments),
@@ -74,6 +74,9 @@ impl RunOptions {
 struct PixelNerfArguments {
     #[command(flatten)]
     run: RunOptions,
+    /// Go on from what this network has learned, with steps, rates and data of a run of its own
+    #[arg(long, value_name = "FILE", conflicts_with = "width")]
+    from: Option<PathBuf>,
     /// Width of the point network
     #[arg(long, value_name = "N", default_value_t = 64)]
     width: usize,
@@ -98,6 +101,9 @@ struct PixelNerfArguments {
 struct GenvsArguments {
     #[command(flatten)]
     run: RunOptions,
+    /// Go on from what this network has learned, with steps, rates and data of a run of its own
+    #[arg(long, value_name = "FILE", conflicts_with = "width")]
+    from: Option<PathBuf>,
     /// Channels of the denoiser's first level, a multiple of 4
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = width)]
     width: usize,
@@ -173,24 +179,28 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
-    let PixelNerfArguments { run, width, side, objects, rays, coarse, fine } = arguments;
+    let PixelNerfArguments { run, from, width, side, objects, rays, coarse, fine } = arguments;
     let settings =
         PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
     let [train, validation] = scenes(&run.data)?;
     let progress = Progress::new("training");
-    let train_it = || train_pixelnerf(&settings, &run.schedule(), [&train, &validation], &run.output, &progress);
+    let from = from.as_deref().map(Checkpoint::open).transpose()?;
+    let train_it =
+        || train_pixelnerf(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;
     drop(progress);
     report(&outcome)
 }
 
 fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
-    let GenvsArguments { run, width, side, objects, targets, samples } = arguments;
+    let GenvsArguments { run, from, width, side, objects, targets, samples } = arguments;
     let settings =
         GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
     let [train, validation] = scenes(&run.data)?;
     let progress = Progress::new("training");
-    let train_it = || train_genvs(&settings, &run.schedule(), [&train, &validation], &run.output, &progress);
+    let from = from.as_deref().map(Checkpoint::open).transpose()?;
+    let train_it =
+        || train_genvs(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;
     drop(progress);
     report(&outcome)

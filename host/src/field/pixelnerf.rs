@@ -12,6 +12,7 @@ mod network;
 mod options;
 mod parameters;
 mod pass;
+mod probes;
 pub mod reference;
 
 pub use architecture::{Architecture, Level, Pass};
@@ -280,7 +281,7 @@ impl<D: Device> Field<D> for PixelNerf {
 
     fn left_out(&self) -> Vec<LeftOut> {
         let Counts { views, encoded_views, latent_rows, mapped_rows, passes: [coarse, fine] } = *self.counts();
-        let Omissions { unused_views, latent_layers, empty_space, empty_rays, empty_parts, hidden_samples } =
+        let Omissions { unused_views, latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, .. } =
             self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let unasked = |pass: Asked| pass.samples.saturating_sub(pass.asked);

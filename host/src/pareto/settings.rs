@@ -16,11 +16,12 @@ pub const ALL: &str = "all";
 
 const NONE: Omissions = Omissions::NONE;
 const VIEWS: Omissions = Omissions { unused_views: true, ..NONE };
+const PROBED: Omissions = Omissions { empty_space: 4, probe_error: 1.0 / 128.0, ..NONE };
 const HIDDEN: Omissions = Omissions { hidden_samples: true, ..NONE };
 
 /// PixelNeRF: each of these alone, with everything else as exact. Words, what is left out, `--leave-out`, `--settled`.
 #[rustfmt::skip]
-const ALONE: [(&str, Omissions, f32, f32); 14] = [
+const ALONE: [(&str, Omissions, f32, f32); 16] = [
     ("unused views",    VIEWS,                                     0.0,  0.0),
     ("leave out 0.01",  VIEWS,                                     0.01, 0.0),
     ("leave out 0.05",  VIEWS,                                     0.05, 0.0),
@@ -29,6 +30,8 @@ const ALONE: [(&str, Omissions, f32, f32); 14] = [
     ("empty space, 2",  Omissions { empty_space: 2, ..NONE },      0.0,  0.0),
     ("empty space, 4",  Omissions { empty_space: 4, ..NONE },      0.0,  0.0),
     ("empty space, 8",  Omissions { empty_space: 8, ..NONE },      0.0,  0.0),
+    ("probe error 1/128", PROBED,                                  0.0,  0.0),
+    ("probe error 1/64", Omissions { probe_error: 1.0 / 64.0, ..PROBED }, 0.0, 0.0),
     ("empty rays",      Omissions { empty_rays: true, ..NONE },    0.0,  0.0),
     ("empty parts",     Omissions { empty_parts: true, ..NONE },   0.0,  0.0),
     ("hidden, 1/256",   HIDDEN,                                    0.0,  1.0 / 256.0),

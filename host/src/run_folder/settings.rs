@@ -1,13 +1,11 @@
 //! What an evaluation's numbers hang on.
 
+use crate::digest::hexadecimal;
 use crate::scene::Scene;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io;
-use std::path::Path;
 
 /// Everything that decides which jobs there are and what they give. Not in it: which device a machine has (each finished
 /// job says its own), the shard, the number of threads, and where the scenes lie.
@@ -105,24 +103,4 @@ impl Settings {
         }
         flat
     }
-}
-
-/// SHA-256 of a file's bytes, hexadecimal.
-///
-/// # Errors
-/// If it cannot be read.
-pub fn sha256_of(path: &Path) -> io::Result<String> {
-    let mut digest = Sha256::new();
-    let mut file = File::open(path)?;
-    let mut piece = vec![0; 1 << 20];
-    loop {
-        match io::Read::read(&mut file, &mut piece)? {
-            0 => return Ok(hexadecimal(&digest.finalize())),
-            length => digest.update(&piece[..length]),
-        }
-    }
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }

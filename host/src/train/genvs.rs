@@ -52,21 +52,27 @@ fn unused(tensors: &[TensorShape]) -> BTreeSet<String> {
 
 impl Genvs {
     /// At the beginning of training: He's initialisation where rectification follows, layers behind which something is added
-    /// zero, as published for the denoiser.
+    /// zero, as published for the denoiser, whose other layers without a norm in front hand on what they get.
     pub(crate) fn new(architecture: Architecture, dtype: DType, seed: u64) -> std::result::Result<Genvs, TrainError> {
-        let parameters = Parameters::new(&used(&architecture), dtype, |tensor| Ok(first_values(tensor, seed)))?;
+        let parameters = Parameters::new(&used(&architecture), dtype, |tensor| {
+            Ok(denoiser::handed_on(&architecture, tensor).unwrap_or_else(|| first_values(tensor, seed)))
+        })?;
         Ok(Genvs { architecture, parameters, is_frozen: false })
     }
 
     /// A trained one, to be left as it is.
     ///
     /// # Errors
-    /// [`TrainError`] if the checkpoint is of another family or has no denoiser.
-    pub(crate) fn frozen(checkpoint: &Checkpoint, dtype: DType) -> std::result::Result<Genvs, TrainError> {
+    /// [`TrainError`] if the checkpoint is of another family, has no denoiser, or is for pictures of another side.
+    pub(crate) fn frozen(checkpoint: &Checkpoint, side: u32, dtype: DType) -> std::result::Result<Genvs, TrainError> {
         let architecture = Architecture::of(checkpoint)?;
+        let refuse = |reason: String| Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
         if architecture.denoiser.is_none() {
-            let reason = "it has no denoiser, without which no picture is made here".to_owned();
-            return Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
+            return refuse("it has no denoiser, without which no picture is made here".to_owned());
+        }
+        let own = architecture.image_side;
+        if own != side as usize {
+            return refuse(format!("it is for pictures of {own}x{own} pixels, and --side is {side}"));
         }
         let parameters = Parameters::of(checkpoint, &used(&architecture), dtype)?;
         Ok(Genvs { architecture, parameters, is_frozen: true })

@@ -1,4 +1,4 @@
-//! A small GeNVS from scratch, with equal weights of the views as published.
+//! A small GeNVS, with equal weights of the views as published.
 //!
 //! The loss is that of "Elucidating the design space of diffusion-based generative models" (Karras et al. 2022): noise of a
 //! random level on the truth, the network asked for what it would have to say, all levels of one weight. Two things are for
@@ -12,8 +12,9 @@ use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
-use super::run::{Learner, Outcome, Schedule, Validated, run};
+use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
+use crate::checkpoint::Checkpoint;
 use crate::field::genvs::Architecture;
 use crate::progress::Progress;
 use candle_core::{DType, Device, Result, Tensor};
@@ -25,7 +26,8 @@ use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
 /// What a run is made of beside its schedule and scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GenvsSettings {
-    /// Channels of the denoiser's first level; see [`Architecture::narrow`].
+    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that goes on from a file has the
+    /// file's.
     pub width: usize,
     /// Side of the pictures.
     pub side: u32,
@@ -45,8 +47,6 @@ const LEVELS: [f32; 2] = [-1.2, 1.2];
 const SHARE_OF_LARGEST: f32 = 0.25;
 /// Weight of the first features' squared error: at the largest level, that of the picture's has the same.
 const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
-/// Share of the average of the parameters that a step leaves.
-const AVERAGING: f64 = 0.999;
 /// Objects that validation looks at, and views of each.
 const VALIDATION_OBJECTS: usize = 24;
 const VALIDATION_VIEWS: ViewCounts = ViewCounts { sources: 3, targets: 1 };
@@ -58,12 +58,13 @@ struct GenvsLearner {
     settings: GenvsSettings,
 }
 
-/// Trains a GeNVS in `folder`, or goes on there.
+/// Trains a GeNVS in `folder`, or goes on there: from scratch, or from a network that was learned before.
 ///
 /// # Errors
 /// [`TrainError`].
 pub fn train_genvs(
     settings: &GenvsSettings,
+    from: Option<&Checkpoint>,
     schedule: &Schedule,
     [scenes, validation]: [&[PathBuf]; 2],
     folder: &Path,
@@ -73,13 +74,16 @@ pub fn train_genvs(
     let least_views = most_sources + settings.targets.max(1);
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let architecture = Architecture::narrow(settings.side as usize, settings.width);
-    let network = Genvs::new(architecture, DType::F32, schedule.seed)?;
-    let record = serde_json::json!({
-        "model": "genvs", "settings": settings, "schedule": schedule,
-        "scenes": scenes.len(), "first_scene": scenes[0], "validation_scenes": validation.len(),
-    });
-    let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings: *settings };
-    run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
+    let network = match from {
+        Some(checkpoint) => Genvs { is_frozen: false, ..Genvs::frozen(checkpoint, settings.side, DType::F32)? },
+        None => Genvs::new(architecture, DType::F32, schedule.seed)?,
+    };
+    let denoiser = network.architecture.denoiser.as_ref();
+    let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
+    let settings = GenvsSettings { width, ..*settings };
+    let record = run::settings("genvs", &settings, schedule, &data, from)?;
+    let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings };
+    run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
 }
 
 /// Pictures with noise on them.
@@ -167,10 +171,6 @@ pub(super) fn scores(
 impl Learner for GenvsLearner {
     fn parameters(&self) -> &Parameters {
         &self.network.parameters
-    }
-
-    fn averaging(&self) -> Option<f64> {
-        Some(AVERAGING)
     }
 
     fn loss(&self, draw: &Draw) -> Result<Tensor> {

@@ -1,12 +1,13 @@
-//! A small PixelNeRF from scratch, with equal weights of the views as published.
+//! A small PixelNeRF, with equal weights of the views as published.
 
 use super::TrainError;
 use super::batch::{Batch, BatchSize, Targets};
 use super::draw::{Draw, Purpose};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
-use super::run::{Learner, Outcome, Schedule, Validated, run};
+use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
+use crate::checkpoint::Checkpoint;
 use crate::field::pixelnerf::architecture::Architecture;
 use crate::progress::Progress;
 use candle_core::{DType, Result, Tensor};
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// What a run is made of beside its schedule and scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PixelNerfSettings {
-    /// Width of the point network; the trunk is as wide as fits to it.
+    /// Width of the point network; the trunk is as wide as fits to it. A network that goes on from a file has the file's.
     pub width: usize,
     /// Side of the pictures.
     pub side: u32,
@@ -45,12 +46,13 @@ struct PixelNerfLearner {
     settings: PixelNerfSettings,
 }
 
-/// Trains a PixelNeRF in `folder`, or goes on there.
+/// Trains a PixelNeRF in `folder`, or goes on there: from scratch, or from a network that was learned before.
 ///
 /// # Errors
 /// [`TrainError`].
 pub fn train_pixelnerf(
     settings: &PixelNerfSettings,
+    from: Option<&Checkpoint>,
     schedule: &Schedule,
     [scenes, validation]: [&[PathBuf]; 2],
     folder: &Path,
@@ -59,13 +61,14 @@ pub fn train_pixelnerf(
     let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
     let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
-    let network = PixelNerf::new(architecture, DType::F32, schedule.seed)?;
-    let record = serde_json::json!({
-        "model": "pixelnerf", "settings": settings, "schedule": schedule,
-        "scenes": scenes.len(), "first_scene": scenes[0], "validation_scenes": validation.len(),
-    });
-    let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings: *settings };
-    run(&learner, schedule, &record, "PSNR dB", folder, progress)
+    let network = match from {
+        Some(checkpoint) => PixelNerf { is_frozen: false, ..PixelNerf::frozen(checkpoint, DType::F32)? },
+        None => PixelNerf::new(architecture, DType::F32, schedule.seed)?,
+    };
+    let settings = PixelNerfSettings { width: network.architecture.width, ..*settings };
+    let record = run::settings("pixelnerf", &settings, schedule, &data, from)?;
+    let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings };
+    run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
 }
 
 /// Ten times the logarithm of one over the mean square.

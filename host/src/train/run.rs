@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! state.safetensors   to go on from
-//! model.safetensors   the learned parameters, whenever the state is written
+//! model.safetensors   the learned parameters (their moving average), whenever the state is written
 //! curve.svg           loss and validation over the steps
 //! record.json         settings, times, scores
 //! ```
@@ -13,17 +13,20 @@ use super::average::Average;
 use super::curve;
 use super::draw::Draw;
 use super::parameters::{Contents, Parameters};
+use super::scenes::Data;
 use super::state::{self, Learned, Progressed};
 use crate::checkpoint::{Checkpoint, Precision};
+use crate::digest::sha256_of;
 use crate::files::write_whole;
 use crate::interrupt;
 use crate::progress::Progress;
 use candle_core::Tensor;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// How long, and how fast.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Schedule {
     /// Steps of the run.
     pub steps: u32,
@@ -47,6 +50,8 @@ const LAST_RATE: f64 = 0.03;
 const LOSS_EVERY: u32 = 50;
 /// Largest norm of a gradient.
 const MOST_GRADIENT: f64 = 1.0;
+/// Share of the average of the parameters that a step leaves.
+const AVERAGING: f64 = 0.999;
 
 impl Schedule {
     /// Learning rate of a step.
@@ -56,6 +61,27 @@ impl Schedule {
         let falling = LAST_RATE + (1.0 - LAST_RATE) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
         self.rate * rising.min(falling)
     }
+}
+
+/// What the numbers of a run hang on: a run goes on only where all of it is the same. Files are told by what is in them,
+/// not by where they lie.
+pub(crate) fn settings(
+    model: &str,
+    own: &impl Serialize,
+    schedule: &Schedule,
+    data: &Data,
+    checkpoint: Option<&Checkpoint>,
+) -> Result<serde_json::Value, TrainError> {
+    let unreadable = |path: &Path, cause: &std::io::Error| TrainError::Checkpoint {
+        path: path.to_path_buf(),
+        reason: format!("cannot be read: {cause}"),
+    };
+    let digest = |path: &Path| sha256_of(path).map_err(|cause| unreadable(path, &cause));
+    let checkpoint = checkpoint.map(|checkpoint| digest(checkpoint.path())).transpose()?;
+    Ok(serde_json::json!({
+        "model": model, "settings": own, "schedule": schedule, "checkpoint": checkpoint,
+        "scenes": data.training.len(), "validation_scenes": data.validation.len(), "data": data.digest(),
+    }))
 }
 
 /// Something that is learned.
@@ -68,11 +94,6 @@ pub(crate) trait Learner {
 
     /// How good it is on what it does not learn from; higher is better.
     fn validate(&self) -> candle_core::Result<Validated>;
-
-    /// What a step leaves of the average of the parameters; with one, it is what is validated, and what the file holds.
-    fn averaging(&self) -> Option<f64> {
-        None
-    }
 
     /// The file that it becomes: tensors and metadata.
     fn checkpoint(&self) -> candle_core::Result<Contents>;
@@ -107,7 +128,7 @@ pub(crate) fn run(
     progress: &Progress,
 ) -> Result<Outcome, TrainError> {
     let run = Run { learner, schedule, settings, score_name, folder };
-    let average = learner.averaging().map(|decay| Average::new(learner.parameters(), decay)).transpose()?;
+    let average = Average::new(learner.parameters(), AVERAGING)?;
     let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
     let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
@@ -126,9 +147,7 @@ pub(crate) fn run(
         }
         let rate = schedule.rate_at(step);
         learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MOST_GRADIENT)?;
-        if let Some(average) = &learned.average {
-            average.step(learner.parameters(), step)?;
-        }
+        learned.average.step(learner.parameters(), step)?;
         so_far.steps += 1;
         so_far.pending = (so_far.pending.0 + value, so_far.pending.1 + 1);
         if so_far.steps % LOSS_EVERY == 0 {

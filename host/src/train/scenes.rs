@@ -1,6 +1,7 @@
 //! Scenes to learn from, in memory: pictures over white at the size that is trained at, with their cameras.
 
 use super::TrainError;
+use crate::digest::hexadecimal;
 use crate::field::learned::default_near_far;
 use crate::interrupt;
 use crate::progress::Progress;
@@ -8,6 +9,7 @@ use crate::scene::Scene;
 use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
+use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 use viewfuse_core::camera::{Camera, CameraBlock};
 
@@ -35,6 +37,17 @@ impl Data {
         }
         let [training, validation] = lists.map(|list| TrainingScene::open_all(list, side, least_views, progress));
         Ok(Data { training: training?, validation: validation? })
+    }
+
+    /// SHA-256 of all cameras and pictures as training sees them.
+    pub(crate) fn digest(&self) -> String {
+        let mut digest = Sha256::new();
+        for scene in self.training.iter().chain(&self.validation) {
+            digest.update((scene.pictures.len() as u64).to_le_bytes());
+            digest.update(bytemuck::cast_slice(&scene.blocks));
+            scene.pictures.iter().for_each(|picture| digest.update(picture.as_raw()));
+        }
+        hexadecimal(&digest.finalize())
     }
 }
 

@@ -34,16 +34,13 @@ const PROGRESSED: &str = "progressed";
 pub(crate) struct Learned<'a> {
     pub(crate) parameters: &'a Parameters,
     pub(crate) adam: Adam,
-    pub(crate) average: Option<Average>,
+    pub(crate) average: Average,
 }
 
 impl Learned<'_> {
-    /// Does something while the parameters are what the run's model is: their average where there is one.
+    /// Does something while the parameters are what the run's model is: their average.
     pub(crate) fn as_written<R>(&self, work: impl FnOnce() -> candle_core::Result<R>) -> candle_core::Result<R> {
-        match &self.average {
-            Some(average) => average.during(self.parameters, work),
-            None => work(),
-        }
+        self.average.during(self.parameters, work)
     }
 
     /// Every tensor by its name in the file.
@@ -51,9 +48,9 @@ impl Learned<'_> {
         let mut all = Vec::new();
         for (name, variable) in self.parameters.iter() {
             let [mean, square] = &self.adam.moments[name];
-            let average = self.average.as_ref().map(|average| ("average", &average.values[name]));
-            let own = [("parameter", variable), ("mean", mean), ("square", square)];
-            all.extend(own.into_iter().chain(average).map(|(prefix, own)| (format!("{prefix}.{name}"), own)));
+            let average = &self.average.values[name];
+            let own = [("parameter", variable), ("mean", mean), ("square", square), ("average", average)];
+            all.extend(own.map(|(prefix, own)| (format!("{prefix}.{name}"), own)));
         }
         all
     }

@@ -10,7 +10,7 @@ use super::genvs_learner;
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::pixelnerf_learner;
-use super::run::{Learner, Outcome, Schedule, Validated, run};
+use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
 use crate::checkpoint::Checkpoint;
 use crate::field::family::Family;
@@ -72,15 +72,12 @@ pub fn train_weighting(
 ) -> std::result::Result<Outcome, TrainError> {
     let network = match Family::of(checkpoint)? {
         Family::PixelNerf => Frozen::PixelNerf(PixelNerf::frozen(checkpoint, DType::F32)?),
-        Family::Genvs => Frozen::Genvs(Genvs::frozen(checkpoint, DType::F32)?),
+        Family::Genvs => Frozen::Genvs(Genvs::frozen(checkpoint, settings.side, DType::F32)?),
     };
     let least_views = SOURCE_COUNTS.into_iter().max().unwrap_or(1) + 1;
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let attention = Attention::new(settings.embedding, DType::F32, schedule.seed)?;
-    let record = serde_json::json!({
-        "model": "weighting", "network": checkpoint.path(), "settings": settings, "schedule": schedule,
-        "scenes": scenes.len(), "first_scene": scenes[0], "validation_scenes": validation.len(),
-    });
+    let record = run::settings("weighting", settings, schedule, &data, Some(checkpoint))?;
     let learner = WeightingLearner {
         attention,
         network,
@@ -88,7 +85,7 @@ pub fn train_weighting(
         validation: data.validation,
         settings: *settings,
     };
-    run(&learner, schedule, &record, "PSNR dB", folder, progress)
+    run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
 }
 
 impl WeightingLearner {

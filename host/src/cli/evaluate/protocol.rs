@@ -12,6 +12,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use viewfuse::device::Device;
 use viewfuse::device::choice::Chosen;
+use viewfuse::digest::sha256_of;
 use viewfuse::evaluate::Evaluator;
 use viewfuse::field::Field;
 use viewfuse::files::{check_writable, write_whole};
@@ -21,9 +22,7 @@ use viewfuse::photographs::Album;
 use viewfuse::progress::Progress;
 use viewfuse::protocol::{Draws, Job, Plan, Protocol};
 use viewfuse::render::RenderOptions;
-use viewfuse::run_folder::{
-    Finished, FolderError, RunFolder, SETTINGS, SceneSettings, Settings, Shard, missing, sha256_of,
-};
+use viewfuse::run_folder::{Finished, FolderError, RunFolder, SETTINGS, SceneSettings, Settings, Shard, missing};
 use viewfuse::scene::Scene;
 use viewfuse::summary::tables;
 use viewfuse::weighting::Weighting;

@@ -37,11 +37,16 @@ impl Omission {
 }
 
 /// What a PixelNeRF leaves out if it must compute these.
-pub(super) fn of_pixelnerf(computes: impl Fn(Omission) -> bool, probe_step: u32) -> pixelnerf::Omissions {
+pub(super) fn of_pixelnerf(
+    computes: impl Fn(Omission) -> bool,
+    probe_step: u32,
+    probe_error: f32,
+) -> pixelnerf::Omissions {
     pixelnerf::Omissions {
         unused_views: !computes(Omission::Views),
         latent_layers: !computes(Omission::Layers),
         empty_space: if computes(Omission::Space) { 0 } else { probe_step },
+        probe_error,
         empty_rays: !computes(Omission::Rays),
         empty_parts: !computes(Omission::Parts),
         hidden_samples: !computes(Omission::Hidden),

@@ -49,6 +49,10 @@ pub struct Omissions {
     /// First-pass samples in empty space: a ray in every square of this many pixels on a side is looked at first, and
     /// the others only where the four around them met something. 0 or 1: no.
     pub empty_space: u32,
+    /// How much the probes' colours may change in the root of the mean square, `1` from black to white, if parts of rays
+    /// that stop little light count as empty: the largest share of the light that is no more than that is taken instead of
+    /// [`LEAST_SHARE`]. 0: always [`LEAST_SHARE`].
+    pub probe_error: f32,
     /// Second-pass samples on rays in whose first pass less than [`LEAST_OPACITY`] stopped.
     pub empty_rays: bool,
     /// Second-pass samples in parts of a ray where the first pass, one part to either side included, met nothing.
@@ -58,6 +62,7 @@ pub struct Omissions {
 }
 
 /// A part is empty if it stops less than this share of the light that reaches it: 1/512, half of a half of a level of 256.
+/// Where probes show that more costs little, it is more.
 pub const LEAST_SHARE: f32 = 1.0 / 512.0;
 /// A ray is empty if it stops less than this share of the light.
 pub const LEAST_OPACITY: f32 = 1.0 / 256.0;
@@ -68,6 +73,7 @@ impl Omissions {
         unused_views: false,
         latent_layers: false,
         empty_space: 0,
+        probe_error: 0.0,
         empty_rays: false,
         empty_parts: false,
         hidden_samples: false,
@@ -78,6 +84,7 @@ impl Omissions {
         unused_views: true,
         latent_layers: true,
         empty_space: 4,
+        probe_error: 1.0 / 128.0,
         empty_rays: true,
         empty_parts: true,
         hidden_samples: true,

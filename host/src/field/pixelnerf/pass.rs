@@ -2,6 +2,7 @@
 
 use super::network::{Network, Views, Workspace};
 use super::options::{LEAST_OPACITY, LEAST_SHARE, Omissions, Sampling};
+use super::probes::Seen;
 use crate::device::{Device, Pixels, Rays};
 use crate::field::FieldError;
 use crate::interrupt;
@@ -35,13 +36,6 @@ pub(super) struct Asked {
     pub(super) asked: u64,
 }
 
-/// What was seen of some rays by a first pass: `[ray][part]` of weight and transmittance in front.
-pub(super) struct Seen<D: Device> {
-    values: D::Buffer<[f32; 2]>,
-    columns: u32,
-    rows: u32,
-}
-
 /// Everything that the rays of a target share.
 pub(super) struct Renderer<'a, D: Device> {
     pub(super) device: &'a D,
@@ -57,45 +51,16 @@ pub(super) struct Renderer<'a, D: Device> {
 }
 
 /// Samples of some rays.
-struct Samples<D: Device> {
+pub(super) struct Samples<D: Device> {
     depths: D::Buffer<f32>,
-    values: D::Buffer<[f32; 4]>,
+    /// Colour and optical depth.
+    pub(super) values: D::Buffer<[f32; 4]>,
     count: u32,
 }
 
-type Outcome<T, D> = Result<T, FieldError<<D as crate::device::Memory>::Error>>;
+pub(super) type Outcome<T, D> = Result<T, FieldError<<D as crate::device::Memory>::Error>>;
 
 impl<D: Device> Renderer<'_, D> {
-    /// Looks at one ray in every square of `step` pixels, and at those of the last row and column, by the first pass.
-    pub(super) fn probe(&self, workspace: &mut Workspace<D>, step: u32, asked: &mut Asked) -> Outcome<Seen<D>, D> {
-        let (width, height) = (self.cast.camera.width, self.cast.camera.height);
-        let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
-        let place = |index: u32, side: u32| (index * step).min(side - 1);
-        let pixels: Vec<u32> =
-            (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
-        let count = self.sampling.coarse_count;
-        let mut parts = Vec::new();
-        for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
-            let rays = self.rays(some)?;
-            let samples = self.first_pass(workspace, &rays, None, asked)?;
-            let mut part = self.zeros(some.len() * count as usize)?;
-            self.device.weigh_samples(count, rays.count, &samples.values, &mut part).map_err(FieldError::Device)?;
-            parts.push(part);
-        }
-        // Large pictures: the pieces are put together on the host.
-        let values = match <[_; 1]>::try_from(parts) {
-            Ok([all]) => all,
-            Err(parts) => {
-                let mut all = Vec::with_capacity(pixels.len() * count as usize);
-                for part in &parts {
-                    all.extend(self.device.download(part).map_err(FieldError::Device)?);
-                }
-                self.device.upload(&all).map_err(FieldError::Device)?
-            }
-        };
-        Ok(Seen { values, columns, rows })
-    }
-
     /// The colours and depths (along the rays) of some pixels.
     pub(super) fn render(
         &self,
@@ -128,7 +93,7 @@ impl<D: Device> Renderer<'_, D> {
         let wanted = (empty_rays || empty_parts || hidden_samples).then_some(WantedBlock {
             sample_count: count,
             part_count: coarse.count,
-            least_share: if empty_parts { LEAST_SHARE } else { 0.0 },
+            least_share: if empty_parts { seen.map_or(LEAST_SHARE, |seen| seen.least_share) } else { 0.0 },
             settled: if hidden_samples { self.settled } else { -1.0 },
             least_opacity: if empty_rays { LEAST_OPACITY } else { 0.0 },
             width: self.cast.camera.width,
@@ -141,7 +106,7 @@ impl<D: Device> Renderer<'_, D> {
     }
 
     /// Evenly spread samples; where rays were probed, only those that the probes around a ray want.
-    fn first_pass(
+    pub(super) fn first_pass(
         &self,
         workspace: &mut Workspace<D>,
         rays: &Rays<D>,
@@ -155,7 +120,7 @@ impl<D: Device> Renderer<'_, D> {
             let block = WantedBlock {
                 sample_count: block.sample_count,
                 part_count: block.sample_count,
-                least_share: LEAST_SHARE,
+                least_share: seen.least_share,
                 // What is hidden on the probes' rays is not on a ray that passes beside their surfaces.
                 settled: -1.0,
                 least_opacity: 0.0,
@@ -221,7 +186,7 @@ impl<D: Device> Renderer<'_, D> {
         self.device.composite(&block, &samples.values, &samples.depths, pixels).map_err(FieldError::Device)
     }
 
-    fn rays(&self, pixels: &[u32]) -> Outcome<Rays<D>, D> {
+    pub(super) fn rays(&self, pixels: &[u32]) -> Outcome<Rays<D>, D> {
         let (count, pixel_buffer) = (pixels.len() as u32, self.device.upload(pixels).map_err(FieldError::Device)?);
         let mut rays = Rays { count, pixels: pixel_buffer, rays: self.zeros(pixels.len())? };
         self.device.cast_rays(&self.cast, &mut rays).map_err(FieldError::Device)?;
@@ -237,7 +202,7 @@ impl<D: Device> Renderer<'_, D> {
         Ok(Pixels { colours: self.zeros(count)?, depths: self.zeros(count)? })
     }
 
-    fn zeros<T: crate::device::Element>(&self, count: usize) -> Outcome<D::Buffer<T>, D> {
+    pub(super) fn zeros<T: crate::device::Element>(&self, count: usize) -> Outcome<D::Buffer<T>, D> {
         self.device.zeros(count).map_err(FieldError::Device)
     }
 

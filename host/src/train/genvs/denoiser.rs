@@ -4,13 +4,16 @@
 use super::super::images::dims4;
 use super::super::operations::Window;
 use super::layers::{Layers, convolved};
-use crate::field::genvs::{Block, Denoiser, DenoiserStep, Resampling};
+use crate::checkpoint::TensorShape;
+use crate::field::genvs::{Architecture, Block, COLOUR_CHANNELS, Denoiser, DenoiserStep, Resampling};
 use candle_core::{D, Result, Tensor};
 use std::f64::consts::FRAC_1_SQRT_2;
 use viewfuse_core::math::{exp, ln, sin_cos};
 
 /// What the names of its tensors begin with; the architecture's own names have it already.
 const PREFIX: &str = "denoiser.model.";
+/// Channels of a group of the norms, but in very wide layers.
+const GROUP: usize = 4;
 /// Ratio of the highest frequency of the embedding to the lowest.
 const FREQUENCY_RATIO: f32 = 10_000.0;
 
@@ -46,6 +49,42 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
     }
     let (norm, convolution) = sizes.exit();
     layers.convolved(&convolution.name, &layers.normalised(&norm, &x, true)?, Window::same(3), false)
+}
+
+/// First values of a layer that hands on what it gets: the first convolution, those of the halved inputs, and the shortcuts
+/// of blocks; of other tensors `None`.
+///
+/// As published, the features are scaled down with the noisy picture, at the largest noise level to an eightieth, beside
+/// noise of variance 1. Where layers mix both at random, group norms never bring the features back, and short runs do not
+/// learn that there are any. Here noise and features begin in groups of channels of their own, of [`GROUP`], and stay so
+/// on all shortcuts; the last block's hands on the inputs.
+pub(super) fn handed_on(architecture: &Architecture, tensor: &TensorShape) -> Option<Vec<f32>> {
+    let sizes = architecture.denoiser.as_ref()?;
+    let name = tensor.name.strip_suffix(".weight")?;
+    let &[outputs, inputs, height, width] = tensor.shape.as_slice() else { return None };
+    let blocks: Vec<Block> = sizes.up();
+    let last = blocks.last()?;
+    let takes_inputs = inputs == sizes.in_channels && outputs > GROUP;
+    let input_of = |output: usize| match () {
+        () if name == format!("{}.skip", last.name) => {
+            Some(inputs - last.joined_channels + output % last.joined_channels)
+        }
+        () if name.ends_with(".skip") => Some(output % inputs.min(outputs)),
+        () if name.ends_with("_conv") && !name.ends_with("_aux_conv") || name.ends_with("_aux_residual") => {
+            match takes_inputs {
+                true if output < GROUP => Some(output % COLOUR_CHANNELS),
+                true => Some(COLOUR_CHANNELS + (output - GROUP) % (inputs - COLOUR_CHANNELS)),
+                false => Some(output % inputs),
+            }
+        }
+        () => None,
+    };
+    let mut values = vec![0.0; outputs * inputs * height * width];
+    for output in 0..outputs {
+        let middle = (output * inputs + input_of(output)?) * height * width + height / 2 * width + width / 2;
+        values[middle] = 1.0;
+    }
+    Some(values)
 }
 
 fn block(layers: Layers<'_>, sizes: &Block, image: &Tensor, embedded: &Tensor) -> Result<Tensor> {

@@ -53,7 +53,7 @@ fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -
 #[test]
 fn the_graph_is_the_renderers() {
     let made = made::by_formula(&Architecture::small());
-    let network = Genvs::frozen(&made, DType::F64).expect("a network");
+    let network = Genvs::frozen(&made, 64, DType::F64).expect("a network");
     let field = Field::new(made, GenvsOptions::default()).expect("a network");
     let (sources, target) = (photographs(3, 64), target(64, 2.0));
     let reference = Reference::new(&field, &Cpu, &sources).expect("sources");
@@ -154,7 +154,7 @@ fn looking_has_its_slopes() {
 #[test]
 fn the_loss_has_its_slopes() {
     let made = made::by_formula(&Architecture::narrow(32, 4));
-    let network = Genvs { is_frozen: false, ..Genvs::frozen(&made, DType::F64).expect("a network") };
+    let network = Genvs { is_frozen: false, ..Genvs::frozen(&made, 32, DType::F64).expect("a network") };
     let views = views(&photographs(2, 32), &[target(32, 2.0), target(32, 0.5)], 2);
     let samples = CoarseBlock { seed: [1, 2], sample_count: 4, jitter: 1.0 };
     let weights = variable(&[2, 2], 30);

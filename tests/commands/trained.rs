@@ -1,0 +1,95 @@
+//! The networks and weightings that are in the repository, on an object that none of them was trained on.
+
+use super::done;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use viewfuse_tests::scenes::Folder;
+
+/// Everything is named from the repository's root, as in the README.
+fn repository() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// PSNR by scheme of some targets of the car, from three sources.
+fn scores(network: &str, weightings: &[&str]) -> BTreeMap<String, f64> {
+    let folder = Folder::new();
+    let schemes: String = weightings.iter().map(|scheme| format!(" --weights {scheme}")).collect();
+    let table = folder.path().join("scores.csv");
+    done(
+        &repository(),
+        &format!(
+            "evaluate tests/data/car --sources 16,72,136 --targets 48,104,160,200 --device cpu {network} \
+             --weights mean{schemes} -o {}",
+            table.display()
+        ),
+    );
+    let mut reader = csv::Reader::from_path(&table).expect("a table");
+    let header = reader.headers().expect("a header").clone();
+    let column = |name: &str| header.iter().position(|title| title == name).unwrap_or_else(|| panic!("{header:?}"));
+    let (scheme, psnr) = (column("scheme"), column("psnr_db"));
+    let mut sums: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    for row in reader.records() {
+        let row = row.expect("a row");
+        sums.entry(row[scheme].to_owned()).or_default().push(row[psnr].parse().expect("a number"));
+    }
+    sums.into_iter().map(|(scheme, all)| (scheme, all.iter().sum::<f64>() / all.len() as f64)).collect()
+}
+
+#[test]
+fn networks_beat_the_nearest_copy_with_every_weighting() {
+    // The denoiser called twice: nearly the mean of what it would draw, which is what PSNR asks for.
+    for (model, options, least) in [("pixelnerf_cars", "", 6.0), ("genvs_cars", "--steps 2", 3.0)] {
+        let attention = ["attention", "attention_flat"]
+            .map(|embedding| format!("attention:host/models/{model}_{embedding}.safetensors"));
+        let weightings = ["error:alpha=1", &attention[0], &attention[1]];
+        let scores = scores(&format!("--model host/models/{model}.safetensors {options}"), &weightings);
+        println!("{model}: {scores:.2?}");
+        assert_eq!(scores.len(), 5, "{scores:?}");
+        let copy = scores["nearest copy"];
+        for (scheme, psnr) in scores.iter().filter(|(scheme, _)| *scheme != "nearest copy") {
+            assert!(*psnr > copy + least, "{model}, {scheme}: {psnr:.2} dB, copy {copy:.2} dB");
+        }
+        // Learned weights are not equal ones.
+        assert!(attention.iter().all(|scheme| (scores[scheme] - scores["mean"]).abs() > 1.0e-3), "{scores:?}");
+    }
+}
+
+#[test]
+fn most_samples_are_left_out_and_the_picture_stays() {
+    let folder = Folder::new();
+    let render = |name: &str, options: &str| -> Value {
+        let output = folder.path().join(name);
+        done(
+            &repository(),
+            &format!(
+                "render tests/data/car --model host/models/pixelnerf_cars.safetensors --device cpu --weights mean \
+                 --sources 16,72,136 --targets 48,104 {options} -o {}",
+                output.display()
+            ),
+        );
+        serde_json::from_slice(&std::fs::read(output.join("run.json")).expect("a record")).expect("JSON")
+    };
+    render("exact", "--exact");
+    let record = render("default", "");
+    let samples = record["left_out"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter(|line| line["what"].as_str().is_some_and(|what| what.ends_with("-pass samples")));
+    let [left_out, of] = samples.fold([0.0, 0.0], |[left_out, of], line| {
+        let number = |key: &str| line[key].as_f64().expect("a number");
+        [left_out + number("left_out"), of + number("of")]
+    });
+    println!("{:.1} % of the samples left out", 100.0 * left_out / of);
+    assert!(left_out > 0.85 * of, "{left_out} of {of}");
+    for target in ["000048", "000104"] {
+        let [picture, exact] = ["default", "exact"].map(|name| {
+            image::open(folder.path().join(name).join(format!("{target}.png"))).expect("a picture").to_rgb8()
+        });
+        let squares = picture.as_raw().iter().zip(exact.as_raw()).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+        let psnr = 20.0 * 255.0_f64.log10() - 10.0 * (squares.sum::<f64>() / picture.as_raw().len() as f64).log10();
+        println!("{target}: {psnr:.1} dB to the exact picture");
+        assert!(psnr > 40.0, "{target}: {psnr} dB");
+    }
+}
