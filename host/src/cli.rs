@@ -10,6 +10,7 @@ mod metrics_options;
 mod model;
 mod options;
 mod pareto;
+mod parse;
 mod render;
 mod report;
 mod scenes;

@@ -15,7 +15,7 @@ mod omission;
 pub(crate) use any::{AnyField, Work};
 pub(crate) use genvs::parse_level;
 
-use super::options::parse_share;
+use super::parse::parse_share;
 use super::wrong;
 use anyhow::Context;
 use clap::{Args, ValueEnum};

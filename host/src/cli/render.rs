@@ -1,7 +1,8 @@
 //! `viewfuse render`.
 
 use super::model::{GENVS, ModelOptions, Work, parse_level};
-use super::options::{DeviceOptions, PictureOptions, SourceOptions, parse_count};
+use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::parse::parse_count;
 use super::{on_threads, say};
 use clap::Args;
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};

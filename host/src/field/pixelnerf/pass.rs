@@ -2,7 +2,6 @@
 
 use super::network::{Network, Views, Workspace};
 use super::options::{LEAST_OPACITY, LEAST_SHARE, Omissions, Sampling};
-use super::probes::Seen;
 use crate::device::{Device, Pixels, Rays};
 use crate::field::FieldError;
 use crate::interrupt;
@@ -34,6 +33,16 @@ pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
 pub(super) struct Asked {
     pub(super) samples: u64,
     pub(super) asked: u64,
+}
+
+/// What was seen of some rays by a first pass.
+pub(super) struct Seen<D: Device> {
+    /// `[ray][part]` of weight and transmittance in front.
+    pub(super) values: D::Buffer<[f32; 2]>,
+    pub(super) columns: u32,
+    pub(super) rows: u32,
+    /// A part is empty if it stops less than this share of the light that reaches it.
+    pub(super) least_share: f32,
 }
 
 /// Everything that the rays of a target share.

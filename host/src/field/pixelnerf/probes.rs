@@ -2,7 +2,7 @@
 
 use super::network::Workspace;
 use super::options::LEAST_SHARE;
-use super::pass::{Asked, Outcome, Renderer, rays_at_once};
+use super::pass::{Asked, Outcome, Renderer, Seen, rays_at_once};
 use crate::device::Device;
 use crate::field::FieldError;
 use viewfuse_core::composite::Compositor;
@@ -10,16 +10,6 @@ use viewfuse_core::composite::Compositor;
 /// Shares of the light below which a part of a ray may count as empty, the largest first. After them comes
 /// [`LEAST_SHARE`], which needs no proof.
 const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
-
-/// What was seen of some rays by a first pass.
-pub(super) struct Seen<D: Device> {
-    /// `[ray][part]` of weight and transmittance in front.
-    pub(super) values: D::Buffer<[f32; 2]>,
-    pub(super) columns: u32,
-    pub(super) rows: u32,
-    /// A part is empty if it stops less than this share of the light that reaches it.
-    pub(super) least_share: f32,
-}
 
 impl<D: Device> Renderer<'_, D> {
     /// Looks at one ray in every square of `step` pixels, and at those of the last row and column, by the first pass.

@@ -9,6 +9,7 @@ use crate::field::genvs::{Architecture, Block, COLOUR_CHANNELS, Denoiser, Denois
 use candle_core::{D, Result, Tensor};
 use std::f64::consts::FRAC_1_SQRT_2;
 use viewfuse_core::math::{exp, ln, sin_cos};
+use viewfuse_core::schedule::NoiseSchedule;
 
 /// What the names of its tensors begin with; the architecture's own names have it already.
 const PREFIX: &str = "denoiser.model.";
@@ -55,34 +56,35 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
 /// of blocks; of other tensors `None`.
 ///
 /// As published, the features are scaled down with the noisy picture, at the largest noise level to an eightieth, beside
-/// noise of variance 1. Where layers mix both at random, group norms never bring the features back, and short runs do not
-/// learn that there are any. Here noise and features begin in groups of channels of their own, of [`GROUP`], and stay so
-/// on all shortcuts; the last block's hands on the inputs.
+/// noise of variance 1. Where layers mix both at random, short runs do not learn that there are any features. Here noise and
+/// features begin in groups of channels of their own, of [`GROUP`], and stay so on all shortcuts; the last block's hands on
+/// the inputs. The first group of features, in which the colours are, begins so large that at the largest level, too, it
+/// is there when the last norm has been, and the last convolution can read colours off it from the first step on.
 pub(super) fn handed_on(architecture: &Architecture, tensor: &TensorShape) -> Option<Vec<f32>> {
     let sizes = architecture.denoiser.as_ref()?;
     let name = tensor.name.strip_suffix(".weight")?;
     let &[outputs, inputs, height, width] = tensor.shape.as_slice() else { return None };
-    let blocks: Vec<Block> = sizes.up();
+    let blocks = sizes.up();
     let last = blocks.last()?;
-    let takes_inputs = inputs == sizes.in_channels && outputs > GROUP;
-    let input_of = |output: usize| match () {
-        () if name == format!("{}.skip", last.name) => {
-            Some(inputs - last.joined_channels + output % last.joined_channels)
-        }
-        () if name.ends_with(".skip") => Some(output % inputs.min(outputs)),
-        () if name.ends_with("_conv") && !name.ends_with("_aux_conv") || name.ends_with("_aux_residual") => {
-            match takes_inputs {
-                true if output < GROUP => Some(output % COLOUR_CHANNELS),
-                true => Some(COLOUR_CHANNELS + (output - GROUP) % (inputs - COLOUR_CHANNELS)),
-                false => Some(output % inputs),
-            }
-        }
-        () => None,
-    };
+    let is_last = name.strip_suffix(".skip") == Some(&last.name);
+    let is_convolution = name.ends_with("_conv") && !name.ends_with("_aux_conv") || name.ends_with("_aux_residual");
+    let takes_inputs = is_convolution && inputs == sizes.in_channels && outputs > GROUP;
+    if !(is_convolution || name.ends_with(".skip")) {
+        return None;
+    }
+    let largest = NoiseSchedule::published().level(0, 2);
     let mut values = vec![0.0; outputs * inputs * height * width];
     for output in 0..outputs {
-        let middle = (output * inputs + input_of(output)?) * height * width + height / 2 * width + width / 2;
-        values[middle] = 1.0;
+        let (input, value) = match () {
+            () if is_last => (inputs - last.joined_channels + output % last.joined_channels, 1.0),
+            () if takes_inputs && output < GROUP => (output % COLOUR_CHANNELS, 1.0),
+            () if takes_inputs => {
+                let feature = (output - GROUP) % (inputs - COLOUR_CHANNELS);
+                (COLOUR_CHANNELS + feature, if feature < GROUP { largest } else { 1.0 })
+            }
+            () => (output % inputs, 1.0),
+        };
+        values[((output * inputs + input) * height + height / 2) * width + width / 2] = value;
     }
     Some(values)
 }

@@ -195,3 +195,24 @@ fn an_average_stands_in_for_the_parameters_and_goes_again() {
     assert!(during.iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 1.0e-12), "{during:?}");
     assert_eq!(value(), last);
 }
+
+#[test]
+fn noise_and_features_begin_in_groups_of_their_own() {
+    let network = Genvs::new(Architecture::narrow(32, 16), DType::F32, 1).expect("a network");
+    let taps = |name: &str| -> Vec<[usize; 2]> {
+        let weights = network.parameters.get(&format!("denoiser.model.{name}.weight")).expect("a tensor");
+        let [_, inputs, height, width] = *weights.dims() else { panic!("{:?}", weights.dims()) };
+        let values: Vec<f32> = weights.flatten_all().and_then(|all| all.to_vec1()).expect("numbers");
+        let set = values.iter().enumerate().filter(|(_, value)| **value != 0.0);
+        set.map(|(index, _)| index / (height * width)).map(|pair| [pair / inputs, pair % inputs]).collect()
+    };
+    // One input each; of 19, three are the noisy picture's.
+    for name in ["enc.32x32_conv", "enc.16x16_aux_residual"] {
+        let taps = taps(name);
+        assert_eq!(taps.len(), 16, "{name}: {taps:?}");
+        assert!(taps.iter().all(|[output, input]| (*output < 4) == (*input < 3)), "{name}: {taps:?}");
+    }
+    // The last shortcut takes what the first convolution kept, whose channels come last.
+    let last: Vec<[usize; 2]> = (0..16).map(|channel| [channel, 16 + channel]).collect();
+    assert_eq!(taps("dec.32x32_block1.skip"), last);
+}
