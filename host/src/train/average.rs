@@ -25,7 +25,9 @@ impl Average {
         let decay = self.decay.min((1.0 + f64::from(step)) / (10.0 + f64::from(step)));
         for (name, variable) in parameters.iter() {
             if let Some(average) = self.values.get(name) {
-                let next = ((average.as_tensor() * decay)? + (variable.as_tensor() * (1.0 - decay))?)?;
+                // In this form, what does not change stays what it is, to the bit.
+                let change = (variable.as_tensor() - average.as_tensor())?;
+                let next = (average.as_tensor() + (change * (1.0 - decay))?)?;
                 average.set(&next)?;
             }
         }
