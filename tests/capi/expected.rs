@@ -81,7 +81,7 @@ impl Inputs {
     pub(crate) fn attended(&self, embedding: &FourierEmbedding) -> (String, Vec<u32>) {
         let poses = self.sources[..3].as_flattened().iter().chain(&self.target);
         let weights = cross_attention(embedding, &self.sources_up_to::<8>(3), &pose(&self.target));
-        let bits = weights.values().iter().map(|weight| weight.to_bits()).collect();
+        let bits = weights.values()[..3].iter().map(|weight| weight.to_bits()).collect();
         (poses.map(|number| format!("{:08x}\n", number.to_bits())).collect(), bits)
     }
 
