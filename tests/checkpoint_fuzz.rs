@@ -5,7 +5,7 @@
 use peak_alloc::PeakAlloc;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use viewfuse::checkpoint::{Checkpoint, OPENING_BYTES};
+use viewfuse::nn::checkpoint::{Checkpoint, OPENING_BYTES};
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, snapshot, state_dict};
 
 #[global_allocator]

@@ -13,7 +13,7 @@ mod tensors;
 #[path = "checkpoints/writing.rs"]
 mod writing;
 
-use viewfuse::checkpoint::{Checkpoint, CheckpointError};
+use viewfuse::nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_tests::checkpoints::{Claim, archive, file, legacy, state_dict};
 
 /// Two tensors.

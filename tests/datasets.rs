@@ -1,6 +1,6 @@
 //! Data sets: every way in which their folders are laid out, and what is said where there is none.
 
-use viewfuse::dataset::{Dataset, DatasetError, Split};
+use viewfuse::scene::dataset::{Dataset, DatasetError, Split};
 use viewfuse_tests::scenes::Folder;
 
 /// A folder with scenes: only what is looked at to find them.

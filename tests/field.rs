@@ -10,7 +10,7 @@ mod sample;
 mod worlds;
 
 use viewfuse::field::photo::PhotoField;
-use viewfuse::photographs::SourceImages;
+use viewfuse::scene::photographs::SourceImages;
 use worlds::{Run, assert_shows_an_object, assert_sound, largest_difference, lorry_views, share_within, target};
 
 #[test]
@@ -71,7 +71,7 @@ fn the_order_of_the_sources_is_only_rounding() {
             .images
             .iter()
             .zip(sources.images.iter().cycle().skip(1))
-            .map(|(image, next)| viewfuse::photographs::SourceImage { camera: next.camera, ..image.clone() })
+            .map(|(image, next)| viewfuse::scene::photographs::SourceImage { camera: next.camera, ..image.clone() })
             .collect(),
         ..sources
     };

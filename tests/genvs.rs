@@ -18,9 +18,9 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
 use viewfuse::field::{Field, FieldError, Rendered};
-use viewfuse::photographs::SourceImages;
-use viewfuse::progress::Progress;
-use viewfuse::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::photographs::SourceImages;
+use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
@@ -64,7 +64,7 @@ fn try_picture(
     weights: &SourceWeights,
     target: &Camera,
 ) -> Result<Rendered, FieldError<Infallible>> {
-    let quiet = Progress::hidden();
+    let quiet = Silent;
     let prepared = field.prepare(&Cpu, sources, &quiet)?;
     field.encode(&Cpu, &prepared, &[], &quiet)?;
     field.render(&Cpu, &prepared, &(), weights, target, 0.0, &quiet)

@@ -1,11 +1,11 @@
 //! GeNVS's family of networks: sizes are read off the tensors, and what is no member is refused.
 
 use std::collections::BTreeMap;
-use viewfuse::checkpoint::{Checkpoint, Precision, TensorShape};
 use viewfuse::field::genvs::{
     Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Level, Resampling, group_count, made,
 };
-use viewfuse::formula;
+use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
+use viewfuse::nn::formula;
 
 /// The tensors of a made network, without values as long as nobody changes them.
 struct Tensors {

@@ -6,8 +6,8 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
 use viewfuse::field::{Field, LeftOut, Rendered};
-use viewfuse::photographs::{SourceImage, SourceImages};
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::half::{LARGEST, fetch_half, half_bits, half_value, packed_halves, word_count};
@@ -114,7 +114,7 @@ fn sources() -> SourceImages {
 }
 
 fn picture(field: &Genvs, sources: &SourceImages) -> Rendered {
-    let quiet = Progress::hidden();
+    let quiet = Silent;
     let prepared = field.prepare(&Cpu, sources, &quiet).expect("sources on the device");
     field.encode(&Cpu, &prepared, &[], &quiet).expect("nothing to do");
     field.render(&Cpu, &prepared, &(), &Weights::mean(VIEWS), &target(), 0.0, &quiet).expect("a picture")

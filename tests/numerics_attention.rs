@@ -4,7 +4,7 @@ use serde_json::Value;
 use viewfuse::check::compare::Comparator;
 use viewfuse::check::oracle::{Matrix, WidePose};
 use viewfuse::check::poses::{Random, pose_of};
-use viewfuse::formula;
+use viewfuse::nn::formula;
 use viewfuse_core::attention::{
     EMBEDDING, FlatEmbedding, FourierEmbedding, LearnedCrossAttention, Linear, POSE_FEATURES, PoseEmbedding,
     PoseSelfAttention, cross_attention, learned_cross_attention, pose_self_attention, published_cross_attention,

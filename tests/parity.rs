@@ -19,7 +19,7 @@ use viewfuse::device::Device;
 use viewfuse::device::choice::vulkan_devices;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_vulkan::kernel::{Access, Kernel};
 
@@ -214,7 +214,7 @@ fn a_fault_is_reported(kernel: Kernel) -> Result<(), Failed> {
 /// And no other kernel's; the whole check fails with it.
 fn a_faulty_device_fails_the_check() -> Result<(), Failed> {
     let device = Faulty { kernel: Kernel::FuseViews };
-    let checked = check_device(&device, Role::Other, 1, &Progress::hidden())?;
+    let checked = check_device(&device, Role::Other, 1, &Silent)?;
     let breaches = checked.breaches();
     let others_equal = checked
         .kernels

@@ -2,10 +2,10 @@
 
 use std::convert::Infallible;
 use viewfuse::field::LONGEST_DEFAULT_SIDE;
-use viewfuse::photographs::{Album, BackgroundChoice, reduced_size, scaled_size};
-use viewfuse::progress::Progress;
-use viewfuse::render::{RenderOptions, working_side};
+use viewfuse::field::render::{RenderOptions, working_side};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
+use viewfuse::scene::photographs::{Album, BackgroundChoice, reduced_size, scaled_size};
 use viewfuse_tests::command::toy;
 use viewfuse_tests::scenes;
 
@@ -14,8 +14,8 @@ fn photographs_that_are_not_kept_are_read_when_they_are_needed() {
     let folder = toy();
     let scene = Scene::open(folder.file("toy")).expect("a scene");
     let views: Vec<usize> = (0..6).collect();
-    let kept = Album::open(&scene, views.iter().copied(), &Progress::hidden()).expect("photographs");
-    let none = Album::open(&scene, [], &Progress::hidden()).expect("no photograph");
+    let kept = Album::open(&scene, views.iter().copied(), &Silent).expect("photographs");
+    let none = Album::open(&scene, [], &Silent).expect("no photograph");
     let sources = |album: &Album| album.sources(&views, 48, BackgroundChoice::Auto).expect("sources");
     assert_eq!(sources(&kept), sources(&none));
     let truth = |album: &Album| album.truth(7, [40, 40], [0.25; 3]).expect("a truth");

@@ -10,9 +10,9 @@ mod sizes;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, made};
 use viewfuse::field::{Field, Rendered};
-use viewfuse::photographs::SourceImages;
-use viewfuse::progress::Progress;
-use viewfuse::sources::SourceWeights;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::photographs::SourceImages;
+use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::lorry::{orbit, photographs, target};
@@ -50,7 +50,7 @@ fn picture_with(
     target: &Camera,
     settled: f32,
 ) -> Rendered {
-    let quiet = Progress::hidden();
+    let quiet = Silent;
     let prepared = field.prepare(&Cpu, sources, &quiet).expect("sources on the device");
     field.encode(&Cpu, &prepared, &[], &quiet).expect("latents");
     field.render(&Cpu, &prepared, &(), weights, target, settled, &quiet).expect("a picture")
@@ -109,7 +109,7 @@ fn the_order_of_the_sources_is_only_rounding() {
     let sources = sources(3);
     let reversed = SourceImages { images: sources.images.iter().rev().cloned().collect(), ..sources.clone() };
     let weights = |scores: [f32; 3]| {
-        let mut all = [0.0; viewfuse::sources::MOST_SOURCES];
+        let mut all = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
         all[..3].copy_from_slice(&scores);
         Weights::from_scores(&all, 3)
     };

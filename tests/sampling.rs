@@ -7,7 +7,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;
 use viewfuse::field::genvs::sampling::{Plan, Sampled, Start, Steps, UnknownSampler, sample, sampler_named};
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
 use viewfuse_core::random::normal;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
@@ -26,7 +26,7 @@ fn run(
     mut denoise: impl FnMut(&[f32], f32) -> Vec<f32>,
 ) -> (Outcome, Vec<Vec<f32>>) {
     let mut states = Vec::new();
-    let outcome = sample(&Cpu, plan, COUNT, start, &Progress::hidden(), |state, sigma, denoised| {
+    let outcome = sample(&Cpu, plan, COUNT, start, &Silent, |state, sigma, denoised| {
         states.push(state.clone());
         *denoised = denoise(state, sigma);
         Ok(())
@@ -37,7 +37,7 @@ fn run(
 fn picture(plan: &Plan) -> Sampled<Cpu> {
     let mixture = Mixture::new(3, &[0.2, 0.3, 0.25]);
     let denoise = |state: &_, sigma, denoised: &mut _| mixture.denoise(&Cpu, state, sigma, denoised);
-    sample(&Cpu, plan, COUNT, Start::Noise, &Progress::hidden(), denoise).expect("a picture")
+    sample(&Cpu, plan, COUNT, Start::Noise, &Silent, denoise).expect("a picture")
 }
 
 fn fixed(sampler: Sampler, level_count: u32) -> Plan {
@@ -108,7 +108,7 @@ fn noise_has_the_deviation_of_its_level() {
             denoised.fill(0.0);
             Ok(())
         };
-        sample(&Cpu, &plan, MANY, Start::Noise, &Progress::hidden(), look).expect("a picture");
+        sample(&Cpu, &plan, MANY, Start::Noise, &Silent, look).expect("a picture");
     }
     let within = levels(12).iter().filter(|level| (0.05..=50.0).contains(*level)).count();
     assert_eq!(raised as usize, 2 * within);

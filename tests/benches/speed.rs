@@ -17,12 +17,12 @@ use viewfuse::device::Device;
 use viewfuse::device::choice::vulkan_devices;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::few_shot::{Target, target_of};
 use viewfuse::field::photo::{PhotoField, find_object};
-use viewfuse::photographs::Album;
-use viewfuse::progress::Progress;
-use viewfuse::render::{Frame, RenderOptions, Stage};
+use viewfuse::field::render::{Frame, RenderOptions, Stage};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{Target, target_of};
+use viewfuse::scene::photographs::Album;
 use viewfuse::weighting::Weighting;
 use viewfuse_core::Vec3;
 use viewfuse_core::photo::shade::sample;
@@ -71,10 +71,10 @@ fn weights(criterion: &mut Criterion) {
 fn stages(criterion: &mut Criterion) {
     let scene = Scene::open(Path::new(env!("CARGO_MANIFEST_DIR")).join("data/toy")).expect("the sample scene");
     let sources: Vec<usize> = (0..20).collect();
-    let album = Album::open(&scene, 0..scene.views.len(), &Progress::hidden()).expect("its photographs");
+    let album = Album::open(&scene, 0..scene.views.len(), &Silent).expect("its photographs");
     let options = RenderOptions::default();
     let weighting = Weighting::default_scheme();
-    let progress = Progress::hidden();
+    let progress = Silent;
     let field = PhotoField::default();
     let stage = || Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &progress).expect("prepared");
     let mut group = criterion.benchmark_group("sample scene 128x128, 20 sources");
@@ -129,7 +129,7 @@ fn own_scene(criterion: &mut Criterion) {
     let Some(path) = std::env::var_os("VIEWFUSE_BENCH_SCENE") else { return };
     let scene = Scene::open(Path::new(&path)).expect("the scene of VIEWFUSE_BENCH_SCENE");
     let sources: Vec<usize> = (1..scene.views.len()).collect();
-    let progress = Progress::hidden();
+    let progress = Silent;
     let album = Album::open(&scene, 0..scene.views.len(), &progress).expect("its photographs");
     let pinhole = scene.views[0].camera.pinhole;
     let size = [160, (160.0 * pinhole.height() as f32 / pinhole.width() as f32).round() as u32];
@@ -161,7 +161,7 @@ impl Views<'_> {
     /// From photographs to a picture.
     fn picture<D: Device>(&self, device: &D, target: &Target) -> Frame {
         let Views { scene, album, sources, options, field } = self;
-        let (weighting, progress) = (Weighting::default_scheme(), Progress::hidden());
+        let (weighting, progress) = (Weighting::default_scheme(), Silent);
         let mut stage = Stage::prepare(scene, album, sources, device, *field, options, &progress).expect("prepared");
         let latents = stage.encode(&weighting, &progress).expect("encoded");
         black_box(stage.frame(&weighting, &latents, target, &progress).expect("rendered"))

@@ -39,7 +39,7 @@ fn something_else() {
     assert_refused(&zip(&[], 0), &["a zip archive without data.pkl"]);
     assert_refused(&Pickle::new().raw(b"}").end(), &["a pickle that torch.save did not write"]);
     let folder = tempfile::tempdir().expect("a folder");
-    let message = |path| viewfuse::checkpoint::Checkpoint::open(path).expect_err("must be refused").to_string();
+    let message = |path| viewfuse::nn::checkpoint::Checkpoint::open(path).expect_err("must be refused").to_string();
     assert!(message(folder.path()).contains("no checkpoint: not a file"), "{}", message(folder.path()));
     assert!(message(&folder.path().join("none")).contains("cannot be read: No such file"));
 }

@@ -3,7 +3,7 @@
 use super::{pair, read};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use viewfuse::checkpoint::{Checkpoint, Element};
+use viewfuse::nn::checkpoint::{Checkpoint, Element};
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetensors, state_dict};
 
 /// A file of `tests/data/checkpoints`.

@@ -2,7 +2,7 @@
 
 use super::{assert_refused, pair, read};
 use std::path::PathBuf;
-use viewfuse::checkpoint::Checkpoint;
+use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, snapshot, state_dict};
 
 /// A file of `tests/data/checkpoints`.

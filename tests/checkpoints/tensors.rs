@@ -2,7 +2,7 @@
 
 use super::{assert_claims_refused, assert_refused, pair};
 use std::collections::BTreeMap;
-use viewfuse::checkpoint::{Checkpoint, CheckpointError, TensorShape};
+use viewfuse::nn::checkpoint::{Checkpoint, CheckpointError, TensorShape};
 use viewfuse_tests::checkpoints::safetensors;
 
 fn shapes(names: &[(&str, &[usize])]) -> Vec<TensorShape> {

@@ -4,7 +4,7 @@ use super::pair;
 use safetensors::SafeTensors;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use viewfuse::checkpoint::{Checkpoint, Element, Precision, TensorShape};
+use viewfuse::nn::checkpoint::{Checkpoint, Element, Precision, TensorShape};
 use viewfuse_tests::checkpoints::{archive, file, state_dict};
 
 fn data(name: &str) -> Checkpoint {

@@ -2,7 +2,7 @@
 
 use super::{BINARY, done};
 use std::path::Path;
-use viewfuse::checkpoint::Checkpoint;
+use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse_tests::command::{assert_refused, files_below};
 use viewfuse_tests::scenes::Folder;
 

@@ -4,8 +4,8 @@ use super::{BINARY, done, texts};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use viewfuse::checkpoint::Precision;
 use viewfuse::field::{genvs, pixelnerf};
+use viewfuse::nn::checkpoint::Precision;
 use viewfuse_tests::command::{
     Outcome, assert_refused, assert_wrong_arguments, command, f32_bytes, names_in, safetensors, toy,
 };

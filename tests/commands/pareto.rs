@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
-use viewfuse::pareto::front::best_for_their_time;
+use viewfuse::evaluate::pareto::front::best_for_their_time;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in, toy};
 
 const NETWORK: &str =

@@ -3,7 +3,7 @@
 use crate::worlds::{Run, assert_shows_an_object, assert_sound, ball, ball_views, orbit, source, target, views};
 use image::{Rgba, RgbaImage};
 use viewfuse::field::FieldError;
-use viewfuse::photographs::SourceImages;
+use viewfuse::scene::photographs::SourceImages;
 use viewfuse::synthetic::render;
 use viewfuse_core::camera::Camera;
 

@@ -6,7 +6,7 @@ use crate::worlds::{
 };
 use viewfuse::field::FieldError;
 use viewfuse::field::Rendered;
-use viewfuse::photographs::{SourceImage, SourceImages};
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::toy::lorry;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;

@@ -4,14 +4,14 @@ use image::{Rgba, RgbaImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
+use viewfuse::evaluate::metrics::Metrics;
 use viewfuse::evaluate::{Evaluator, Mean, NEAREST_COPY, PSNR, SSIM, means};
-use viewfuse::few_shot::{Selection, target_of};
 use viewfuse::field::photo::PhotoField;
-use viewfuse::metrics::Metrics;
-use viewfuse::photographs::{Album, BackgroundChoice, PhotographsError, to_rgb8};
-use viewfuse::progress::Progress;
-use viewfuse::render::{Frame, RenderOptions, Stage};
+use viewfuse::field::render::{Frame, RenderOptions, Stage};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{Selection, target_of};
+use viewfuse::scene::photographs::{Album, BackgroundChoice, PhotographsError, to_rgb8};
 use viewfuse::weighting::Weighting;
 use viewfuse_tests::scenes::Folder;
 
@@ -31,7 +31,7 @@ fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {
     let scene = Scene::open(folder).expect("the sample");
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<Weighting> = schemes.iter().map(|name| scheme(name)).collect();
-    let (field, options, quiet) = (PhotoField::default(), RenderOptions::default(), Progress::hidden());
+    let (field, options, quiet) = (PhotoField::default(), RenderOptions::default(), Silent);
     let evaluator = Evaluator {
         weightings: &weightings,
         device: &Cpu,
@@ -100,8 +100,8 @@ fn frame(leave_out: f32) -> (Frame, image::RgbImage) {
     let scene = Scene::open(sample_folder()).expect("the sample");
     let sources: Vec<usize> = (0..20).step_by(3).collect();
     let options = RenderOptions { size: Some([48, 48]), leave_out, ..RenderOptions::default() };
-    let album = Album::open(&scene, 0..24, &Progress::hidden()).expect("photographs");
-    let (field, quiet) = (PhotoField::default(), Progress::hidden());
+    let album = Album::open(&scene, 0..24, &Silent).expect("photographs");
+    let (field, quiet) = (PhotoField::default(), Silent);
     let mut stage = Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &quiet).expect("a stage");
     let weighting = scheme("error:alpha=1");
     let latents = stage.encode(&weighting, &quiet).expect("latents");
@@ -136,7 +136,7 @@ fn a_photograph_of_nothing_is_named() {
     let folder = flattened_sample();
     RgbaImage::from_pixel(128, 128, Rgba([255; 4])).save(folder.file("rgb/000007.png")).expect("a photograph");
     let scene = Scene::open(folder.path()).expect("a scene");
-    let album = Album::open(&scene, 0..20, &Progress::hidden()).expect("photographs");
+    let album = Album::open(&scene, 0..20, &Silent).expect("photographs");
     let sources: Vec<usize> = (0..20).collect();
     match album.sources(&sources, 128, BackgroundChoice::Auto) {
         Err(PhotographsError::NoSilhouette { path, colour }) => {

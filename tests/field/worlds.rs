@@ -4,12 +4,12 @@ use image::RgbaImage;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::photo::PhotoField;
 use viewfuse::field::{Field, FieldError, Rendered};
-use viewfuse::photographs::{SourceImage, SourceImages};
-use viewfuse::progress::Progress;
-use viewfuse::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::toy::{lorry, training_cameras};
 use viewfuse::synthetic::{Finish, Object, Orbit, Part, Placement, Shape, Texture, render};
 use viewfuse::weighting::Weighting;
+use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::Sources;
@@ -39,7 +39,7 @@ impl Run {
         sources: &SourceImages,
         target: &Camera,
     ) -> Result<Rendered, FieldError<std::convert::Infallible>> {
-        let (field, quiet) = (self.field, Progress::hidden());
+        let (field, quiet) = (self.field, Silent);
         let weighting: Weighting = self.scheme.parse().expect("a scheme");
         let prepared = field.prepare(&Cpu, sources, &quiet)?;
         let relevance = relevance(sources, &weighting);

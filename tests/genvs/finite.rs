@@ -2,11 +2,11 @@
 
 use crate::{exact, sources, target, try_picture};
 use std::collections::BTreeMap;
-use viewfuse::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;
 use viewfuse::field::genvs::{Architecture, Genvs, made};
-use viewfuse::photographs::SourceImages;
+use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
+use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::weights::Weights;
 
 /// Times this, every weight is finite still; what becomes of numbers that meet several of them is not.

@@ -27,7 +27,7 @@ fn a_person_need_not_wait_for_the_picture() {
 }
 
 fn interrupted() {
-    viewfuse::interrupt::listen().expect("no other handler");
+    viewfuse::job::interrupt::listen().expect("no other handler");
     let start = Instant::now();
     spawn(|| {
         sleep(Duration::from_millis(300));

@@ -9,7 +9,7 @@ use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Genvs, GenvsOptions, Omissions};
 use viewfuse::field::{Field, LeftOut};
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
@@ -56,7 +56,7 @@ fn rows_that_no_ray_reaches_are_not_computed() {
         Camera { pinhole, ..camera }
     };
     let targets = [part(16.0, 8), part(-12.0, 4), part(16.0, 32)];
-    let quiet = Progress::hidden();
+    let quiet = Silent;
     let with = |omissions| {
         let field = without_denoiser(leaving_out(omissions));
         let prepared = field.prepare(&Cpu, &sources, &quiet).expect("sources on the device");
@@ -87,7 +87,7 @@ fn an_earlier_frame_saves_calls() {
             ..viewfuse_tests::lorry::orbit(16).camera(2.02, 0.35).expect("a camera")
         },
     ];
-    let quiet = Progress::hidden();
+    let quiet = Silent;
     let frames = |reuse| {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
         let field = made(GenvsOptions { plan: Plan { settled: None, ..in_18_calls() }, ..options });

@@ -2,7 +2,7 @@
 
 use crate::{assert_sound, exact, made, picture, target};
 use viewfuse::field::genvs::GenvsOptions;
-use viewfuse::photographs::{SourceImage, SourceImages};
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_tests::lorry::photographs;
 

@@ -3,8 +3,8 @@
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use viewfuse::check::verify::verify;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::verify::verify;
 
 /// A tensor: its type, its shape, its bytes.
 type Tensor = (Dtype, Vec<usize>, Vec<u8>);

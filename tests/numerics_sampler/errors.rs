@@ -4,7 +4,7 @@ use crate::walk::{published, row, start, walk};
 use viewfuse::device::Memory;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Sampled, Start, Steps, sample};
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_tests::mixture::{DIMENSIONS, Mixture, distance};
 
@@ -34,7 +34,7 @@ fn error(sampler: Sampler, calls: u32, mixture: &Mixture, truth: &[f64]) -> f64 
 fn on_cpu(plan: &Plan, mixture: &Mixture) -> (Vec<f64>, Sampled<Cpu>) {
     let denoise = |state: &_, sigma, denoised: &mut _| mixture.denoise(&Cpu, state, sigma, denoised);
     let count = start(80.0).len();
-    let sampled = sample(&Cpu, plan, count, Start::Noise, &Progress::hidden(), denoise).expect("a picture");
+    let sampled = sample(&Cpu, plan, count, Start::Noise, &Silent, denoise).expect("a picture");
     let picture = Cpu.download(&sampled.picture).expect("the CPU").into_iter().map(f64::from).collect();
     (picture, sampled)
 }

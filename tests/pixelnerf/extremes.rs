@@ -2,7 +2,7 @@
 
 use crate::{assert_sound, body, exact, leaving_out, mist, orbit, picture, picture_with, sources, target};
 use viewfuse::field::pixelnerf::{Omissions, PixelNerfOptions};
-use viewfuse::photographs::SourceImages;
+use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
@@ -28,7 +28,7 @@ fn one_source_looks_as_far_as_several() {
 #[test]
 fn a_target_that_is_a_source() {
     let sources = sources(3);
-    let mut scores = [0.0; viewfuse::sources::MOST_SOURCES];
+    let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
     scores[1] = 1.0;
     let camera = Camera { pinhole: orbit(12).pinhole, ..sources.images[1].camera };
     assert_sound(&picture_with(&mist(exact()), &sources, &Weights::from_scores(&scores, 3), &camera, 0.0));

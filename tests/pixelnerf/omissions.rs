@@ -4,7 +4,7 @@ use crate::{body, exact, largest_difference, leaving_out, mist, picture, picture
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions};
 use viewfuse::field::{Field, LeftOut, Rendered};
-use viewfuse::sources::MOST_SOURCES;
+use viewfuse::weighting::sources::MOST_SOURCES;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::weights::Weights;
 

@@ -2,8 +2,8 @@
 
 use crate::{assert_sound, exact, picture, sources, target};
 use std::collections::BTreeMap;
-use viewfuse::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::field::pixelnerf::{Architecture, Level, PixelNerf, made};
+use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 
 fn with_changes(change: impl FnOnce(&mut Vec<(TensorShape, Vec<f32>)>)) -> Checkpoint {
     let made = made::by_formula(&Architecture::small(16));

@@ -2,9 +2,9 @@
 
 use std::collections::HashSet;
 use std::path::Path;
-use viewfuse::protocol::{Draws, Job, Plan, Protocol, ProtocolError};
-use viewfuse::rig::Rig;
+use viewfuse::evaluate::protocol::{Draws, Job, Plan, Protocol, ProtocolError};
 use viewfuse::scene::Scene;
+use viewfuse::scene::rig::Rig;
 use viewfuse_tests::command::toy;
 
 const DRAWS: Draws = Draws { seed: 7, trial_count: 5, target_count: 4 };

@@ -1,9 +1,9 @@
 //! Tables over scenes, against sums by hand.
 
 use std::time::Duration;
+use viewfuse::evaluate::run_folder::Finished;
+use viewfuse::evaluate::summary::{Table, tables};
 use viewfuse::evaluate::{NEAREST_COPY, PSNR, SSIM, Score};
-use viewfuse::run_folder::Finished;
-use viewfuse::summary::{Table, tables};
 
 /// A job of a scene: PSNR and SSIM of the copy, the mean and another scheme.
 fn job(number: usize, scene: usize, source_count: usize, values: [[f64; 2]; 3]) -> Finished {

@@ -1,6 +1,6 @@
 //! Photographs of the lorry in memory, as fields are given them, and cameras around it.
 
-use viewfuse::photographs::{SourceImage, SourceImages};
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
 

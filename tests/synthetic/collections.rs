@@ -3,8 +3,8 @@
 use super::folders::assert_poses;
 use std::fs;
 use std::path::Path;
-use viewfuse::dataset::{Dataset, Split};
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::dataset::{Dataset, Split};
 use viewfuse::scene::{Layout, Scene};
 use viewfuse::synthetic::cameras::{random_views, sphere, spiral_views};
 use viewfuse::synthetic::collection::{Made, MakeError, ObjectCounts, RAYS_PER_SIDE, Settings, make};
@@ -18,7 +18,7 @@ fn settings() -> Settings {
 }
 
 fn made(out: &Path, settings: &Settings, counts: ObjectCounts) -> Result<Made, MakeError> {
-    make(out, Kind::Toys, settings, counts, &Progress::hidden())
+    make(out, Kind::Toys, settings, counts, &Silent)
 }
 
 #[test]

@@ -4,13 +4,13 @@ use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
 use std::error::Error;
 use std::path::Path;
+use viewfuse::check::verify::verify;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
 use viewfuse::field::{Field, FieldError};
-use viewfuse::progress::Progress;
-use viewfuse::verify::verify;
+use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::lorry::{photographs, target};
@@ -55,10 +55,10 @@ fn picture<D: Device>(
     let plan = Plan { steps, ..Plan::published(0) };
     let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
     let field = Genvs::new(made::by_formula(&architecture), options)?;
-    let quiet = Progress::hidden();
+    let quiet = Silent;
     let prepared = field.prepare(device, &photographs(3, 30), &quiet)?;
     field.encode(device, &prepared, &[], &quiet)?;
-    let mut scores = [0.0; viewfuse::sources::MOST_SOURCES];
+    let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
     (scores[0], scores[2]) = (0.7, 0.3);
     let weights = Weights::from_scores(&scores, 3);
     Ok(field.render(device, &prepared, &(), &weights, &target(22), 0.0, &quiet)?.colours)

@@ -6,7 +6,7 @@ use crate::picture::{KERNELS, Rendering, SIDE, SOURCE_COUNT};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use viewfuse::field::FieldError;
-use viewfuse::render::RenderError;
+use viewfuse::field::render::RenderError;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{GpuOptions, Limits, VulkanError};

@@ -9,11 +9,11 @@ use viewfuse::check::picture::compare;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::few_shot::Selection;
 use viewfuse::field::photo::PhotoField;
-use viewfuse::progress::Progress;
-use viewfuse::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::Selection;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Tally, VulkanError};
 
@@ -53,7 +53,7 @@ impl Rendering {
             rendering.depths.push(frame.depths);
             Ok(())
         };
-        render(&scene, &job, &weighting, device, &PhotoField::default(), &options, &Progress::hidden(), keep)?;
+        render(&scene, &job, &weighting, device, &PhotoField::default(), &options, &Silent, keep)?;
         Ok(rendering)
     }
 

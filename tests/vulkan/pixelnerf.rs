@@ -3,14 +3,14 @@
 use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
 use std::path::Path;
+use viewfuse::check::verify::verify;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::few_shot::Selection;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, made};
-use viewfuse::progress::Progress;
-use viewfuse::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
-use viewfuse::verify::verify;
+use viewfuse::scene::few_shot::Selection;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
 pub(crate) const TESTS: &[Test] = &[
@@ -52,7 +52,7 @@ fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>,
         Ok(())
     };
     let weighting = "error:alpha=1".parse().expect("a scheme");
-    render(&scene, &job, &weighting, device, &field, &options, &Progress::hidden(), keep)?;
+    render(&scene, &job, &weighting, device, &field, &options, &Silent, keep)?;
     Ok(colours)
 }
 

@@ -5,7 +5,7 @@ use libtest_mimic::Failed;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Memory};
 use viewfuse::field::genvs::sampling::{Plan, Sampled, Start, Steps, sample};
-use viewfuse::progress::Progress;
+use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_tests::mixture::Mixture;
@@ -23,7 +23,7 @@ const TOLERANCE: f32 = 4.0e-4;
 fn sampled<D: Device>(device: &D, plan: &Plan) -> Result<Sampled<D>, Failed> {
     let mixture = Mixture::new(3, &[0.2, 0.3, 0.25]);
     let denoise = |state: &_, sigma, denoised: &mut _| mixture.denoise(device, state, sigma, denoised);
-    let sampled = sample(device, plan, COUNT, Start::Noise, &Progress::hidden(), denoise);
+    let sampled = sample(device, plan, COUNT, Start::Noise, &Silent, denoise);
     sampled.map_err(|error| format!("{error:?}").into())
 }
 

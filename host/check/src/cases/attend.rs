@@ -1,0 +1,89 @@
+//! [`Kernel::Attend`]: softmax of products of random embeddings, from nearly equal weights to one that has all.
+
+use crate::agreement::Limits;
+use crate::attention_oracle::attend;
+use crate::bounded::Bounded;
+use crate::case::{Case, Spoiler};
+use crate::poses::{numbers, random};
+use rayon::prelude::*;
+use viewfuse_core::attention::EMBEDDING;
+use viewfuse_core::weighting::MOST_WEIGHED;
+use viewfuse_device::Device;
+use viewfuse_vulkan::kernel::Kernel;
+
+/// A dispatch.
+#[derive(Clone, Debug)]
+pub struct Job {
+    source_count: u32,
+    queries: Vec<f32>,
+    keys: Vec<f32>,
+}
+
+/// See the module.
+pub enum Attend {}
+
+impl Case for Attend {
+    const KERNEL: Kernel = Kernel::Attend;
+    const LIMITS: Limits = Limits { tolerance: 3.0e-5, least: 1.0e-30 };
+    const REASON: &'static str = "an error of a logit is a relative error of its weight: differences from the largest \
+        logit, five roundings, then the exponential";
+    const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
+        ("queries", |jobs| jobs.iter_mut().for_each(|job| job.queries[0] *= 1.01)),
+        ("keys", |jobs| jobs.iter_mut().for_each(|job| job.keys[5] *= 1.01)),
+    ];
+
+    type Inputs = Vec<Job>;
+    type Loaded<D: Device> = Vec<(D::Buffer<f32>, D::Buffer<f32>, D::Buffer<f32>)>;
+
+    fn inputs(seed: u64, size: u32) -> Vec<Job> {
+        let random = &mut random(2, seed, size);
+        let first = seed as usize * 5 + size as usize;
+        let job = |(index, scale): (usize, f64)| {
+            let source_count = (first + 11 * index) % MOST_WEIGHED + 1;
+            Job {
+                source_count: source_count as u32,
+                queries: numbers(size as usize * EMBEDDING, || scale * random.normal()),
+                keys: numbers(source_count * EMBEDDING, || scale * random.normal()),
+            }
+        };
+        [0.1, 0.5, 1.0, 2.0].into_iter().enumerate().map(job).collect()
+    }
+
+    fn element_count(jobs: &Vec<Job>) -> usize {
+        jobs.iter().map(|job| job.queries.len() / EMBEDDING).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+        let load = |job: &Job| {
+            let weights = device.zeros(job.queries.len() / EMBEDDING * MOST_WEIGHED)?;
+            Ok((device.upload(&job.queries)?, device.upload(&job.keys)?, weights))
+        };
+        jobs.iter().map(load).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, (queries, keys, weights))| device.attend(job.source_count, queries, keys, weights))
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        let rows: Vec<Vec<f32>> =
+            loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
+        Ok(rows.concat())
+    }
+
+    fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
+        let row = |job: &Job, query: &[f32]| {
+            let mut row = [Some(Bounded::ZERO); MOST_WEIGHED];
+            row.iter_mut().zip(attend(query, &job.keys)).for_each(|(place, weight)| *place = Some(weight));
+            row
+        };
+        jobs.iter()
+            .flat_map(|job| {
+                let rows: Vec<_> = job.queries.par_chunks_exact(EMBEDDING).map(|query| row(job, query)).collect();
+                rows.into_iter().flatten()
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,262 @@
+//! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, addends and outputs that are
+//! some of the channels of wider images, all that a convolution can be told. Behind what is read lies NaN, beside what is
+//! written nothing may change.
+
+use super::layers::{Counts, Job, LoadedJob, Product, read, spoil};
+use crate::agreement::Limits;
+use crate::bounded::Bounded;
+use crate::case::{Case, Spoiler};
+use crate::network_oracle;
+use crate::poses::{Random, random};
+use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_device::Device;
+use viewfuse_vulkan::kernel::{Kernel, tile_elements};
+
+/// What a layer of convolutions is like.
+#[derive(Clone, Copy)]
+struct Window {
+    size: u32,
+    stride: u32,
+    padding: u32,
+    dilation: u32,
+    enlarge: u32,
+    channels: [u32; 2],
+    /// Whether images are channels of wider ones.
+    is_part: bool,
+    /// Whether the layer is for large images.
+    is_wide: bool,
+}
+
+impl Window {
+    const fn new([size, stride, padding]: [u32; 3], channels: [u32; 2]) -> Window {
+        Window { size, stride, padding, dilation: 1, enlarge: 1, channels, is_part: false, is_wide: false }
+    }
+
+    const fn wide(padding: u32, enlarge: u32, channels: [u32; 2], is_part: bool) -> Window {
+        Window { enlarge, is_part, is_wide: true, ..Window::new([3, 1, padding], channels) }
+    }
+}
+
+/// The first layer of a residual network and its others, a lone pixel, more border than image; gaps, enlarged images, parts
+/// of wider ones; layers for large images, which on small ones are right as well.
+const WINDOWS: [Window; 15] = [
+    Window::new([7, 2, 3], [3, 64]),
+    Window::new([3, 1, 1], [5, 7]),
+    Window::new([3, 2, 1], [16, 65]),
+    Window::new([1, 2, 0], [9, 3]),
+    Window::new([3, 1, 1], [1, 1]),
+    Window::new([2, 1, 2], [3, 2]),
+    Window::new([3, 1, 1], [64, 64]),
+    Window { dilation: 6, is_part: true, ..Window::new([3, 1, 6], [4, 5]) },
+    Window { enlarge: 2, is_part: true, ..Window::new([3, 1, 1], [6, 3]) },
+    Window { is_part: true, ..Window::new([1, 1, 0], [33, 17]) },
+    Window { dilation: 2, enlarge: 3, ..Window::new([2, 2, 1], [2, 70]) },
+    Window::wide(1, 1, [3, 5], false),
+    Window::wide(1, 1, [37, 33], true),
+    Window::wide(0, 2, [5, 2], true),
+    Window::wide(3, 1, [1, 18], false),
+];
+
+/// Numbers between the pixels of images that are parts of wider ones, and in front of the first.
+fn gap(random: &mut Random, is_part: bool) -> u32 {
+    if is_part { 1 + random.below(5) as u32 } else { 0 }
+}
+
+/// Whether a number of an image's buffer is one of these channels: pixel and channel.
+fn place(index: usize, first: u32, pitch: u32, channels: u32) -> Option<[usize; 2]> {
+    let index = index.checked_sub(first as usize)?;
+    let (pixel, channel) = (index / pitch as usize, index % pitch as usize);
+    (channel < channels as usize).then_some([pixel, channel])
+}
+
+/// See the module.
+pub enum Convolve {}
+
+impl Case for Convolve {
+    const KERNEL: Kernel = Kernel::Convolve;
+    const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-2 };
+    const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n summands, in whatever order; of layers for \
+        large images channels + 14 units of the magnitudes in Winograd's transforms, whose factors come to about 10^2";
+    const SPOILERS: &'static [Spoiler<Vec<Job<ConvolveBlock>>>] = &[
+        ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
+        ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
+        ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
+        ("addend", |jobs| spoil(jobs, |job| job.addend.as_deref_mut().unwrap_or_default())),
+        ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.scale *= 1.01)),
+    ];
+
+    type Inputs = Vec<Job<ConvolveBlock>>;
+    type Loaded<D: Device> = Vec<LoadedJob<D>>;
+
+    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+        let random = &mut random(18, seed, size);
+        let job = |(index, window): (usize, Window)| {
+            let Window { size: side, stride, padding, dilation, enlarge, channels, is_part, is_wide } = window;
+            let [in_channels, out_channels] = channels;
+            // About as many output numbers as asked for; the window is never larger than image and border.
+            let pixel_count = f64::from(size * stride * stride) / f64::from(out_channels * enlarge * enlarge);
+            let reach = (side - 1) * dilation + 1;
+            let least = reach.saturating_sub(2 * padding).max(1).div_ceil(enlarge);
+            let in_width = (pixel_count.sqrt() as u32 + random.below(3) as u32).max(least);
+            let in_height = ((pixel_count / f64::from(in_width)) as u32 + random.below(3) as u32).max(least);
+            let out = |inner: u32| (inner * enlarge + 2 * padding - reach) / stride + 1;
+            let flags = index as u64 + seed;
+            let [in_gap, out_gap, addend_gap] = [0, 1, 2].map(|_| gap(random, is_part));
+            // Of some layers all pixels have the same addend.
+            let is_shared = flags.is_multiple_of(3);
+            let block = ConvolveBlock {
+                in_height,
+                in_width,
+                in_channels,
+                in_pitch: in_channels + 2 * in_gap,
+                in_first: in_gap,
+                enlarge,
+                out_height: out(in_height),
+                out_width: out(in_width),
+                out_channels,
+                out_pitch: out_channels + 2 * out_gap,
+                out_first: out_gap,
+                size: side,
+                stride,
+                dilation,
+                padding,
+                scale: if flags.is_multiple_of(5) { 0.7 } else { 1.0 },
+                relu_outputs: flags as u32 & 1,
+                // Whether there is one a device sees for itself.
+                has_addend: 0,
+                addend_pitch: if is_shared { 0 } else { out_channels + 2 * addend_gap },
+                addend_first: addend_gap,
+            };
+            let addend_pixels = if is_shared { 0 } else { block.pixel_count() - 1 };
+            let addend_count = addend_gap + addend_pixels * block.addend_pitch + out_channels;
+            let counts = Counts {
+                inputs: (in_height * in_width * block.in_pitch) as usize,
+                inner: block.patch_len() as usize,
+                columns: out_channels as usize,
+                bias: out_channels as usize,
+                addend: (flags >> 1 & 1 == 1).then_some(addend_count as usize),
+                outputs: (block.pixel_count() * block.out_pitch) as usize,
+            };
+            Job { has_wide_images: is_wide, ..Job::new(random, block, counts) }
+        };
+        WINDOWS.into_iter().enumerate().map(job).collect()
+    }
+
+    fn element_count(jobs: &Self::Inputs) -> usize {
+        jobs.iter().map(|job| tile_elements(job.block.pixel_count(), job.block.out_channels) as usize).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+        jobs.iter().map(|job| job.load(device, job.block.out_channels)).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
+            device.convolve(&job.block, inputs, layer, addend.as_ref(), outputs)
+        })
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        read(device, loaded)
+    }
+
+    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
+        let outputs = |job: &Job<ConvolveBlock>| {
+            let block = &job.block;
+            job.expected(|layer, index| {
+                let [pixel, channel] = place(index, block.out_first, block.out_pitch, block.out_channels)?;
+                Some(match job.has_wide_images {
+                    true => network_oracle::convolve_wide(layer, block, pixel, channel),
+                    false => network_oracle::convolve(layer, block, pixel, channel),
+                })
+            })
+        };
+        jobs.iter().flat_map(outputs).collect()
+    }
+}
+
+/// See the module.
+pub enum ConvolveTransposed {}
+
+impl Case for ConvolveTransposed {
+    const KERNEL: Kernel = Kernel::ConvolveTransposed;
+    const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
+    const REASON: &'static str = Product::REASON;
+    const SPOILERS: &'static [Spoiler<Vec<Job<TransposedBlock>>>] = &[
+        ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
+        ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
+        ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
+    ];
+
+    type Inputs = Vec<Job<TransposedBlock>>;
+    type Loaded<D: Device> = Vec<LoadedJob<D>>;
+
+    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+        let random = &mut random(21, seed, size);
+        let job = |(index, [size_of_square, in_channels, out_channels, part]): (usize, [u32; 4])| {
+            let pixel_count = f64::from(size) / f64::from(size_of_square * size_of_square * out_channels);
+            let in_width = pixel_count.sqrt() as u32 + 1 + random.below(3) as u32;
+            let in_height = (pixel_count / f64::from(in_width)) as u32 + 1 + random.below(3) as u32;
+            let [in_gap, out_gap] = [0, 1].map(|_| gap(random, part == 1));
+            let block = TransposedBlock {
+                in_height,
+                in_width,
+                in_channels,
+                in_pitch: in_channels + 2 * in_gap,
+                in_first: in_gap,
+                out_channels,
+                out_pitch: out_channels + 2 * out_gap,
+                out_first: out_gap,
+                size: size_of_square,
+                relu_outputs: (index as u64 + seed) as u32 & 1,
+            };
+            let out_pixels = block.pixel_count() * size_of_square * size_of_square;
+            let counts = Counts {
+                inputs: (block.pixel_count() * block.in_pitch) as usize,
+                inner: in_channels as usize,
+                columns: block.column_count() as usize,
+                bias: out_channels as usize,
+                addend: None,
+                outputs: (out_pixels * block.out_pitch) as usize,
+            };
+            Job::new(random, block, counts)
+        };
+        // Side of the square, channels, whether images are parts of wider ones.
+        [[2, 5, 3, 0], [2, 64, 17, 1], [1, 3, 70, 0], [3, 130, 8, 1], [2, 1, 1, 0]]
+            .into_iter()
+            .enumerate()
+            .map(job)
+            .collect()
+    }
+
+    fn element_count(jobs: &Self::Inputs) -> usize {
+        jobs.iter().map(|job| tile_elements(job.block.pixel_count(), job.block.column_count()) as usize).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+        jobs.iter().map(|job| job.load(device, job.block.column_count())).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, outputs, .. })| {
+            device.convolve_transposed(&job.block, inputs, layer, outputs)
+        })
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        read(device, loaded)
+    }
+
+    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
+        let outputs = |job: &Job<TransposedBlock>| {
+            let block = &job.block;
+            job.expected(|layer, index| {
+                let [pixel, channel] = place(index, block.out_first, block.out_pitch, block.out_channels)?;
+                let out_width = (block.in_width * block.size) as usize;
+                Some(network_oracle::transposed(layer, block, [pixel / out_width, pixel % out_width], channel))
+            })
+        };
+        jobs.iter().flat_map(outputs).collect()
+    }
+}

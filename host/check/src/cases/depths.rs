@@ -1,0 +1,150 @@
+//! [`Kernel::CoarseDepths`] and [`Kernel::DrawChances`]: what only seeds, pixels and rays decide.
+
+use crate::agreement::Limits;
+use crate::bounded::Bounded;
+use crate::case::{Case, Spoiler};
+use crate::poses::random;
+use crate::ray_oracle;
+use crate::sights::{load_rays, pixels, ray};
+use viewfuse_core::depths::{CoarseBlock, FineBlock};
+use viewfuse_core::rays::TargetRay;
+use viewfuse_device::{Device, Rays};
+use viewfuse_vulkan::kernel::Kernel;
+
+/// Rays, and how to look along them.
+#[derive(Clone, Debug)]
+pub struct Job<B> {
+    block: B,
+    pixels: Vec<u32>,
+    rays: Vec<TargetRay>,
+}
+
+impl<B> Job<B> {
+    fn spoil_pixels(&mut self) {
+        self.pixels.iter_mut().for_each(|pixel| *pixel = *pixel * 101 / 100);
+    }
+}
+
+/// See the module.
+pub enum CoarseDepths {}
+
+impl Case for CoarseDepths {
+    const KERNEL: Kernel = Kernel::CoarseDepths;
+    const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
+    const REASON: &'static str = "a share of the interval: five roundings and a division, then its product and sum";
+    const SPOILERS: &'static [Spoiler<Vec<Job<CoarseBlock>>>] = &[
+        ("rays", |jobs| jobs.iter_mut().for_each(|job| job.rays.iter_mut().for_each(|ray| ray.far *= 1.01))),
+        ("pixels", |jobs| jobs.iter_mut().for_each(Job::spoil_pixels)),
+        ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.jitter *= 1.01)),
+    ];
+
+    type Inputs = Vec<Job<CoarseBlock>>;
+    type Loaded<D: Device> = Vec<(Rays<D>, D::Buffer<f32>)>;
+
+    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+        let random = &mut random(7, seed, size);
+        let job = |(sample_count, jitter): (u32, f32)| {
+            let count = size.div_ceil(sample_count);
+            let seed = [random.below(1 << 32) as u32, random.below(1 << 32) as u32];
+            let block = CoarseBlock { seed, sample_count, jitter };
+            Job { block, pixels: pixels(random, count), rays: (0..count).map(|_| ray(random)).collect() }
+        };
+        [(1, 1.0), (7, 0.5), (64, 1.0), (64, 0.0)].map(job).to_vec()
+    }
+
+    fn element_count(jobs: &Self::Inputs) -> usize {
+        jobs.iter().map(|job| job.rays.len() * job.block.sample_count as usize).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+        let load = |job: &Job<CoarseBlock>| {
+            let depths = device.zeros(job.rays.len() * job.block.sample_count as usize)?;
+            Ok((load_rays(device, &job.pixels, &job.rays)?, depths))
+        };
+        jobs.iter().map(load).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter().zip(loaded).try_for_each(|(job, (rays, depths))| device.coarse_depths(&job.block, rays, depths))
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        let depths: Vec<Vec<f32>> =
+            loaded.iter().map(|(_, depths)| device.download(depths)).collect::<Result<_, _>>()?;
+        Ok(depths.concat())
+    }
+
+    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
+        let mut expected = Vec::new();
+        for Job { block, pixels, rays } in jobs {
+            for (ray, pixel) in rays.iter().zip(pixels) {
+                let depth = |sample| Some(ray_oracle::coarse_depth(ray, *pixel, sample, block));
+                expected.extend((0..block.sample_count).map(depth));
+            }
+        }
+        expected
+    }
+}
+
+/// See the module.
+pub enum DrawChances {}
+
+impl Case for DrawChances {
+    const KERNEL: Kernel = Kernel::DrawChances;
+    const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
+    const REASON: &'static str = "an addition and a division; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
+        9e-8 of the cosine, two roundings of its argument of up to a turn";
+    const SPOILERS: &'static [Spoiler<Vec<Job<FineBlock>>>] =
+        &[("pixels", |jobs| jobs.iter_mut().for_each(Job::spoil_pixels))];
+
+    type Inputs = Vec<Job<FineBlock>>;
+    type Loaded<D: Device> = Vec<(Rays<D>, D::Buffer<[f32; 2]>)>;
+
+    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+        let random = &mut random(8, seed, size);
+        let job = |(coarse_count, importance_count, depth_count): (u32, u32, u32)| {
+            let count = size.div_ceil(importance_count + depth_count);
+            let seed = [random.below(1 << 32) as u32, random.below(1 << 32) as u32];
+            let block = FineBlock { seed, coarse_count, importance_count, depth_count, ..FineBlock::default() };
+            Job { block, pixels: pixels(random, count), rays: vec![TargetRay::default(); count as usize] }
+        };
+        [(64, 16, 16), (64, 0, 3), (1, 1, 0), (17, 128, 5)].map(job).to_vec()
+    }
+
+    fn element_count(jobs: &Self::Inputs) -> usize {
+        jobs.iter().map(|job| job.rays.len() * job.block.fine_count() as usize).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+        let load = |job: &Job<FineBlock>| {
+            let chances = device.zeros(job.rays.len() * job.block.fine_count() as usize)?;
+            Ok((load_rays(device, &job.pixels, &job.rays)?, chances))
+        };
+        jobs.iter().map(load).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter().zip(loaded).try_for_each(|(job, (rays, chances))| device.draw_chances(&job.block, rays, chances))
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        let mut values = Vec::new();
+        for (_, chances) in loaded {
+            values.extend(device.download(chances)?.into_flattened());
+        }
+        Ok(values)
+    }
+
+    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
+        let chances = |job: &Job<FineBlock>| {
+            let block = job.block;
+            let indices =
+                job.pixels.iter().flat_map(move |pixel| (0..block.fine_count()).map(move |index| (*pixel, index)));
+            indices
+                .flat_map(move |(pixel, index)| ray_oracle::draw_chance(pixel, index, &block))
+                .map(Some)
+                .collect::<Vec<_>>()
+        };
+        jobs.iter().flat_map(chances).collect()
+    }
+}

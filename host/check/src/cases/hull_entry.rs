@@ -1,0 +1,50 @@
+//! [`Kernel::HullEntry`]: every pixel of every view of a small world.
+
+use crate::agreement::Limits;
+use crate::bounded::Bounded;
+use crate::case::{Case, Spoiler};
+use crate::photo_oracle;
+use crate::world::World;
+use rayon::prelude::*;
+use viewfuse_device::{Device, PhotoScene};
+use viewfuse_vulkan::kernel::Kernel;
+
+/// See the module.
+pub enum HullEntry {}
+
+impl Case for HullEntry {
+    const KERNEL: Kernel = Kernel::HullEntry;
+    const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
+    const REASON: &'static str = "up to 60 additions of a step to a depth of 3";
+    const SPOILERS: &'static [Spoiler<World>] =
+        &[("object", World::spoil_box), ("views", World::spoil_focal), ("texels", World::spoil_texels)];
+
+    type Inputs = World;
+    type Loaded<D: Device> = (PhotoScene<D>, D::Buffer<f32>);
+
+    fn inputs(seed: u64, size: u32) -> World {
+        World::of_size(seed, size)
+    }
+
+    fn element_count(world: &World) -> usize {
+        world.texels.len()
+    }
+
+    fn load<D: Device>(device: &D, world: &World) -> Result<Self::Loaded<D>, D::Error> {
+        Ok((world.load(device)?, device.zeros(world.texels.len())?))
+    }
+
+    fn run<D: Device>(device: &D, world: &World, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        (0..world.object.view_count).try_for_each(|view| device.hull_entry(&loaded.0, view, &mut loaded.1))
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        device.download(&loaded.1)
+    }
+
+    fn expected(world: &World) -> Vec<Option<Bounded>> {
+        let scene = world.scene();
+        let pixels: Vec<(u32, u32)> = world.pixels().collect();
+        pixels.par_iter().map(|&(view, pixel)| photo_oracle::hull_entry(&scene, view, pixel)).collect()
+    }
+}

@@ -1,0 +1,186 @@
+//! [`Kernel::Product`], and what the cases of all layers with weights share: matrices of awkward sizes, with and without
+//! addend and rectification. Behind what is read lies NaN, behind what is written nothing may change.
+
+use crate::agreement::Limits;
+use crate::bounded::Bounded;
+use crate::case::{Case, Spoiler};
+use crate::network_oracle::{self, LayerInputs};
+use crate::poses::{Random, numbers, random};
+use rayon::prelude::*;
+use viewfuse_core::network::product::ProductBlock;
+use viewfuse_device::{Device, Layer, LayerShape, Memory};
+use viewfuse_vulkan::kernel::{Kernel, tile_elements};
+
+/// Numbers behind the last.
+const SLACK: usize = 5;
+
+/// What outputs hold where nothing is written.
+pub(super) const UNTOUCHED: f32 = 3.0;
+
+/// A dispatch.
+#[derive(Clone, Debug)]
+pub struct Job<B> {
+    pub(super) block: B,
+    pub(super) inputs: Vec<f32>,
+    pub(super) weights: Vec<f32>,
+    pub(super) bias: Vec<f32>,
+    pub(super) addend: Option<Vec<f32>>,
+    pub(super) has_wide_images: bool,
+    /// Numbers from the first on of which some are outputs.
+    pub(super) output_count: usize,
+}
+
+/// The same in a device's memory, and the outputs.
+pub struct LoadedJob<D: Device> {
+    pub(super) inputs: D::Buffer<f32>,
+    pub(super) layer: Layer<D>,
+    pub(super) addend: Option<<D as Memory>::Buffer<f32>>,
+    pub(super) outputs: D::Buffer<f32>,
+}
+
+/// How many numbers a layer has of each kind.
+pub(super) struct Counts {
+    pub(super) inputs: usize,
+    /// Numbers that an output is made of.
+    pub(super) inner: usize,
+    /// Columns of the weights.
+    pub(super) columns: usize,
+    /// Numbers of the bias.
+    pub(super) bias: usize,
+    /// Numbers of the addend, if there is one.
+    pub(super) addend: Option<usize>,
+    pub(super) outputs: usize,
+}
+
+impl<B> Job<B> {
+    /// A layer of random numbers of many magnitudes with outputs of about 1.
+    pub(super) fn new(random: &mut Random, block: B, counts: Counts) -> Job<B> {
+        let scale = 1.0 / (counts.inner as f64).sqrt();
+        let magnitude = random.below(3);
+        let mut number = || match magnitude {
+            0 => random.normal() * random.log_range(1.0e-8, 1.0),
+            _ => random.normal(),
+        };
+        Job {
+            block,
+            inputs: numbers(counts.inputs, &mut number),
+            weights: numbers(counts.inner * counts.columns, || scale * number()),
+            bias: numbers(counts.bias, &mut number),
+            addend: counts.addend.map(|count| numbers(count, &mut number)),
+            has_wide_images: false,
+            output_count: counts.outputs,
+        }
+    }
+
+    pub(super) fn load<D: Device>(&self, device: &D, columns: u32) -> Result<LoadedJob<D>, D::Error> {
+        let longer = |values: &[f32]| [values, &[f32::NAN; SLACK]].concat();
+        let column_count = columns as usize;
+        let shape = LayerShape {
+            inner_count: self.weights.len() / column_count,
+            column_count,
+            has_wide_images: self.has_wide_images,
+        };
+        Ok(LoadedJob {
+            inputs: device.upload(&longer(&self.inputs))?,
+            layer: Layer::new(device, &shape, &longer(&self.weights), &longer(&self.bias))?,
+            addend: self.addend.as_deref().map(|addend| device.upload(&longer(addend))).transpose()?,
+            outputs: device.upload(&vec![UNTOUCHED; self.output_count + SLACK])?,
+        })
+    }
+
+    /// What all outputs should be, in front of what is behind them: `output(index)` for each; `None` for what no output
+    /// is.
+    pub(super) fn expected(
+        &self,
+        output: impl Fn(&LayerInputs, usize) -> Option<Bounded> + Sync,
+    ) -> Vec<Option<Bounded>> {
+        let Job { inputs, weights, bias, addend, .. } = self;
+        let layer = LayerInputs { inputs, weights, bias, addend: addend.as_deref() };
+        let output = |index| Some(output(&layer, index).unwrap_or(UNTOUCHED.into()));
+        let outputs = (0..self.output_count).into_par_iter().map(output);
+        outputs.chain([Some(UNTOUCHED.into()); SLACK]).collect()
+    }
+}
+
+/// Puts an input of every dispatch off by 1 %.
+pub(super) fn spoil<B>(jobs: &mut [Job<B>], input: impl Fn(&mut Job<B>) -> &mut [f32]) {
+    jobs.iter_mut().for_each(|job| input(job).iter_mut().for_each(|value| *value *= 1.01));
+}
+
+pub(super) fn read<D: Device>(device: &D, loaded: &[LoadedJob<D>]) -> Result<Vec<f32>, D::Error> {
+    let outputs: Vec<Vec<f32>> = loaded.iter().map(|job| device.download(&job.outputs)).collect::<Result<_, _>>()?;
+    Ok(outputs.concat())
+}
+
+/// See the module.
+pub enum Product {}
+
+impl Case for Product {
+    const KERNEL: Kernel = Kernel::Product;
+    const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
+    const REASON: &'static str =
+        "n units (2^-24) of the sum of magnitudes of n summands, in whatever order they are summed";
+    const SPOILERS: &'static [Spoiler<Vec<Job<ProductBlock>>>] = &[
+        ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
+        ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
+        ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
+        ("addend", |jobs| spoil(jobs, |job| job.addend.as_deref_mut().unwrap_or_default())),
+    ];
+
+    type Inputs = Vec<Job<ProductBlock>>;
+    type Loaded<D: Device> = Vec<LoadedJob<D>>;
+
+    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+        let random = &mut random(17, seed, size);
+        let awkward = 1 + random.below(100) as u32;
+        let shapes = [
+            [1, 1, 1],
+            [size, awkward, 1 + awkward / 3],
+            [65, 3, 7],
+            [130, 64, 64],
+            [64, 512, 4],
+            [63, 17, 129],
+            [size.div_ceil(7), 42, 512],
+            [3, 512, 70],
+        ];
+        let job = |(index, [row_count, inner_count, column_count]): (usize, [u32; 3])| {
+            // Neighbouring seeds give every shape every combination.
+            let flags = index as u64 + seed;
+            let flag = |bit: u32| (flags >> bit) as u32 & 1;
+            let (relu_inputs, relu_outputs) = (flag(0), flag(2));
+            // Whether there is an addend a device sees for itself.
+            let block = ProductBlock { row_count, inner_count, column_count, relu_inputs, relu_outputs, has_addend: 0 };
+            let [rows, inner, columns] = [row_count, inner_count, column_count].map(|count| count as usize);
+            let outputs = rows * columns;
+            let addend = (flag(1) == 1).then_some(outputs);
+            let counts = Counts { inputs: rows * inner, inner, columns, bias: columns, addend, outputs };
+            Job::new(random, block, counts)
+        };
+        shapes.into_iter().enumerate().map(job).collect()
+    }
+
+    fn element_count(jobs: &Self::Inputs) -> usize {
+        jobs.iter().map(|job| tile_elements(job.block.row_count, job.block.column_count) as usize).sum()
+    }
+
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+        jobs.iter().map(|job| job.load(device, job.block.column_count)).collect()
+    }
+
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
+            device.product(&job.block, inputs, layer, addend.as_ref(), outputs)
+        })
+    }
+
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+        read(device, loaded)
+    }
+
+    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
+        let outputs = |job: &Job<ProductBlock>| {
+            job.expected(|layer, index| Some(network_oracle::product(layer, &job.block, index)))
+        };
+        jobs.iter().flat_map(outputs).collect()
+    }
+}

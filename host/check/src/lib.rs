@@ -1,0 +1,50 @@
+//! How closely devices agree with the mathematics: every kernel against an `f64` evaluation, and whole pictures.
+//!
+//! Each kernel runs through a device's trait method on small random inputs. What must come out is evaluated in `f64` by
+//! code that shares nothing with the kernel, with a bound for each number: running error analysis, or roundings counted
+//! by hand. The bounds hold on every device, also on one whose divisions are as coarse as Vulkan allows. Where rounding
+//! decides (which side of a threshold), there is no answer; such elements must be few.
+//!
+//! ```text
+//! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
+//! poses, world, sights           inputs for a seed
+//! oracle, attention_oracle,     what must come out
+//!   camera_oracle, photo_oracle,
+//!   ray_oracle, light_oracle,
+//!   network_oracle, point_oracle,
+//!   winograd_oracle,
+//!   normalise_oracle,
+//!   matrix_oracle, volume_oracle
+//! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
+//! report, measure               a device's kernels, checked
+//! picture                       a whole picture against the CPU's
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod agreement;
+pub mod attention_oracle;
+pub mod bounded;
+pub mod camera_oracle;
+pub mod case;
+pub mod cases;
+pub mod compare;
+pub mod light_oracle;
+pub mod matrix_oracle;
+pub mod measure;
+pub mod network_oracle;
+pub mod normalise_oracle;
+pub mod oracle;
+pub mod photo_oracle;
+pub mod picture;
+pub mod point_oracle;
+pub mod poses;
+pub mod ray_oracle;
+pub mod report;
+pub mod sights;
+pub mod verify;
+pub mod volume_oracle;
+pub mod winograd_oracle;
+pub mod world;
+
+pub use measure::{check_device, check_kernel};
+pub use report::{CheckError, DeviceReport, KernelReport, PictureReport, Report};

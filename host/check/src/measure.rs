@@ -1,0 +1,134 @@
+//! Running the cases on a device.
+
+use super::agreement::{Agreement, measure, versus};
+use super::bounded::Bounded;
+use super::case::{Case, SIZES, Visitor};
+use super::cases::visit;
+use super::report::{CheckError, DeviceReport, KernelReport};
+use std::time::{Duration, Instant};
+use viewfuse_device::Device;
+use viewfuse_device::cpu::Cpu;
+use viewfuse_job::progress::Progress;
+use viewfuse_vulkan::kernel::Kernel;
+
+/// Seeds that a kernel is checked with unless a person says otherwise.
+pub const DEFAULT_SEED_COUNT: u32 = 4;
+/// How long a kernel runs to have its time taken.
+const MEASURED: Duration = Duration::from_millis(40);
+
+/// Which device this is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// The CPU: there is nothing but `f64` to compare it with.
+    Reference,
+    /// Another one: it is compared with the CPU as well.
+    Other,
+}
+
+/// Checks every kernel of a device, for the seeds `1..=seed_count`.
+///
+/// # Errors
+/// [`CheckError`] if the device fails. A tolerance that is exceeded is no error but part of the report.
+pub fn check_device<D: Device>(
+    device: &D,
+    role: Role,
+    seed_count: u32,
+    progress: &dyn Progress,
+) -> Result<DeviceReport, CheckError> {
+    progress.expect(Kernel::ALL.len());
+    let mut kernels = Vec::new();
+    for kernel in Kernel::ALL {
+        kernels.push(check_kernel(device, role, kernel, seed_count)?);
+        progress.step();
+    }
+    Ok(DeviceReport { device: device.name(), kernels, picture: None })
+}
+
+/// Checks a kernel of a device.
+///
+/// # Errors
+/// As [`check_device`].
+pub fn check_kernel<D: Device>(
+    device: &D,
+    role: Role,
+    kernel: Kernel,
+    seed_count: u32,
+) -> Result<KernelReport, CheckError> {
+    visit(kernel, Check { device, role, seed_count })
+}
+
+struct Check<'a, D> {
+    device: &'a D,
+    role: Role,
+    seed_count: u32,
+}
+
+impl<D: Device> Visitor for Check<'_, D> {
+    type Output = Result<KernelReport, CheckError>;
+
+    fn visit<C: Case>(self) -> Result<KernelReport, CheckError> {
+        let kernel = C::KERNEL.name();
+        let failed = |source: D::Error| CheckError::Device { kernel, source: Box::new(source) };
+        let mut actual = Vec::new();
+        let mut on_cpu = Vec::new();
+        let mut expected: Vec<Option<Bounded>> = Vec::new();
+        for seed in 1..=u64::from(self.seed_count) {
+            for size in SIZES {
+                progress.check()?;
+                let inputs = C::inputs(seed, size);
+                actual.extend(C::results(self.device, &inputs).map_err(failed)?);
+                expected.extend(C::expected(&inputs));
+                if self.role == Role::Other {
+                    let Ok(values) = C::results(&Cpu, &inputs);
+                    on_cpu.extend(values);
+                }
+            }
+        }
+        let Agreement { compared, undecided, worst, worst_of_bound, largest_bound, disagreement } =
+            measure(&actual, &expected, C::LIMITS);
+        let versus_cpu = match self.role {
+            Role::Reference => None,
+            Role::Other => Some(versus(&actual, &on_cpu, &expected, C::LIMITS).into()),
+        };
+        Ok(KernelReport {
+            kernel,
+            compared,
+            undecided,
+            absolute: worst.absolute,
+            relative: worst.relative,
+            ulps: worst.ulps,
+            least: C::LIMITS.least,
+            of_bound: worst_of_bound,
+            tolerance: largest_bound,
+            reason: C::REASON,
+            versus_cpu,
+            nanoseconds_per_element: 1.0e9 * seconds_per_element::<C, D>(self.device).map_err(failed)?,
+            breach: disagreement.map(|disagreement| disagreement.to_string()),
+        })
+    }
+}
+
+/// The time of an element at the largest size. Runs may go on behind the call: a download waits for all of them, and its
+/// own time is taken off.
+fn seconds_per_element<C: Case, D: Device>(device: &D) -> Result<f64, D::Error> {
+    let inputs = C::inputs(1, SIZES[SIZES.len() - 1]);
+    let mut loaded = C::load(device, &inputs)?;
+    // Once for what is made at the first use.
+    C::run(device, &inputs, &mut loaded)?;
+    C::read(device, &loaded)?;
+    let start = Instant::now();
+    C::run(device, &inputs, &mut loaded)?;
+    C::read(device, &loaded)?;
+    let once = start.elapsed();
+    let start = Instant::now();
+    C::read(device, &loaded)?;
+    let download = start.elapsed();
+    let run_count = (MEASURED.as_secs_f64() / once.as_secs_f64().max(1.0e-6)).clamp(1.0, 1000.0) as u32;
+    let start = Instant::now();
+    for _ in 0..run_count {
+        C::run(device, &inputs, &mut loaded)?;
+    }
+    C::read(device, &loaded)?;
+    let runs = start.elapsed().saturating_sub(download);
+    Ok(runs.as_secs_f64() / f64::from(run_count) / C::element_count(&inputs) as f64)
+}

@@ -1,0 +1,172 @@
+//! A whole picture on a device against the CPU's.
+//!
+//! The scene is a person's, or the synthetic lorry, photographed into a temporary folder: an installed program has no
+//! sample beside it. The last view is rendered from up to [`MOST_SOURCES`] others.
+
+use super::measure::Role;
+use super::report::{CheckError, PictureReport, PictureVersusCpu};
+use image::RgbImage;
+use std::path::Path;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::metrics::psnr;
+use viewfuse_device::Device;
+use viewfuse_device::cpu::Cpu;
+use viewfuse_field::Field;
+use viewfuse_field::photo::PhotoField;
+use viewfuse_field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::{FewShot, Selection};
+use viewfuse_scene::photographs::longest_side;
+use viewfuse_synthetic::render::RAYS_PER_SIDE;
+use viewfuse_synthetic::{toy, write_scene};
+use viewfuse_weighting::Weighting;
+
+/// Most sources of the picture.
+pub const MOST_SOURCES: usize = 12;
+/// Longest side of the picture.
+pub const LONGEST_SIDE: u32 = 160;
+/// Width and height of the synthetic scene's photographs.
+const SYNTHETIC_SIDE: u32 = 64;
+/// Largest difference of a channel that passes, in steps of 1/255: rounding to 8 bits may fall to either side.
+pub const LARGEST_DIFFERENCE: u8 = 1;
+
+type AnyError = Box<dyn std::error::Error + Send + Sync>;
+
+/// A picture to be rendered on every device, and the CPU's.
+pub struct Picture {
+    scene: Scene,
+    name: String,
+    job: FewShot,
+    options: RenderOptions,
+    reference: RgbImage,
+    reference_time: Duration,
+    /// Holds the synthetic photographs for as long as they are needed.
+    _folder: Option<TempDir>,
+}
+
+impl Picture {
+    /// Of a scene, or of the synthetic one; renders the CPU's.
+    ///
+    /// # Errors
+    /// [`CheckError::Picture`].
+    pub fn new(path: Option<&Path>, progress: &dyn Progress) -> Result<Picture, CheckError> {
+        let name = path.map_or_else(|| "the synthetic lorry".to_owned(), |path| path.display().to_string());
+        Picture::prepare(path, name.clone(), progress).map_err(|source| CheckError::Picture { scene: name, source })
+    }
+
+    fn prepare(path: Option<&Path>, name: String, progress: &dyn Progress) -> Result<Picture, AnyError> {
+        let (folder, scene) = match path {
+            Some(path) => (None, Scene::open(path)?),
+            None => {
+                let folder = synthetic()?;
+                let scene = Scene::open(folder.path().join("lorry"))?;
+                (Some(folder), scene)
+            }
+        };
+        let selection = Selection {
+            targets: scene.views.last().map(|view| view.name.clone()),
+            orbit: None,
+            sources: None,
+            view_count: Some(MOST_SOURCES),
+        };
+        let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&PhotoField::default()))?;
+        let options =
+            RenderOptions { size: job.targets.first().and_then(|t| size(&t.camera)), ..RenderOptions::default() };
+        let (reference, reference_time) = rendered(&Cpu, &scene, &job, &options, progress)?;
+        Ok(Picture { scene, name, job, options, reference, reference_time, _folder: folder })
+    }
+
+    /// Renders it on a device and compares it with the CPU's.
+    ///
+    /// # Errors
+    /// [`CheckError::Picture`].
+    pub fn check<D: Device>(
+        &self,
+        device: &D,
+        role: Role,
+        progress: &dyn Progress,
+    ) -> Result<PictureReport, CheckError> {
+        let mut report = PictureReport {
+            scene: self.name.clone(),
+            target: self.job.targets.first().map_or_else(String::new, |target| target.name.clone()),
+            source_count: self.job.sources.len(),
+            size: [self.reference.width(), self.reference.height()],
+            seconds: self.reference_time.as_secs_f64(),
+            versus_cpu: None,
+            breach: None,
+        };
+        // The CPU's picture is not compared with itself.
+        if role == Role::Other {
+            let failed = |source| CheckError::Picture { scene: self.name.clone(), source };
+            let (picture, time) = rendered(device, &self.scene, &self.job, &self.options, progress).map_err(failed)?;
+            report.seconds = time.as_secs_f64();
+            let (versus, breach) = compare(&picture, &self.reference);
+            (report.versus_cpu, report.breach) = (versus, breach);
+        }
+        Ok(report)
+    }
+}
+
+/// Width and height with a longest side of at most [`LONGEST_SIDE`].
+fn size(camera: &Camera) -> Option<[u32; 2]> {
+    let longest = longest_side(camera);
+    let side = |length: u32| {
+        let scaled = f64::from(length) * f64::from(LONGEST_SIDE) / f64::from(longest);
+        (scaled.round() as u32).max(1)
+    };
+    (longest > LONGEST_SIDE).then(|| [side(camera.pinhole.width()), side(camera.pinhole.height())])
+}
+
+/// A temporary folder with the synthetic scene `lorry`: every other training view of the sample, and one of its test views.
+fn synthetic() -> Result<TempDir, AnyError> {
+    let folder = tempfile::tempdir()?;
+    let cameras = toy::training_cameras()?.into_iter().step_by(2).chain(toy::test_cameras()?.into_iter().take(1));
+    let smaller = |camera: Camera| -> Result<Camera, AnyError> {
+        Ok(Camera { pinhole: camera.pinhole.resized(SYNTHETIC_SIDE, SYNTHETIC_SIDE)?, ..camera })
+    };
+    let cameras: Vec<Camera> = cameras.map(smaller).collect::<Result<_, _>>()?;
+    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE)?;
+    Ok(folder)
+}
+
+/// The picture of a job's only target, and the time from the photographs to it.
+fn rendered<D: Device>(
+    device: &D,
+    scene: &Scene,
+    job: &FewShot,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<(RgbImage, Duration), AnyError> {
+    let weighting: Weighting = "error:alpha=1".parse()?;
+    let mut picture = None;
+    let start = Instant::now();
+    let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {
+        picture = Some(frame.picture);
+        Ok(())
+    };
+    render(scene, job, &weighting, device, &PhotoField::default(), options, progress, keep)?;
+    let time = start.elapsed();
+    Ok((picture.ok_or("the scene has no view to render")?, time))
+}
+
+/// How a picture differs from another of the same size, and whether that is too much.
+pub fn compare(picture: &RgbImage, reference: &RgbImage) -> (Option<PictureVersusCpu>, Option<String>) {
+    if picture.dimensions() != reference.dimensions() || picture.is_empty() {
+        return (None, Some("the pictures do not have the same size".to_owned()));
+    }
+    let worst = picture.iter().zip(reference.iter()).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(u8::MAX);
+    let differing = picture.pixels().zip(reference.pixels()).filter(|(a, b)| a != b).count();
+    let decibels = psnr(picture, reference);
+    let versus = PictureVersusCpu { worst, differing, psnr: decibels.is_finite().then_some(decibels) };
+    let breach = if picture.iter().all(|value| *value == picture.as_raw()[0]) {
+        Some("every pixel is the same".to_owned())
+    } else if worst > LARGEST_DIFFERENCE {
+        Some(format!("a pixel differs by {worst}/255"))
+    } else {
+        None
+    };
+    (Some(versus), breach)
+}

@@ -1,0 +1,178 @@
+//! Comparing this build with files of reference values from the official implementations.
+//!
+//! A file is recognised by what it holds; quantities that this version does not compute are listed, not skipped in
+//! silence. Every comparison is `!(error <= tolerance)`: NaN fails.
+
+mod attention;
+mod file;
+mod genvs;
+mod metrics;
+mod pixelnerf;
+mod weighting;
+
+use safetensors::SafeTensors;
+use std::path::{Path, PathBuf};
+use viewfuse_device::Device;
+
+/// Why a file could not be compared at all.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The file could not be read.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// The file is neither JSON nor safetensors.
+    #[error("{}: neither JSON ({json}) nor safetensors ({safetensors})", path.display())]
+    Format {
+        /// The file.
+        path: PathBuf,
+        /// What the JSON reader said.
+        json: serde_json::Error,
+        /// What the safetensors reader said.
+        safetensors: safetensors::SafeTensorError,
+    },
+    /// The JSON does not have the form of a reference file.
+    #[error("{}: {place}: {message}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// Which case, method or tensor.
+        place: String,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// Nothing in the file is known to this version.
+    #[error("{}: holds no reference values that this version knows", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// How a difference is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Measure {
+    /// `|a - e|`.
+    Absolute,
+    /// `|a - e| / |e|`; where `e` is 0, `a` must be.
+    Relative,
+}
+
+/// The outcome for one quantity of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Quantity {
+    /// What was compared.
+    pub name: String,
+    /// How many numbers.
+    pub count: usize,
+    /// The largest difference; NaN if any was.
+    pub worst: f64,
+    /// How differences are measured.
+    pub measure: Measure,
+    /// The largest difference that passes.
+    pub tolerance: f64,
+    /// Where the largest difference is.
+    pub place: String,
+}
+
+impl Quantity {
+    /// Nothing compared yet.
+    fn new(name: impl Into<String>, measure: Measure, tolerance: f64) -> Quantity {
+        Quantity { name: name.into(), count: 0, worst: 0.0, measure, tolerance, place: String::new() }
+    }
+
+    /// Compares a number of ours with the reference.
+    fn compare(&mut self, ours: f64, reference: f64, place: impl FnOnce() -> String) {
+        // Equal infinities (the PSNR of equal pictures) differ by nothing.
+        let difference = if ours == reference { 0.0 } else { (ours - reference).abs() };
+        let error = match self.measure {
+            Measure::Absolute => difference,
+            Measure::Relative if difference == 0.0 => 0.0,
+            Measure::Relative => difference / reference.abs(),
+        };
+        self.count += 1;
+        // Once NaN, always NaN; the first place is remembered.
+        if !self.worst.is_nan() && !(error <= self.worst) {
+            self.worst = error;
+            self.place = place();
+        }
+    }
+
+    /// Compares two lists, the place being an index. A list that is shorter than the other counts as NaN there.
+    fn compare_all(
+        &mut self,
+        ours: impl IntoIterator<Item = f64>,
+        reference: impl IntoIterator<Item = f64>,
+        place: &str,
+    ) {
+        let (mut ours, mut reference) = (ours.into_iter(), reference.into_iter());
+        for index in 0.. {
+            let (a, e) = match (ours.next(), reference.next()) {
+                (None, None) => break,
+                (a, e) => (a.unwrap_or(f64::NAN), e.unwrap_or(f64::NAN)),
+            };
+            self.compare(a, e, || format!("{place}[{index}]"));
+        }
+    }
+
+    /// Whether the quantity was compared and every difference is within the tolerance.
+    pub fn passes(&self) -> bool {
+        self.count > 0 && self.worst <= self.tolerance
+    }
+}
+
+/// The outcome for a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Report {
+    /// The file.
+    pub path: PathBuf,
+    /// What was compared.
+    pub quantities: Vec<Quantity>,
+    /// Reference values that this version does not compute.
+    pub not_covered: Vec<String>,
+}
+
+impl Report {
+    /// Whether every quantity passes.
+    pub fn passes(&self) -> bool {
+        self.quantities.iter().all(Quantity::passes)
+    }
+}
+
+/// Compares this build with a file; what has kernels is computed on a device.
+///
+/// # Errors
+/// [`VerifyError`] if the file cannot be compared at all. A tolerance that is exceeded is no error but part of the
+/// report.
+pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError> {
+    let bytes = std::fs::read(path).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;
+    let report = match SafeTensors::deserialize(&bytes) {
+        Ok(tensors) => {
+            let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };
+            // The header was read once already.
+            let metadata = SafeTensors::read_metadata(&bytes).ok().and_then(|(_, header)| header.metadata().clone());
+            let said = |key: &str| metadata.as_ref()?.get(key).map(String::as_str);
+            let mut covered = attention::verify(path, &tensors, &mut report)?;
+            covered.extend(metrics::verify(path, &tensors, device, &mut report)?);
+            covered.extend(pixelnerf::verify(path, &tensors, said("width"), device, &mut report)?);
+            covered.extend(genvs::verify(path, &tensors, said("member"), device, &mut report)?);
+            let mut rest: Vec<&str> =
+                tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
+            rest.sort_unstable();
+            report.not_covered.extend(rest.into_iter().map(str::to_owned));
+            report
+        }
+        Err(safetensors) => match serde_json::from_slice(&bytes) {
+            Ok(json) => weighting::verify(path, &json)?,
+            Err(json) => return Err(VerifyError::Format { path: path.to_path_buf(), json, safetensors }),
+        },
+    };
+    if report.quantities.is_empty() {
+        return Err(VerifyError::Unknown { path: path.to_path_buf() });
+    }
+    Ok(report)
+}

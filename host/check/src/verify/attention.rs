@@ -1,0 +1,110 @@
+//! The `attention_*` tensors of `genvs_srn.safetensors`: weights of the attention weighters, their parameters computed
+//! by formula from their names.
+
+use super::{Measure, Quantity, Report, VerifyError};
+use safetensors::{Dtype, SafeTensors};
+use std::convert::Infallible;
+use std::path::Path;
+use viewfuse_core::attention::{EMBEDDING, PoseEmbedding, published_cross_attention};
+use viewfuse_core::pose::Pose;
+use viewfuse_core::sources::Sources;
+use viewfuse_nn::formula;
+use viewfuse_weighting::attention::AttentionModel;
+use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
+
+const TOLERANCE: f64 = 1.0e-5;
+const EMBEDDING_TENSOR: &str = "attention_embedding.paper_fourier";
+
+/// Compares what is there; returns the names of the tensors that were used.
+pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    let content = |place: &str, message: String| VerifyError::Content {
+        path: path.to_path_buf(),
+        place: format!("tensor '{place}'"),
+        message,
+    };
+    if file.tensor("attention_src").is_err() || file.tensor("attention_tgt").is_err() {
+        return Ok(Vec::new());
+    }
+    let poses = |name: &str| -> Result<Vec<Pose>, VerifyError> {
+        let values = floats(file, name).ok_or_else(|| content(name, "must be F32 [pose, 4, 4]".into()))?;
+        values
+            .chunks_exact(16)
+            .map(|m| {
+                let rows = [0, 4, 8, 12].map(|at| [m[at], m[at + 1], m[at + 2], m[at + 3]]);
+                Pose::from_opengl(&rows).map_err(|error| content(name, format!("not a camera pose: {error}")))
+            })
+            .collect()
+    };
+    let source_poses = poses("attention_src")?;
+    let sources =
+        Sources::<MOST_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", error.to_string()))?;
+    let targets = poses("attention_tgt")?;
+    let mut covered = vec!["attention_src".to_owned(), "attention_tgt".to_owned()];
+    if let Some(reference) = floats(file, EMBEDDING_TENSOR).filter(|values| values.len() == EMBEDDING * targets.len()) {
+        let Ok(model) = AttentionModel::fourier(&mut prefixed(""));
+        if let AttentionModel::Fourier(embedding) = model {
+            let mut quantity = Quantity::new("attention: embedding of paper_fourier", Measure::Absolute, TOLERANCE);
+            for (index, (target, expected)) in targets.iter().zip(reference.chunks_exact(EMBEDDING)).enumerate() {
+                let ours = embedding.embed(target).map(f64::from);
+                quantity.compare_all(ours, expected.iter().copied().map(f64::from), &format!("target {index}"));
+            }
+            report.quantities.push(quantity);
+            covered.push(EMBEDDING_TENSOR.to_owned());
+        }
+    }
+    for (variant, model) in variants() {
+        let name = format!("attention_weights.{variant}");
+        if file.tensor(&name).is_err() {
+            continue;
+        }
+        let count = source_poses.len() * targets.len();
+        let reference = floats(file, &name)
+            .filter(|values| values.len() == count)
+            .ok_or_else(|| content(&name, format!("must be F32 [{}, {}]", source_poses.len(), targets.len())))?;
+        let weigh = |target: &Pose| -> SourceWeights {
+            match &model {
+                Some(model) => model.weigh(&sources, target),
+                None => published_cross_attention(&sources, target),
+            }
+        };
+        let mut quantity = Quantity::new(format!("attention: {variant}"), Measure::Absolute, TOLERANCE);
+        for (column, target) in targets.iter().enumerate() {
+            let weights = weigh(target);
+            // The file is [source][target].
+            for row in 0..source_poses.len() {
+                let expected = f64::from(reference[row * targets.len() + column]);
+                let place = || format!("source {row}, target {column}");
+                quantity.compare(f64::from(weights.get(row as u32)), expected, place);
+            }
+        }
+        report.quantities.push(quantity);
+        covered.push(name);
+    }
+    Ok(covered)
+}
+
+/// Parameters by formula, their names behind a prefix.
+fn prefixed(prefix: &'static str) -> impl FnMut(&str, &[usize]) -> Result<Vec<f32>, Infallible> {
+    move |name, shape| Ok(formula::tensor(&format!("{prefix}{name}"), shape))
+}
+
+/// Names of the variants in the file, with their parameters; the published cross attention has none.
+fn variants() -> [(&'static str, Option<AttentionModel>); 5] {
+    let Ok(fourier) = AttentionModel::fourier(&mut prefixed(""));
+    let Ok(flat) = AttentionModel::flat(&mut prefixed(""));
+    let Ok(learned) = AttentionModel::learned_cross(&mut prefixed("learned_cross_attention."));
+    let Ok(pose_self) = AttentionModel::pose_self(&mut prefixed("relative_pose_self_attention."));
+    [
+        ("paper_fourier", Some(fourier)),
+        ("paper_flat", Some(flat)),
+        ("cross_attention", None),
+        ("learned_cross_attention", Some(learned)),
+        ("relative_pose_self_attention", Some(pose_self)),
+    ]
+}
+
+/// The values of a tensor of `f32`, or `None` if it is another.
+fn floats(file: &SafeTensors<'_>, name: &str) -> Option<Vec<f32>> {
+    let view = file.tensor(name).ok().filter(|view| view.dtype() == Dtype::F32)?;
+    Some(view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+}

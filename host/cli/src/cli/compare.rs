@@ -1,0 +1,163 @@
+//! `viewfuse compare`.
+
+use super::metrics_options::MetricOptions;
+use super::options::DeviceOptions;
+use super::say;
+use super::table::table;
+use anyhow::{Context, anyhow, bail, ensure};
+use clap::Args;
+use image::RgbImage;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use viewfuse_device::Device;
+use viewfuse_device::choice::{AnyDevice, Chosen};
+use viewfuse_evaluate::metrics::frechet::frechet_distance;
+use viewfuse_evaluate::metrics::kernel::kernel_distance;
+use viewfuse_evaluate::metrics::trunk::InceptionKind;
+use viewfuse_evaluate::metrics::{Metrics, Scored};
+use viewfuse_job::progress::Progress;
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse compare out/000020.png car/rgb/000020.png\n      PSNR and SSIM of one picture\n  \
+    viewfuse compare out/ car/rgb/ --lpips alex=alexnet.pth --dists vgg16.pth --fid pt_inception-2015-12-05.pth\n      \
+    of every picture in out/, with the photograph of the same name\n\n\
+    Transparency is ignored.")]
+pub(crate) struct Arguments {
+    /// A picture, or a folder of pictures (PNG, JPEG)
+    prediction: PathBuf,
+    /// What it should be: a picture, or a folder that has one of each name
+    truth: PathBuf,
+    #[command(flatten)]
+    metrics: MetricOptions,
+    /// Seed of the subsets that KID of more than 1000 pictures is a mean of
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let pairs = pairs(&arguments.prediction, &arguments.truth)?;
+    let Chosen { device, .. } = arguments.device.open()?;
+    match &device {
+        AnyDevice::Cpu(cpu) => compare(arguments, &pairs, cpu)?,
+        AnyDevice::Vulkan(vulkan) => compare(arguments, &pairs, vulkan.as_ref())?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A picture's name, and where it and its truth are.
+struct Pair {
+    name: String,
+    prediction: PathBuf,
+    truth: PathBuf,
+}
+
+/// Every picture with its truth.
+fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
+    if !prediction.is_dir() {
+        ensure!(!truth.is_dir(), "{}: is a folder, {} is not", truth.display(), prediction.display());
+        let name = prediction.display().to_string();
+        return Ok(vec![Pair { name, prediction: prediction.to_owned(), truth: truth.to_owned() }]);
+    }
+    let listed = || format!("{}: cannot be listed", prediction.display());
+    let mut pairs = Vec::new();
+    for entry in std::fs::read_dir(prediction).with_context(listed)? {
+        let path = entry.with_context(listed)?.path();
+        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+        if !extension.is_some_and(|extension| ["png", "jpg", "jpeg"].iter().any(|known| extension == *known)) {
+            continue;
+        }
+        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        pairs.push(Pair { truth: truth.join(&name), prediction: path, name });
+    }
+    pairs.sort_by(|a, b| a.name.cmp(&b.name));
+    match pairs.iter().find(|pair| !pair.truth.is_file()) {
+        _ if pairs.is_empty() => bail!("{}: has no pictures (PNG, JPEG)", prediction.display()),
+        Some(pair) => bail!("{}: is not there, to compare {} with", pair.truth.display(), pair.prediction.display()),
+        None => Ok(pairs),
+    }
+}
+
+fn opened(path: &Path) -> anyhow::Result<RgbImage> {
+    // The decoder's message holds its causes already.
+    let picture = image::open(path).map_err(|cause| anyhow!("{}: cannot be read: {cause}", path.display()))?;
+    Ok(picture.into_rgb8())
+}
+
+fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyhow::Result<()> {
+    let metrics = arguments.metrics.open(device)?;
+    let progress = Progress::new("comparing");
+    progress.expect(pairs.len());
+    let (mut scores, mut pictures) = (Vec::new(), Vec::new());
+    for pair in pairs {
+        progress.check()?;
+        let [prediction, truth] = [opened(&pair.prediction)?, opened(&pair.truth)?];
+        let scored = metrics.compare(device, &prediction, &truth);
+        scores.push(scored.with_context(|| pair.prediction.display().to_string())?);
+        if metrics.inception.is_some() {
+            pictures.push([prediction, truth]);
+        }
+        progress.step();
+    }
+    drop(progress);
+    print_scores(pairs, &scores)?;
+    match &metrics.inception {
+        Some(inception) if pictures.len() > 1 => {
+            print_distances(&metrics, inception.kind(), &pictures, device, arguments.seed)
+        }
+        Some(_) => Ok(say("FID and KID: no; they compare sets of at least 2 pictures")?),
+        None => Ok(()),
+    }
+}
+
+/// A row for each metric: the mean, and where it is worst. A metric that a picture is too small for counts where it can.
+fn print_scores(pairs: &[Pair], scores: &[Vec<Scored>]) -> anyhow::Result<()> {
+    let mut names: Vec<&str> = Vec::new();
+    for score in scores.iter().flatten() {
+        if !names.contains(&score.name) {
+            names.push(score.name);
+        }
+    }
+    let mut rows = table(["metric", "mean", "worst", "of"].map(str::to_owned));
+    for name in names {
+        let own = pairs
+            .iter()
+            .zip(scores)
+            .filter_map(|(pair, scores)| scores.iter().find(|score| score.name == name).map(|score| (pair, score)));
+        let own: Vec<(&Pair, &Scored)> = own.collect();
+        let mean = own.iter().map(|(_, score)| score.value).sum::<f64>() / own.len() as f64;
+        let badness = |score: &Scored| if score.more_is_better { -score.value } else { score.value };
+        let worst = own.iter().max_by(|(_, a), (_, b)| badness(a).total_cmp(&badness(b)));
+        let (place, worst) = worst.map_or((String::new(), f64::NAN), |(pair, score)| (pair.name.clone(), score.value));
+        rows.add_row([name.to_owned(), format!("{mean:.4}"), format!("{worst:.4}"), place]);
+    }
+    say(format_args!(
+        "{}",
+        if pairs.len() == 1 { "1 picture".to_owned() } else { format!("{} pictures", pairs.len()) }
+    ))?;
+    Ok(say(rows)?)
+}
+
+fn print_distances<D: Device>(
+    metrics: &Metrics<D>,
+    kind: InceptionKind,
+    pictures: &[[RgbImage; 2]],
+    device: &D,
+    seed: u64,
+) -> anyhow::Result<()> {
+    let predictions = metrics.features_of_predictions(device, pictures.iter().map(|[prediction, _]| prediction))?;
+    let truths = metrics.features_of_truths(device, pictures.iter().map(|[_, truth]| truth))?;
+    let (Some(predictions), Some(truths)) = (predictions, truths) else { return Ok(()) };
+    let (fid, kid) = (frechet_distance(&predictions, &truths)?, kernel_distance(&predictions, &truths, seed)?);
+    let network = match kind {
+        InceptionKind::Fid => "the Inception that FID is defined with",
+        InceptionKind::Torchvision => "torchvision's Inception: not the numbers of tables",
+    };
+    say(format_args!("FID {fid:.3}, KID {kid:.6} ({network})"))?;
+    if pictures.len() < predictions.dimension() {
+        say(format_args!("FID of {} pictures says little; KID does not depend on their number", pictures.len()))?;
+    }
+    Ok(())
+}

@@ -1,0 +1,161 @@
+//! `viewfuse evaluate`.
+//!
+//! ```text
+//! protocol   with --protocol: jobs, a folder that can be gone on with, shards
+//! tables     means on the terminal, every score as CSV
+//! ```
+
+mod protocol;
+mod tables;
+
+use super::metrics_options::MetricOptions;
+use super::model::{ModelOptions, Work};
+use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::{on_threads, say};
+use clap::Args;
+use protocol::ProtocolOptions;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use tables::{csv_of, print_means};
+use viewfuse_device::Device;
+use viewfuse_device::choice::Chosen;
+use viewfuse_evaluate::{Evaluator, Score, means};
+use viewfuse_field::Field;
+use viewfuse_field::render::RenderOptions;
+use viewfuse_job::files::{check_writable, write_whole};
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::Scene;
+use viewfuse_scene::dataset::{Dataset, DatasetError, Split};
+use viewfuse_scene::few_shot::Selection;
+use viewfuse_weighting::{SCHEME_NAMES, Weighting};
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse evaluate dino/ --targets 1,4,7,10,13,16 --size 160x120\n      each of six views from all others, every scheme\n  \
+    viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the other views from every third, two schemes\n  \
+    viewfuse evaluate cars/*/ --protocol random --trials 3 -o runs/random\n      the paper's first table, with pictures for a report\n  \
+    viewfuse evaluate cars/*/ --protocol count --shard 2/8 -o runs/count\n      the third of eight parts; the folder is shared, or copied together afterwards\n\n\
+    With --protocol, the same command again goes on with a folder after a kill, and prints the tables once every job is \
+    there, whichever shards did them. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
+pub(crate) struct Arguments {
+    /// One or more scenes; with --split data sets
+    #[arg(required = true)]
+    scenes: Vec<PathBuf>,
+    /// Take the scenes of a data set: those for train, val or test
+    #[arg(long, value_name = "SPLIT")]
+    split: Option<Split>,
+    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
+    #[arg(long, value_name = "VIEWS")]
+    targets: Option<String>,
+    #[command(flatten)]
+    sources: SourceOptions,
+    /// A weighting scheme; may be given several times [default: every scheme that needs no file]
+    #[arg(long, value_name = "SCHEME")]
+    weights: Vec<String>,
+    #[command(flatten)]
+    protocol: ProtocolOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    model: ModelOptions,
+    #[command(flatten)]
+    metrics: MetricOptions,
+    /// Seed of every random number: of a protocol's draws, and of networks
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Write every single score to this CSV file; with --protocol the folder of the evaluation
+    #[arg(short, long, value_name = "PATH")]
+    output: Option<PathBuf>,
+}
+
+impl Arguments {
+    /// Where the scenes are.
+    fn paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
+        let Some(split) = self.split else { return Ok(self.scenes.clone()) };
+        let sets: Vec<Dataset> = self.scenes.iter().map(|path| Dataset::open(path, split)).collect::<Result<_, _>>()?;
+        Ok(sets.into_iter().flat_map(|set| set.scenes).collect())
+    }
+}
+
+/// `values` are all options and their values as a person would write them.
+pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
+    arguments.metrics.refuse_sets()?;
+    let mut names: Vec<&str> = match arguments.weights.is_empty() {
+        true => SCHEME_NAMES.to_vec(),
+        false => arguments.weights.iter().map(String::as_str).collect(),
+    };
+    if arguments.protocol.protocol.is_some() {
+        // Once in a table is enough.
+        let mut seen = Vec::new();
+        names.retain(|name| {
+            !seen.contains(name) && {
+                seen.push(*name);
+                true
+            }
+        });
+    }
+    let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
+    if let (Some(protocol), Some(folder)) = (&arguments.protocol.protocol, &arguments.output) {
+        return protocol::run(arguments, protocol, folder, &weightings, values);
+    }
+    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
+    arguments.output.as_deref().map_or(Ok(()), check_writable)?;
+    let field = arguments.model.open(arguments.seed, None)?;
+    let options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
+    let Chosen { device, reason } = arguments.device.open()?;
+    let mut all: Vec<Score> = Vec::new();
+    let mut scene_of: Vec<String> = Vec::new();
+    // All are opened before the first is computed: a wrong path shows at once.
+    let paths = arguments.paths()?;
+    let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    for (path, scene) in paths.iter().zip(&scenes) {
+        let progress = Progress::new("evaluating");
+        let job = Job {
+            scene,
+            selection: &selection,
+            weightings: &weightings,
+            options: &options,
+            metrics: &arguments.metrics,
+            progress: &progress,
+        };
+        let scores = on_threads(arguments.picture.threads, || field.on(&device, &job))??;
+        drop(progress);
+        print_means(&path.display().to_string(), &means(&scores))?;
+        scene_of.extend(scores.iter().map(|_| path.display().to_string()));
+        all.extend(scores);
+    }
+    if paths.len() > 1 {
+        print_means(&format!("all {} scenes", paths.len()), &means(&all))?;
+    }
+    say(format_args!("device: {}, {reason}", device.name()))?;
+    if let Some(path) = &arguments.output {
+        let lines: Vec<_> = scene_of.into_iter().map(|scene| vec![scene]).zip(&all).collect();
+        write_whole(path, &csv_of(&["scene"], &lines)?)?;
+        say(format_args!("{}", path.display()))?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What is evaluated of a scene.
+struct Job<'a> {
+    scene: &'a Scene,
+    selection: &'a Selection,
+    weightings: &'a [Weighting],
+    options: &'a RenderOptions,
+    metrics: &'a MetricOptions,
+    progress: &'a dyn Progress,
+}
+
+impl Work for Job<'_> {
+    type Output = anyhow::Result<Vec<Score>>;
+
+    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
+        let Job { scene, selection, weightings, options, metrics, progress } = *self;
+        let metrics = &metrics.open(device)?;
+        let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
+        Ok(evaluator.score_all(scene, selection)?)
+    }
+}

@@ -1,0 +1,76 @@
+//! `viewfuse inspect`.
+
+use super::say;
+use clap::Args;
+use image::DynamicImage;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_evaluate::inspect::{Inspection, camera_map, inspect};
+use viewfuse_job::files::check_writable;
+use viewfuse_job::progress::Progress;
+use viewfuse_output::png::write_png;
+use viewfuse_scene::Scene;
+use viewfuse_scene::photographs::BackgroundChoice;
+
+#[derive(Args)]
+#[command(after_help = "Example:\n  viewfuse inspect photos/ -o cameras.png")]
+pub(crate) struct Arguments {
+    /// The scene
+    scene: PathBuf,
+    /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
+    #[arg(long, value_name = "COLOUR", default_value = "auto")]
+    background: BackgroundChoice,
+    /// Print JSON instead of text
+    #[arg(long)]
+    json: bool,
+    /// Write a picture of the cameras seen from above
+    #[arg(short, long, value_name = "PNG")]
+    output: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let scene = Scene::open(&arguments.scene)?;
+    arguments.output.as_deref().map_or(Ok(()), check_writable)?;
+    let progress = Progress::new("reading");
+    let inspection = inspect(&scene, arguments.background, &progress)?;
+    drop(progress);
+    if arguments.json {
+        say(format_args!("{}", serde_json::to_string_pretty(&inspection)?))?;
+    } else {
+        print_text(&inspection)?;
+    }
+    if let Some(path) = &arguments.output {
+        write_png(path, &DynamicImage::ImageRgb8(camera_map(&scene, &inspection)))?;
+        if !arguments.json {
+            say(format_args!("cameras    {}", path.display()))?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_text(inspection: &Inspection) -> std::io::Result<()> {
+    let i = inspection;
+    // Four decimals of the scene's own unit: of one that is measured in thousandths, all would be zeros.
+    let usual = (0.1..1.0e4).contains(&i.distances[1]);
+    let number = |x: f32| if usual { format!("{x:.4}") } else { format!("{x:.4e}") };
+    let point = |p: [f32; 3]| format!("({}, {}, {})", number(p[0]), number(p[1]), number(p[2]));
+    say(format_args!("scene      {} ({})", i.path, i.layout))?;
+    say(format_args!("views      {} photographs, {} target poses without one", i.photograph_count, i.target_count))?;
+    say(format_args!(
+        "image      {}x{}, focal {:.2} {:.2}, principal point {:.2} {:.2}",
+        i.size[0], i.size[1], i.focal[0], i.focal[1], i.principal[0], i.principal[1]
+    ))?;
+    let miss = number(i.axis_miss);
+    say(format_args!("focus      {}, missed by the axes by {miss} (root mean square)", point(i.focus)))?;
+    say(format_args!("distance   {} to {}", number(i.distances[0]), number(i.distances[1])))?;
+    say(format_args!("up         {}", point(i.up)))?;
+    match i.object {
+        Some([low, high]) => say(format_args!("object     {} to {}", point(low), point(high)))?,
+        None => say(format_args!("object     not found"))?,
+    }
+    say(format_args!("depth      near {}, far {}", number(i.near), number(i.far)))?;
+    if i.warnings.is_empty() {
+        say("warnings   none")?;
+    }
+    i.warnings.iter().try_for_each(|warning| say(format_args!("warning    {warning}")))
+}

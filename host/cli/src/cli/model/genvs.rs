@@ -1,0 +1,95 @@
+//! GeNVS: from noise to a picture.
+
+use super::{GENVS, Given};
+use clap::Args;
+use viewfuse_core::sampler::Sampler;
+use viewfuse_core::sampler::churn::Churn;
+use viewfuse_core::schedule::NoiseSchedule;
+use viewfuse_field::genvs::sampling::{Plan, Steps, sampler_named};
+
+/// How a run goes from noise to a picture, and what it keeps of the views.
+#[derive(Args)]
+pub(crate) struct RunOptions {
+    #[arg(long, value_name = "NAME", value_parser = parse_sampler, requires = "model", help = sampler_help(), help_heading = GENVS)]
+    sampler: Option<Sampler>,
+    /// Noise levels: a call of the denoiser each, with heun two, but for the last [default: 10, with --exact 25]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "model", help_heading = GENVS)]
+    steps: Option<u32>,
+    /// Choose the levels on the way, each step's error below this (root mean square, of values between -1 and 1); 0.01 is
+    /// about what can be seen
+    #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, requires = "model", conflicts_with_all = ["sampler", "steps"], help_heading = GENVS)]
+    tolerance: Option<f32>,
+    /// Add noise on the way, as much as this over the whole run; samplers that look back begin anew each time, so take heun
+    #[arg(long, value_name = "AMOUNT", value_parser = parse_churn, requires = "model", conflicts_with = "tolerance", help_heading = GENVS)]
+    churn: Option<f32>,
+    /// Keep views' features in 16 bits: half the memory, every row of them computed
+    #[arg(long, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
+    pub(super) half_volumes: bool,
+}
+
+impl RunOptions {
+    /// Those that were given.
+    pub(super) fn given(&self) -> Given {
+        vec![
+            ("--sampler", self.sampler.is_some()),
+            ("--steps", self.steps.is_some()),
+            ("--tolerance", self.tolerance.is_some()),
+            ("--churn", self.churn.is_some()),
+            ("--half-volumes", self.half_volumes),
+        ]
+    }
+
+    /// The plan of a run: the published one if it is `exact`, otherwise the fast one, but for what was given.
+    pub(super) fn plan(&self, seed: u64, schedule: NoiseSchedule, exact: bool, all_calls: bool) -> Plan {
+        let plan = if exact { Plan::published(seed) } else { Plan::fast(seed) };
+        let steps = match (self.tolerance, Plan::careful(seed).steps, plan.steps) {
+            (Some(tolerance), Steps::Chosen { most_calls, .. }, _) => Steps::Chosen { tolerance, most_calls },
+            (_, _, Steps::Fixed { sampler, level_count }) => Steps::Fixed {
+                sampler: self.sampler.unwrap_or(sampler),
+                level_count: self.steps.unwrap_or(level_count),
+            },
+            (_, _, steps) => steps,
+        };
+        let churn = Churn { amount: self.churn.unwrap_or(0.0), ..Churn::NONE };
+        Plan { steps, schedule, churn, settled: plan.settled.filter(|_| !all_calls), seed }
+    }
+}
+
+fn sampler_help() -> String {
+    format!("Sampler: {} [default: ipndm, with --exact heun]", Sampler::ALL.map(Sampler::name).join(", "))
+}
+
+fn parse_sampler(text: &str) -> Result<Sampler, String> {
+    sampler_named(text).map_err(|error| error.to_string())
+}
+
+fn parse_tolerance(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(tolerance) if tolerance > 0.0 && tolerance <= 1.0 => Ok(tolerance),
+        _ => Err("an error is a number above 0, at most 1".to_owned()),
+    }
+}
+
+fn parse_churn(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(amount) if (0.0..=1000.0).contains(&amount) => Ok(amount),
+        _ => Err("an amount is a number from 0 to 1000".to_owned()),
+    }
+}
+
+/// `MAX,MIN`.
+pub(super) fn parse_noise(text: &str) -> Result<NoiseSchedule, String> {
+    let levels: Option<Vec<f32>> = text.split(',').map(|level| level.trim().parse().ok()).collect();
+    match levels.as_deref() {
+        Some(&[largest, smallest]) => NoiseSchedule::new(smallest, largest).map_err(|error| error.to_string()),
+        _ => Err("two noise levels, the largest first, for example 80,0.002".to_owned()),
+    }
+}
+
+/// A noise level.
+pub(crate) fn parse_level(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(level) if level > 0.0 && level.is_finite() => Ok(level),
+        _ => Err("a noise level is a number above 0".to_owned()),
+    }
+}

@@ -1,0 +1,93 @@
+//! Options that several commands share.
+
+use super::model::AnyField;
+use super::parse::{parse_count, parse_seconds, parse_share, parse_size};
+use super::wrong;
+use clap::{ArgMatches, Args, Command};
+use std::collections::BTreeMap;
+use std::time::Duration;
+use viewfuse_device::choice::{self, Chosen, DeviceChoice};
+use viewfuse_field::render::{DEFAULT_LEAVE_OUT, DEFAULT_SETTLED, RenderOptions};
+use viewfuse_scene::few_shot::Selection;
+use viewfuse_scene::photographs::BackgroundChoice;
+use viewfuse_vulkan::VulkanError;
+
+/// How pictures are made.
+#[derive(Args)]
+pub(crate) struct PictureOptions {
+    /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at most
+    /// 512, of a GeNVS at most the size that it was trained for]
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
+    #[arg(long, value_name = "COLOUR", default_value = "auto")]
+    background: BackgroundChoice,
+    /// Leave out the least relevant sources while their weights together stay at or below this
+    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
+    leave_out: f32,
+    /// A ray ends where less than this share of the light still passes; rays of a GeNVS go on to the end [default: 1/256]
+    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
+    settled: Option<f32>,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub(crate) threads: Option<u16>,
+}
+
+impl PictureOptions {
+    /// With `exact`, nothing is left out. What the field does not know must not have been given.
+    pub(crate) fn to_render_options(&self, exact: bool, field: &AnyField) -> anyhow::Result<RenderOptions> {
+        if self.settled.is_some() && !field.ends_rays() {
+            return Err(wrong("--settled cannot be used with a GeNVS, whose rays go on to the end"));
+        }
+        let settled = if exact || !field.ends_rays() { 0.0 } else { self.settled.unwrap_or(DEFAULT_SETTLED) };
+        let leave_out = if exact { 0.0 } else { self.leave_out };
+        Ok(RenderOptions { size: self.size, background: self.background, leave_out, settled })
+    }
+}
+
+/// Where kernels run.
+#[derive(Args)]
+pub(crate) struct DeviceOptions {
+    /// Device: auto (a graphics processor if there is one, otherwise the CPU), cpu, vulkan, vulkan:NUMBER or vulkan:NAME
+    #[arg(long, value_name = "DEVICE", default_value = "auto")]
+    device: DeviceChoice,
+    /// Longest time that a submission to a Vulkan device may run
+    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = parse_seconds)]
+    time_limit: Duration,
+}
+
+impl DeviceOptions {
+    pub(crate) fn open(&self) -> Result<Chosen, VulkanError> {
+        choice::open(&self.device, &choice::gpu_options(self.time_limit))
+    }
+}
+
+/// Which views are sources.
+#[derive(Args)]
+pub(crate) struct SourceOptions {
+    /// Source views: names, ranges A..B, `all`, each with /STEP, separated by commas [default: all but the targets]
+    #[arg(long, value_name = "VIEWS")]
+    sources: Option<String>,
+    /// At most this many sources, spread as far apart as possible
+    #[arg(long, value_name = "K", value_parser = parse_count)]
+    views: Option<usize>,
+}
+
+impl SourceOptions {
+    pub(crate) fn to_selection(&self, targets: Option<&str>, orbit: Option<usize>) -> Selection {
+        Selection { targets: targets.map(str::to_owned), orbit, sources: self.sources.clone(), view_count: self.views }
+    }
+}
+
+/// Every option of the command that was given, by its long name, with its values as a person would write them, defaults
+/// included.
+pub(crate) fn values(command: &Command, matches: &ArgMatches) -> BTreeMap<String, String> {
+    let Some((name, matches)) = matches.subcommand() else { return BTreeMap::new() };
+    let arguments = command.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
+    let value = |argument: &clap::Arg| {
+        let values = matches.try_get_raw(argument.get_id().as_str()).ok()??;
+        let texts: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
+        Some((argument.get_long()?.to_owned(), texts.join(" ")))
+    };
+    arguments.filter_map(value).collect()
+}

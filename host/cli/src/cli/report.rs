@@ -1,0 +1,45 @@
+//! `viewfuse report`.
+
+use super::say;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_evaluate::report::{Evaluation, Report, Sweep, Training, page};
+use viewfuse_job::files::{check_writable, write_whole};
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse report runs/random runs/close runs/count -o report.html\n      three evaluations with their tables, figures and pictures\n  \
+    viewfuse report runs/count --pareto out/pareto.json --training trained -o report.html\n      with error over run time, and the curves of a training\n\n\
+    The page holds everything it shows: no network, no scripts, readable on a phone. Evaluations may still be under way.")]
+pub(crate) struct Arguments {
+    /// Folders of `evaluate --protocol`
+    #[arg(value_name = "DIR", required_unless_present_any = ["pareto", "training"])]
+    evaluations: Vec<PathBuf>,
+    /// A pareto.json, or its folder; may be given several times
+    #[arg(long, value_name = "FILE")]
+    pareto: Vec<PathBuf>,
+    /// A folder of `train`; may be given several times
+    #[arg(long, value_name = "DIR")]
+    training: Vec<PathBuf>,
+    /// Heading of the page
+    #[arg(long, value_name = "TEXT", default_value = "View weighting")]
+    title: String,
+    /// The page
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    check_writable(&arguments.output)?;
+    let report = Report {
+        title: arguments.title.clone(),
+        evaluations: arguments.evaluations.iter().map(|path| Evaluation::open(path)).collect::<Result<_, _>>()?,
+        sweeps: arguments.pareto.iter().map(|path| Sweep::open(path)).collect::<Result<_, _>>()?,
+        trainings: arguments.training.iter().map(|path| Training::open(path)).collect::<Result<_, _>>()?,
+    };
+    let page = page(&report)?;
+    write_whole(&arguments.output, page.as_bytes())?;
+    say(format_args!("{}: {:.1} MB", arguments.output.display(), page.len() as f64 / 1.0e6))?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,92 @@
+//! `viewfuse scenes`.
+
+use super::{on_threads, say};
+use clap::{Args, Subcommand};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_job::progress::Progress;
+use viewfuse_synthetic::collection::{LARGEST_OBJECT_COUNT, ObjectCounts, Settings, make};
+use viewfuse_synthetic::kinds::Kind;
+
+#[derive(Args)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Make objects of one kind and photograph them: training, validation and test scenes in SRN's layout.
+    Make(MakeArguments),
+}
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse scenes make cars learn/ --train 400 --val 10 --test 20 --size 64\n      learn/cars_train, learn/cars_val and learn/cars_test, one folder for each object\n\n\
+    Training views stand at random on a sphere, nine of ten on its upper half; validation and test views on the spiral of\n\
+    SRN's test scenes. The same settings give the same pictures; after an interruption the same command goes on, and with\n\
+    a larger number of objects it adds the missing ones.")]
+struct MakeArguments {
+    /// What to make: cars, chairs or toys
+    kind: Kind,
+    /// The folder that gets KIND_train, KIND_val and KIND_test
+    #[arg(value_name = "OUT_FOLDER")]
+    out: PathBuf,
+    /// Objects to learn from
+    #[arg(long, value_name = "N", default_value_t = 400, value_parser = object_count())]
+    train: u32,
+    /// Objects to watch the learning with
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = object_count())]
+    val: u32,
+    /// Objects to measure the result with
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = object_count())]
+    test: u32,
+    /// Views of an object to learn from
+    #[arg(long, value_name = "N", default_value_t = 50, value_parser = view_count())]
+    views: u32,
+    /// Views of the other objects
+    #[arg(long, value_name = "N", default_value_t = 251, value_parser = view_count())]
+    test_views: u32,
+    /// Pixels of a picture along each side: 64 or 128
+    #[arg(long, value_name = "N", default_value = "128", value_parser = parse_size)]
+    size: u32,
+    /// Seed of every random number
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+fn object_count() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(0..=i64::from(LARGEST_OBJECT_COUNT))
+}
+
+fn view_count() -> clap::builder::RangedI64ValueParser<u32> {
+    clap::value_parser!(u32).range(1..=10_000)
+}
+
+fn parse_size(text: &str) -> Result<u32, String> {
+    match text {
+        "64" => Ok(64),
+        "128" => Ok(128),
+        _ => Err("64 or 128 is wanted".to_owned()),
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    match &arguments.command {
+        Command::Make(arguments) => run_make(arguments),
+    }
+}
+
+fn run_make(arguments: &MakeArguments) -> anyhow::Result<ExitCode> {
+    let MakeArguments { kind, out, train, val, test, views, test_views, size, seed, threads } = arguments;
+    let settings = Settings::new(*kind, *seed, *size, *views, *test_views);
+    let counts = ObjectCounts { train: *train, validation: *val, test: *test };
+    let progress = Progress::new("making");
+    let made = on_threads(*threads, || make(out, *kind, &settings, counts, &progress))??;
+    drop(progress);
+    say(format_args!("{}: {} new scenes, {} were there", out.display(), made.new_count, made.kept_count))?;
+    Ok(ExitCode::SUCCESS)
+}

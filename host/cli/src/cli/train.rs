@@ -1,0 +1,237 @@
+//! `viewfuse train`.
+
+use super::{on_threads, say};
+use clap::{Args, Subcommand, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use viewfuse_job::progress::Progress;
+use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_scene::dataset::{Dataset, Split};
+use viewfuse_train::{
+    Embedding, GenvsSettings, Outcome, PixelNerfSettings, Schedule, WeightingSettings, train_genvs, train_pixelnerf,
+    train_weighting,
+};
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse scenes make cars learn/ --train 400 --val 12 --views 30 --size 64\n  \
+    viewfuse train pixelnerf learn/cars -o runs/pixelnerf --steps 5000\n      a small PixelNeRF: an hour on one core\n  \
+    viewfuse train genvs learn/cars -o runs/genvs\n  \
+    viewfuse train weighting runs/pixelnerf/model.safetensors learn/cars -o runs/weighting --steps 1000\n      \
+    the paper's attention weighting for it\n\n\
+    The same command again goes on with a run that was stopped, and ends in the same numbers.")]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// A small PixelNeRF, from scratch or from a network that was learned before.
+    Pixelnerf(PixelNerfArguments),
+    /// A small GeNVS, from scratch or from a network that was learned before: volumes, feature images and the denoiser, all at once.
+    Genvs(GenvsArguments),
+    /// The weighting of views for a network that stays as it is.
+    Weighting(WeightingArguments),
+}
+
+/// What every run has.
+#[derive(Args)]
+struct RunOptions {
+    /// Data: ROOT/cars for ROOT/cars_train and ROOT/cars_val, or a folder that holds such folders
+    data: PathBuf,
+    /// Folder of the run: its state, the learned model, curves and a record. A run that is there already goes on
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    /// Steps of the run
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
+    steps: u32,
+    /// Learning rate; it rises over the first hundred steps and falls along a cosine
+    #[arg(long, value_name = "RATE", default_value_t = 1.0e-3)]
+    rate: f64,
+    /// Seed of every random number
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Steps from one validation to the next
+    #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
+    validate_every: u32,
+    /// Seconds from one writing of the state to the next
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    write_every: f64,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+}
+
+impl RunOptions {
+    fn schedule(&self) -> Schedule {
+        let RunOptions { steps, rate, seed, validate_every, write_every, .. } = *self;
+        Schedule { steps, rate, seed, validate_every, write_every }
+    }
+}
+
+#[derive(Args)]
+struct PixelNerfArguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Go on from what this network has learned, with steps, rates and data of a run of its own
+    #[arg(long, value_name = "FILE", conflicts_with = "width")]
+    from: Option<PathBuf>,
+    /// Width of the point network
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    width: usize,
+    /// Side of the pictures, pixels
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    side: u32,
+    /// Objects of a step
+    #[arg(long, value_name = "N", default_value_t = 8)]
+    objects: usize,
+    /// Rays of each object
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    rays: usize,
+    /// Samples of a ray that decide where to look
+    #[arg(long, value_name = "N", default_value_t = 32)]
+    coarse: usize,
+    /// Samples that are added where there is something
+    #[arg(long, value_name = "N", default_value_t = 16)]
+    fine: usize,
+}
+
+#[derive(Args)]
+struct GenvsArguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Go on from what this network has learned, with steps, rates and data of a run of its own
+    #[arg(long, value_name = "FILE", conflicts_with = "width")]
+    from: Option<PathBuf>,
+    /// Channels of the denoiser's first level, a multiple of 4
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = width)]
+    width: usize,
+    /// Side of the pictures, pixels, a multiple of 16
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
+    side: u32,
+    /// Objects of a step
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
+    objects: usize,
+    /// Targets of each object
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
+    targets: usize,
+    /// Samples of a ray: as many as renders will have
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
+    samples: u32,
+}
+
+fn width(text: &str) -> Result<usize, String> {
+    number(text, 4).map(|number| number as usize)
+}
+
+fn side(text: &str) -> Result<u32, String> {
+    number(text, 16)
+}
+
+fn count(text: &str) -> Result<usize, String> {
+    number(text, 1).map(|number| number as usize)
+}
+
+/// A whole number above zero, a multiple of `step`.
+fn number(text: &str, step: u32) -> Result<u32, String> {
+    match text.parse::<u32>() {
+        Ok(number @ 1..=1024) if number % step == 0 => Ok(number),
+        _ if step == 1 => Err("a whole number from 1 to 1024 is needed".to_owned()),
+        _ => Err(format!("a multiple of {step} from {step} to 1024 is needed")),
+    }
+}
+
+#[derive(Args)]
+struct WeightingArguments {
+    /// The network: a checkpoint that `train pixelnerf` or `train genvs` wrote
+    #[arg(value_name = "FILE")]
+    model: PathBuf,
+    #[command(flatten)]
+    run: RunOptions,
+    /// How poses become vectors
+    #[arg(long, value_enum, default_value = "fourier")]
+    embedding: EmbeddingName,
+    /// Side of the pictures, pixels
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
+    side: u32,
+    /// Objects of a step, each with one target
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = count)]
+    objects: usize,
+    /// Rays of each target; with a GeNVS a target is a whole picture
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count)]
+    rays: usize,
+}
+
+/// See [`Embedding`].
+#[derive(Clone, Copy, ValueEnum)]
+enum EmbeddingName {
+    Fourier,
+    Flat,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    match &arguments.what {
+        What::Pixelnerf(arguments) => pixelnerf(arguments),
+        What::Genvs(arguments) => genvs(arguments),
+        What::Weighting(arguments) => weighting(arguments),
+    }
+}
+
+fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
+    let PixelNerfArguments { run, from, width, side, objects, rays, coarse, fine } = arguments;
+    let settings =
+        PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
+    let [train, validation] = scenes(&run.data)?;
+    let progress = Progress::new("training");
+    let from = from.as_deref().map(Checkpoint::open).transpose()?;
+    let train_it =
+        || train_pixelnerf(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
+    let outcome = on_threads(run.threads, train_it)??;
+    drop(progress);
+    report(&outcome)
+}
+
+fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
+    let GenvsArguments { run, from, width, side, objects, targets, samples } = arguments;
+    let settings =
+        GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
+    let [train, validation] = scenes(&run.data)?;
+    let progress = Progress::new("training");
+    let from = from.as_deref().map(Checkpoint::open).transpose()?;
+    let train_it =
+        || train_genvs(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
+    let outcome = on_threads(run.threads, train_it)??;
+    drop(progress);
+    report(&outcome)
+}
+
+fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
+    let WeightingArguments { model, run, embedding, side, objects, rays } = arguments;
+    let embedding = match embedding {
+        EmbeddingName::Fourier => Embedding::Fourier,
+        EmbeddingName::Flat => Embedding::Flat,
+    };
+    let settings = WeightingSettings { embedding, side: *side, objects: *objects, rays: *rays };
+    let [train, validation] = scenes(&run.data)?;
+    let checkpoint = Checkpoint::open(model)?;
+    let progress = Progress::new("training");
+    let (schedule, scenes) = (run.schedule(), [&train[..], &validation[..]]);
+    let train_it = || train_weighting(&settings, &checkpoint, &schedule, scenes, &run.output, &progress);
+    let outcome = on_threads(run.threads, train_it)??;
+    drop(progress);
+    report(&outcome)
+}
+
+/// Scenes to learn from and to validate on.
+fn scenes(data: &Path) -> anyhow::Result<[Vec<PathBuf>; 2]> {
+    Ok([Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes])
+}
+
+fn report(outcome: &Outcome) -> anyhow::Result<ExitCode> {
+    if let Some((step, score)) = outcome.scores.last() {
+        say(format_args!("{step} steps in {:.0} s, validation {score:.2}", outcome.seconds))?;
+    }
+    say(format_args!("{}", outcome.model.display()))?;
+    Ok(ExitCode::SUCCESS)
+}

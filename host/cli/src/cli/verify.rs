@@ -1,0 +1,66 @@
+//! `viewfuse verify`.
+
+use super::options::DeviceOptions;
+use super::say;
+use super::table::table;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_check::verify::{Measure, Report, verify};
+use viewfuse_device::choice::{AnyDevice, Chosen};
+
+#[derive(Args)]
+#[command(after_help = "Example:\n  viewfuse verify fixtures/weighting.json fixtures/metrics.safetensors\n\n\
+    Exit code 1 if a tolerance is exceeded.")]
+pub(crate) struct Arguments {
+    /// Files of reference values: weighting.json, metrics.safetensors, pixelnerf_srn.safetensors,
+    /// genvs_srn.safetensors
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    device: DeviceOptions,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let Chosen { device, .. } = arguments.device.open()?;
+    let mut all_pass = true;
+    for path in &arguments.files {
+        let report = match &device {
+            AnyDevice::Cpu(cpu) => verify(path, cpu)?,
+            AnyDevice::Vulkan(vulkan) => verify(path, vulkan.as_ref())?,
+        };
+        print_report(&report)?;
+        all_pass &= report.passes();
+    }
+    Ok(if all_pass { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn print_report(report: &Report) -> std::io::Result<()> {
+    let header = ["quantity", "numbers", "worst error", "", "tolerance", "", "at"];
+    let mut rows = table(header.map(str::to_owned));
+    for quantity in &report.quantities {
+        rows.add_row([
+            quantity.name.clone(),
+            quantity.count.to_string(),
+            format!("{:.2e}", quantity.worst),
+            match quantity.measure {
+                Measure::Absolute => "absolute".to_owned(),
+                Measure::Relative => "relative".to_owned(),
+            },
+            format!("{:.1e}", quantity.tolerance),
+            if quantity.passes() { "ok".to_owned() } else { "EXCEEDED".to_owned() },
+            quantity.place.clone(),
+        ]);
+    }
+    say(format_args!("{}", report.path.display()))?;
+    say(format_args!("{rows}"))?;
+    if !report.not_covered.is_empty() {
+        say(format_args!("not computed by this version: {}", report.not_covered.join(", ")))?;
+    }
+    let failed = report.quantities.iter().filter(|quantity| !quantity.passes()).count();
+    say(format_args!(
+        "{} of {} quantities within tolerance\n",
+        report.quantities.len() - failed,
+        report.quantities.len()
+    ))
+}

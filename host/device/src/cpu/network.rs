@@ -1,0 +1,280 @@
+//! Layers of networks: blocked matrix products, convolutions as products of the image's patches or by Winograd's way, rows
+//! spread over the cores.
+
+use super::Cpu;
+use super::product::{Ending, Panels, Rows};
+use super::room::with_room;
+use super::winograd::Winograd;
+use crate::kernels::network::{Layer, LayerShape, NetworkKernels};
+use pulp::Arch;
+use rayon::prelude::*;
+use std::convert::Infallible;
+use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
+use viewfuse_core::network::depthwise::DepthwiseBlock;
+use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_core::network::transpose::TransposedBlock;
+
+/// Most rows that a core takes at once: their inputs and outputs (512 columns) stay in its second-level cache, beside the
+/// weights, and the last ones keep no core waiting for long.
+const MOST_ROWS: usize = 96;
+/// Rows of a product's tile (or a multiple): fewer at once are wasted.
+const ROW_STEP: usize = 12;
+
+/// A layer's weights in the order in which they are needed.
+pub enum Weights {
+    /// For products of matrices.
+    Product(Panels),
+    /// For convolutions of large images.
+    Winograd(Winograd),
+}
+
+impl Weights {
+    fn panels(&self, inner: usize, columns: usize) -> &Panels {
+        match self {
+            Weights::Product(panels) => {
+                assert_eq!(panels.size(), [inner, columns], "a layer has one size");
+                panels
+            }
+            Weights::Winograd(_) => panic!("a layer for large images is used for nothing else"),
+        }
+    }
+}
+
+impl NetworkKernels for Cpu {
+    type Weights = Weights;
+
+    fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, Infallible> {
+        let LayerShape { inner_count, column_count, has_wide_images } = *shape;
+        Ok(match has_wide_images {
+            true => Weights::Winograd(Winograd::new(weights, inner_count / 9, column_count)),
+            false => Weights::Product(Panels::new(weights, inner_count, column_count)),
+        })
+    }
+
+    fn convolve(
+        &self,
+        block: &ConvolveBlock,
+        inputs: &Vec<f32>,
+        layer: &Layer<Self>,
+        addend: Option<&Vec<f32>>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let (pixel_count, columns) = (block.pixel_count() as usize, block.out_channels as usize);
+        let ending = Ending {
+            bias: &layer.bias[..columns],
+            addend: addend.map(|addend| (&addend[block.addend_first as usize..], block.addend_pitch as usize)),
+            scale: block.scale,
+            relu: block.relu_outputs,
+        };
+        let out_pitch = block.out_pitch as usize;
+        let outputs = window(outputs, block.out_first, pixel_count, out_pitch, columns);
+        if let Weights::Winograd(winograd) = &layer.weights {
+            winograd.convolve(block, inputs, ending, outputs);
+            return Ok(());
+        }
+        let patch_len = block.patch_len() as usize;
+        let panels = layer.weights.panels(patch_len, columns);
+        let rows = chunk_rows(pixel_count);
+        // Windows of one pixel are what lies in the image already.
+        let is_plain = [block.size, block.stride, block.enlarge, block.padding] == [1, 1, 1, 0];
+        let run = |patches: &mut [f32], chunk: usize, outputs: &mut [f32]| {
+            let first = chunk * rows;
+            let row_count = rows.min(pixel_count - first);
+            let (inputs, in_pitch) = if is_plain {
+                (&inputs[block.in_first as usize + first * block.in_pitch as usize..], block.in_pitch as usize)
+            } else {
+                for (pixel, patch) in (first..).zip(patches.chunks_exact_mut(patch_len).take(row_count)) {
+                    read_patch(block, inputs, pixel as u32, patch);
+                }
+                (&*patches, patch_len)
+            };
+            let ending = ending.rows_from(first);
+            panels.multiply(Rows { row_count, inputs, in_pitch, relu_inputs: 0, ending, outputs, out_pitch });
+        };
+        let len = if is_plain { 0 } else { rows * patch_len };
+        let chunks = outputs.par_chunks_mut(rows * out_pitch).enumerate();
+        chunks.for_each(|(chunk, outputs)| with_room(len, |patches| run(patches, chunk, outputs)));
+        Ok(())
+    }
+
+    fn convolve_depthwise(
+        &self,
+        block: &DepthwiseBlock,
+        inputs: &Vec<f32>,
+        weights: &Vec<f32>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let channels = block.channels as usize;
+        let outputs = &mut outputs[..block.pixel_count() as usize * channels];
+        outputs.par_chunks_mut(channels).enumerate().for_each(|(pixel, outputs)| {
+            Arch::new().dispatch(
+                #[inline(always)]
+                || filter_pixel(block, inputs, weights, pixel as u32, outputs),
+            );
+        });
+        Ok(())
+    }
+
+    fn convolve_transposed(
+        &self,
+        block: &TransposedBlock,
+        inputs: &Vec<f32>,
+        layer: &Layer<Self>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let (width, columns) = (block.in_width as usize, block.column_count() as usize);
+        let panels = layer.weights.panels(block.in_channels as usize, columns);
+        let (size, channels, pitch) = (block.size as usize, block.out_channels as usize, block.out_pitch as usize);
+        let pixels = block.pixel_count() as usize * size * size;
+        let bias = layer.bias[..channels].repeat(size * size);
+        let ending = Ending { bias: &bias, addend: None, scale: 1.0, relu: block.relu_outputs };
+        // A row of the input becomes some whole rows of the output.
+        let outputs = window(outputs, block.out_first, pixels, pitch, channels);
+        let run = |results: &mut [f32], row: usize, outputs: &mut [f32]| {
+            let in_pitch = block.in_pitch as usize;
+            let inputs = &inputs[block.in_first as usize + row * width * in_pitch..];
+            let product = Rows {
+                row_count: width,
+                inputs,
+                in_pitch,
+                relu_inputs: 0,
+                ending,
+                outputs: results,
+                out_pitch: columns,
+            };
+            panels.multiply(product);
+            for (column, result) in results.chunks_exact(columns).enumerate() {
+                for (corner, result) in result.chunks_exact(channels).enumerate() {
+                    let place = (corner / size * width + column) * size + corner % size;
+                    outputs[place * pitch..place * pitch + channels].copy_from_slice(result);
+                }
+            }
+        };
+        let rows = outputs.par_chunks_mut(width * size * size * pitch).enumerate();
+        rows.for_each(|(row, outputs)| with_room(width * columns, |results| run(results, row, outputs)));
+        Ok(())
+    }
+
+    fn max_pool(&self, block: &PoolBlock, inputs: &Vec<f32>, outputs: &mut Vec<f32>) -> Result<(), Infallible> {
+        let count = (block.out_height * block.out_width * block.channels) as usize;
+        outputs[..count]
+            .par_iter_mut()
+            .enumerate()
+            .with_min_len(1024)
+            .for_each(|(element, output)| *output = pooled_element(&inputs[..], block, element));
+        Ok(())
+    }
+
+    fn upsample(&self, block: &UpsampleBlock, inputs: &Vec<f32>, outputs: &mut Vec<f32>) -> Result<(), Infallible> {
+        let (in_channels, out_channels) = (block.in_channels as usize, block.out_channels as usize);
+        let pixel_count = (block.out_height * block.out_width) as usize;
+        outputs[..pixel_count * out_channels].par_chunks_mut(out_channels).enumerate().for_each(|(pixel, outputs)| {
+            let first = block.first_channel as usize;
+            for (channel, output) in outputs[first..first + in_channels].iter_mut().enumerate() {
+                *output = upsampled_element(&inputs[..], block, pixel * in_channels + channel);
+            }
+        });
+        Ok(())
+    }
+
+    fn product(
+        &self,
+        block: &ProductBlock,
+        inputs: &Vec<f32>,
+        layer: &Layer<Self>,
+        addend: Option<&Vec<f32>>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let inner = block.inner_count as usize;
+        let (row_count, columns) = (block.row_count as usize, block.column_count as usize);
+        let panels = layer.weights.panels(inner, columns);
+        let ending = Ending {
+            bias: &layer.bias,
+            addend: addend.map(|addend| (&addend[..], columns)),
+            scale: 1.0,
+            relu: block.relu_outputs,
+        };
+        multiply(panels, inputs, inner, block.relu_inputs, ending, &mut outputs[..row_count * columns]);
+        Ok(())
+    }
+}
+
+/// A product of rows that lie side by side, spread over the cores.
+pub(super) fn multiply(
+    panels: &Panels,
+    inputs: &[f32],
+    in_pitch: usize,
+    relu_inputs: u32,
+    ending: Ending<'_>,
+    outputs: &mut [f32],
+) {
+    let [_, columns] = panels.size();
+    let rows = chunk_rows(outputs.len() / columns);
+    outputs.par_chunks_mut(rows * columns).enumerate().for_each(|(chunk, outputs)| {
+        let first = chunk * rows;
+        panels.multiply(Rows {
+            row_count: outputs.len() / columns,
+            inputs: &inputs[first * in_pitch..],
+            in_pitch,
+            relu_inputs,
+            ending: ending.rows_from(first),
+            outputs,
+            out_pitch: columns,
+        });
+    });
+}
+
+/// The part of a buffer that holds `count` rows of `columns` numbers.
+fn window(outputs: &mut [f32], first: u32, count: usize, pitch: usize, columns: usize) -> &mut [f32] {
+    let first = first as usize;
+    &mut outputs[first..first + count.saturating_sub(1) * pitch + columns]
+}
+
+/// How many of these rows a core takes at once.
+fn chunk_rows(row_count: usize) -> usize {
+    let share = row_count.div_ceil(rayon::current_num_threads()).next_multiple_of(ROW_STEP);
+    share.clamp(ROW_STEP, MOST_ROWS)
+}
+
+/// What output pixel `pixel` sees, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at a time.
+fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f32]) {
+    let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
+    for (place, values) in (0..).zip(patch.chunks_exact_mut(block.in_channels as usize)) {
+        let row = out_row * block.stride + place / block.size * block.dilation;
+        let column = out_column * block.stride + place % block.size * block.dilation;
+        match window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column) {
+            u32::MAX => values.fill(0.0),
+            seen => {
+                let first = (block.in_first + seen * block.in_pitch) as usize;
+                values.copy_from_slice(&inputs[first..first + values.len()]);
+            }
+        }
+    }
+}
+
+/// All channels of an output pixel, as [`viewfuse_core::network::depthwise::depthwise_element`] defines them.
+#[inline(always)]
+fn filter_pixel(block: &DepthwiseBlock, inputs: &[f32], weights: &[f32], pixel: u32, outputs: &mut [f32]) {
+    let channels = outputs.len();
+    outputs.fill(0.0);
+    let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
+    for place in 0..block.size * block.size {
+        let row = out_row * block.stride + place / block.size * block.dilation;
+        let column = out_column * block.stride + place % block.size * block.dilation;
+        let seen = window_pixel([block.in_height, block.in_width], 1, block.padding, row, column);
+        if seen == u32::MAX {
+            continue;
+        }
+        let first = (block.in_first + seen * block.in_pitch) as usize;
+        let inputs = &inputs[first..first + channels];
+        if block.is_shared != 0 {
+            let weight = weights[place as usize];
+            outputs.iter_mut().zip(inputs).for_each(|(output, input)| *output += input * weight);
+        } else {
+            let weights = &weights[place as usize * channels..][..channels];
+            let pairs = inputs.iter().zip(weights);
+            outputs.iter_mut().zip(pairs).for_each(|(output, (input, weight))| *output += input * weight);
+        }
+    }
+}

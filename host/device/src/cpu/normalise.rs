@@ -1,0 +1,162 @@
+//! Means of images and normalisation by them, all channels of a pixel together.
+
+use super::Cpu;
+use crate::kernels::normalise::NormaliseKernels;
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+use std::convert::Infallible;
+use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock, PART, merged_moments, silu};
+
+impl NormaliseKernels for Cpu {
+    fn channel_means(&self, block: &MeanBlock, inputs: &Vec<f32>, means: &mut Vec<f32>) -> Result<(), Infallible> {
+        let means = &mut means[..block.channels as usize];
+        means.fill(0.0);
+        // The same sums, all channels of a pixel at once.
+        for row in inputs.chunks_exact(means.len()).take(block.pixel_count as usize) {
+            means.iter_mut().zip(row).for_each(|(sum, input)| *sum += input);
+        }
+        means.iter_mut().for_each(|mean| *mean /= block.pixel_count as f32);
+        Ok(())
+    }
+
+    fn part_moments(
+        &self,
+        block: &NormaliseBlock,
+        inputs: &Vec<f32>,
+        parts: &mut Vec<[f32; 2]>,
+    ) -> Result<(), Infallible> {
+        let groups = block.group_count as usize;
+        let parts = &mut parts[..block.part_count() as usize * groups];
+        parts.par_chunks_mut(groups).enumerate().for_each_init(Vec::new, |sums, (part, moments)| {
+            Arch::new().dispatch(PartMoments { block, inputs, part, sums, moments });
+        });
+        Ok(())
+    }
+
+    fn merge_moments(
+        &self,
+        block: &NormaliseBlock,
+        parts: &Vec<[f32; 2]>,
+        moments: &mut Vec<[f32; 2]>,
+    ) -> Result<(), Infallible> {
+        for (group, moments) in moments[..block.group_count as usize].iter_mut().enumerate() {
+            *moments = merged_moments(&parts[..], block, group);
+        }
+        Ok(())
+    }
+
+    fn normalise(
+        &self,
+        block: &NormaliseBlock,
+        inputs: &Vec<f32>,
+        moments: &Vec<[f32; 2]>,
+        weights: &Vec<f32>,
+        bias: &Vec<f32>,
+        outputs: &mut Vec<f32>,
+    ) -> Result<(), Infallible> {
+        let (channels, pixel_count) = (block.channels as usize, block.pixel_count as usize);
+        let of_channel = |channel: usize| moments[channel / block.group_channels() as usize];
+        let mean: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[0]).collect();
+        let factor: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[1] * weights[channel]).collect();
+        let pixels = (4096 / channels).max(1);
+        let outputs = outputs[..pixel_count * channels].par_chunks_mut(pixels * channels).enumerate();
+        outputs.for_each(|(chunk, outputs)| {
+            let first_pixel = chunk * pixels;
+            Arch::new().dispatch(Normalise { block, inputs, first_pixel, mean: &mean, factor: &factor, bias, outputs });
+        });
+        Ok(())
+    }
+}
+
+/// Some pixels, as [`viewfuse_core::network::normalise::normalised_element`] defines them. A struct and not a closure, as
+/// all that must run with the machine's widest instructions: a closure becomes a function of its own, without them.
+struct Normalise<'a> {
+    block: &'a NormaliseBlock,
+    inputs: &'a [f32],
+    first_pixel: usize,
+    /// `[channel]`, as all of these.
+    mean: &'a [f32],
+    factor: &'a [f32],
+    bias: &'a [f32],
+    outputs: &'a mut [f32],
+}
+
+impl WithSimd for Normalise<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Normalise { block, inputs, first_pixel, mean, factor, bias, outputs } = self;
+        let channels = block.channels as usize;
+        let (mean, factor, bias) = (&mean[..channels], &factor[..channels], &bias[..channels]);
+        for (pixel, outputs) in (first_pixel..).zip(outputs.chunks_exact_mut(channels)) {
+            let first = block.in_first as usize + pixel * block.in_pitch as usize;
+            let inputs = &inputs[first..first + channels];
+            if block.silu_outputs != 0 {
+                for channel in 0..channels {
+                    outputs[channel] = silu((inputs[channel] - mean[channel]) * factor[channel] + bias[channel]);
+                }
+            } else {
+                for channel in 0..channels {
+                    outputs[channel] = (inputs[channel] - mean[channel]) * factor[channel] + bias[channel];
+                }
+            }
+        }
+    }
+}
+
+/// [`viewfuse_core::network::normalise::part_moments`] of all groups of a part: channel by channel first, the channels of
+/// a group then summed.
+struct PartMoments<'a> {
+    block: &'a NormaliseBlock,
+    inputs: &'a [f32],
+    part: usize,
+    /// Room for sums.
+    sums: &'a mut Vec<f32>,
+    /// `[group]`.
+    moments: &'a mut [[f32; 2]],
+}
+
+impl WithSimd for PartMoments<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let PartMoments { block, inputs, part, sums, moments } = self;
+        let (channels, own) = (block.channels as usize, block.group_channels() as usize);
+        let first = part * PART as usize;
+        let pixels = first..block.pixel_count.min((first + PART as usize) as u32) as usize;
+        let count = (pixels.len() * own) as f32;
+        sums.clear();
+        sums.resize(2 * channels, 0.0);
+        let (sums, means) = sums.split_at_mut(channels);
+        // First the group's first value, then its mean.
+        for (means, inputs) in means.chunks_mut(own).zip(row_of(block, inputs, first).chunks(own)) {
+            means.fill(inputs[0]);
+        }
+        for pixel in pixels.clone() {
+            for ((sum, mean), input) in sums.iter_mut().zip(&*means).zip(row_of(block, inputs, pixel)) {
+                *sum += input - mean;
+            }
+        }
+        for ((sums, means), moments) in sums.chunks(own).zip(means.chunks_mut(own)).zip(&mut *moments) {
+            *moments = [means[0] + sums.iter().sum::<f32>() / count, 0.0];
+            means.fill(moments[0]);
+        }
+        sums.fill(0.0);
+        for pixel in pixels {
+            for ((sum, mean), input) in sums.iter_mut().zip(&*means).zip(row_of(block, inputs, pixel)) {
+                *sum += (input - mean) * (input - mean);
+            }
+        }
+        for (sums, moments) in sums.chunks(own).zip(moments) {
+            moments[1] = sums.iter().sum();
+        }
+    }
+}
+
+/// The channels of a pixel.
+#[inline(always)]
+fn row_of<'a>(block: &NormaliseBlock, inputs: &'a [f32], pixel: usize) -> &'a [f32] {
+    &inputs[block.in_first as usize + pixel * block.in_pitch as usize..][..block.channels as usize]
+}

@@ -1,0 +1,264 @@
+//! What a scene holds and what looks wrong with it: before hours are spent on rendering.
+
+use image::RgbImage;
+use serde::Serialize;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::photo::ObjectBlock;
+use viewfuse_field::photo::find_object;
+use viewfuse_job::progress::Interrupted;
+use viewfuse_job::progress::Progress;
+use viewfuse_output::canvas::{BLUE, Canvas, GREY, INK, LINE_HEIGHT, RED};
+use viewfuse_scene::photographs::{Album, BackgroundChoice};
+use viewfuse_scene::rig::Rig;
+use viewfuse_scene::{Layout, Scene, View};
+use viewfuse_weighting::sources::MOST_SOURCES;
+
+/// Longest side at which photographs are looked at: enough to find the object.
+const LOOK_SIDE: u32 = 128;
+/// A rig whose axes miss their common point by more than this share of the distance has no common subject.
+const MOST_AXIS_MISS: f32 = 0.25;
+/// Distances within which the parameters of published schemes (Gaussian, attention) mean something.
+const USUAL_DISTANCES: (f32, f32) = (0.1, 100.0);
+
+/// What was found out about a scene. Lengths in world units, world coordinates.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inspection {
+    /// The path it was opened from.
+    pub path: String,
+    /// `srn`, `transforms` or `middlebury`.
+    pub layout: &'static str,
+    /// Views with a photograph.
+    pub photograph_count: usize,
+    /// Target poses without one.
+    pub target_count: usize,
+    /// Width and height of the first view's image.
+    pub size: [u32; 2],
+    /// Focal lengths of the first view in pixels.
+    pub focal: [f32; 2],
+    /// Principal point of the first view in pixels from the outer corner of the top left pixel.
+    pub principal: [f32; 2],
+    /// The point nearest to all principal axes.
+    pub focus: [f32; 3],
+    /// Root mean square distance of the principal axes from it.
+    pub axis_miss: f32,
+    /// Least and greatest distance of a camera from it.
+    pub distances: [f32; 2],
+    /// Which way is up.
+    pub up: [f32; 3],
+    /// Least and greatest corner of the box around the object that the silhouettes show, if they show one.
+    pub object: Option<[[f32; 3]; 2]>,
+    /// Least depth of the object in any view, or of the ball that the cameras see.
+    pub near: f32,
+    /// Greatest depth.
+    pub far: f32,
+    /// What looks wrong, one line each.
+    pub warnings: Vec<String>,
+}
+
+/// Looks at a scene. Photographs are read at a small size to find the object; if that fails, the reason is a warning.
+///
+/// # Errors
+/// [`Interrupted`] if the work is stopped.
+pub fn inspect(
+    scene: &Scene,
+    background: BackgroundChoice,
+    progress: &dyn Progress,
+) -> Result<Inspection, Interrupted> {
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    let rig = Rig::of(&cameras);
+    let mut warnings = rig_warnings(scene, &rig);
+    let object = match object_of(scene, background, progress, &mut warnings) {
+        Ok(object) => Some(object),
+        Err(reason) => {
+            warnings.push(reason);
+            None
+        }
+    };
+    progress.check()?;
+    let [near, far] = depth_range(&cameras, &rig, object.as_ref());
+    let distance = |camera: &Camera| camera.pose.centre_world().distance(rig.focus);
+    let pinhole = cameras[0].pinhole;
+    let photograph_count = scene.views.iter().filter(|view| view.image.is_some()).count();
+    Ok(Inspection {
+        path: scene.path.display().to_string(),
+        layout: match scene.layout {
+            Layout::Srn => "srn",
+            Layout::Transforms => "transforms",
+            Layout::Middlebury => "middlebury",
+        },
+        photograph_count,
+        target_count: scene.views.len() - photograph_count,
+        size: [pinhole.width(), pinhole.height()],
+        focal: pinhole.focal(),
+        principal: pinhole.principal(),
+        focus: rig.focus.to_array(),
+        axis_miss: rig.axis_miss,
+        distances: [
+            cameras.iter().map(distance).fold(f32::INFINITY, f32::min),
+            cameras.iter().map(distance).fold(0.0, f32::max),
+        ],
+        up: rig.up.to_array(),
+        object: object.map(|object| [object.low, object.high].map(|c| [c[0], c[1], c[2]])),
+        near,
+        far,
+        warnings,
+    })
+}
+
+/// What looks wrong with the cameras.
+fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let cameras = || scene.views.iter().map(|view| &view.camera);
+    let away = cameras().filter(|c| (rig.focus - c.pose.centre_world()).dot(c.pose.forward_world()) < 0.0).count();
+    let count = scene.views.len();
+    if count > 1 && 2 * away > count {
+        warnings.push(format!(
+            "{away} of {count} cameras look away from the point that their axes come nearest to: the axes look flipped \
+             (OpenGL poses read as OpenCV, or the other way round)"
+        ));
+    }
+    if rig.axis_miss > MOST_AXIS_MISS * rig.distance {
+        warnings.push(format!(
+            "the cameras do not look at a common point: their axes miss the nearest one by {:.3} at a distance of {:.3}",
+            rig.axis_miss, rig.distance
+        ));
+    }
+    if !(USUAL_DISTANCES.0..=USUAL_DISTANCES.1).contains(&rig.distance) {
+        warnings.push(format!(
+            "the cameras are {:.3e} units from what they look at: weightings that depend on the unit (gaussian, l1, \
+             frobenius, attention) expect between {} and {}",
+            rig.distance, USUAL_DISTANCES.0, USUAL_DISTANCES.1
+        ));
+    }
+    let twin = |(index, view): (usize, &View)| {
+        let other = scene.views[..index].iter().find(|other| other.camera.pose == view.camera.pose)?;
+        Some((other.name.clone(), view.name.clone()))
+    };
+    let twins: Vec<(String, String)> = scene.views.iter().enumerate().filter_map(twin).collect();
+    if let Some((first, second)) = twins.first() {
+        let more =
+            if twins.len() > 1 { format!(", and so have {} more views", twins.len() - 1) } else { String::new() };
+        warnings.push(format!("views '{first}' and '{second}' have the same pose{more}"));
+    }
+    let first = &scene.views[0].camera.pinhole;
+    if let Some(view) = scene.views.iter().find(|view| {
+        let pinhole = &view.camera.pinhole;
+        (pinhole.width(), pinhole.height()) != (first.width(), first.height())
+    }) {
+        warnings.push(format!("view '{}' has another size than the first", view.name));
+    }
+    warnings
+}
+
+/// The object that the silhouettes show, or why there is none.
+fn object_of(
+    scene: &Scene,
+    background: BackgroundChoice,
+    progress: &dyn Progress,
+    warnings: &mut Vec<String>,
+) -> Result<ObjectBlock, String> {
+    let views: Vec<usize> =
+        (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).take(MOST_SOURCES).collect();
+    if views.len() < 2 {
+        return Err("fewer than two photographs: the object cannot be found".to_owned());
+    }
+    let album = Album::open(scene, views.iter().copied(), progress).map_err(|error| error.to_string())?;
+    let images = album.sources(&views, LOOK_SIDE, background).map_err(|error| error.to_string())?;
+    warnings.extend(images.warning.clone());
+    find_object(&images).ok_or_else(|| {
+        "the silhouettes have no common object: wrong poses, or a background that is not of one colour".to_owned()
+    })
+}
+
+/// Least and greatest depth of the object's box, or of the rig's ball, over the cameras.
+fn depth_range(cameras: &[Camera], rig: &Rig, object: Option<&ObjectBlock>) -> [f32; 2] {
+    let depth = |camera: &Camera, point: Vec3| camera.pose.to_camera(point).z;
+    let mut range = [f32::INFINITY, 0.0_f32];
+    let mut include = |depth: f32| range = [range[0].min(depth), range[1].max(depth)];
+    for camera in cameras {
+        match object {
+            Some(object) => object.corners().into_iter().for_each(|corner| include(depth(camera, corner))),
+            None => {
+                include(depth(camera, rig.focus) - rig.subject_radius);
+                include(depth(camera, rig.focus) + rig.subject_radius);
+            }
+        }
+    }
+    // Cameras that look away from everything have nothing before them: the range is empty then, not inside out.
+    range[0] = range[0].max(0.01 * rig.distance);
+    range[1] = range[1].max(range[0]);
+    range
+}
+
+const MAP_SIDE: i32 = 560;
+const MAP_MARGIN: i32 = 60;
+
+/// The cameras seen from above (along the up direction): sources blue, target poses red, the object's box grey.
+pub fn camera_map(scene: &Scene, inspection: &Inspection) -> RgbImage {
+    let focus = Vec3::from_array(inspection.focus);
+    let up = Vec3::from_array(inspection.up);
+    let right = up.any_orthonormal_vector();
+    let back = up.cross(right);
+    let flat = |point: Vec3| ((point - focus).dot(right), (point - focus).dot(back));
+    let centre_of = |camera: &Camera| flat(camera.pose.centre_world());
+    let reach = scene
+        .views
+        .iter()
+        .map(|view| centre_of(&view.camera))
+        .fold(0.0_f32, |reach, (x, y)| reach.max(x.abs()).max(y.abs()))
+        .max(f32::MIN_POSITIVE);
+    let scale = (MAP_SIDE / 2 - MAP_MARGIN) as f32 / reach;
+    let at = |(x, y): (f32, f32)| (MAP_SIDE / 2 + (x * scale) as i32, MAP_SIDE / 2 - (y * scale) as i32);
+    let legend = 2 * LINE_HEIGHT as i32 + 12;
+    let mut canvas = Canvas::new(MAP_SIDE as u32, (MAP_SIDE + legend) as u32);
+    if let Some([low, high]) = inspection.object {
+        let corners = ObjectBlock::new(Vec3::from_array(low), Vec3::from_array(high), 1).corners();
+        for first in 0..8_usize {
+            // Corners that differ in one bit share an edge.
+            for second in [first ^ 1, first ^ 2, first ^ 4].into_iter().filter(|second| *second > first) {
+                canvas.line(at(flat(corners[first])), at(flat(corners[second])), GREY);
+            }
+        }
+    }
+    let middle = at((0.0, 0.0));
+    canvas.line((middle.0 - 5, middle.1), (middle.0 + 5, middle.1), INK);
+    canvas.line((middle.0, middle.1 - 5), (middle.0, middle.1 + 5), INK);
+    for view in &scene.views {
+        let colour = if view.image.is_some() { BLUE } else { RED };
+        let pose = &view.camera.pose;
+        let from = at(centre_of(&view.camera));
+        let ahead = flat(pose.centre_world() + pose.forward_world() * (0.12 * reach));
+        canvas.line(from, at(ahead), colour);
+        canvas.disc(from, 7, colour);
+        // Names stand outside the ring.
+        let outwards = (from.0 - middle.0, from.1 - middle.1);
+        let label = short_name(&view.name);
+        let width = label.len() as i32 * 6;
+        let x = if outwards.0 >= 0 { from.0 + 8 } else { from.0 - 8 - width };
+        canvas.text(x, from.1 - 5, &label, INK);
+    }
+    let line = |number: i32| MAP_SIDE + 4 + number * LINE_HEIGHT as i32;
+    let count = format!(
+        "{} photographs (blue), {} target poses (red), seen from above; + is the common focus",
+        inspection.photograph_count, inspection.target_count
+    );
+    canvas.text(10, line(0), &count, INK);
+    let size = format!(
+        "distance {:.3} to {:.3}, object near {:.3}, far {:.3}",
+        inspection.distances[0], inspection.distances[1], inspection.near, inspection.far
+    );
+    canvas.text(10, line(1), &size, INK);
+    canvas.into_image()
+}
+
+/// The number at the end of a name without leading zeros, or the whole name if there is none.
+fn short_name(name: &str) -> String {
+    let digits = name.len() - name.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let number = name[name.len() - digits..].trim_start_matches('0');
+    match (digits, number) {
+        (0, _) => name.to_owned(),
+        (_, "") => "0".to_owned(),
+        (_, number) => number.to_owned(),
+    }
+}

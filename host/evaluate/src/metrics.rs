@@ -1,0 +1,170 @@
+//! How good pictures are: as numbers, and through the eyes of published networks.
+//!
+//! ```text
+//! similarity       SSIM with a Gaussian window
+//! trunk            the networks' layers, on any device
+//! heads            the few numbers that were fitted to people's judgement
+//! lpips, dists     distance of two pictures
+//! features         a set of pictures as Inception's numbers
+//! frechet, kernel  distance of two sets: FID, KID
+//! convention       what published tables mean by their scores
+//! interval         means over scenes, and how sure they are
+//! ```
+//!
+//! PSNR and SSIM with a uniform window are in [`viewfuse_core::metrics`]. The networks' weights are not part of this
+//! project: a person brings the `state_dict`s that torchvision and pytorch-fid publish. [`Metrics`] is what the commands
+//! use.
+
+pub mod convention;
+pub mod dists;
+pub mod features;
+pub mod frechet;
+pub mod heads;
+pub mod interval;
+pub mod kernel;
+pub mod lpips;
+pub mod similarity;
+pub mod trunk;
+
+use convention::Convention;
+use dists::Dists;
+use features::{Features, Inception};
+use image::RgbImage;
+use lpips::Lpips;
+use trunk::Map;
+use viewfuse_core::metrics::{psnr, ssim};
+use viewfuse_device::Device;
+use viewfuse_field::finite::NotFinite;
+use viewfuse_nn::checkpoint::CheckpointError;
+
+/// Why pictures could not be scored.
+#[derive(Debug, thiserror::Error)]
+pub enum MetricError<E: std::error::Error> {
+    /// A network's parameters cannot be used.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A picture is too small for a network.
+    #[error("a picture of {width}x{height} is too small for a metric's network")]
+    Small {
+        /// Its width.
+        width: usize,
+        /// Its height.
+        height: usize,
+    },
+    /// Two pictures that are to be compared have different sizes.
+    #[error("a picture of {}x{} cannot be compared with one of {}x{}", prediction[0], prediction[1], truth[0], truth[1])]
+    Sizes {
+        /// Width and height of the prediction.
+        prediction: [u32; 2],
+        /// Width and height of the truth.
+        truth: [u32; 2],
+    },
+    /// A number that is none came up inside.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
+    /// The device failed.
+    #[error("the device failed")]
+    Device(#[source] E),
+}
+
+/// A score of a picture, by name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scored {
+    /// `psnr`, `ssim`, `lpips-alex`, `lpips-vgg`, `lpips-squeeze` or `dists`.
+    pub name: &'static str,
+    /// PSNR in decibels, infinite for equal pictures; the others have no unit.
+    pub value: f64,
+    /// Whether more is better.
+    pub more_is_better: bool,
+}
+
+/// The metrics that a person asked for, their networks on a device.
+pub struct Metrics<D: Device> {
+    /// What the scores are to mean.
+    pub convention: Convention,
+    /// LPIPS by any number of trunks.
+    pub lpips: Vec<Lpips<D>>,
+    /// DISTS.
+    pub dists: Option<Dists<D>>,
+    /// The network of FID and KID.
+    pub inception: Option<Inception<D>>,
+}
+
+impl<D: Device> Metrics<D> {
+    /// PSNR and SSIM of the pictures as they are.
+    pub fn plain() -> Metrics<D> {
+        Metrics { convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
+    }
+
+    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, and what networks there are, in the order of
+    /// [`Scored::name`]'s list.
+    ///
+    /// # Errors
+    /// [`MetricError`].
+    pub fn compare(
+        &self,
+        device: &D,
+        prediction: &RgbImage,
+        truth: &RgbImage,
+    ) -> Result<Vec<Scored>, MetricError<D::Error>> {
+        same_size(prediction, truth)?;
+        let (shown, shown_truth) = (self.convention.shown(prediction), self.convention.shown(truth));
+        let (width, height) = (truth.width() as usize, truth.height() as usize);
+        let mut scores = vec![Scored { name: "psnr", value: psnr(&shown, &shown_truth), more_is_better: true }];
+        if let Some(value) = ssim(&shown, &shown_truth, width, height, 3) {
+            scores.push(Scored { name: "ssim", value, more_is_better: true });
+        }
+        // Networks see the prediction as it was saved and the photograph as it is.
+        for lpips in &self.lpips {
+            let value = lpips.distance(device, &shown, truth)?;
+            scores.push(Scored { name: lpips.kind().metric(), value, more_is_better: false });
+        }
+        if let Some(dists) = &self.dists {
+            let value = dists.distance(device, &shown, truth)?;
+            scores.push(Scored { name: "dists", value, more_is_better: false });
+        }
+        Ok(scores)
+    }
+
+    /// What Inception sees in predictions as the convention shows them; `None` without that network.
+    ///
+    /// # Errors
+    /// [`MetricError`].
+    pub fn features_of_predictions<'a>(
+        &self,
+        device: &D,
+        pictures: impl IntoIterator<Item = &'a RgbImage>,
+    ) -> Result<Option<Features>, MetricError<D::Error>> {
+        let shown: Vec<_> = pictures.into_iter().map(|picture| self.convention.shown(picture)).collect();
+        self.features_of_truths(device, shown.iter().map(AsRef::as_ref))
+    }
+
+    /// What Inception sees in photographs; `None` without that network.
+    ///
+    /// # Errors
+    /// [`MetricError`].
+    pub fn features_of_truths<'a>(
+        &self,
+        device: &D,
+        pictures: impl IntoIterator<Item = &'a RgbImage>,
+    ) -> Result<Option<Features>, MetricError<D::Error>> {
+        self.inception.as_ref().map(|inception| inception.features(device, pictures)).transpose()
+    }
+}
+
+/// Only pictures of one size can be compared.
+fn same_size<E: std::error::Error>(prediction: &RgbImage, truth: &RgbImage) -> Result<(), MetricError<E>> {
+    match prediction.dimensions() == truth.dimensions() {
+        true => Ok(()),
+        false => {
+            Err(MetricError::Sizes { prediction: prediction.dimensions().into(), truth: truth.dimensions().into() })
+        }
+    }
+}
+
+/// A picture as a network takes it: each channel's 8-bit level by its function.
+fn seen(picture: &RgbImage, value: impl Fn(usize, f32) -> f32) -> Map {
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    let values = picture.as_raw().iter().enumerate().map(|(at, level)| value(at % 3, f32::from(*level))).collect();
+    Map { height, width, channels: 3, values }
+}

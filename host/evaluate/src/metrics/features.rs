@@ -1,0 +1,210 @@
+//! Sets of pictures as numbers: what the Inception network that FID is defined with sees in them.
+//!
+//! As pytorch-fid does it (mseitzer/pytorch-fid): a picture, levels in `[0, 1]`, is resized to 299x299 (bilinear between
+//! the four nearest pixels, whatever the size: nothing is blurred before it is made smaller), stretched to `[-1, 1]`, and
+//! the 2048 channels at the end are averaged over pixels. Which of the two Inceptions a file holds, its last layer tells
+//! ([`InceptionKind`]); with torchvision's, `transform_input` is left out, as pytorch-fid does.
+
+use super::trunk::{InceptionKind, Map, Trunk, inception};
+use super::{MetricError, seen};
+use image::RgbImage;
+use viewfuse_device::Device;
+use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes};
+
+/// Side of the pictures that Inception sees.
+const SIDE: usize = 299;
+/// Numbers that a picture becomes.
+const DIMENSION: usize = 2048;
+
+/// A set of pictures as points: as many numbers each, all finite.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Features {
+    dimension: usize,
+    values: Vec<f64>,
+}
+
+/// Why numbers are no set of points, or two sets cannot be compared.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SetError {
+    /// Rows of another length, or none.
+    #[error("{count} numbers are no rows of {dimension}")]
+    Rows {
+        /// How many numbers there are.
+        count: usize,
+        /// How many a row is to have.
+        dimension: usize,
+    },
+    /// A number is infinite or not a number.
+    #[error("number {index} of row {row} is not finite")]
+    NotFinite {
+        /// The picture.
+        row: usize,
+        /// Which of its numbers.
+        index: usize,
+    },
+    /// Two sets of different networks.
+    #[error("points of {0} and of {1} numbers cannot be compared")]
+    Dimensions(usize, usize),
+    /// One picture has no spread.
+    #[error("sets of {0} and {1} pictures cannot be compared; each needs at least 2")]
+    Few(usize, usize),
+    /// The decomposition of a matrix did not come to an end.
+    #[error("the singular values of the sets' common matrix cannot be computed")]
+    NotConverged,
+}
+
+impl Features {
+    /// Points `[picture][dimension]`, flat.
+    ///
+    /// # Errors
+    /// [`SetError::Rows`], [`SetError::NotFinite`].
+    pub fn new(dimension: usize, values: Vec<f64>) -> Result<Features, SetError> {
+        if dimension == 0 || !values.len().is_multiple_of(dimension) {
+            return Err(SetError::Rows { count: values.len(), dimension });
+        }
+        match values.iter().position(|value| !value.is_finite()) {
+            Some(at) => Err(SetError::NotFinite { row: at / dimension, index: at % dimension }),
+            None => Ok(Features { dimension, values }),
+        }
+    }
+
+    /// How many pictures.
+    pub fn count(&self) -> usize {
+        self.values.len() / self.dimension
+    }
+
+    /// Numbers of a picture.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// The numbers of each picture.
+    pub fn rows(&self) -> impl ExactSizeIterator<Item = &[f64]> {
+        self.values.chunks_exact(self.dimension)
+    }
+
+    /// The numbers of a picture.
+    pub(super) fn row(&self, picture: usize) -> &[f64] {
+        &self.values[picture * self.dimension..][..self.dimension]
+    }
+
+    /// Two sets that have a distance.
+    pub(super) fn comparable(&self, other: &Features) -> Result<(), SetError> {
+        if self.dimension != other.dimension {
+            return Err(SetError::Dimensions(self.dimension, other.dimension));
+        }
+        match self.count().min(other.count()) {
+            0 | 1 => Err(SetError::Few(self.count(), other.count())),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Inception v3 with its parameters on a device.
+pub struct Inception<D: Device> {
+    kind: InceptionKind,
+    trunk: Trunk<D>,
+}
+
+impl<D: Device> Inception<D> {
+    /// From pytorch-fid's or torchvision's `state_dict`.
+    ///
+    /// # Errors
+    /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
+    pub fn new(device: &D, checkpoint: &Checkpoint) -> Result<Inception<D>, MetricError<D::Error>> {
+        let kind = kind_of(checkpoint)?;
+        let optional = |name: &str| {
+            name.starts_with("fc.") || name.starts_with("AuxLogits.") || name.ends_with(".num_batches_tracked")
+        };
+        Ok(Inception { kind, trunk: Trunk::load(device, checkpoint, &inception(kind), optional)? })
+    }
+
+    /// Which of the two it is.
+    pub fn kind(&self) -> InceptionKind {
+        self.kind
+    }
+
+    /// What it sees in pictures of any sizes; of none, a set of none.
+    ///
+    /// # Errors
+    /// [`MetricError::NotFinite`]; [`MetricError::Device`].
+    pub fn features<'a>(
+        &self,
+        device: &D,
+        pictures: impl IntoIterator<Item = &'a RgbImage>,
+    ) -> Result<Features, MetricError<D::Error>> {
+        let mut values = Vec::new();
+        for picture in pictures {
+            let resized = resized(&seen(picture, |_, level| level / 255.0), SIDE);
+            let stretched = resized.values.iter().map(|value| 2.0 * value - 1.0).collect();
+            for map in self.trunk.taps(device, &Map { values: stretched, ..resized })? {
+                let count = (map.height * map.width) as f64;
+                values.extend((0..map.channels).map(|channel| map.channel(channel).sum::<f64>() / count));
+            }
+        }
+        Ok(Features { dimension: DIMENSION, values })
+    }
+}
+
+/// The last layer's classes tell the two apart.
+fn kind_of(checkpoint: &Checkpoint) -> Result<InceptionKind, CheckpointError> {
+    let sizes = Sizes::new(checkpoint, "Inception v3");
+    match sizes.size("fc.weight", 2, 0)? {
+        1008 => Ok(InceptionKind::Fid),
+        1000 => Ok(InceptionKind::Torchvision),
+        count => Err(sizes.refuse(format!(
+            "fc.weight has {count} classes; the network of FID has 1008, torchvision's 1000, and which of them it is decides \
+             how it pools"
+        ))),
+    }
+}
+
+/// A square image, bilinear between the four nearest pixels, the outer edges of both laid over one another (PyTorch's
+/// `interpolate` without `align_corners`).
+fn resized(image: &Map, side: usize) -> Map {
+    let along = |length: usize| -> Vec<(usize, usize, f32)> {
+        let scale = length as f64 / side as f64;
+        let place = |index: usize| {
+            let at = ((index as f64 + 0.5) * scale - 0.5).max(0.0);
+            let first = (at as usize).min(length - 1);
+            (first, (first + 1).min(length - 1), (at - first as f64) as f32)
+        };
+        (0..side).map(place).collect()
+    };
+    let (rows, columns) = (along(image.height), along(image.width));
+    let mut values = Vec::with_capacity(side * side * image.channels);
+    for &(top, bottom, share_y) in &rows {
+        for &(left, right, share_x) in &columns {
+            let corners = [(top, left), (top, right), (bottom, left), (bottom, right)].map(|(y, x)| image.pixel(y, x));
+            values.extend((0..image.channels).map(|channel| {
+                let [a, b, c, d] = corners.map(|corner| corner[channel]);
+                let (upper, lower) = (a + (b - a) * share_x, c + (d - c) * share_x);
+                upper + (lower - upper) * share_y
+            }));
+        }
+    }
+    Map { height: side, width: side, channels: image.channels, values }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn resizing_keeps_outer_edges() {
+        let image = Map { height: 1, width: 2, channels: 1, values: vec![0.0, 1.0] };
+        // Four pixels over two: centres at -1/4, 1/4, 3/4 and 5/4 of the distance between the two.
+        let wide = resized(&image, 4);
+        assert_eq!(wide.values[..4], [0.0, 0.25, 0.75, 1.0]);
+        assert_eq!(wide.values[12..], wide.values[..4]);
+        assert_eq!(resized(&wide, 2).values, [0.125, 0.875, 0.125, 0.875]);
+    }
+
+    #[test]
+    fn rows_are_whole_and_finite() {
+        assert_eq!(Features::new(3, vec![0.0; 4]), Err(SetError::Rows { count: 4, dimension: 3 }));
+        assert_eq!(Features::new(0, Vec::new()), Err(SetError::Rows { count: 0, dimension: 0 }));
+        let values = vec![0.0, 1.0, 2.0, f64::NAN];
+        assert_eq!(Features::new(2, values), Err(SetError::NotFinite { row: 1, index: 1 }));
+    }
+}

@@ -1,0 +1,154 @@
+//! LPIPS: how far two pictures are apart in a network's eyes.
+//!
+//! At each tap of the trunk, every pixel's channels are scaled to length 1; the squares of the differences, weighted by
+//! the head, are added up over channels and averaged over pixels; the taps are added up. Version 0.1 of the published code
+//! (Zhang, Isola, Efros, Shechtman, Wang: "The unreasonable effectiveness of deep features as a perceptual metric", CVPR
+//! 2018; richzhang/PerceptualSimilarity), not its spatial variant. The trunk computes in `f32`, the rest is `f64`.
+
+use super::trunk::{Convolution, Map, Pooling, Step, Trunk, alexnet, squeezenet, vgg16};
+use super::{MetricError, same_size, seen};
+use image::RgbImage;
+use std::fmt::{Display, Formatter};
+use std::str::FromStr;
+use viewfuse_device::Device;
+use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
+
+/// What pictures, levels in `[-1, 1]`, are shifted by and divided by.
+const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
+const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
+/// Added to lengths.
+const FLOOR: f64 = 1.0e-10;
+
+/// The network that LPIPS looks through.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LpipsTrunk {
+    /// AlexNet, the published default for scores.
+    Alex,
+    /// VGG16.
+    Vgg,
+    /// SqueezeNet 1.1.
+    Squeeze,
+}
+
+impl LpipsTrunk {
+    /// All of them.
+    pub const ALL: [LpipsTrunk; 3] = [LpipsTrunk::Alex, LpipsTrunk::Vgg, LpipsTrunk::Squeeze];
+
+    /// Name of the score.
+    pub fn metric(self) -> &'static str {
+        match self {
+            LpipsTrunk::Alex => "lpips-alex",
+            LpipsTrunk::Vgg => "lpips-vgg",
+            LpipsTrunk::Squeeze => "lpips-squeeze",
+        }
+    }
+
+    /// Its layers.
+    pub fn steps(self) -> Vec<Step<Convolution>> {
+        match self {
+            LpipsTrunk::Alex => alexnet(),
+            LpipsTrunk::Vgg => vgg16(Pooling::Largest),
+            LpipsTrunk::Squeeze => squeezenet(),
+        }
+    }
+
+    /// Channels at each tap.
+    fn channels(self) -> &'static [usize] {
+        match self {
+            LpipsTrunk::Alex => &[64, 192, 384, 256, 256],
+            LpipsTrunk::Vgg => &[64, 128, 256, 512, 512],
+            LpipsTrunk::Squeeze => &[64, 128, 256, 384, 384, 512, 512],
+        }
+    }
+}
+
+impl Display for LpipsTrunk {
+    fn fmt(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            LpipsTrunk::Alex => "alex",
+            LpipsTrunk::Vgg => "vgg",
+            LpipsTrunk::Squeeze => "squeeze",
+        })
+    }
+}
+
+/// There is no such network.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("LPIPS has the networks alex, vgg and squeeze, not '{0}'")]
+pub struct NoTrunk(pub String);
+
+impl FromStr for LpipsTrunk {
+    type Err = NoTrunk;
+
+    fn from_str(text: &str) -> Result<LpipsTrunk, NoTrunk> {
+        let found = LpipsTrunk::ALL.into_iter().find(|trunk| trunk.to_string() == text);
+        found.ok_or_else(|| NoTrunk(text.to_owned()))
+    }
+}
+
+/// LPIPS with its parameters on a device.
+pub struct Lpips<D: Device> {
+    kind: LpipsTrunk,
+    trunk: Trunk<D>,
+    /// `[tap][channel]`.
+    heads: Vec<Vec<f32>>,
+}
+
+impl<D: Device> Lpips<D> {
+    /// From torchvision's `state_dict` of the network, and heads: [`super::heads::published_lpips`], or a file with
+    /// `lin0.model.1.weight` and so on.
+    ///
+    /// # Errors
+    /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
+    pub fn new(
+        device: &D,
+        kind: LpipsTrunk,
+        trunk: &Checkpoint,
+        heads: &Checkpoint,
+    ) -> Result<Lpips<D>, MetricError<D::Error>> {
+        let shape = |(tap, channels): (usize, &usize)| TensorShape {
+            name: format!("lin{tap}.model.1.weight"),
+            shape: vec![1, *channels, 1, 1],
+        };
+        let expected: Vec<TensorShape> = kind.channels().iter().enumerate().map(shape).collect();
+        // A whole LPIPS, as it is saved, has the trunk, and the heads a second time.
+        heads.check(&expected, |name| ["lins.", "net.", "scaling_layer."].iter().any(|own| name.starts_with(own)))?;
+        let heads = expected.iter().map(|tensor| heads.tensor(&tensor.name)).collect::<Result<_, _>>()?;
+        let trunk = Trunk::load(device, trunk, &kind.steps(), |name| name.starts_with("classifier."))?;
+        Ok(Lpips { kind, trunk, heads })
+    }
+
+    /// The network.
+    pub fn kind(&self) -> LpipsTrunk {
+        self.kind
+    }
+
+    /// The distance: 0 for equal pictures, the same both ways, about 1 for pictures that have nothing in common.
+    ///
+    /// # Errors
+    /// [`MetricError`] if the sizes differ or are too small for the network, or if the device fails.
+    pub fn distance(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<f64, MetricError<D::Error>> {
+        same_size(prediction, truth)?;
+        let taps = |picture| {
+            let scaled = |channel: usize, level: f32| (level / 127.5 - 1.0 - SHIFT[channel]) / SCALE[channel];
+            self.trunk.taps(device, &seen(picture, scaled))
+        };
+        let (prediction, truth) = (taps(prediction)?, taps(truth)?);
+        Ok(prediction.iter().zip(&truth).zip(&self.heads).map(|((p, t), head)| tap_distance(p, t, head)).sum())
+    }
+}
+
+/// The share of one tap.
+fn tap_distance(prediction: &Map, truth: &Map, head: &[f32]) -> f64 {
+    let length = |pixel: &[f32]| pixel.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt() + FLOOR;
+    let distance = |(prediction, truth): (&[f32], &[f32])| -> f64 {
+        let (prediction_length, truth_length) = (length(prediction), length(truth));
+        let channels = prediction.iter().zip(truth).zip(head);
+        channels
+            .map(|((p, t), weight)| {
+                f64::from(*weight) * (f64::from(*p) / prediction_length - f64::from(*t) / truth_length).powi(2)
+            })
+            .sum()
+    };
+    prediction.pixels().zip(truth.pixels()).map(distance).sum::<f64>() / (truth.height * truth.width) as f64
+}

@@ -1,0 +1,114 @@
+//! Trunks: the published image networks that metrics look at pictures through, as trees of steps.
+//!
+//! A trunk is data ([`Step`]): which layers follow one another, which stand beside one another, and where the metric taps
+//! it. The same tree says which tensors a `state_dict` must have, is read from a checkpoint, and runs on any device
+//! ([`Trunk`]).
+
+mod architectures;
+mod layer;
+mod pool;
+mod run;
+
+pub use architectures::{InceptionKind, Pooling, alexnet, inception, squeezenet, vgg16};
+pub use run::{Map, Trunk};
+
+use viewfuse_nn::checkpoint::TensorShape;
+
+/// A convolution with bias; its output is rectified, as all of these networks do.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Convolution {
+    /// Its name in a `state_dict`.
+    pub name: String,
+    /// Whether it is torchvision's `BasicConv2d`: `conv.weight` and a batch norm `bn` in place of `weight` and `bias`.
+    pub is_normalised: bool,
+    /// Output channels.
+    pub channels: usize,
+    /// Rows and columns of the window.
+    pub window: [usize; 2],
+    /// Pixels from one window to the next.
+    pub stride: usize,
+    /// Zeros above and below the image, and left and right of it.
+    pub padding: [usize; 2],
+}
+
+impl Convolution {
+    /// A square window.
+    pub fn square(name: impl Into<String>, channels: usize, side: usize, stride: usize, padding: usize) -> Convolution {
+        Convolution {
+            name: name.into(),
+            is_normalised: false,
+            channels,
+            window: [side; 2],
+            stride,
+            padding: [padding; 2],
+        }
+    }
+
+    /// Every tensor that it has, if its input has this many channels.
+    fn tensors(&self, in_channels: usize) -> Vec<TensorShape> {
+        let [rows, columns] = self.window;
+        let kernel = vec![self.channels, in_channels, rows, columns];
+        let tensor = |leaf: &str, shape| TensorShape { name: format!("{}.{leaf}", self.name), shape };
+        if !self.is_normalised {
+            return vec![tensor("weight", kernel), tensor("bias", vec![self.channels])];
+        }
+        let norms = ["bn.weight", "bn.bias", "bn.running_mean", "bn.running_var"];
+        let norms = norms.map(|leaf| tensor(leaf, vec![self.channels]));
+        [tensor("conv.weight", kernel)].into_iter().chain(norms).collect()
+    }
+}
+
+/// The largest of square windows; what lies outside of the image does not count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LargestOf {
+    /// Side of the window.
+    pub side: u32,
+    /// Pixels from one window to the next.
+    pub stride: u32,
+    /// How far windows reach over the border.
+    pub padding: u32,
+    /// Whether a last window may hang over the bottom and right border (PyTorch's `ceil_mode`).
+    pub hangs_over: bool,
+}
+
+/// A step of a trunk. `C` is a convolution, or one with its parameters on a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Step<C> {
+    /// A convolution.
+    Convolve(C),
+    /// The largest of every window.
+    Largest(LargestOf),
+    /// The mean of every window of 3x3 around a pixel.
+    Mean {
+        /// Whether zeros outside of the image count (PyTorch's `count_include_pad`).
+        counts_border: bool,
+    },
+    /// DISTS' pooling: the square root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second
+    /// pixel.
+    RootMeanSquare,
+    /// Steps that see the same image, their outputs put side by side by channels.
+    Beside(Vec<Vec<Step<C>>>),
+    /// The metric wants the image that is here.
+    Tap,
+}
+
+/// Every tensor that the steps have, in the order of the data, and the number of channels that come out.
+pub fn tensors(steps: &[Step<Convolution>], in_channels: usize) -> (Vec<TensorShape>, usize) {
+    let (mut all, mut channels) = (Vec::new(), in_channels);
+    for step in steps {
+        match step {
+            Step::Convolve(convolution) => {
+                all.extend(convolution.tensors(channels));
+                channels = convolution.channels;
+            }
+            Step::Beside(branches) => {
+                let branches = branches.iter().map(|branch| tensors(branch, channels));
+                let (shapes, counts): (Vec<_>, Vec<_>) = branches.unzip();
+                all.extend(shapes.into_iter().flatten());
+                channels = counts.iter().sum();
+            }
+            Step::Largest(_) | Step::Mean { .. } | Step::RootMeanSquare | Step::Tap => {}
+        }
+    }
+    (all, channels)
+}

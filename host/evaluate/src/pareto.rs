@@ -1,0 +1,287 @@
+//! Error against run time: one scene rendered under a list of settings, each compared with the first of them, which
+//! leaves nothing out.
+//!
+//! A field says what can be set about it in [`settings`]; [`Subject::measure`] renders, [`front`] marks the settings that are the
+//! best for their time, [`plot`] and [`record`] show the outcome. Nothing here knows a particular field but the lists.
+//!
+//! Times are medians over rounds. A round goes once through all settings, so that what else a machine does at one time
+//! falls on all of them; still, times on a shared machine are noisy, and differences of a few percent mean nothing.
+
+pub mod difference;
+pub mod enlarged;
+pub mod front;
+pub mod plot;
+pub mod record;
+pub mod settings;
+
+use difference::Difference;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::sync::Arc;
+use std::time::Duration;
+use viewfuse_device::Device;
+use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
+use viewfuse_field::{Denoising, Field, LeftOut};
+use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::{FewShot, Target};
+use viewfuse_scene::photographs::{Album, SourceImages};
+use viewfuse_weighting::Weighting;
+
+/// One way to make the pictures.
+#[derive(Clone, Debug)]
+pub struct Setting<F> {
+    /// In a few words, for tables and labels.
+    pub words: String,
+    /// The field, set up for it.
+    pub field: F,
+    /// What is set outside of the field. The size must be the same in all settings.
+    pub options: RenderOptions,
+}
+
+/// What a setting gave.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// The setting, in a few words.
+    pub setting: String,
+    /// Seconds for a target, encoding included: the median over the rounds.
+    pub seconds: f64,
+    /// The least and the most of the rounds.
+    pub seconds_range: [f64; 2],
+    /// Seconds of that for encoding the sources: the median over the rounds.
+    pub encode_seconds: f64,
+    /// How the pictures differ from the first setting's.
+    pub difference: Difference,
+    /// Peak signal to noise ratio against the photographs in decibels, of 8-bit values, the mean over the targets that
+    /// have one.
+    pub truth_psnr: Option<f64>,
+    /// What the field left out in one round.
+    pub left_out: Vec<LeftOut>,
+    /// How the field went from noise to the pictures of one round; `None` for fields that do not.
+    pub denoising: Option<Denoising>,
+    /// Whether every round gave the same pictures, bit for bit.
+    pub is_repeatable: bool,
+}
+
+/// What all settings gave on a device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Measured {
+    /// One for each setting, in their order.
+    pub points: Vec<Point>,
+    /// The first setting's pictures, `[target][pixel]` of red, green, blue and opacity, not rounded.
+    pub exact: Vec<Vec<[f32; 4]>>,
+    /// Width and height of the first target's pictures; zeros without settings.
+    pub size: [u32; 2],
+}
+
+impl Measured {
+    /// How the exact pictures differ from those of another device.
+    pub fn exact_versus(&self, other: &Measured) -> Difference {
+        let mut difference = Difference::default();
+        self.exact.iter().zip(&other.exact).for_each(|(own, others)| difference.add(own, others));
+        difference
+    }
+}
+
+/// What is rendered.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its photographs.
+    pub album: &'a Album<'a>,
+    /// Sources and targets.
+    pub job: &'a FewShot,
+    /// The weighting scheme.
+    pub weighting: &'a Weighting,
+}
+
+impl Subject<'_> {
+    /// Renders all targets under every setting, `round_count` times after a first round that is not timed. In each round a
+    /// setting starts with nothing encoded; taking photographs and parameters to the device is not counted.
+    ///
+    /// `progress` gets a step for every picture.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn measure<D: Device, F: Field<D>>(
+        &self,
+        device: &D,
+        settings: &[Setting<F>],
+        round_count: u32,
+        progress: &dyn Progress,
+    ) -> Result<Measured, RenderError<D::Error>> {
+        progress.expect(settings.len() * self.job.targets.len() * (round_count as usize + 1));
+        let images = self.images(settings, progress)?;
+        // Later rounds only take time: they are not compared with the truth.
+        let mut without_truth = self.job.targets.clone();
+        without_truth.iter_mut().for_each(|target| target.truth = None);
+        let mut exact: Vec<Vec<[f32; 4]>> = Vec::new();
+        let mut size = [0; 2];
+        let mut firsts: Vec<First> = Vec::new();
+        for (setting, images) in settings.iter().zip(&images) {
+            let Round { frames, .. } = self.round(device, setting, images, &self.job.targets, progress)?;
+            if exact.is_empty() {
+                exact = frames.iter().map(|frame| frame.colours.clone()).collect();
+                size = frames.first().map_or(size, |frame| frame.picture.dimensions().into());
+            }
+            firsts.push(First::of::<D, F>(&frames, &exact, &setting.field));
+        }
+        let mut times: Vec<Vec<[f64; 2]>> = vec![Vec::new(); settings.len()];
+        for _ in 0..round_count {
+            for (index, (setting, images)) in settings.iter().zip(&images).enumerate() {
+                let round = self.round(device, setting, images, &without_truth, progress)?;
+                times[index].push(round.seconds_a_target());
+                firsts[index].is_repeatable &= fingerprint(&round.frames) == firsts[index].fingerprint;
+            }
+        }
+        let points = settings.iter().zip(firsts).zip(&times);
+        let points = points.map(|((setting, first), times)| first.point(&setting.words, times)).collect();
+        Ok(Measured { points, exact, size })
+    }
+
+    /// The sources for each setting; those of one size are prepared once.
+    fn images<D: Device, F: Field<D>>(
+        &self,
+        settings: &[Setting<F>],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Arc<SourceImages>>, RenderError<D::Error>> {
+        let Subject { scene, album, job, .. } = self;
+        let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
+        let mut images = Vec::new();
+        for Setting { field, options, .. } in settings {
+            let side = field.source_side(working_side(scene, options, field.longest_side())?);
+            if !known.iter().any(|(known_side, _)| *known_side == side) {
+                let prepared = album.sources(&job.sources, side, options.background)?;
+                if let Some(warning) = &prepared.warning {
+                    progress.warn(&format!("{}: {warning}", scene.path.display()));
+                }
+                known.push((side, Arc::new(prepared)));
+            }
+            images.extend(known.iter().find(|(known_side, _)| *known_side == side).map(|(_, images)| images.clone()));
+        }
+        Ok(images)
+    }
+
+    fn round<D: Device, F: Field<D>>(
+        &self,
+        device: &D,
+        setting: &Setting<F>,
+        images: &Arc<SourceImages>,
+        targets: &[Target],
+        progress: &dyn Progress,
+    ) -> Result<Round, RenderError<D::Error>> {
+        let (Setting { field, options, .. }, quiet) = (setting, Silent);
+        let (images, sources) = (Arc::clone(images), &self.job.sources);
+        let mut stage = Stage::of_images(self.scene, self.album, sources, images, device, field, options, &quiet)?;
+        // What was sent to the device must not end within the first measured time.
+        device.finish().map_err(viewfuse_field::FieldError::Device)?;
+        let latents = stage.encode(self.weighting, &quiet)?;
+        let mut frames = Vec::new();
+        for target in targets {
+            frames.push(stage.frame(self.weighting, &latents, target, &quiet)?);
+            progress.step();
+        }
+        Ok(Round { encode: stage.costs.encode, frames })
+    }
+}
+
+/// All targets rendered once under a setting.
+struct Round {
+    /// What the targets share.
+    encode: Duration,
+    frames: Vec<Frame>,
+}
+
+impl Round {
+    /// In all, and for encoding alone.
+    fn seconds_a_target(&self) -> [f64; 2] {
+        let encode = self.encode + self.frames.iter().map(|frame| frame.encode).sum::<Duration>();
+        let all = self.encode + self.frames.iter().map(|frame| frame.time).sum::<Duration>();
+        [all, encode].map(|time| time.as_secs_f64() / self.frames.len().max(1) as f64)
+    }
+}
+
+/// What is kept of a setting's first round.
+struct First {
+    difference: Difference,
+    truth_psnr: Option<f64>,
+    left_out: Vec<LeftOut>,
+    denoising: Option<Denoising>,
+    fingerprint: u64,
+    is_repeatable: bool,
+}
+
+impl First {
+    fn of<D: Device, F: Field<D>>(frames: &[Frame], exact: &[Vec<[f32; 4]>], field: &F) -> First {
+        let mut difference = Difference::default();
+        for (frame, exact) in frames.iter().zip(exact) {
+            difference.add(&frame.colours, exact);
+        }
+        let scores: Vec<f64> = frames.iter().filter_map(|frame| Some(frame.truth.as_ref()?.psnr)).collect();
+        let truth_psnr = (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / scores.len() as f64);
+        First {
+            difference,
+            truth_psnr,
+            left_out: field.left_out(),
+            denoising: field.denoising(),
+            fingerprint: fingerprint(frames),
+            is_repeatable: true,
+        }
+    }
+
+    /// `times[round]`: in all and for encoding.
+    fn point(self, words: &str, times: &[[f64; 2]]) -> Point {
+        let First { difference, truth_psnr, left_out, denoising, is_repeatable, .. } = self;
+        let all = sorted(times.iter().map(|[all, _]| *all));
+        let encode = sorted(times.iter().map(|[_, encode]| *encode));
+        let end = |time: Option<&f64>| time.copied().unwrap_or(f64::NAN);
+        Point {
+            setting: words.to_owned(),
+            seconds: median(&all),
+            seconds_range: [end(all.first()), end(all.last())],
+            encode_seconds: median(&encode),
+            difference,
+            truth_psnr,
+            left_out,
+            denoising,
+            is_repeatable,
+        }
+    }
+}
+
+/// A number that two sets of pictures share only if they are the same bit for bit (or by a chance of one in 2^64).
+fn fingerprint(frames: &[Frame]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    for frame in frames {
+        bytemuck::cast_slice::<[f32; 4], u32>(&frame.colours).hash(&mut hasher);
+    }
+    hasher.finish()
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+/// The middle of sorted values, or the mean of the two middle ones; NaN of none.
+fn median(sorted: &[f64]) -> f64 {
+    match (sorted.len(), sorted.len() / 2) {
+        (0, _) => f64::NAN,
+        (count, middle) if count % 2 == 1 => sorted[middle],
+        (_, middle) => 0.5 * (sorted[middle - 1] + sorted[middle]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians() {
+        assert!(median(&[]).is_nan());
+        assert_eq!(median(&[3.0]), 3.0);
+        assert_eq!(median(&sorted([9.0, 1.0, 2.0].into_iter())), 2.0);
+        assert_eq!(median(&sorted([4.0, 1.0, 9.0, 2.0].into_iter())), 3.0);
+    }
+}

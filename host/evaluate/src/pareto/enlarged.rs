@@ -1,0 +1,163 @@
+//! A field's pictures made smaller and enlarged: what a person gets who asks for a preview.
+
+use viewfuse_core::camera::Camera;
+use viewfuse_device::Device;
+use viewfuse_field::{Denoising, Field, FieldError, LeftOut, Rendered};
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::SourceImages;
+use viewfuse_weighting::sources::SourceWeights;
+
+/// A field whose pictures have a fraction of the rows and columns that are asked for, and are enlarged to them.
+#[derive(Clone, Debug)]
+pub struct Enlarged<F> {
+    /// The field.
+    pub field: F,
+    /// Rows and columns are divided by this; 1 for pictures as they are.
+    pub factor: u32,
+}
+
+impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
+    type Prepared = F::Prepared;
+    type Latents = F::Latents;
+
+    fn name(&self) -> &'static str {
+        self.field.name()
+    }
+
+    fn least_sources(&self) -> usize {
+        self.field.least_sources()
+    }
+
+    fn source_side(&self, picture_side: u32) -> u32 {
+        self.field.source_side(picture_side)
+    }
+
+    fn longest_side(&self) -> u32 {
+        self.field.longest_side()
+    }
+
+    fn left_out(&self) -> Vec<LeftOut> {
+        self.field.left_out()
+    }
+
+    fn denoising(&self) -> Option<Denoising> {
+        self.field.denoising()
+    }
+
+    fn memory_estimate(&self, device: &D, source_sizes: &[[u32; 2]]) -> Option<u64> {
+        self.field.memory_estimate(device, source_sizes)
+    }
+
+    fn prepare(
+        &self,
+        device: &D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<F::Prepared, FieldError<D::Error>> {
+        self.field.prepare(device, sources, progress)
+    }
+
+    fn encode(
+        &self,
+        device: &D,
+        prepared: &F::Prepared,
+        relevance: &[SourceWeights],
+        progress: &dyn Progress,
+    ) -> Result<F::Latents, FieldError<D::Error>> {
+        self.field.encode(device, prepared, relevance, progress)
+    }
+
+    fn encode_used(
+        &self,
+        device: &D,
+        prepared: &F::Prepared,
+        latents: &F::Latents,
+        weights: &SourceWeights,
+    ) -> Result<(), FieldError<D::Error>> {
+        self.field.encode_used(device, prepared, latents, weights)
+    }
+
+    fn render(
+        &self,
+        device: &D,
+        prepared: &F::Prepared,
+        latents: &F::Latents,
+        weights: &SourceWeights,
+        target: &Camera,
+        settled: f32,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, FieldError<D::Error>> {
+        let (width, height) = (target.pinhole.width(), target.pinhole.height());
+        // A camera that cannot be made so small is left as it is.
+        let pinhole = target.pinhole.resized(width.div_ceil(self.factor), height.div_ceil(self.factor));
+        let small = Camera { pinhole: pinhole.unwrap_or(target.pinhole), ..*target };
+        let rendered = self.field.render(device, prepared, latents, weights, &small, settled, progress)?;
+        Ok(enlarged(rendered, [width, height]))
+    }
+}
+
+/// A picture of `[width, height]` pixels, each the bilinear mean of the four nearest ones of a smaller picture; depths are
+/// those of the nearest one, since a mean of two depths is the depth of nothing.
+fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
+    if [rendered.width, rendered.height] == [width, height] {
+        return rendered;
+    }
+    let (columns, rows) = (places(rendered.width, width), places(rendered.height, height));
+    let at = |row: u32, column: u32| (row * rendered.width + column) as usize;
+    let mut picture = Rendered { colours: Vec::new(), depths: Vec::new(), width, height };
+    for [top, bottom] in &rows {
+        for [left, right] in &columns {
+            let mut colour = [0.0; 4];
+            for (row, row_share) in [top, bottom] {
+                for (column, column_share) in [left, right] {
+                    let texel = rendered.colours[at(*row, *column)];
+                    colour = [0, 1, 2, 3].map(|channel| colour[channel] + row_share * column_share * texel[channel]);
+                }
+            }
+            picture.colours.push(colour);
+            let nearest = |[first, second]: [&(u32, f32); 2]| if first.1 >= second.1 { first.0 } else { second.0 };
+            let index = at(nearest([top, bottom]), nearest([left, right]));
+            picture.depths.extend(rendered.depths.get(index));
+        }
+    }
+    picture
+}
+
+/// For each of `wanted` pixels along an axis the two nearest of `own`, with their shares, which sum to 1.
+fn places(own: u32, wanted: u32) -> Vec<[(u32, f32); 2]> {
+    let last = own.saturating_sub(1);
+    let place = |pixel: u32| {
+        let centre = (pixel as f32 + 0.5) * own as f32 / wanted as f32 - 0.5;
+        let centre = centre.clamp(0.0, last as f32);
+        let (before, share) = (centre.floor(), centre.fract());
+        [(before as u32, 1.0 - share), ((before as u32 + 1).min(last), share)]
+    };
+    (0..wanted).map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slope_stays_a_slope() {
+        let colours = (0..8).map(|index| [(index % 4) as f32, (index / 4) as f32, 0.5, 1.0]).collect();
+        let depths = (0..8).map(|index| index as f32).collect();
+        let picture = enlarged(Rendered { colours, depths, width: 4, height: 2 }, [8, 4]);
+        let red: Vec<f32> = picture.colours[..8].iter().map(|colour| colour[0]).collect();
+        assert_eq!(red, [0.0, 0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.0]);
+        let green: Vec<f32> = picture.colours.iter().step_by(8).map(|colour| colour[1]).collect();
+        assert_eq!(green, [0.0, 0.25, 0.75, 1.0]);
+        assert!(picture.colours.iter().all(|colour| colour[2..] == [0.5, 1.0]));
+        assert_eq!(picture.depths[..8], [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert_eq!((picture.width, picture.height, picture.depths.len()), (8, 4, 32));
+    }
+
+    #[test]
+    fn odd_sides_and_no_depths() {
+        let picture =
+            enlarged(Rendered { colours: vec![[0.5; 4]; 6], depths: Vec::new(), width: 3, height: 2 }, [5, 3]);
+        assert_eq!((picture.colours.len(), picture.depths.len()), (15, 0));
+        assert!(picture.colours.iter().flatten().all(|value| (value - 0.5).abs() < 1.0e-6));
+    }
+}

@@ -1,0 +1,205 @@
+//! The outcome of a sweep for other programs: JSON with all that led to it, and a CSV table of the points.
+
+use super::Point;
+use super::difference::Difference;
+use super::front::{best_points, fastest_of_same_look, fastest_without_loss, loss};
+use serde::{Deserialize, Serialize};
+use viewfuse_field::{Denoising, LeftOut};
+
+/// A sweep as written to `pareto.json`. Times are in seconds.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParetoRecord {
+    /// Version of the program.
+    pub viewfuse: &'static str,
+    /// The scene's path as given.
+    pub scene: String,
+    /// The field.
+    pub field: &'static str,
+    /// Where its network's parameters come from; null for the field that needs none.
+    pub model: Option<String>,
+    /// The weighting scheme.
+    pub weighting: String,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Width and height of the pictures.
+    pub size: [u32; 2],
+    /// Names of the source views.
+    pub sources: Vec<String>,
+    /// Names of the targets.
+    pub targets: Vec<String>,
+    /// How many timed rounds there were.
+    pub round_count: u32,
+    /// One entry a device.
+    pub devices: Vec<DeviceRecord>,
+    /// Devices that failed, and how.
+    pub failures: Vec<String>,
+}
+
+/// A device's points.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct DeviceRecord {
+    /// The device.
+    pub device: String,
+    /// How its exact pictures differ from those of the first device of the sweep; null for that one.
+    pub exact_versus_first: Option<DifferenceRecord>,
+    /// The fastest setting without loss against the photographs ([`fastest_without_loss`]).
+    pub fastest_without_loss: Option<String>,
+    /// The fastest setting whose pictures look the same as the exact ones ([`fastest_of_same_look`]).
+    pub fastest_of_same_look: Option<String>,
+    /// One entry a setting.
+    pub points: Vec<PointRecord>,
+}
+
+/// A difference. JSON knows neither infinity nor NaN: where a value was none, `root_mean_square` is null; where pictures
+/// are equal it is 0 and `psnr` is null.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct DifferenceRecord {
+    /// Root mean square over pixels and channels of range 1.
+    pub root_mean_square: Option<f64>,
+    /// The same as a peak signal to noise ratio in decibels.
+    pub psnr: Option<f64>,
+    /// The largest difference of a channel.
+    pub largest: Option<f64>,
+}
+
+impl From<Difference> for DifferenceRecord {
+    fn from(difference: Difference) -> DifferenceRecord {
+        DifferenceRecord {
+            root_mean_square: finite(difference.root_mean_square()),
+            psnr: finite(difference.psnr()),
+            largest: finite(difference.largest()),
+        }
+    }
+}
+
+/// A setting with what it gave.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PointRecord {
+    /// The setting, in a few words.
+    pub setting: String,
+    /// Whether no other setting of the device is both as fast and as near to the exact pictures.
+    pub best: bool,
+    /// Time for a target, encoding included: the median over the rounds.
+    pub seconds: f64,
+    /// The least and the most of the rounds.
+    pub seconds_range: [f64; 2],
+    /// The part of it for encoding the sources: the median over the rounds.
+    pub encode_seconds: f64,
+    /// How many times as fast as the exact pictures.
+    pub gain: f64,
+    /// How the pictures differ from the exact ones, not rounded.
+    pub versus_exact: DifferenceRecord,
+    /// Peak signal to noise ratio against the photographs, decibels, of 8-bit values, mean over the targets that have one.
+    pub truth_psnr: Option<f64>,
+    /// What that loses compared with the exact pictures.
+    pub truth_loss: Option<f64>,
+    /// What the field left out in one round; not read back.
+    #[serde(skip_deserializing)]
+    pub left_out: Vec<LeftOut>,
+    /// How the field went from noise to the pictures of one round; null for fields that do not; not read back.
+    #[serde(skip_deserializing)]
+    pub denoising: Option<Denoising>,
+    /// Whether every round gave the same pictures, bit for bit.
+    pub repeatable: bool,
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+impl DeviceRecord {
+    /// The record of a device's points, the exact one first.
+    pub fn of(device: String, points: &[Point], exact_versus_first: Option<Difference>) -> Self {
+        let exact_seconds = points.first().map_or(f64::NAN, |exact| exact.seconds);
+        let record = |(point, best): (&Point, bool)| PointRecord {
+            setting: point.setting.clone(),
+            best,
+            seconds: point.seconds,
+            seconds_range: point.seconds_range,
+            encode_seconds: point.encode_seconds,
+            gain: exact_seconds / point.seconds,
+            versus_exact: point.difference.into(),
+            truth_psnr: point.truth_psnr.and_then(finite),
+            truth_loss: loss(points, point).and_then(finite),
+            left_out: point.left_out.clone(),
+            denoising: point.denoising,
+            repeatable: point.is_repeatable,
+        };
+        let words = |point: Option<&Point>| point.map(|point| point.setting.clone());
+        DeviceRecord {
+            device,
+            exact_versus_first: exact_versus_first.map(DifferenceRecord::from),
+            fastest_without_loss: words(fastest_without_loss(points)),
+            fastest_of_same_look: words(fastest_of_same_look(points)),
+            points: points.iter().zip(best_points(points)).map(record).collect(),
+        }
+    }
+}
+
+/// The points of all devices as CSV, one a line. The ratio of equal pictures is `inf`, of pictures with a value that is
+/// none `NaN`. Fields with a denoiser have a column for its calls in one round. For
+/// everything that the field leaves out there are two columns: how much of it, and of how much.
+///
+/// # Errors
+/// Only if memory runs out.
+pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    let mut header: Vec<String> = [
+        "device",
+        "setting",
+        "best",
+        "seconds",
+        "seconds_least",
+        "seconds_most",
+        "encode_seconds",
+        "gain",
+        "psnr_exact_db",
+        "largest_difference",
+        "psnr_truth_db",
+        "truth_loss_db",
+        "repeatable",
+    ]
+    .map(str::to_owned)
+    .to_vec();
+    let points = || record.devices.iter().flat_map(|device| device.points.iter().map(move |point| (device, point)));
+    // Fields that go from noise to a picture have another column, and all settings are of one field.
+    let has_calls = points().any(|(_, point)| point.denoising.is_some());
+    if has_calls {
+        header.push("calls".to_owned());
+    }
+    for LeftOut { what, .. } in points().next().iter().flat_map(|(_, point)| &point.left_out) {
+        let what = what.replace([' ', '-'], "_");
+        header.extend([format!("{what}_left_out"), format!("{what}_of")]);
+    }
+    writer.write_record(&header)?;
+    let optional = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:.6}"));
+    for (device, point) in points() {
+        let DifferenceRecord { root_mean_square, psnr, largest } = point.versus_exact;
+        let psnr = match (root_mean_square, psnr) {
+            (_, Some(psnr)) => psnr,
+            (Some(_), None) => f64::INFINITY,
+            (None, None) => f64::NAN,
+        };
+        let mut line = vec![
+            device.device.clone(),
+            point.setting.clone(),
+            u8::from(point.best).to_string(),
+            format!("{:.6}", point.seconds),
+            format!("{:.6}", point.seconds_range[0]),
+            format!("{:.6}", point.seconds_range[1]),
+            format!("{:.6}", point.encode_seconds),
+            format!("{:.4}", point.gain),
+            format!("{psnr:.4}"),
+            format!("{:e}", largest.unwrap_or(f64::NAN)),
+            optional(point.truth_psnr),
+            optional(point.truth_loss),
+            u8::from(point.repeatable).to_string(),
+        ];
+        if has_calls {
+            line.push(point.denoising.map_or(String::new(), |denoising| denoising.calls.to_string()));
+        }
+        line.extend(point.left_out.iter().flat_map(|row| [row.left_out.to_string(), row.of.to_string()]));
+        writer.write_record(&line)?;
+    }
+    writer.into_inner().map_err(|error| error.into_error().into())
+}

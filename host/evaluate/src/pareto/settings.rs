@@ -1,0 +1,124 @@
+//! What is tried of each field. The first setting of a list leaves nothing out.
+
+mod genvs;
+
+pub use genvs::of_genvs;
+
+use super::Setting;
+use viewfuse_field::photo::PhotoField;
+use viewfuse_field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions, Sampling};
+use viewfuse_field::render::RenderOptions;
+
+/// What the setting that leaves nothing out is called.
+pub const EXACT: &str = "exact";
+/// What the setting is called that leaves out all that a run leaves out unless told otherwise.
+pub const ALL: &str = "all";
+
+const NONE: Omissions = Omissions::NONE;
+const VIEWS: Omissions = Omissions { unused_views: true, ..NONE };
+const PROBED: Omissions = Omissions { empty_space: 4, probe_error: 1.0 / 128.0, ..NONE };
+const HIDDEN: Omissions = Omissions { hidden_samples: true, ..NONE };
+
+/// PixelNeRF: each of these alone, with everything else as exact. Words, what is left out, `--leave-out`, `--settled`.
+#[rustfmt::skip]
+const ALONE: [(&str, Omissions, f32, f32); 16] = [
+    ("unused views",    VIEWS,                                     0.0,  0.0),
+    ("leave out 0.01",  VIEWS,                                     0.01, 0.0),
+    ("leave out 0.05",  VIEWS,                                     0.05, 0.0),
+    ("leave out 0.1",   VIEWS,                                     0.1,  0.0),
+    ("latent layers",   Omissions { latent_layers: true, ..NONE }, 0.0,  0.0),
+    ("empty space, 2",  Omissions { empty_space: 2, ..NONE },      0.0,  0.0),
+    ("empty space, 4",  Omissions { empty_space: 4, ..NONE },      0.0,  0.0),
+    ("empty space, 8",  Omissions { empty_space: 8, ..NONE },      0.0,  0.0),
+    ("probe error 1/128", PROBED,                                  0.0,  0.0),
+    ("probe error 1/64", Omissions { probe_error: 1.0 / 64.0, ..PROBED }, 0.0, 0.0),
+    ("empty rays",      Omissions { empty_rays: true, ..NONE },    0.0,  0.0),
+    ("empty parts",     Omissions { empty_parts: true, ..NONE },   0.0,  0.0),
+    ("hidden, 1/256",   HIDDEN,                                    0.0,  1.0 / 256.0),
+    ("hidden, 1/64",    HIDDEN,                                    0.0,  1.0 / 64.0),
+    ("hidden, 1/16",    HIDDEN,                                    0.0,  1.0 / 16.0),
+    ("hidden, 1/4",     HIDDEN,                                    0.0,  1.0 / 4.0),
+];
+
+/// PixelNeRF: all but each of these, because what is harmless alone may not be so together. Words as `--compute` takes
+/// them.
+#[rustfmt::skip]
+const ALL_BUT: [(&str, Omissions); 6] = [
+    ("views",  Omissions { unused_views: false, ..Omissions::ALL }),
+    ("layers", Omissions { latent_layers: false, ..Omissions::ALL }),
+    ("space",  Omissions { empty_space: 0, ..Omissions::ALL }),
+    ("rays",   Omissions { empty_rays: false, ..Omissions::ALL }),
+    ("parts",  Omissions { empty_parts: false, ..Omissions::ALL }),
+    ("hidden", Omissions { hidden_samples: false, ..Omissions::ALL }),
+];
+
+/// PixelNeRF: with all left out, so many eighths of the exact picture's samples in the first and in the second pass.
+const SAMPLES: [[u32; 2]; 8] = [[6, 6], [4, 4], [3, 3], [2, 2], [1, 1], [8, 0], [4, 0], [2, 0]];
+
+/// The settings of a PixelNeRF. Of `field` the sampling is taken, and of `options` what `all` leaves out, besides the size
+/// and the background; what the field itself leaves out does not matter.
+pub fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting<PixelNerf>> {
+    let full = field.options().sampling;
+    let setting = |words: &str, sampling, omissions, leave_out, settled| Setting {
+        words: words.to_owned(),
+        field: field.with_options(PixelNerfOptions { sampling, omissions }),
+        options: RenderOptions { leave_out, settled, ..options.clone() },
+    };
+    let all =
+        |words: &str, sampling| setting(words, sampling, Omissions::default(), options.leave_out, options.settled);
+    let mut settings = vec![setting(EXACT, full, NONE, 0.0, 0.0)];
+    settings.extend(
+        ALONE.map(|(words, omissions, leave_out, settled)| setting(words, full, omissions, leave_out, settled)),
+    );
+    settings.push(all(ALL, full));
+    settings.extend(ALL_BUT.map(|(words, omissions)| {
+        // Without `views` there is nothing to leave out of the weights either.
+        let leave_out = if omissions.unused_views { options.leave_out } else { 0.0 };
+        setting(&format!("{ALL} but {words}"), full, omissions, leave_out, options.settled)
+    }));
+    settings.extend(SAMPLES.map(|[first, second]| {
+        let share = |count: u32, eighths: u32| (count * eighths).div_ceil(8);
+        let sampling = Sampling {
+            coarse_count: share(full.coarse_count, first),
+            importance_count: share(full.importance_count, second),
+            depth_count: share(full.depth_count, second),
+            ..full
+        };
+        let Sampling { coarse_count, importance_count, depth_count, .. } = sampling;
+        all(&format!("{ALL}, {coarse_count}+{importance_count}+{depth_count}"), sampling)
+    }));
+    settings
+}
+
+/// The weight-free field: words, `--leave-out`, `--settled`, alone.
+const PHOTO: [(&str, f32, f32); 8] = [
+    ("leave out 0.01", 0.01, 0.0),
+    ("leave out 0.05", 0.05, 0.0),
+    ("leave out 0.1", 0.1, 0.0),
+    ("leave out 0.2", 0.2, 0.0),
+    ("leave out 0.4", 0.4, 0.0),
+    ("settled 1/256", 0.0, 1.0 / 256.0),
+    ("settled 1/64", 0.0, 1.0 / 64.0),
+    ("settled 1/16", 0.0, 1.0 / 16.0),
+];
+
+/// The weight-free field: the sources' side as a share of the pictures', alone and with all.
+const SOURCES: [(&str, f32); 3] = [("3/4", 0.75), ("1/2", 0.5), ("1/4", 0.25)];
+
+/// The settings of the field that needs no network. Of `options` is taken what `all` leaves out, besides the size and the
+/// background.
+pub fn of_photo(field: &PhotoField, options: &RenderOptions) -> Vec<Setting<PhotoField>> {
+    let setting = |words: &str, source_share, leave_out, settled| Setting {
+        words: words.to_owned(),
+        field: PhotoField { source_share, ..*field },
+        options: RenderOptions { leave_out, settled, ..options.clone() },
+    };
+    let mut settings = vec![setting(EXACT, 1.0, 0.0, 0.0)];
+    settings.extend(PHOTO.map(|(words, leave_out, settled)| setting(words, 1.0, leave_out, settled)));
+    settings.extend(SOURCES.map(|(words, share)| setting(&format!("sources {words}"), share, 0.0, 0.0)));
+    let RenderOptions { leave_out, settled, .. } = *options;
+    settings.push(setting(ALL, 1.0, leave_out, settled));
+    settings
+        .extend(SOURCES.map(|(words, share)| setting(&format!("{ALL}, sources {words}"), share, leave_out, settled)));
+    settings
+}

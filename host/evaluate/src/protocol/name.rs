@@ -1,0 +1,136 @@
+//! Protocols as text, and the view lists that were published.
+
+use super::{CLOSE_DEGREES, CLOSE_SOURCES, COUNTS, Protocol, RANDOM_SOURCES};
+use std::fmt;
+use std::str::FromStr;
+use viewfuse_scene::few_shot::SelectionError;
+use viewfuse_weighting::sources::MOST_SOURCES;
+
+const GRAMMAR: &str = "random[:sources=N], close[:sources=N,degrees=D], count[:sources=N+N+...], \
+     fixed[:cars|chairs|pixelnerf-1|pixelnerf-2], fixed:SOURCES:TARGETS";
+
+/// Lists of views by name, sources and targets. `cars` and `chairs` are those of the paper's published evaluation scripts
+/// for SRN's test scenes; `pixelnerf-1` and `pixelnerf-2` are those of pixelNeRF's (one and two sources, all other views).
+const PUBLISHED: [(&str, &str, &str); 4] = [
+    ("cars", "56,58,67,75,91,113,241,244", "40,44,54,149,159,173,181,245"),
+    ("chairs", "5,8,14", "3,10,18"),
+    ("pixelnerf-1", "64", "all"),
+    ("pixelnerf-2", "64,104", "all"),
+];
+
+/// Why there is no plan.
+#[derive(Debug, thiserror::Error)]
+pub enum ProtocolError {
+    /// No protocol has this name.
+    #[error("unknown protocol '{text}'; there are: {GRAMMAR}")]
+    Unknown {
+        /// What was given.
+        text: String,
+    },
+    /// A protocol's value is not usable.
+    #[error("protocol '{protocol}': {key} must be {wanted}, not '{value}'")]
+    BadValue {
+        /// The protocol.
+        protocol: String,
+        /// The key.
+        key: &'static str,
+        /// What it must be.
+        wanted: String,
+        /// What was given.
+        value: String,
+    },
+    /// The field needs more sources than the protocol has.
+    #[error("protocol '{protocol}' has too few sources: the field needs at least {least_sources}")]
+    FewSources {
+        /// The protocol.
+        protocol: String,
+        /// What the field needs.
+        least_sources: usize,
+    },
+    /// No scene has what the protocol wants.
+    #[error("protocol '{protocol}' fits none of the scenes: {notes}")]
+    NoJobs {
+        /// The protocol.
+        protocol: String,
+        /// What the scenes lack.
+        notes: String,
+    },
+    /// The lists do not fit a scene.
+    #[error(transparent)]
+    Selection(#[from] SelectionError),
+}
+
+impl fmt::Display for Protocol {
+    /// As it is parsed, with every value.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Protocol::Random { sources } => write!(f, "random:sources={sources}"),
+            Protocol::Close { sources, degrees } => write!(f, "close:sources={sources},degrees={degrees}"),
+            Protocol::Count { sources } => {
+                let counts: Vec<String> = sources.iter().map(usize::to_string).collect();
+                write!(f, "count:sources={}", counts.join("+"))
+            }
+            Protocol::Fixed { sources, targets } => {
+                match PUBLISHED
+                    .iter()
+                    .find(|(_, own_sources, own_targets)| own_sources == sources && own_targets == targets)
+                {
+                    Some((name, ..)) => write!(f, "fixed:{name}"),
+                    None => write!(f, "fixed:{sources}:{targets}"),
+                }
+            }
+        }
+    }
+}
+
+impl FromStr for Protocol {
+    type Err = ProtocolError;
+
+    fn from_str(text: &str) -> Result<Protocol, ProtocolError> {
+        let unknown = || ProtocolError::Unknown { text: text.to_owned() };
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        if name == "fixed" {
+            let named = |name: &str| PUBLISHED.iter().find(|(own, ..)| *own == name);
+            let (sources, targets) = match (rest.split_once(':'), named(if rest.is_empty() { "cars" } else { rest })) {
+                (Some((sources, targets)), _) if !sources.is_empty() && !targets.is_empty() => (sources, targets),
+                (None, Some((_, sources, targets))) => (*sources, *targets),
+                _ => return Err(unknown()),
+            };
+            return Ok(Protocol::Fixed { sources: sources.to_owned(), targets: targets.to_owned() });
+        }
+        let mut protocol = match name {
+            "random" => Protocol::Random { sources: RANDOM_SOURCES },
+            "close" => Protocol::Close { sources: CLOSE_SOURCES, degrees: CLOSE_DEGREES },
+            "count" => Protocol::Count { sources: COUNTS.to_vec() },
+            _ => return Err(unknown()),
+        };
+        for pair in rest.split(',').filter(|pair| !pair.is_empty()) {
+            let (key, value) = pair.split_once('=').ok_or_else(unknown)?;
+            let bad = |key, wanted: &str| ProtocolError::BadValue {
+                protocol: name.to_owned(),
+                key,
+                wanted: wanted.to_owned(),
+                value: value.to_owned(),
+            };
+            let count = |text: &str, least: usize| {
+                let count = text.parse().ok().filter(|count| (least..=MOST_SOURCES).contains(count));
+                count.ok_or_else(|| bad("sources", &format!("a whole number from {least} to {MOST_SOURCES}")))
+            };
+            match (&mut protocol, key) {
+                (Protocol::Random { sources }, "sources") => *sources = count(value, 1)?,
+                (Protocol::Close { sources, .. }, "sources") => *sources = count(value, 1)?,
+                (Protocol::Close { degrees, .. }, "degrees") => {
+                    let given = value.parse().ok().filter(|degrees| *degrees > 0.0 && *degrees <= 180.0);
+                    *degrees = given.ok_or_else(|| bad("degrees", "above 0 and at most 180"))?;
+                }
+                (Protocol::Count { sources }, "sources") => {
+                    *sources = value.split('+').map(|text| count(text, 1)).collect::<Result<_, _>>()?;
+                    sources.sort_unstable();
+                    sources.dedup();
+                }
+                _ => return Err(unknown()),
+            }
+        }
+        Ok(protocol)
+    }
+}

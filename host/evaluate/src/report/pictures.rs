@@ -1,0 +1,109 @@
+//! Pictures side by side: the sources with their weights, every scheme's prediction, the truth.
+
+use super::{ReportError, counted, data_address, read};
+use crate::PSNR;
+use crate::gallery::{PICTURES, Shown, ShownScheme};
+use crate::summary::Metric;
+use maud::{Markup, html};
+use std::path::Path;
+
+/// Width and height of a bar of weights, in units of the figure.
+const BAR: [f32; 2] = [8.0, 22.0];
+
+/// What there is to see of a target.
+pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportError> {
+    let picture = |file: &str| -> Result<String, ReportError> {
+        Ok(data_address("image/png", &read(&folder.join(PICTURES).join(file))?))
+    };
+    let sources: Vec<String> = shown.sources.iter().map(|source| picture(&source.file)).collect::<Result<_, _>>()?;
+    let predictions: Vec<String> =
+        shown.schemes.iter().map(|scheme| picture(&scheme.file)).collect::<Result<_, _>>()?;
+    let truth = picture(&shown.truth)?;
+    let heaviest = shown.schemes.iter().flat_map(|scheme| &scheme.weights).copied().fold(0.0, f32::max);
+    let metric = Metric::named(PSNR);
+    let psnr = |scheme: &ShownScheme| {
+        scheme.values.iter().find(|(name, _)| name == PSNR).map(|(_, value)| value.unwrap_or(f64::INFINITY))
+    };
+    // The best as it is written.
+    let best = shown.schemes.iter().filter_map(psnr).fold(f64::NEG_INFINITY, f64::max);
+    let marked = |value: f64| {
+        if metric.text(value) == metric.text(best) {
+            html! { b { (metric.text(value)) } }
+        } else {
+            html! { (metric.text(value)) }
+        }
+    };
+    Ok(html! {
+        article.comparison {
+            h4 { (shown.scene) ", view " (shown.target) ", from " (counted(shown.sources.len(), "source")) }
+            div.sources {
+                @for (index, (source, address)) in shown.sources.iter().zip(&sources).enumerate() {
+                    figure { img src=(address) alt={ "source " (source.name) }; figcaption { b { (index + 1) } br; (source.name) } }
+                }
+            }
+            div.predictions {
+                figure.truth { img src=(truth) alt="the photograph at the target"; figcaption { "truth" } }
+                @for (scheme, address) in shown.schemes.iter().zip(&predictions) {
+                    figure {
+                        img src=(address) alt={ "prediction with " (scheme.scheme) };
+                        (bars(&scheme.weights, heaviest))
+                        figcaption {
+                            (breakable(&scheme.scheme))
+                            @if let Some(psnr) = psnr(scheme) { br; (marked(psnr)) " dB" }
+                        }
+                    }
+                }
+            }
+            (weights(shown))
+        }
+    })
+}
+
+/// The name of a scheme, which may be broken where one of its parts ends.
+fn breakable(name: &str) -> Markup {
+    let pieces = name.split_inclusive([',', ':', '/']);
+    html! { @for (index, piece) in pieces.enumerate() { @if index > 0 { wbr; } (piece) } }
+}
+
+/// The weights of the sources as bars in their order, all schemes on the same scale.
+fn bars(weights: &[f32], heaviest: f32) -> Markup {
+    let [width, height] = BAR;
+    let words: Vec<String> =
+        weights.iter().enumerate().map(|(index, weight)| format!("{}: {weight:.3}", index + 1)).collect();
+    html! {
+        svg.bars viewBox={ "0 0 " (width * weights.len() as f32) " " (height) } preserveAspectRatio="none" role="img" aria-label={ "weights " (words.join(", ")) } {
+            title { "weights " (words.join(", ")) }
+            @for (index, weight) in weights.iter().enumerate() {
+                @let length = height * weight / heaviest.max(f32::MIN_POSITIVE);
+                rect x=(width * index as f32 + 0.08 * width) y=(height - length) width=(0.84 * width) height=(length) {}
+            }
+        }
+    }
+}
+
+/// The weights as numbers, folded in.
+fn weights(shown: &Shown) -> Markup {
+    html! {
+        details {
+            summary { "Weights" }
+            div.scroll {
+                table.results {
+                    thead { tr {
+                        th scope="col" { "weighting" }
+                        @for (index, source) in shown.sources.iter().enumerate() { th scope="col" title=(source.name) { (index + 1) } }
+                    } }
+                    tbody {
+                        @for scheme in &shown.schemes {
+                            tr {
+                                th scope="row" { (scheme.scheme) }
+                                @for weight in &scheme.weights {
+                                    td { @if *weight > 0.0 { (format!("{weight:.3}")) } @else { "–" } }
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The folder of an evaluation: it goes on after a kill, and several machines can share it.
+//!
+//! ```text
+//! run.json              what is evaluated; written first, and compared ever after
+//! scores-I-of-N.jsonl   finished jobs of shard I of N, a line each
+//! pictures/             of a few jobs: sources, predictions, truth (`gallery`)
+//! scores.csv            every score, once all jobs are there
+//! ```
+//!
+//! Whoever reads takes the lines of all shards together, by number of job. It makes no difference how many shards there
+//! were, whether their number changed on the way, or which of them were started again.
+
+mod journal;
+mod settings;
+
+pub use journal::{Finished, Journal, Shard};
+pub use settings::{SceneSettings, Settings};
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use viewfuse_job::files::{WriteError, write_whole};
+
+/// Name of the file of settings.
+pub const SETTINGS: &str = "run.json";
+
+/// Why a folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FolderError {
+    /// A file cannot be read or written.
+    #[error("{}: {doing}: {cause}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What could not be done.
+        doing: &'static str,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A file, or a line of it, is not what this program writes.
+    #[error("{}{}: is not of an evaluation: {cause}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// The line, from 1.
+        line: Option<usize>,
+        /// What is wrong with it.
+        cause: serde_json::Error,
+    },
+    /// The folder is that of another evaluation.
+    #[error(
+        "{}: is of an evaluation with other settings ({}); take another folder, or the same settings to go on with it",
+        path.display(), differences.join("; ")
+    )]
+    Different {
+        /// The file of settings.
+        path: PathBuf,
+        /// What differs, and how.
+        differences: Vec<String>,
+    },
+    /// A finished job is none of this evaluation, although the settings are the same.
+    #[error("{}: job {job} has other views than this version of the program would take; take another folder", path.display())]
+    OtherJob {
+        /// The folder.
+        path: PathBuf,
+        /// Its number.
+        job: usize,
+    },
+    /// Another process does the same shard.
+    #[error("{}: another process is writing to it; give each its own --shard", path.display())]
+    Busy {
+        /// The journal.
+        path: PathBuf,
+    },
+}
+
+/// The folder of an evaluation.
+#[derive(Clone, Debug)]
+pub struct RunFolder {
+    path: PathBuf,
+    settings: Settings,
+}
+
+impl RunFolder {
+    /// Begins an evaluation, or goes on with it.
+    ///
+    /// # Errors
+    /// [`FolderError`]: above all, if the folder is that of an evaluation with other settings.
+    pub fn begin(path: &Path, settings: Settings) -> Result<RunFolder, FolderError> {
+        let file = path.join(SETTINGS);
+        if file.exists() {
+            let found = RunFolder::open(path)?;
+            let differences = settings.differences(&found.settings);
+            if !differences.is_empty() {
+                return Err(FolderError::Different { path: file, differences });
+            }
+            return Ok(found);
+        }
+        let json = serde_json::to_vec_pretty(&settings);
+        let json = json.map_err(|cause| FolderError::Json { path: file.clone(), line: None, cause })?;
+        // Several shards may do this at once: they write the same.
+        write_whole(&file, &json)?;
+        Ok(RunFolder { path: path.to_path_buf(), settings })
+    }
+
+    /// Opens the folder of an evaluation that has begun.
+    ///
+    /// # Errors
+    /// [`FolderError`].
+    pub fn open(path: &Path) -> Result<RunFolder, FolderError> {
+        let file = path.join(SETTINGS);
+        let text =
+            fs::read(&file).map_err(|cause| FolderError::Io { path: file.clone(), doing: "cannot be read", cause })?;
+        let settings =
+            serde_json::from_slice(&text).map_err(|cause| FolderError::Json { path: file, line: None, cause })?;
+        Ok(RunFolder { path: path.to_path_buf(), settings })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What is evaluated.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The journal of a shard, to be added to. A last line that was cut off by a kill is removed.
+    ///
+    /// # Errors
+    /// [`FolderError`]; [`FolderError::Busy`] while another process adds to it.
+    pub fn journal(&self, shard: Shard) -> Result<Journal, FolderError> {
+        Journal::open(&self.path, shard)
+    }
+
+    /// Every finished job of every shard, by number. Of a job that was done twice, the first shard's.
+    ///
+    /// # Errors
+    /// [`FolderError`].
+    pub fn finished(&self) -> Result<BTreeMap<usize, Finished>, FolderError> {
+        let mut finished = BTreeMap::new();
+        for journal in journal::journals(&self.path)? {
+            for line in journal::read(&journal)? {
+                finished.entry(line.job).or_insert(line);
+            }
+        }
+        Ok(finished)
+    }
+}
+
+/// Numbers of jobs that are not finished.
+pub fn missing(job_count: usize, finished: &BTreeMap<usize, Finished>) -> Vec<usize> {
+    (0..job_count).filter(|job| !finished.contains_key(job)).collect()
+}

@@ -1,0 +1,197 @@
+//! Finished jobs, a line each, that survive a kill at any moment.
+
+use super::FolderError;
+use crate::Score;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::Duration;
+
+/// Which jobs are a process's own: those whose number leaves this rest when it is divided by the count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0.
+    pub index: usize,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl Shard {
+    /// All jobs.
+    pub const ALL: Shard = Shard { index: 0, count: 1 };
+
+    /// Whether it does the job of this number.
+    pub fn does(&self, job: usize) -> bool {
+        job % self.count == self.index
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    /// `INDEX/COUNT`.
+    fn from_str(text: &str) -> Result<Shard, String> {
+        let numbers = text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+        match numbers {
+            Some((index, count)) if index < count => Ok(Shard { index, count }),
+            _ => Err("a shard is INDEX/COUNT, counted from 0: 0/4, 1/4, 2/4 and 3/4 are all of four".to_owned()),
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// A job that is done.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Finished {
+    /// Its number.
+    pub job: usize,
+    /// Which of the scenes, from 0.
+    pub scene: usize,
+    /// The scene's name.
+    pub scene_name: String,
+    /// Which draw.
+    pub trial: u32,
+    /// The device that did it.
+    pub device: String,
+    /// Names of the sources.
+    pub sources: Vec<String>,
+    /// Scores of every scheme at every target.
+    #[serde(with = "score_lines")]
+    pub scores: Vec<Score>,
+}
+
+/// Scores as JSON: numbers that JSON has not (a ratio of equal pictures is infinite) as text.
+mod score_lines {
+    use super::{Deserialize, Duration, Score, Serialize};
+    use serde::de::Error;
+    use serde::{Deserializer, Serializer};
+
+    #[derive(Serialize, Deserialize)]
+    struct Line {
+        scheme: String,
+        target: String,
+        source_count: usize,
+        seconds: f64,
+        values: Vec<(String, Number)>,
+    }
+
+    #[derive(Serialize, Deserialize)]
+    #[serde(untagged)]
+    enum Number {
+        Finite(f64),
+        Other(String),
+    }
+
+    pub(super) fn serialize<S: Serializer>(scores: &[Score], serializer: S) -> Result<S::Ok, S::Error> {
+        let number =
+            |value: f64| if value.is_finite() { Number::Finite(value) } else { Number::Other(value.to_string()) };
+        serializer.collect_seq(scores.iter().map(|score| Line {
+            scheme: score.scheme.clone(),
+            target: score.target.clone(),
+            source_count: score.source_count,
+            seconds: score.time.as_secs_f64(),
+            values: score.values.iter().map(|(name, value)| (name.clone(), number(*value))).collect(),
+        }))
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Score>, D::Error> {
+        let score = |line: Line| {
+            let value = |(name, number): (String, Number)| match number {
+                Number::Finite(value) => Ok((name, value)),
+                Number::Other(text) => match text.parse() {
+                    Ok(value) => Ok((name, value)),
+                    Err(_) => Err(D::Error::custom(format!("{name} is '{text}'"))),
+                },
+            };
+            Ok(Score {
+                scheme: line.scheme,
+                target: line.target,
+                source_count: line.source_count,
+                values: line.values.into_iter().map(value).collect::<Result<_, _>>()?,
+                time: Duration::try_from_secs_f64(line.seconds).map_err(D::Error::custom)?,
+            })
+        };
+        Vec::<Line>::deserialize(deserializer)?.into_iter().map(score).collect()
+    }
+}
+
+/// The journal of one shard. While it is open, no other process opens it.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    file: File,
+}
+
+impl Journal {
+    pub(super) fn open(folder: &Path, shard: Shard) -> Result<Journal, FolderError> {
+        let path = folder.join(format!("scores-{}-of-{}.jsonl", shard.index, shard.count));
+        let failed = |doing, cause| FolderError::Io { path: path.clone(), doing, cause };
+        let file = OpenOptions::new().create(true).append(true).read(true).open(&path);
+        let file = file.map_err(|cause| failed("cannot be opened", cause))?;
+        // File systems that know no locks still work.
+        if let Err(TryLockError::WouldBlock) = file.try_lock() {
+            return Err(FolderError::Busy { path });
+        }
+        let text = read_bytes(&path)?;
+        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
+        if whole < text.len() {
+            let cut = file.set_len(whole as u64);
+            cut.map_err(|cause| failed("its unfinished last line cannot be removed", cause))?;
+        }
+        Ok(Journal { path, file })
+    }
+
+    /// Adds a finished job; it is on disk when this returns.
+    ///
+    /// # Errors
+    /// [`FolderError`].
+    pub fn add(&mut self, finished: &Finished) -> Result<(), FolderError> {
+        let path = || self.path.clone();
+        let mut line =
+            serde_json::to_vec(finished).map_err(|cause| FolderError::Json { path: path(), line: None, cause })?;
+        line.push(b'\n');
+        let written = self.file.write_all(&line).and_then(|()| self.file.sync_data());
+        written.map_err(|cause| FolderError::Io { path: path(), doing: "cannot be written", cause })
+    }
+}
+
+/// The journals of a folder, sorted by name.
+pub(super) fn journals(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
+    let failed = |cause| FolderError::Io { path: folder.to_path_buf(), doing: "cannot be read", cause };
+    let mut journals = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with("scores-") && name.ends_with(".jsonl") {
+            journals.push(path);
+        }
+    }
+    journals.sort();
+    Ok(journals)
+}
+
+/// The finished jobs of a journal. A last line without an end is being written, or was cut off: it does not count.
+pub(super) fn read(path: &Path) -> Result<Vec<Finished>, FolderError> {
+    let text = read_bytes(path)?;
+    let whole = text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n"));
+    let parsed = |(index, line): (usize, &[u8])| {
+        serde_json::from_slice(line).map_err(|cause| FolderError::Json {
+            path: path.to_path_buf(),
+            line: Some(index + 1),
+            cause,
+        })
+    };
+    whole.enumerate().map(parsed).collect()
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, FolderError> {
+    fs::read(path).map_err(|cause| FolderError::Io { path: path.to_path_buf(), doing: "cannot be read", cause })
+}

@@ -1,0 +1,106 @@
+//! What an evaluation's numbers hang on.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use viewfuse_job::digest::hexadecimal;
+use viewfuse_scene::Scene;
+
+/// Everything that decides which jobs there are and what they give. Not in it: which device a machine has (each finished
+/// job says its own), the shard, the number of threads, and where the scenes lie.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Version of the program.
+    pub viewfuse: String,
+    /// The protocol with all its values.
+    pub protocol: String,
+    /// The schemes in the order of the table.
+    pub schemes: Vec<String>,
+    /// What makes the pictures.
+    pub field: String,
+    /// Every option of the command and its value, defaults included.
+    pub options: BTreeMap<String, String>,
+    /// SHA-256 of the files of parameters: checkpoints, learned attention.
+    pub files: BTreeMap<String, String>,
+    /// How many jobs there are.
+    pub job_count: usize,
+    /// What the protocol wanted and the scenes have not.
+    pub notes: Vec<String>,
+    /// The scenes, in order.
+    pub scenes: Vec<SceneSettings>,
+}
+
+/// A scene as far as it can be told without reading pixels.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SceneSettings {
+    /// Its name.
+    pub name: String,
+    /// How many views it has.
+    pub views: usize,
+    /// SHA-256 of the names, poses and sizes of its views, the first eight bytes.
+    pub cameras: String,
+}
+
+impl SceneSettings {
+    /// Those of a scene.
+    pub fn of(scene: &Scene) -> SceneSettings {
+        let mut digest = Sha256::new();
+        for view in &scene.views {
+            digest.update(view.name.as_bytes());
+            digest.update([0, u8::from(view.image.is_some())]);
+            let numbers = view.camera.pose.to_opencv().into_iter().flatten().chain(view.camera.pinhole.focal());
+            numbers.for_each(|number| digest.update(number.to_le_bytes()));
+            [view.camera.pinhole.width(), view.camera.pinhole.height()]
+                .iter()
+                .for_each(|side| digest.update(side.to_le_bytes()));
+        }
+        let cameras = hexadecimal(&digest.finalize()[..8]);
+        SceneSettings { name: scene.name(), views: scene.views.len(), cameras }
+    }
+}
+
+impl Settings {
+    /// What is not the same in `found`, in words: key, value here, value there.
+    pub fn differences(&self, found: &Settings) -> Vec<String> {
+        let (here, there) = (self.flat(), found.flat());
+        let keys = here.keys().chain(there.keys().filter(|key| !here.contains_key(*key)));
+        let differs = |key: &&String| here.get(*key) != there.get(*key);
+        // The number of jobs and the notes follow from the rest.
+        let all: Vec<&String> = keys.filter(differs).collect();
+        let causes: Vec<&String> = all.iter().copied().filter(|key| *key != "job_count" && *key != "notes").collect();
+        let told = if causes.is_empty() { all } else { causes };
+        let words = |values: &BTreeMap<String, String>, key: &String| {
+            let text = values.get(key).map_or("none", String::as_str);
+            if text.chars().count() <= 60 {
+                text.to_owned()
+            } else {
+                format!("{}...", text.chars().take(57).collect::<String>())
+            }
+        };
+        told.into_iter().map(|key| format!("{key}: {} here, {} there", words(&here, key), words(&there, key))).collect()
+    }
+
+    /// Values as text by key, options and files one by one.
+    fn flat(&self) -> BTreeMap<String, String> {
+        let text = |value: Value| if let Value::String(text) = value { text } else { value.to_string() };
+        let Ok(Value::Object(all)) = serde_json::to_value(self) else { return BTreeMap::new() };
+        let mut flat = BTreeMap::new();
+        for (key, value) in all {
+            match value {
+                Value::Object(inner) => flat.extend(inner.into_iter().map(|(key, value)| (key, text(value)))),
+                Value::Array(items) if key == "scenes" => {
+                    let name = |item: &Value| item["name"].as_str().unwrap_or_default().to_owned();
+                    flat.insert(key, items.iter().map(name).collect::<Vec<_>>().join(", "));
+                    let cameras =
+                        items.into_iter().map(|item| (format!("cameras of {}", name(&item)), item.to_string()));
+                    flat.extend(cameras);
+                }
+                value => {
+                    flat.insert(key, text(value));
+                }
+            }
+        }
+        flat
+    }
+}

@@ -1,0 +1,46 @@
+//! Numbers that are none are found where they arise, and not in the picture at the end.
+
+use super::FieldError;
+use viewfuse_device::Device;
+
+/// A tensor has an element that is infinite or not a number.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{stage}: element {index} of the {tensor} is {value}, not a finite number")]
+pub struct NotFinite {
+    /// What was being done.
+    pub stage: String,
+    /// What came out of it.
+    pub tensor: String,
+    /// The first such element, flat.
+    pub index: usize,
+    /// What it is.
+    pub value: f32,
+}
+
+/// Looks at all values of a tensor that a stage made.
+///
+/// # Errors
+/// [`NotFinite`] with the first value that is not finite.
+pub fn check_finite(values: &[f32], stage: &str, tensor: &str) -> Result<(), NotFinite> {
+    match values.iter().position(|value| !value.is_finite()) {
+        None => Ok(()),
+        Some(index) => {
+            Err(NotFinite { stage: stage.to_owned(), tensor: tensor.to_owned(), index, value: values[index] })
+        }
+    }
+}
+
+/// Downloads a tensor that a stage made, and looks at all its values.
+///
+/// # Errors
+/// [`FieldError::NotFinite`] with the first value that is not finite; [`FieldError::Device`] if the device is lost.
+pub fn download_finite<D: Device>(
+    device: &D,
+    buffer: &D::Buffer<f32>,
+    stage: &str,
+    tensor: &str,
+) -> Result<Vec<f32>, FieldError<D::Error>> {
+    let values = device.download(buffer).map_err(FieldError::Device)?;
+    check_finite(&values, stage, tensor)?;
+    Ok(values)
+}

@@ -1,0 +1,188 @@
+//! The family of networks: which tensors a checkpoint must have, by its sizes.
+//!
+//! Names and shapes are those of the official `state_dict` (ViewAttention, `genvs/cars/genvs/models/{genvs,genvs_encoder,
+//! pixel_nerf_net}.py` and `training/networks.py`). It has tensors that no picture depends on: all batch norms of the
+//! encoder are switched off, and a segmentation head is left of the network that the encoder was made from. They are part
+//! of the architecture; nothing reads their values.
+//!
+//! Sizes are read off the tensors. What they do not tell is the same in all members ([`ASPP_RATES`], [`group_count`]); only
+//! the side of the images, which the denoiser's names tell, stands in the metadata of a checkpoint without denoiser.
+
+mod denoiser;
+mod encoder;
+
+pub use crate::resnet::Level;
+pub use denoiser::{Block, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Resampling, group_count};
+pub use encoder::{ASPP_RATES, Encoder};
+
+use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
+
+/// Channels of a picture.
+pub const COLOUR_CHANNELS: usize = 3;
+
+/// Of a checkpoint's metadata: the side of the images of a network without denoiser.
+pub(super) const IMAGE_SIDE: &str = "viewfuse.image_side";
+/// The sides of an image are whole multiples of this: so often the encoder halves it.
+const ENCODER_STRIDE: usize = 16;
+
+/// What the names of the tensors of the network at points begin with; a number follows.
+pub(crate) const MLP: &str = "pixel_nerf_net.mlp.layers";
+
+/// Sizes of a member of the family.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Architecture {
+    /// Side of source images and pictures, pixels; the denoiser's where there is one. Volumes are as high and wide,
+    /// feature images too, of half as many rays on a side.
+    pub image_side: usize,
+    /// From an image to a volume of features.
+    pub encoder: Encoder,
+    /// Width of both hidden layers of the network that turns a point's features into its density and features.
+    pub mlp_width: usize,
+    /// From features and noise to a picture. Without one, the first three features are the picture's colours in
+    /// `[-1, 1]`.
+    pub denoiser: Option<Denoiser>,
+}
+
+impl Architecture {
+    /// The published network.
+    pub fn published() -> Architecture {
+        let encoder = Encoder::published();
+        Architecture {
+            image_side: 128,
+            mlp_width: 64,
+            denoiser: Some(Denoiser::published(COLOUR_CHANNELS + encoder.feature_count)),
+            encoder,
+        }
+    }
+
+    /// A small member for machines without a GPU: images of half the side, a quarter of the encoder's widths, a denoiser
+    /// of three levels. Everything that the published network has it has, too.
+    pub fn small() -> Architecture {
+        let encoder = Encoder::small();
+        Architecture {
+            image_side: 64,
+            mlp_width: 32,
+            denoiser: Some(Denoiser::small(COLOUR_CHANNELS + encoder.feature_count)),
+            encoder,
+        }
+    }
+
+    /// A member narrow enough to be trained on a single core: a denoiser whose first level has `width` channels (a multiple
+    /// of 4), an encoder that has twice as many behind its trunk, and volumes of half as many depths as the small one's.
+    pub fn narrow(image_side: usize, width: usize) -> Architecture {
+        let encoder = Encoder::narrow(2 * width);
+        Architecture {
+            image_side,
+            mlp_width: 32,
+            denoiser: Some(Denoiser::narrow(image_side, COLOUR_CHANNELS + encoder.feature_count, width)),
+            encoder,
+        }
+    }
+
+    /// Reads the sizes off a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if it is not of this family.
+    pub fn of(checkpoint: &Checkpoint) -> Result<Architecture, CheckpointError> {
+        let sizes = Sizes::new(checkpoint, "GeNVS");
+        let feature_count = sizes.size(&format!("{MLP}.0.weight"), 2, 1)?;
+        let mlp_width = sizes.size(&format!("{MLP}.0.weight"), 2, 0)?;
+        let encoder = Encoder::of(&sizes, feature_count)?;
+        let has_denoiser = checkpoint.shapes().keys().any(|name| name.starts_with("denoiser."));
+        let denoiser = if has_denoiser { Some(Denoiser::of(&sizes)?) } else { None };
+        match &denoiser {
+            Some(denoiser) if denoiser.in_channels != COLOUR_CHANNELS + feature_count => {
+                return Err(sizes.refuse(format!(
+                    "the denoiser takes {} channels, not {COLOUR_CHANNELS} colours and the {feature_count} features of a point",
+                    denoiser.in_channels
+                )));
+            }
+            None if feature_count < COLOUR_CHANNELS => {
+                return Err(sizes.refuse(format!(
+                    "it has no denoiser, and the {feature_count} features of a point cannot be a colour"
+                )));
+            }
+            _ => {}
+        }
+        let image_side = match &denoiser {
+            Some(denoiser) => denoiser.image_side,
+            None => image_side(&sizes)?,
+        };
+        if image_side % ENCODER_STRIDE != 0 {
+            return Err(sizes.refuse(format!(
+                "images of {image_side} pixels on a side; the encoder takes multiples of {ENCODER_STRIDE}"
+            )));
+        }
+        // Numbers of a volume are counted in 32 bits.
+        let numbers = image_side as u64 * image_side as u64 * (encoder.feature_count * encoder.volume_depth) as u64;
+        if numbers > u64::from(u32::MAX) {
+            return Err(sizes.refuse(format!("a volume of {numbers} numbers, of which there may be {}", u32::MAX)));
+        }
+        let architecture = Architecture { image_side, encoder, mlp_width, denoiser };
+        checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
+        architecture.check_filters(&sizes)?;
+        Ok(architecture)
+    }
+
+    /// Every tensor that it has, in the order of the data.
+    pub fn tensors(&self) -> Vec<TensorShape> {
+        let mut tensors = self.encoder.tensors();
+        let features = self.encoder.feature_count;
+        let mlp = [(features, self.mlp_width), (self.mlp_width, self.mlp_width), (self.mlp_width, 1 + features)];
+        for (layer, (in_count, out_count)) in mlp.into_iter().enumerate() {
+            with_bias(&mut tensors, &format!("{MLP}.{layer}"), &[out_count, in_count]);
+        }
+        tensors.extend(self.denoiser.iter().flat_map(|denoiser| denoiser.tensors()));
+        tensors
+    }
+
+    /// Tensors that official checkpoints may have beside these: counters, the filters with which the denoiser halves and
+    /// doubles images (all means of four pixels, see [`Architecture::check_filters`]), its input for augmented training
+    /// images, and parameters of a learned weighting.
+    fn is_optional(&self, name: &str) -> bool {
+        name.ends_with(".num_batches_tracked")
+            || self.is_filter(name)
+            || self.denoiser.is_some() && name == "denoiser.model.map_augment.weight"
+            || name.starts_with("pixel_nerf_net.cam_weighter.")
+    }
+
+    fn is_filter(&self, name: &str) -> bool {
+        self.denoiser.is_some() && name.starts_with(denoiser::PREFIX) && name.ends_with(".resample_filter")
+    }
+
+    /// Refuses a denoiser that resamples in another way than with the mean of two by two pixels.
+    fn check_filters(&self, sizes: &Sizes<'_>) -> Result<(), CheckpointError> {
+        const MEAN: [f32; 4] = [0.25; 4];
+        for (name, shape) in sizes.checkpoint().shapes().iter().filter(|(name, _)| self.is_filter(name)) {
+            // The shape first: it says how much there is to read.
+            if *shape != [1, 1, 2, 2] || sizes.checkpoint().tensor(name)? != MEAN {
+                return Err(sizes.refuse(format!(
+                    "{name}, of shape {shape:?}, is not the mean of 2x2 pixels; denoisers with other filters are not run"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// Numbers in all its tensors, those that no picture depends on included.
+    pub fn parameter_count(&self) -> usize {
+        self.tensors().iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum()
+    }
+}
+
+/// The side of the images of a network without denoiser.
+fn image_side(sizes: &Sizes<'_>) -> Result<usize, CheckpointError> {
+    let Some(text) = sizes.checkpoint().metadata().get(IMAGE_SIDE) else {
+        return Ok(Architecture::published().image_side);
+    };
+    match text.parse() {
+        Ok(side @ 1..=4096) => Ok(side),
+        _ => Err(sizes.refuse(format!("its metadata says {IMAGE_SIDE} = '{text}', which is no number from 1 to 4096"))),
+    }
+}
+
+/// A layer: its weight, and a bias for each of its outputs, which stand on the weight's first axis.
+fn with_bias(tensors: &mut Vec<TensorShape>, name: &str, shape: &[usize]) {
+    tensors.push(TensorShape { name: format!("{name}.weight"), shape: shape.to_vec() });
+    tensors.push(TensorShape { name: format!("{name}.bias"), shape: shape[..1].to_vec() });
+}

@@ -1,0 +1,225 @@
+//! From volumes to a target's feature image: rays at half the resolution, points looked up in every view's volume, the
+//! views fused, a small network, compositing; then bilinear enlargement.
+//!
+//! Source: `pixel_nerf_net.py`, with the mean over views replaced by weights.
+
+use super::image::{Image, Scratch, Size, enlarge};
+use super::layers::Loader;
+use super::looking::Looking;
+use super::volume::Volume;
+use crate::FieldError;
+use crate::finite::check_finite;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::depths::CoarseBlock;
+use viewfuse_core::fuse::FuseBlock;
+use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
+use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::rays::CastBlock;
+use viewfuse_device::{Device, Layer, Rays};
+
+/// Rays that the CPU takes at once: their points' activations stay in its caches.
+const LEAST_RAYS: usize = 64;
+/// Length of the last sample as published: whatever is there is opaque.
+pub(crate) const LAST_LENGTH: f32 = 1.0e10;
+
+type Outcome<T, D> = Result<T, FieldError<<D as viewfuse_device::Memory>::Error>>;
+
+/// The views that a target uses.
+pub(super) struct Views<'a, D: Device> {
+    /// Their cameras; width and height are those of the images that were encoded.
+    pub(super) cameras: D::Buffer<CameraBlock>,
+    /// Their weights, which sum to 1.
+    pub(super) weights: D::Buffer<f32>,
+    /// Their volumes.
+    pub(super) volumes: Vec<&'a Volume<D>>,
+}
+
+/// The network that is asked about points, on a device.
+pub(super) struct PointNetwork<D: Device> {
+    layers: [Layer<D>; 3],
+    /// Features of a point.
+    pub(super) features: u32,
+    width: u32,
+}
+
+impl<D: Device> PointNetwork<D> {
+    /// Reads it: `features` of a point, `width` inside.
+    pub(super) fn load(loader: &Loader<'_, D>, features: u32, width: u32) -> Outcome<PointNetwork<D>, D> {
+        let layer = |index: usize| loader.linear(&format!("mlp.layers.{index}"));
+        Ok(PointNetwork { layers: [layer(0)?, layer(1)?, layer(2)?], features, width })
+    }
+
+    /// Density and what is added to each feature, `raw[point][1 + feature]`, from `fused[point][feature]`; not rectified.
+    pub(super) fn run(
+        &self,
+        device: &D,
+        point_count: u32,
+        fused: &D::Buffer<f32>,
+        hidden: &mut [D::Buffer<f32>; 2],
+        raw: &mut D::Buffer<f32>,
+    ) -> Result<(), D::Error> {
+        let block = |inner_count: u32, column_count: u32, relu_outputs: u32| ProductBlock {
+            row_count: point_count,
+            inner_count,
+            column_count,
+            relu_outputs,
+            ..ProductBlock::default()
+        };
+        let [first, second, third] = &self.layers;
+        let [inside, next] = hidden;
+        device.product(&block(self.features, self.width, 1), fused, first, None, inside)?;
+        device.product(&block(self.width, self.width, 1), inside, second, None, next)?;
+        device.product(&block(self.width, 1 + self.features, 0), next, third, None, raw)
+    }
+
+    /// Room for what is inside it at so many points.
+    pub(super) fn hidden(&self, device: &D, point_count: usize) -> Result<[D::Buffer<f32>; 2], D::Error> {
+        let room = || device.zeros(point_count * self.width as usize);
+        Ok([room()?, room()?])
+    }
+}
+
+/// The features `[row][column][feature]` that a target sees; its rows and columns are even.
+pub(super) fn render<D: Device>(
+    device: &D,
+    scratch: &mut Scratch<'_, D>,
+    network: &PointNetwork<D>,
+    views: &Views<'_, D>,
+    target: &CameraBlock,
+    looking: &Looking,
+) -> Outcome<Image<D>, D> {
+    let failed = FieldError::Device;
+    let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
+    let at_once = (device.busy_elements() / looking.sample_count as usize).max(LEAST_RAYS);
+    // What is looked up in all views is bound as a whole.
+    let a_ray = looking.sample_count as usize * network.features as usize * views.volumes.len();
+    let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);
+    let pixels: Vec<u32> = (0..half.pixel_count()).collect();
+    let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len())).map_err(failed)?;
+    let cast = cast_block(target, looking.near_far, looking.sample_count);
+    let mut features = Vec::with_capacity(pixels.len() * network.features as usize);
+    for pixels in pixels.chunks(at_once) {
+        progress.check()?;
+        features.extend(tile.render(pixels, &cast).map_err(failed)?);
+    }
+    check_finite(&features, "rendering the target's features", "feature image")?;
+    let half_image = scratch.uploaded(half, &features).map_err(failed)?;
+    let mut image = scratch.image(half.doubled()).map_err(failed)?;
+    enlarge(device, &half_image, 0, &mut image).map_err(failed)?;
+    scratch.give(half_image);
+    Ok(image)
+}
+
+/// Rays through a grid whose corners are the picture's corners (published: `linspace(-1, 1)` over half the pixels), with
+/// this many samples between two depths along the target's principal axis. Rows and columns of the target are even.
+pub(crate) fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_count: u32) -> CastBlock {
+    let [width, height] = [target.width / 2, target.height / 2];
+    let scale = |nodes: u32, pixels: u32| nodes.saturating_sub(1).max(1) as f32 / pixels as f32;
+    let (across, down) = (scale(width, target.width), scale(height, target.height));
+    let [focal_x, focal_y, principal_x, principal_y] = target.intrinsics;
+    let camera = CameraBlock {
+        intrinsics: [focal_x * across, focal_y * down, principal_x * across, principal_y * down],
+        width,
+        height,
+        ..*target
+    };
+    // Samples are the middles of equal parts: the parts of the first and the last reach half their length further.
+    let beyond = 0.5 * (far - near) / (sample_count - 1) as f32;
+    CastBlock { camera, near: near - beyond, far: far + beyond, pixel_centre: 0.0, along_axis: 1 }
+}
+
+/// How long a ray is from its first to its last sample in the lengths that the network's densities are for, unless a person
+/// says otherwise: as published for SRN, 1 over the focal length in halves of the image's height.
+pub(crate) fn ray_length(target: &CameraBlock) -> f32 {
+    target.height as f32 / (2.0 * target.intrinsics[1])
+}
+
+/// Buffers for some rays.
+struct Tile<'a, D: Device> {
+    device: &'a D,
+    network: &'a PointNetwork<D>,
+    views: &'a Views<'a, D>,
+    looking: &'a Looking,
+    /// Every sample of every ray.
+    samples: D::Buffer<u32>,
+    depths: D::Buffer<f32>,
+    points: D::Buffer<viewfuse_core::rays::RayPoint>,
+    gathered: D::Buffer<f32>,
+    fused: D::Buffer<f32>,
+    hidden: [D::Buffer<f32>; 2],
+    raw: D::Buffer<f32>,
+    weights: D::Buffer<f32>,
+}
+
+impl<'a, D: Device> Tile<'a, D> {
+    fn new(
+        device: &'a D,
+        network: &'a PointNetwork<D>,
+        views: &'a Views<'a, D>,
+        looking: &'a Looking,
+        ray_count: usize,
+    ) -> Result<Tile<'a, D>, D::Error> {
+        let count = ray_count * looking.sample_count as usize;
+        let features = network.features as usize;
+        Ok(Tile {
+            device,
+            network,
+            views,
+            looking,
+            samples: device.upload(&(0..count as u32).collect::<Vec<u32>>())?,
+            depths: device.zeros(count)?,
+            points: device.zeros(count)?,
+            gathered: device.zeros(count * features * views.volumes.len())?,
+            fused: device.zeros(count * features)?,
+            hidden: network.hidden(device, count)?,
+            raw: device.zeros(count * (features + 1))?,
+            weights: device.zeros(count)?,
+        })
+    }
+
+    /// `[ray][feature]` of some pixels.
+    fn render(&mut self, pixels: &[u32], cast: &CastBlock) -> Result<Vec<f32>, D::Error> {
+        let Tile { device, network, views, looking, .. } = *self;
+        let Looking { near_far: [near, far], sample_count, jitter, seed, ray_length, inclusive } = *looking;
+        let ray_count = pixels.len() as u32;
+        let point_count = ray_count * sample_count;
+        let mut rays = Rays { count: ray_count, pixels: device.upload(pixels)?, rays: device.zeros(pixels.len())? };
+        device.cast_rays(cast, &mut rays)?;
+        let coarse = CoarseBlock { seed: [seed as u32, (seed >> 32) as u32], sample_count, jitter };
+        device.coarse_depths(&coarse, &rays, &mut self.depths)?;
+        device.place_points(sample_count, point_count, &self.samples, &rays, &self.depths, &mut self.points)?;
+        let features = network.features;
+        for (view, volume) in (0..).zip(&views.volumes) {
+            let block = VolumeBlock {
+                view,
+                point_count,
+                feature_count: features,
+                height: volume.size.height,
+                width: volume.size.width,
+                depth_count: volume.size.channels / features,
+                near,
+                far,
+            };
+            volume.gather(device, &block, &views.cameras, &self.points, &mut self.gathered)?;
+        }
+        let block = FuseBlock {
+            view_count: views.volumes.len() as u32,
+            stride: point_count * features,
+            ..FuseBlock::default()
+        };
+        let elements = point_count * features;
+        device.fuse_views(&block, elements, &views.weights, &self.gathered, &mut self.fused)?;
+        network.run(device, point_count, &self.fused, &mut self.hidden, &mut self.raw)?;
+        let block = FeatureBlock {
+            sample_count,
+            feature_count: features,
+            length_scale: ray_length / (far - near),
+            last_length: LAST_LENGTH,
+            inclusive: u32::from(inclusive),
+        };
+        device.weigh_features(&block, ray_count, &self.raw, &self.points, &mut self.weights)?;
+        let mut summed = device.zeros((ray_count * features) as usize)?;
+        device.sum_features(&block, ray_count, &self.weights, &self.fused, &self.raw, &mut summed)?;
+        device.download(&summed)
+    }
+}

@@ -1,0 +1,151 @@
+//! The network's parts on a device, and what each makes of its inputs. What a part makes is looked at before the next one
+//! gets it: numbers that are none are found where they arise.
+
+use super::Outcome;
+use super::architecture::{Architecture, COLOUR_CHANNELS};
+use super::denoiser::Denoiser;
+use super::encoder::Encoder;
+use super::feature_image::{PointNetwork, Views, render};
+use super::image::{Image, Scratch, Size};
+use super::layers::Loader;
+use super::looking::Looking;
+use super::sampling::{Plan, Sampled, Start, sample};
+use super::volume::Volume;
+use crate::FieldError;
+use crate::finite::{check_finite, download_finite};
+use std::ops::Range;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::network::normalise::MeanBlock;
+use viewfuse_core::sampler::Mix;
+use viewfuse_core::schedule::Preconditioning;
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_nn::checkpoint::Checkpoint;
+
+/// The parts of a network.
+pub(super) struct Parts<D: Device> {
+    encoder: Encoder<D>,
+    points: PointNetwork<D>,
+    /// Without one, the first features are the picture.
+    denoiser: Option<Denoiser<D>>,
+}
+
+impl<D: Device> Parts<D> {
+    /// Reads them, for images of at least `side` rows and columns.
+    ///
+    /// # Errors
+    /// If the checkpoint cannot be read, or the device has no room.
+    pub(super) fn load(
+        device: &D,
+        checkpoint: &Checkpoint,
+        architecture: &Architecture,
+        side: u32,
+    ) -> Outcome<Parts<D>, D> {
+        let loader = |prefix| Loader { device, checkpoint, prefix };
+        let features = architecture.encoder.feature_count;
+        let denoiser = architecture.denoiser.as_ref().map(|denoiser| {
+            let sides: Vec<u32> =
+                (0..denoiser.levels.len()).map(|level| (denoiser.image_side >> level) as u32).collect();
+            Denoiser::load(&loader("denoiser.model."), side, &sides)
+        });
+        Ok(Parts {
+            encoder: Encoder::load(&loader("pixel_nerf_net.encoder."), side, features)?,
+            points: PointNetwork::load(&loader("pixel_nerf_net."), features as u32, architecture.mlp_width as u32)?,
+            denoiser: denoiser.transpose()?,
+        })
+    }
+
+    /// A view's volume, without its rows.
+    pub(super) fn encode(&self, device: &D, values: &[f32], size: Size, view: usize) -> Outcome<Volume<D>, D> {
+        check_finite(values, &encoding(view), "image [row][column][3]")?;
+        Volume::encode(device, &self.encoder, values, size).map_err(FieldError::Device)
+    }
+
+    /// Computes rows of a volume that are not there yet. Returns how many.
+    pub(super) fn fill(&self, device: &D, volume: &mut Volume<D>, rows: Range<u32>, view: usize) -> Outcome<u32, D> {
+        let failed = FieldError::Device;
+        let new_rows = volume.fill(device, &self.encoder, rows).map_err(failed)?;
+        if new_rows == 0 {
+            return Ok(0);
+        }
+        let Some(image) = volume.image() else { return Ok(new_rows) };
+        // A mean is no number where one of its summands is none: a small download tells whether to look at all of them.
+        let Size { channels, .. } = image.size;
+        let block = MeanBlock { pixel_count: image.size.pixel_count(), channels };
+        let mut means = device.zeros(channels as usize).map_err(failed)?;
+        device.channel_means(&block, &image.values, &mut means).map_err(failed)?;
+        let means = device.download(&means).map_err(failed)?;
+        if means.iter().any(|mean| !mean.is_finite()) {
+            download_finite(device, &image.values, &encoding(view), "volume [row][column][depth][feature]")?;
+        }
+        Ok(new_rows)
+    }
+
+    /// The features that a target sees.
+    pub(super) fn features(
+        &self,
+        device: &D,
+        scratch: &mut Scratch<'_, D>,
+        views: &Views<'_, D>,
+        target: &CameraBlock,
+        looking: &Looking,
+    ) -> Outcome<Image<D>, D> {
+        render(device, scratch, &self.points, views, target, looking)
+    }
+
+    /// The network at points.
+    pub(super) fn points(&self) -> &PointNetwork<D> {
+        &self.points
+    }
+
+    /// The picture `[row][column][3]` in `[-1, 1]` that features tell of, and how many calls of the denoiser it took; those
+    /// that were planned are its calls and what it left out.
+    pub(super) fn picture(
+        &self,
+        device: &D,
+        scratch: &mut Scratch<'_, D>,
+        features: &Image<D>,
+        plan: &Plan,
+        start: Start<'_, D>,
+        progress: &dyn Progress,
+    ) -> Outcome<Sampled<D>, D> {
+        let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
+        if self.denoiser.is_none() {
+            let values = device.download(&features.values).map_err(FieldError::Device)?;
+            let colours: Vec<f32> = values
+                .chunks_exact(features.size.channels as usize)
+                .flat_map(|features| features[..COLOUR_CHANNELS].to_vec())
+                .collect();
+            let picture = device.upload(&colours).map_err(FieldError::Device)?;
+            return Ok(Sampled { picture, levels: Vec::new(), left_out: 0 });
+        }
+        sample(device, plan, count, start, progress, |noisy, level, denoised| {
+            self.denoise(device, scratch, noisy, features, level, denoised).map_err(FieldError::Device)
+        })
+    }
+
+    /// What the denoiser believes is behind a noisy picture of a level, given the features: `c_skip x + c_out F(c_in x)`.
+    /// Without denoiser, nothing is written.
+    pub(super) fn denoise(
+        &self,
+        device: &D,
+        scratch: &mut Scratch<'_, D>,
+        noisy: &D::Buffer<f32>,
+        features: &Image<D>,
+        level: f32,
+        denoised: &mut D::Buffer<f32>,
+    ) -> Result<(), D::Error> {
+        let Some(denoiser) = &self.denoiser else { return Ok(()) };
+        let at = Preconditioning::at(level);
+        let output = denoiser.run(device, scratch, noisy, features, &at)?;
+        let mix = Mix { state: at.skip, results: [at.output, 0.0, 0.0, 0.0] };
+        device.mix_pictures(&mix, noisy, [&output.values; 4], denoised)?;
+        scratch.give(output);
+        Ok(())
+    }
+}
+
+/// The stage's name in errors.
+fn encoding(view: usize) -> String {
+    format!("encoding source {view}")
+}

@@ -1,0 +1,270 @@
+//! One picture on its way from noise.
+
+use super::super::super::FieldError;
+use super::super::super::finite::download_finite;
+use super::{Outcome, Plan, Sampled, Start};
+use std::collections::VecDeque;
+use viewfuse_core::math::{clamp, ln_ratio};
+use viewfuse_core::sampler::control::{FIRST_STEP, change_to_come, reached, verdict};
+use viewfuse_core::sampler::{History, Mix, NoiseBlock, Sampler};
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+
+/// The noise that a run starts from; the noise before level `index` is number `index + 1`.
+const START: u32 = 0;
+
+/// A run: what it needs, and what it knows.
+pub(super) struct Run<'a, D: Device, F> {
+    device: &'a D,
+    plan: &'a Plan,
+    element_count: usize,
+    progress: &'a dyn Progress,
+    denoise: F,
+    /// Buffers that nobody needs any more.
+    free: Vec<D::Buffer<f32>>,
+    /// What is kept of the calls, the newest first, and at which levels they were.
+    results: VecDeque<D::Buffer<f32>>,
+    history: History,
+    /// Levels of all calls.
+    levels: Vec<f32>,
+    /// What the denoiser said last, and at which level.
+    last: Option<(Vec<f32>, f32)>,
+}
+
+/// What the denoiser says: on the device, and on the host.
+struct Denoised<D: Device> {
+    buffer: D::Buffer<f32>,
+    values: Vec<f32>,
+}
+
+impl<'a, D: Device, F> Run<'a, D, F>
+where
+    F: FnMut(&D::Buffer<f32>, f32, &mut D::Buffer<f32>) -> Outcome<(), D>,
+{
+    pub(super) fn new(
+        device: &'a D,
+        plan: &'a Plan,
+        element_count: usize,
+        progress: &'a dyn Progress,
+        denoise: F,
+    ) -> Run<'a, D, F> {
+        Run {
+            device,
+            plan,
+            element_count,
+            progress,
+            denoise,
+            free: Vec::new(),
+            results: VecDeque::new(),
+            history: History::NONE,
+            levels: Vec::new(),
+            last: None,
+        }
+    }
+
+    /// Over the levels of the schedule.
+    pub(super) fn over_levels(
+        mut self,
+        sampler: Sampler,
+        level_count: u32,
+        start: Start<'_, D>,
+    ) -> Outcome<Sampled<D>, D> {
+        let schedule = self.plan.schedule;
+        let level = |index: u32| schedule.level(index, level_count);
+        let is_reached = |index: &u32| level(*index) <= start.highest();
+        let first = (0..level_count).find(is_reached).unwrap_or(level_count - 1);
+        let planned = sampler.call_count(level_count);
+        self.progress.expect(sampler.call_count(level_count - first) as usize);
+        let mut state = self.begun(&start, level(first))?;
+        // Where the last step began: its correction starts there.
+        let mut begun: Option<D::Buffer<f32>> = None;
+        for index in first..level_count {
+            let (mut sigma, next) = (level(index), level(index + 1));
+            let churned = self.plan.churn.before(sigma, level_count);
+            if churned.scale > 0.0 {
+                let noisy = self.noisy(Some(&state), churned.scale, index + 1)?;
+                self.free.push(std::mem::replace(&mut state, noisy));
+                self.forget();
+                self.free.extend(begun.take());
+                sigma = churned.level;
+            }
+            let denoised = self.call(&state, sigma)?;
+            if next <= 0.0 || self.is_settled(&denoised.values, sigma) {
+                return Ok(self.finished(denoised.buffer, planned));
+            }
+            if let Some(begun) = begun.take() {
+                let correction = sampler.correction(&self.history, sigma);
+                let corrected = self.mixed(&correction, &begun, Some(&denoised.buffer))?;
+                self.free.extend([begun, std::mem::replace(&mut state, corrected)]);
+            }
+            self.keep(sampler, sigma, &state, denoised)?;
+            let mut reached = self.mixed(&sampler.step(&self.history, next), &state, None)?;
+            if sampler == Sampler::Heun {
+                let there = self.call(&reached, next)?;
+                if self.is_settled(&there.values, next) {
+                    return Ok(self.finished(there.buffer, planned));
+                }
+                let correction = sampler.correction(&self.history, next);
+                let corrected = self.mixed(&correction, &reached, Some(&there.buffer))?;
+                self.last = Some((there.values, next));
+                self.free.extend([std::mem::replace(&mut reached, corrected), there.buffer]);
+            }
+            let before = std::mem::replace(&mut state, reached);
+            match sampler {
+                Sampler::UniPc => begun = Some(before),
+                _ => self.free.push(before),
+            }
+        }
+        // Not reached: the level behind the last is 0. A schedule without levels has the picture it started with.
+        Ok(self.finished(state, planned))
+    }
+
+    /// Over levels that are chosen on the way.
+    pub(super) fn by_tolerance(
+        mut self,
+        tolerance: f32,
+        most_calls: u32,
+        start: Start<'_, D>,
+    ) -> Outcome<Sampled<D>, D> {
+        let sampler = Sampler::UniPc;
+        let [largest, smallest] = [0, 1].map(|index| self.plan.schedule.level(index, 2));
+        let highest = clamp(start.highest(), smallest, largest);
+        let mut state = self.begun(&start, highest)?;
+        let (mut sigma, mut step) = (highest, FIRST_STEP);
+        self.progress.expect(1);
+        let mut newest = self.call(&state, sigma)?;
+        loop {
+            let is_last = sigma <= smallest || self.levels.len() >= most_calls as usize;
+            if is_last || self.is_settled(&newest.values, sigma) {
+                return Ok(self.finished(newest.buffer, 0));
+            }
+            self.keep(sampler, sigma, &state, newest)?;
+            // Until a step is accepted.
+            newest = loop {
+                let next = reached(sigma, step, smallest);
+                let predictor = sampler.step(&self.history, next);
+                let predicted = self.mixed(&predictor, &state, None)?;
+                self.progress.expect(1);
+                let denoised = self.call(&predicted, next)?;
+                self.free.push(predicted);
+                let corrector = sampler.correction(&self.history, next);
+                let beyond = self.mixed(&corrector.correction_beyond(&predictor), &state, Some(&denoised.buffer))?;
+                let error = root_mean_square(&self.device.download(&beyond).map_err(FieldError::Device)?);
+                self.free.push(beyond);
+                let known = self.history.count().min(sampler.result_count());
+                let verdict = verdict(error, tolerance, ln_ratio(sigma, next), known + 1);
+                step = verdict.step;
+                let is_last = self.levels.len() >= most_calls as usize;
+                if verdict.is_accepted || is_last {
+                    let corrected = self.mixed(&corrector, &state, Some(&denoised.buffer))?;
+                    self.free.push(std::mem::replace(&mut state, corrected));
+                    sigma = next;
+                    break denoised;
+                }
+                self.free.push(denoised.buffer);
+            };
+        }
+    }
+
+    /// A call of the denoiser. What it says is finite.
+    fn call(&mut self, state: &D::Buffer<f32>, sigma: f32) -> Outcome<Denoised<D>, D> {
+        progress.check()?;
+        let mut buffer = self.buffer()?;
+        (self.denoise)(state, sigma, &mut buffer)?;
+        let values = download_finite(self.device, &buffer, &format!("denoising at level {sigma}"), "denoised picture")?;
+        self.levels.push(sigma);
+        self.progress.step();
+        Ok(Denoised { buffer, values })
+    }
+
+    /// Whether no value of the picture changes any more by what can be seen.
+    fn is_settled(&self, values: &[f32], sigma: f32) -> bool {
+        let (Some(settled), Some((before, level))) = (self.plan.settled, &self.last) else { return false };
+        let change = values.iter().zip(before).fold(0.0, |largest: f32, (now, then)| largest.max((now - then).abs()));
+        change_to_come(change, *level, sigma) <= settled
+    }
+
+    /// Keeps what later steps need of a call.
+    fn keep(&mut self, sampler: Sampler, sigma: f32, state: &D::Buffer<f32>, denoised: Denoised<D>) -> Outcome<(), D> {
+        let Denoised { buffer, values } = denoised;
+        let kept = match sampler.kept(sigma) {
+            None => buffer,
+            Some(mix) => {
+                let mut kept = self.buffer()?;
+                let results = [&buffer, state, state, state];
+                self.device.mix_pictures(&mix, state, results, &mut kept).map_err(FieldError::Device)?;
+                self.free.push(buffer);
+                kept
+            }
+        };
+        self.last = Some((values, sigma));
+        self.history.push(sigma);
+        self.results.push_front(kept);
+        self.free.extend(self.results.drain(self.history.count().min(sampler.result_count()) as usize..));
+        Ok(())
+    }
+
+    /// Forgets all calls: noise was added.
+    fn forget(&mut self) {
+        self.history = History::NONE;
+        self.free.extend(self.results.drain(..));
+    }
+
+    /// A combination of a state and of what is kept, behind what was just said, if it was.
+    fn mixed(
+        &mut self,
+        mix: &Mix,
+        state: &D::Buffer<f32>,
+        said: Option<&D::Buffer<f32>>,
+    ) -> Outcome<D::Buffer<f32>, D> {
+        let mut mixed = self.buffer()?;
+        // What is not there has coefficient 0.
+        let mut all = said.into_iter().chain(&self.results);
+        let results = std::array::from_fn(|_| all.next().unwrap_or(state));
+        self.device.mix_pictures(mix, state, results, &mut mixed).map_err(FieldError::Device)?;
+        Ok(mixed)
+    }
+
+    /// The state at a run's first level.
+    fn begun(&mut self, start: &Start<'_, D>, level: f32) -> Outcome<D::Buffer<f32>, D> {
+        match start {
+            Start::Noise => self.noisy(None, level, START),
+            Start::Picture { picture, .. } => self.noisy(Some(picture), level, START),
+            Start::Latents(latents) => self.mixed(&Mix { state: level, ..Mix::default() }, latents, None),
+        }
+    }
+
+    /// A picture, or nothing, with noise.
+    fn noisy(&mut self, picture: Option<&D::Buffer<f32>>, scale: f32, stream: u32) -> Outcome<D::Buffer<f32>, D> {
+        let mut noisy = self.buffer()?;
+        let block = NoiseBlock { seed: [self.plan.seed as u32, (self.plan.seed >> 32) as u32], stream, scale };
+        let nothing;
+        let picture = match picture {
+            Some(picture) => picture,
+            None => {
+                nothing = self.device.zeros(self.element_count).map_err(FieldError::Device)?;
+                &nothing
+            }
+        };
+        self.device.add_noise(&block, picture, &mut noisy).map_err(FieldError::Device)?;
+        Ok(noisy)
+    }
+
+    fn buffer(&mut self) -> Outcome<D::Buffer<f32>, D> {
+        match self.free.pop() {
+            Some(buffer) => Ok(buffer),
+            None => self.device.zeros(self.element_count).map_err(FieldError::Device),
+        }
+    }
+
+    fn finished(self, picture: D::Buffer<f32>, planned: u32) -> Sampled<D> {
+        let made = u32::try_from(self.levels.len()).unwrap_or(u32::MAX);
+        Sampled { picture, levels: self.levels, left_out: planned.saturating_sub(made) }
+    }
+}
+
+/// In `f64`; infinite or NaN where a value is.
+fn root_mean_square(values: &[f32]) -> f32 {
+    let sum: f64 = values.iter().map(|value| f64::from(*value) * f64::from(*value)).sum();
+    (sum / values.len().max(1) as f64).sqrt() as f32
+}

@@ -1,0 +1,169 @@
+//! A view's volume of features, whose rows are computed when a target first looks at them; or all at once, and then kept in
+//! 16 bits.
+
+use super::encoder::Encoder;
+use super::image::{Image, Scratch, Size};
+use super::looking::Looking;
+use std::ops::Range;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::genvs::VolumeBlock;
+use viewfuse_core::half::{fetch_half, word_count};
+use viewfuse_core::rays::RayPoint;
+use viewfuse_device::Device;
+
+/// What is known of a view.
+pub(super) struct Volume<D: Device> {
+    /// Rows, columns, and what a pixel has: `[depth][feature]`.
+    pub(super) size: Size,
+    nodes: Nodes<D>,
+    /// Rows that are there already.
+    filled: Range<u32>,
+}
+
+/// Features `[row][column][depth][feature]`.
+enum Nodes<D: Device> {
+    /// As they are computed.
+    Whole {
+        /// What the last layer makes rows of.
+        deep: Image<D>,
+        image: Image<D>,
+    },
+    /// All of them, in 16 bits each, two in a word.
+    Halves(D::Buffer<u32>),
+}
+
+impl<D: Device> Volume<D> {
+    /// Encodes an image up to the last layer.
+    ///
+    /// # Errors
+    /// If the device is lost or has no room.
+    pub(super) fn encode(device: &D, encoder: &Encoder<D>, values: &[f32], size: Size) -> Result<Volume<D>, D::Error> {
+        // Its own: what an encoding needs in between is not kept beside the volumes.
+        let mut scratch = Scratch::new(device);
+        let deep = encoder.encode(device, &mut scratch, values, size)?;
+        let size = encoder.volume_size(size);
+        // Rows that no target looks at are never written.
+        let image = Scratch::new(device).image(size)?;
+        Ok(Volume { size, nodes: Nodes::Whole { deep, image }, filled: 0..0 })
+    }
+
+    /// How many rows it has.
+    pub(super) fn row_count(&self) -> u32 {
+        self.size.height
+    }
+
+    /// How many features all its nodes have.
+    fn number_count(&self) -> u32 {
+        self.size.pixel_count() * self.size.channels
+    }
+
+    /// Bytes that its features take.
+    pub(super) fn byte_count(&self) -> u64 {
+        let numbers = self.number_count();
+        u64::from(if matches!(self.nodes, Nodes::Halves(_)) { word_count(numbers) } else { numbers }) * 4
+    }
+
+    /// Computes rows that are not there yet. Returns how many.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub(super) fn fill(&mut self, device: &D, encoder: &Encoder<D>, rows: Range<u32>) -> Result<u32, D::Error> {
+        let filled = self.filled.clone();
+        let Nodes::Whole { deep, image } = &mut self.nodes else { return Ok(0) };
+        if rows.is_empty() {
+            return Ok(0);
+        }
+        let all = match filled.is_empty() {
+            true => rows,
+            false => filled.start.min(rows.start)..filled.end.max(rows.end),
+        };
+        let missing = match filled.is_empty() {
+            true => [all.clone(), 0..0],
+            false => [all.start..filled.start, filled.end..all.end],
+        };
+        for rows in missing.iter().filter(|rows| !rows.is_empty()) {
+            encoder.fill_rows(device, deep, rows.clone(), image)?;
+        }
+        self.filled = all;
+        Ok(missing.iter().map(|rows| rows.len() as u32).sum())
+    }
+
+    /// The rows that are there, in an image; `None` once they are packed.
+    pub(super) fn image(&self) -> Option<&Image<D>> {
+        match &self.nodes {
+            Nodes::Whole { image, .. } => Some(image),
+            Nodes::Halves(_) => None,
+        }
+    }
+
+    /// Keeps what is there in 16 bits, and nothing that further rows could be made of: all rows are filled.
+    ///
+    /// # Errors
+    /// If the device is lost or has no room.
+    pub(super) fn pack(&mut self, device: &D) -> Result<(), D::Error> {
+        let Nodes::Whole { image, .. } = &self.nodes else { return Ok(()) };
+        let number_count = self.number_count();
+        let mut words = device.zeros(word_count(number_count) as usize)?;
+        device.pack_halves(number_count, &image.values, &mut words)?;
+        self.nodes = Nodes::Halves(words);
+        Ok(())
+    }
+
+    /// Looks up every feature of points in it, by [`VolumeBlock`].
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub(super) fn gather(
+        &self,
+        device: &D,
+        block: &VolumeBlock,
+        views: &D::Buffer<CameraBlock>,
+        points: &D::Buffer<RayPoint>,
+        gathered: &mut D::Buffer<f32>,
+    ) -> Result<(), D::Error> {
+        match &self.nodes {
+            Nodes::Whole { image, .. } => device.gather_volume(block, views, points, &image.values, gathered),
+            Nodes::Halves(words) => device.gather_halves(block, views, points, words, gathered),
+        }
+    }
+
+    /// Its features, those that are packed as they are read.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub(super) fn values(&self, device: &D) -> Result<Vec<f32>, D::Error> {
+        match &self.nodes {
+            Nodes::Whole { image, .. } => device.download(&image.values),
+            Nodes::Halves(words) => {
+                let words = device.download(words)?;
+                let number_count = self.number_count();
+                Ok((0..number_count as usize).map(|index| fetch_half(&words[..], index)).collect())
+            }
+        }
+    }
+
+    /// The rows that rays of a target can reach: the projections of the corners of what they go through, and a node
+    /// beyond. All of them where a corner is not in front of the view.
+    pub(super) fn rows_seen(&self, view: &CameraBlock, target: &CameraBlock, looking: &Looking) -> Range<u32> {
+        let (width, height) = (target.width as f32, target.height as f32);
+        let mut seen = f32::MAX..-f32::MAX;
+        let [near, far] = looking.near_far;
+        let astray = looking.jitter * 0.5 * (far - near) / (looking.sample_count - 1) as f32;
+        for depth in [near - astray, far + astray] {
+            for (x, y) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
+                let point: Vec3 = target.centre_world() + target.towards(x, y) * depth;
+                let at = view.project(point);
+                if !at.in_front {
+                    return 0..self.row_count();
+                }
+                seen = seen.start.min(at.y)..seen.end.max(at.y);
+            }
+        }
+        // Nodes lie at halves of the image's rows: a look-up reads one before and one behind, and one more is for rounding.
+        let scale = self.row_count() as f32 / view.height as f32;
+        let (first, last) = (seen.start * scale - 2.0, seen.end * scale + 3.0);
+        // Saturating: what lies outside has no rows.
+        (first as u32).min(self.row_count())..(last as u32).min(self.row_count())
+    }
+}

@@ -1,0 +1,103 @@
+//! A box around the object that the silhouettes show.
+
+use rayon::prelude::*;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::photo::ObjectBlock;
+use viewfuse_core::photo::hull::hull_alpha;
+use viewfuse_scene::rig::nearest_point_to_lines;
+
+/// Grid cells along a side of the two passes, coarse and fine.
+const GRIDS: [usize; 2] = [32, 48];
+/// Least hull alpha of a cell's centre that belongs to the object.
+const LEAST_ALPHA: f32 = 0.2;
+/// Texels of at least this alpha belong to a silhouette.
+const SILHOUETTE_ALPHA: f32 = 0.3;
+/// The first box is larger than the largest silhouette by this factor.
+const ALLOWANCE: f32 = 1.2;
+
+/// The box around every point that all silhouettes allow, or `None` if there is none.
+pub(super) fn find(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<ObjectBlock> {
+    let view_count = cameras.len() as u32;
+    let (middle, radius) = first_guess(cameras, texels)?;
+    let reach = Vec3::splat(ALLOWANCE * radius);
+    let mut object = ObjectBlock::new(middle - reach, middle + reach, view_count);
+    for side in GRIDS {
+        let (low, high) = corners(&object);
+        let cell = (high - low) / side as f32;
+        let inside = (0..side)
+            .into_par_iter()
+            .filter_map(|slice| occupied_box(&object, cameras, texels, low, cell, side, slice))
+            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        // Centres of cells were asked: matter may reach up to a cell beyond them.
+        object = ObjectBlock::new(inside.0 - cell, inside.1 + cell, view_count);
+    }
+    Some(object)
+}
+
+fn corners(object: &ObjectBlock) -> (Vec3, Vec3) {
+    let [low, high] = [object.low, object.high].map(|c| Vec3::new(c[0], c[1], c[2]));
+    (low, high)
+}
+
+/// The point nearest to the rays through the middles of the silhouettes, and the largest radius that a silhouette has
+/// around it.
+fn first_guess(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<(Vec3, f32)> {
+    let silhouette = |camera: &CameraBlock| {
+        let first = camera.first_texel as usize;
+        let width = camera.width as usize;
+        let count = width * camera.height as usize;
+        texels[first..first + count]
+            .iter()
+            .enumerate()
+            .filter(|(_, texel)| texel[3] > SILHOUETTE_ALPHA)
+            .map(move |(pixel, _)| ((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5))
+            .collect::<Vec<(f32, f32)>>()
+    };
+    let silhouettes: Vec<Vec<(f32, f32)>> = cameras.par_iter().map(silhouette).collect();
+    let lines: Vec<(Vec3, Vec3)> = cameras
+        .iter()
+        .zip(&silhouettes)
+        .filter(|(_, pixels)| !pixels.is_empty())
+        .map(|(camera, pixels)| {
+            let count = pixels.len() as f64;
+            let x = pixels.iter().map(|p| f64::from(p.0)).sum::<f64>() / count;
+            let y = pixels.iter().map(|p| f64::from(p.1)).sum::<f64>() / count;
+            (camera.centre_world(), camera.towards(x as f32, y as f32).normalize())
+        })
+        .collect();
+    let middle = nearest_point_to_lines(&lines)?;
+    let radius = cameras
+        .iter()
+        .zip(&silhouettes)
+        .map(|(camera, pixels)| {
+            let seen = camera.project(middle);
+            let farthest = pixels.iter().map(|p| (p.0 - seen.x).hypot(p.1 - seen.y)).fold(0.0, f32::max);
+            if seen.in_front { farthest * seen.depth / camera.intrinsics[0] } else { 0.0 }
+        })
+        .fold(0.0, f32::max);
+    (radius > 0.0 && radius.is_finite()).then_some((middle, radius))
+}
+
+/// Least and greatest occupied cell centre in one slice of the grid.
+fn occupied_box(
+    object: &ObjectBlock,
+    cameras: &[CameraBlock],
+    texels: &[[f32; 4]],
+    low: Vec3,
+    cell: Vec3,
+    side: usize,
+    slice: usize,
+) -> Option<(Vec3, Vec3)> {
+    let mut found: Option<(Vec3, Vec3)> = None;
+    for row in 0..side {
+        for column in 0..side {
+            let centre = low + cell * (Vec3::new(column as f32, row as f32, slice as f32) + 0.5);
+            if hull_alpha(object, cameras, texels, centre, LEAST_ALPHA) > 0.0 {
+                let (least, greatest) = found.unwrap_or((centre, centre));
+                found = Some((least.min(centre), greatest.max(centre)));
+            }
+        }
+    }
+    found
+}

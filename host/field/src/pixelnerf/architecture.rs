@@ -1,0 +1,241 @@
+//! The family of networks: which tensors a checkpoint must have, by its sizes.
+//!
+//! Names and shapes are those of the official `state_dict` (pixelNeRF, `src/model/{models,encoder,resnetfc}.py`; the
+//! trunk is torchvision's ResNet of basic blocks). Sizes are read off the tensors: trunk width and depth, how many trunk
+//! levels there are latents of, the width and depth of the two point networks, how many blocks latents are injected into.
+
+pub use crate::resnet::Level;
+
+use crate::resnet;
+use std::collections::BTreeMap;
+use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
+
+/// Most octaves: sines of more are noise in `f32`.
+const MOST_OCTAVES: usize = 20;
+
+/// Sizes of a member of the family.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Architecture {
+    /// Channels after the first convolution (7x7, stride 2).
+    pub stem_channels: usize,
+    /// The levels behind it that latents are taken from.
+    pub levels: Vec<Level>,
+    /// Width of the point networks.
+    pub width: usize,
+    /// Residual blocks of a point network.
+    pub block_count: usize,
+    /// Blocks in front of which latents are injected; behind them the views are combined.
+    pub injected_count: usize,
+    /// Octaves of sines and cosines.
+    pub frequency_count: usize,
+    /// Lowest angular frequency, radians a world unit.
+    pub frequency: f32,
+    /// Whether there is a second point network for the fine pass. Without one the first serves both.
+    pub has_fine: bool,
+    /// Where in a pixel its centre is; see [`viewfuse_core::rays::CastBlock::pixel_centre`]. 0 as published.
+    pub pixel_centre: f32,
+}
+
+/// The two point networks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// The first pass's.
+    Coarse,
+    /// The second's.
+    Fine,
+}
+
+impl Pass {
+    /// What its tensors' names start with.
+    pub fn prefix(self) -> &'static str {
+        match self {
+            Pass::Coarse => "mlp_coarse",
+            Pass::Fine => "mlp_fine",
+        }
+    }
+}
+
+impl Architecture {
+    /// The published network (`conf/exp/srn.conf`).
+    pub fn published() -> Architecture {
+        let level = |channels, block_count| Level { channels, block_count };
+        Architecture {
+            stem_channels: 64,
+            levels: vec![level(64, 3), level(128, 4), level(256, 6)],
+            width: 512,
+            block_count: 5,
+            injected_count: 3,
+            frequency_count: 6,
+            frequency: 1.5,
+            has_fine: true,
+            pixel_centre: 0.0,
+        }
+    }
+
+    /// A small member for machines without a GPU: a fraction of the published trunk, point networks of this width.
+    pub fn small(width: usize) -> Architecture {
+        let level = |channels, block_count| Level { channels, block_count };
+        let stem_channels = (width / 4).max(4);
+        Architecture {
+            stem_channels,
+            levels: vec![level(stem_channels, 1), level(2 * stem_channels, 1)],
+            width,
+            ..Architecture::published()
+        }
+    }
+
+    /// Channels of the latents: those of the stem and of all levels behind one another.
+    pub fn latent_channels(&self) -> usize {
+        self.stem_channels + self.levels.iter().map(|level| level.channels).sum::<usize>()
+    }
+
+    /// Numbers that describe a point in a view.
+    pub fn embedded_len(&self) -> usize {
+        6 + 6 * self.frequency_count
+    }
+
+    /// The point networks there are.
+    pub fn passes(&self) -> &'static [Pass] {
+        if self.has_fine { &[Pass::Coarse, Pass::Fine] } else { &[Pass::Coarse] }
+    }
+
+    /// Reads the sizes off a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
+    ///
+    /// # Errors
+    /// [`CheckpointError`] if it is not of this family.
+    pub fn of(checkpoint: &Checkpoint) -> Result<Architecture, CheckpointError> {
+        let sizes = Sizes::new(checkpoint, "PixelNeRF");
+        let stem_channels = sizes.size("encoder.model.conv1.weight", 4, 0)?;
+        let width = sizes.size("mlp_coarse.lin_in.weight", 2, 0)?;
+        let embedded_len = sizes.size("mlp_coarse.lin_in.weight", 2, 1)?;
+        if embedded_len < 12 || embedded_len % 6 != 0 || embedded_len > 6 + 6 * MOST_OCTAVES {
+            return Err(sizes.refuse(format!(
+                "mlp_coarse.lin_in.weight takes {embedded_len} numbers a point; this family takes 6 + 6 x octaves (a point \
+                 with sines and cosines, and a direction), at most {MOST_OCTAVES}"
+            )));
+        }
+        let block_count = sizes.count(|block| format!("mlp_coarse.blocks.{block}.fc_0.weight"));
+        let injected_count = sizes.count(|block| format!("mlp_coarse.lin_z.{block}.weight"));
+        if block_count == 0 || injected_count == 0 || injected_count > block_count {
+            return Err(sizes.refuse(format!(
+                "mlp_coarse has {block_count} blocks and {injected_count} latent layers (lin_z); at least one of each is \
+                 needed, and no more latent layers than blocks"
+            )));
+        }
+        let latent_channels = sizes.size("mlp_coarse.lin_z.0.weight", 2, 1)?;
+        let mut levels = Vec::new();
+        let mut channels = stem_channels;
+        while channels < latent_channels {
+            let level = levels.len() + 1;
+            let block_count = sizes.count(|block| format!("encoder.model.layer{level}.{block}.conv1.weight"));
+            if block_count == 0 {
+                return Err(sizes.refuse(format!(
+                    "the point networks take latents of {latent_channels} channels, but the trunk's levels up to layer{} \
+                     have {channels} and there is no layer{level}",
+                    level - 1
+                )));
+            }
+            let own = sizes.size(&format!("encoder.model.layer{level}.0.conv1.weight"), 4, 0)?;
+            channels += own;
+            levels.push(Level { channels: own, block_count });
+        }
+        if channels != latent_channels {
+            return Err(sizes.refuse(format!(
+                "the point networks take latents of {latent_channels} channels; the trunk's levels up to layer{} have \
+                 {channels}",
+                levels.len()
+            )));
+        }
+        let architecture = Architecture {
+            stem_channels,
+            levels,
+            width,
+            block_count,
+            injected_count,
+            frequency_count: (embedded_len - 6) / 6,
+            frequency: frequency(&sizes, (embedded_len - 6) / 6)?,
+            has_fine: checkpoint.shapes().keys().any(|name| name.starts_with("mlp_fine.")),
+            pixel_centre: sizes.number("viewfuse.pixel_centre", 0.0)?,
+        };
+        checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
+        Ok(architecture)
+    }
+
+    /// Every tensor that it needs, in the order of the data.
+    pub fn tensors(&self) -> Vec<TensorShape> {
+        let mut tensors = resnet::tensors("encoder.model", self.stem_channels, &self.levels);
+        for pass in self.passes() {
+            let prefix = pass.prefix();
+            linear(&mut tensors, &format!("{prefix}.lin_in"), self.width, self.embedded_len());
+            linear(&mut tensors, &format!("{prefix}.lin_out"), 4, self.width);
+            for block in 0..self.block_count {
+                linear(&mut tensors, &format!("{prefix}.blocks.{block}.fc_0"), self.width, self.width);
+                linear(&mut tensors, &format!("{prefix}.blocks.{block}.fc_1"), self.width, self.width);
+            }
+            for block in 0..self.injected_count {
+                linear(&mut tensors, &format!("{prefix}.lin_z.{block}"), self.width, self.latent_channels());
+            }
+        }
+        tensors
+    }
+
+    /// Tensors that official checkpoints have and that are not needed: trunk levels that no latents are taken from,
+    /// counters, and buffers that code recomputes.
+    fn is_optional(&self, name: &str) -> bool {
+        let unused_level = name
+            .strip_prefix("encoder.model.layer")
+            .and_then(|rest| rest.split('.').next()?.parse::<usize>().ok())
+            .is_some_and(|level| level > self.levels.len());
+        const BUFFERS: [&str; 8] = [
+            "code._freqs",
+            "code._phases",
+            "poses",
+            "image_shape",
+            "focal",
+            "c",
+            "encoder.latent",
+            "encoder.latent_scaling",
+        ];
+        unused_level
+            || name.ends_with(".num_batches_tracked")
+            || name.starts_with("encoder.model.fc.")
+            || BUFFERS.contains(&name)
+    }
+
+    /// What a checkpoint's metadata say of it that its tensors do not tell.
+    pub fn metadata(&self) -> BTreeMap<String, String> {
+        let number = |key: &str, value: f32| (key.to_owned(), value.to_string());
+        BTreeMap::from([
+            number("viewfuse.frequency", self.frequency),
+            number("viewfuse.pixel_centre", self.pixel_centre),
+        ])
+    }
+
+    /// Numbers of all parameters that it needs.
+    pub fn parameter_count(&self) -> usize {
+        self.tensors().iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum()
+    }
+}
+
+fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count: usize) {
+    tensors.push(TensorShape { name: format!("{name}.weight"), shape: vec![out_count, in_count] });
+    tensors.push(TensorShape { name: format!("{name}.bias"), shape: vec![out_count] });
+}
+
+/// The lowest frequency: of the checkpoint's own table if it has one, otherwise the published one.
+fn frequency(sizes: &Sizes<'_>, octaves: usize) -> Result<f32, CheckpointError> {
+    const TABLE: &str = "code._freqs";
+    let published = Architecture::published().frequency;
+    let Some(shape) = sizes.shape(TABLE) else { return sizes.number("viewfuse.frequency", published) };
+    // Each frequency stands twice, for sine and cosine.
+    if shape.iter().try_fold(1_usize, |count, side| count.checked_mul(*side)) != Some(2 * octaves) {
+        return Err(sizes.refuse(format!("{TABLE} has the shape {shape:?} instead of 2 x {octaves} numbers")));
+    }
+    let table = sizes.checkpoint().tensor(TABLE)?;
+    let lowest = table.first().copied().unwrap_or(published);
+    let is_octaves = table.iter().zip(0..).all(|(value, index)| *value == lowest * 2_f32.powi(index / 2));
+    if !is_octaves || !(lowest > 0.0) {
+        return Err(sizes.refuse(format!("{TABLE} does not hold octaves of one frequency")));
+    }
+    Ok(lowest)
+}

@@ -1,0 +1,83 @@
+//! Checkpoints that are computed, not trained: for checking against other implementations, and for measuring.
+
+use super::architecture::Architecture;
+use std::collections::BTreeMap;
+use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
+use viewfuse_nn::formula;
+
+/// Outputs of the networks by formula are multiplied by this, so that densities vary.
+const OUTPUT_GAIN: f32 = 6.0;
+
+/// Every tensor by [`formula`]; space is full of mist. With [`Architecture::published`] it is the network of the reference
+/// values.
+pub fn by_formula(architecture: &Architecture) -> Checkpoint {
+    made("formula", architecture, |tensor| {
+        let gain = if tensor.name.ends_with("lin_out.weight") { OUTPUT_GAIN } else { 1.0 };
+        let mut values = formula::tensor(&tensor.name, &tensor.shape);
+        values.iter_mut().for_each(|value| *value *= gain);
+        values
+    })
+}
+
+/// A solid ball-like body around the world's origin, of a radius near 0.3, coloured by what the views show and empty
+/// outside: a network for measuring what can be left out, as long as there is no trained one.
+///
+/// It is [`by_formula`] with one channel of the flow set aside: it enters as the sum of the cosines of the lowest
+/// frequency, which falls with the distance from the origin whatever the view's axes, passes all blocks unchanged, and
+/// decides the density.
+pub fn body(architecture: &Architecture) -> Checkpoint {
+    let frequency_axes = 6..9;
+    let frequency = architecture.frequency;
+    made("body", architecture, move |tensor| {
+        let TensorShape { name, shape } = tensor;
+        let mut values = by_formula_values(tensor);
+        let leaf = name.split_once('.').map_or("", |(_, leaf)| leaf);
+        let columns = shape.get(1).copied().unwrap_or(1);
+        if !name.starts_with("mlp_") {
+            return values;
+        }
+        match leaf {
+            "lin_in.weight" => {
+                for (column, value) in values[..columns].iter_mut().enumerate() {
+                    *value = if frequency_axes.contains(&column) { 1.0 } else { 0.0 };
+                }
+            }
+            // The sum of three cosines at the surface.
+            "lin_in.bias" => values[0] = -3.0 * (frequency * SURFACE_COORDINATE).cos(),
+            "lin_out.weight" => {
+                let density = &mut values[3 * columns..];
+                density.iter_mut().for_each(|value| *value *= DENSITY_NOISE);
+                density[0] = DENSITY_SLOPE;
+            }
+            "lin_out.bias" => values[3] = -DENSITY_OFFSET,
+            // Nothing else touches the channel: not the second layers of blocks, not the latents.
+            _ if leaf.ends_with("fc_1.weight") || leaf.contains("lin_z") && leaf.ends_with("weight") => {
+                values[..columns].fill(0.0);
+            }
+            _ if leaf.ends_with("fc_1.bias") || leaf.contains("lin_z") => values[0] = 0.0,
+            _ => {}
+        }
+        values
+    })
+}
+
+/// Coordinate on each axis of a point of the body's surface on the space diagonal: its radius is 1.73 times that.
+const SURFACE_COORDINATE: f32 = 0.18;
+/// Density gained for a change of the channel by 1.
+const DENSITY_SLOPE: f32 = 2000.0;
+/// Density below zero just outside of the surface.
+const DENSITY_OFFSET: f32 = 2.0;
+/// What is left of the formula's own density.
+const DENSITY_NOISE: f32 = 0.02;
+
+fn by_formula_values(tensor: &TensorShape) -> Vec<f32> {
+    formula::tensor(&tensor.name, &tensor.shape)
+}
+
+fn made(
+    label: &str,
+    architecture: &Architecture,
+    values: impl Fn(&TensorShape) -> Vec<f32> + Send + Sync + 'static,
+) -> Checkpoint {
+    Checkpoint::computed(label, architecture.tensors(), BTreeMap::new(), values)
+}

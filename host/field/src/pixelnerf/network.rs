@@ -1,0 +1,223 @@
+//! A point network, asked about many points at once: each view's blocks, the views fused, the blocks behind.
+
+use super::architecture::Architecture;
+use super::encoder::ViewLatents;
+use super::parameters::PointNetwork;
+use std::mem::swap;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::fuse::FuseBlock;
+use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
+use viewfuse_core::rays::RayPoint;
+use viewfuse_device::{Device, Layer};
+
+/// Floats that a buffer of activations holds on the CPU: 4 MiB, which a few cores' caches hold together. Quarter and four
+/// times as many took the same time.
+const LEAST_ACTIVATIONS: usize = 1 << 20;
+/// Outputs of a product that an invocation computes.
+const OUTPUTS_AN_INVOCATION: usize = 64;
+
+/// The views that a target uses, with their weights.
+pub(super) struct Views<'a, D: Device> {
+    /// Their cameras.
+    pub(super) cameras: D::Buffer<CameraBlock>,
+    /// Their weights, which sum to 1.
+    pub(super) weights: D::Buffer<f32>,
+    /// What is known of each.
+    pub(super) latents: Vec<&'a ViewLatents<D>>,
+}
+
+/// Buffers for activations, used again for every chunk of points.
+pub(super) struct Workspace<D: Device> {
+    /// Most points at once.
+    pub(super) point_count: u32,
+    pub(super) points: D::Buffer<RayPoint>,
+    embedded: D::Buffer<f32>,
+    /// `[view][point][channel]`; empty where the grids hold injections.
+    latents: D::Buffer<f32>,
+    /// `[view][point][width]`, later `[point][width]`: what flows through the blocks, what comes behind it, and what is
+    /// inside a block.
+    flow: D::Buffer<f32>,
+    next: D::Buffer<f32>,
+    inside: D::Buffer<f32>,
+    visible: D::Buffer<f32>,
+    pub(super) raw: D::Buffer<f32>,
+}
+
+impl<D: Device> Workspace<D> {
+    /// Room for as many points as keep the device busy, for `view_count` views; at most `most_points`.
+    pub(super) fn new(
+        device: &D,
+        architecture: &Architecture,
+        view_count: usize,
+        most_points: usize,
+        maps: bool,
+    ) -> Result<Workspace<D>, D::Error> {
+        let Architecture { width, .. } = *architecture;
+        let points = points_at_once(device, architecture, view_count, most_points, maps);
+        let rows = points * view_count;
+        Ok(Workspace {
+            point_count: points as u32,
+            points: device.zeros(points)?,
+            embedded: device.zeros(rows * architecture.embedded_len())?,
+            latents: device.zeros(if maps { 1 } else { rows * architecture.latent_channels() })?,
+            flow: device.zeros(rows * width)?,
+            next: device.zeros(rows * width)?,
+            inside: device.zeros(rows * width)?,
+            visible: device.zeros(rows)?,
+            raw: device.zeros(points * 4)?,
+        })
+    }
+}
+
+/// How many points [`Workspace::new`] makes room for.
+fn points_at_once<D: Device>(
+    device: &D,
+    architecture: &Architecture,
+    view_count: usize,
+    most_points: usize,
+    maps: bool,
+) -> usize {
+    let latents = if maps { 0 } else { architecture.latent_channels() };
+    let widest = architecture.width.max(architecture.embedded_len()).max(latents);
+    let busy = LEAST_ACTIVATIONS.max(device.busy_elements().saturating_mul(OUTPUTS_AN_INVOCATION));
+    let rows = (busy / widest).min(device.most_elements::<f32>() / widest);
+    (rows / view_count.max(1)).clamp(1, most_points.max(1))
+}
+
+/// Bytes of a [`Workspace`].
+pub(super) fn workspace_bytes<D: Device>(
+    device: &D,
+    architecture: &Architecture,
+    view_count: usize,
+    maps: bool,
+) -> usize {
+    let points = points_at_once(device, architecture, view_count, usize::MAX, maps);
+    let latents = if maps { 0 } else { architecture.latent_channels() };
+    let row = architecture.embedded_len() + latents + 3 * architecture.width + 1;
+    points * (view_count * row * size_of::<f32>() + size_of::<RayPoint>() + 4 * size_of::<f32>())
+}
+
+/// A network on a device, with what it needs to be asked.
+pub(super) struct Network<'a, D: Device> {
+    pub(super) device: &'a D,
+    pub(super) architecture: &'a Architecture,
+    pub(super) layers: &'a PointNetwork<Layer<D>>,
+    /// Which list of a view's grids is this network's; `None` where the grid holds latents.
+    pub(super) grids: Option<usize>,
+}
+
+impl<D: Device> Network<'_, D> {
+    /// Computes the four raw outputs of the first `point_count` points of a workspace.
+    pub(super) fn ask(
+        &self,
+        workspace: &mut Workspace<D>,
+        views: &Views<'_, D>,
+        point_count: u32,
+    ) -> Result<(), D::Error> {
+        let Network { device, architecture, layers, .. } = self;
+        let view_count = views.latents.len() as u32;
+        let width = architecture.width as u32;
+        let row_count = view_count * point_count;
+        let embed = EmbedBlock {
+            point_count,
+            frequency_count: architecture.frequency_count as u32,
+            frequency: architecture.frequency,
+        };
+        device.embed_points(&embed, view_count, &views.cameras, &workspace.points, &mut workspace.embedded)?;
+        let entry =
+            ProductBlock { row_count, inner_count: embed.row_len(), column_count: width, ..ProductBlock::default() };
+        device.product(&entry, &workspace.embedded, &layers.entry, None, &mut workspace.flow)?;
+        if self.grids.is_none() {
+            self.gather_latents(workspace, views, point_count)?;
+        }
+        for block in 0..architecture.injected_count {
+            self.inject(workspace, views, point_count, block)?;
+            self.run_block(workspace, row_count, block)?;
+        }
+        let Workspace { points, visible, flow, next, .. } = workspace;
+        device.visible_weights(view_count, point_count, &views.cameras, &views.weights, points, visible)?;
+        let fuse =
+            FuseBlock { view_count, stride: point_count * width, channel_count: width, weight_stride: view_count };
+        device.fuse_views(&fuse, point_count * width, visible, flow, next)?;
+        swap(flow, next);
+        for block in architecture.injected_count..architecture.block_count {
+            self.run_block(workspace, point_count, block)?;
+        }
+        let exit = ProductBlock {
+            row_count: point_count,
+            inner_count: width,
+            column_count: 4,
+            relu_inputs: 1,
+            ..ProductBlock::default()
+        };
+        device.product(&exit, &workspace.flow, &layers.exit, None, &mut workspace.raw)
+    }
+
+    /// Looks the latents up in every view.
+    fn gather_latents(
+        &self,
+        workspace: &mut Workspace<D>,
+        views: &Views<'_, D>,
+        point_count: u32,
+    ) -> Result<(), D::Error> {
+        let channel_count = self.architecture.latent_channels() as u32;
+        for (view, known) in (0..).zip(&views.latents) {
+            let block = self.gather(known, view, point_count, channel_count);
+            let Workspace { points, latents, .. } = workspace;
+            self.device.gather_latents(&block, &views.cameras, points, &known.grids[0][0], None, latents)?;
+        }
+        Ok(())
+    }
+
+    /// Adds a block's injection of latents: from the grids that hold it already, or as a product.
+    fn inject(
+        &self,
+        workspace: &mut Workspace<D>,
+        views: &Views<'_, D>,
+        point_count: u32,
+        block: usize,
+    ) -> Result<(), D::Error> {
+        let width = self.architecture.width as u32;
+        let Workspace { points, latents, flow, next, .. } = workspace;
+        match self.grids {
+            Some(network) => {
+                for (view, known) in (0..).zip(&views.latents) {
+                    let gather = self.gather(known, view, point_count, width);
+                    let grid = &known.grids[network][block];
+                    self.device.gather_latents(&gather, &views.cameras, points, grid, Some(flow), next)?;
+                }
+            }
+            None => {
+                let product = ProductBlock {
+                    row_count: views.latents.len() as u32 * point_count,
+                    inner_count: self.architecture.latent_channels() as u32,
+                    column_count: width,
+                    ..ProductBlock::default()
+                };
+                self.device.product(&product, latents, &self.layers.injections[block], Some(flow), next)?;
+            }
+        }
+        swap(flow, next);
+        Ok(())
+    }
+
+    fn gather(&self, known: &ViewLatents<D>, view: u32, point_count: u32, channel_count: u32) -> GatherBlock {
+        let [height, width] = known.grid_size;
+        let pixel_centre = self.architecture.pixel_centre;
+        GatherBlock { view, point_count, channel_count, height, width, has_addend: 0, pixel_centre }
+    }
+
+    /// A residual block: `flow + second(relu(first(relu(flow))))`.
+    fn run_block(&self, workspace: &mut Workspace<D>, row_count: u32, block: usize) -> Result<(), D::Error> {
+        let width = self.architecture.width as u32;
+        let [first, second] = &self.layers.blocks[block];
+        let product = ProductBlock { row_count, inner_count: width, column_count: width, ..ProductBlock::default() };
+        let into = ProductBlock { relu_inputs: 1, relu_outputs: 1, ..product };
+        let Workspace { flow, next, inside, .. } = workspace;
+        self.device.product(&into, flow, first, None, inside)?;
+        self.device.product(&product, inside, second, Some(flow), next)?;
+        swap(flow, next);
+        Ok(())
+    }
+}

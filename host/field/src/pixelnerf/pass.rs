@@ -1,0 +1,239 @@
+//! Rays of a target, some at a time: a first pass finds where something is, a second looks there closely.
+
+use super::network::{Network, Views, Workspace};
+use super::options::{LEAST_OPACITY, LEAST_SHARE, Omissions, Sampling};
+use crate::FieldError;
+use viewfuse_core::composite::CompositeBlock;
+use viewfuse_core::depths::{CoarseBlock, FineBlock};
+use viewfuse_core::rays::CastBlock;
+use viewfuse_core::wanted::WantedBlock;
+use viewfuse_device::{Device, Pixels, Rays};
+
+/// Most rays at a time.
+pub(super) const MOST_RAYS: usize = 4096;
+
+/// How many rays at a time: as many as a buffer of the device holds the samples of.
+pub(super) fn rays_at_once<D: Device>(device: &D, sampling: &Sampling) -> usize {
+    let samples = sampling.coarse_count as usize + sampling.importance_count as usize + sampling.depth_count as usize;
+    MOST_RAYS.min(device.most_elements::<[f32; 4]>() / samples).max(1)
+}
+
+/// Bytes that a ray takes on its way through both passes.
+pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
+    // Depth, colour with optical depth, mark and place in the list, of both passes' samples; weights and transmittances
+    // of the first's; random numbers and depth of the second's.
+    let sample = size_of::<f32>() + size_of::<[f32; 4]>() + 3 * size_of::<u32>();
+    let (coarse, fine) = (coarse_count as usize, fine_count as usize);
+    (2 * coarse + fine) * sample + (coarse + fine) * size_of::<[f32; 2]>() + fine * size_of::<f32>() + 64
+}
+
+/// How many samples a pass had, and how many of them the network was asked about.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Asked {
+    pub(super) samples: u64,
+    pub(super) asked: u64,
+}
+
+/// What was seen of some rays by a first pass.
+pub(super) struct Seen<D: Device> {
+    /// `[ray][part]` of weight and transmittance in front.
+    pub(super) values: D::Buffer<[f32; 2]>,
+    pub(super) columns: u32,
+    pub(super) rows: u32,
+    /// A part is empty if it stops less than this share of the light that reaches it.
+    pub(super) least_share: f32,
+}
+
+/// Everything that the rays of a target share.
+pub(super) struct Renderer<'a, D: Device> {
+    pub(super) device: &'a D,
+    pub(super) coarse: Network<'a, D>,
+    pub(super) fine: Network<'a, D>,
+    pub(super) views: &'a Views<'a, D>,
+    pub(super) sampling: Sampling,
+    pub(super) omissions: Omissions,
+    /// Transmittance at which a ray may end.
+    pub(super) settled: f32,
+    pub(super) cast: CastBlock,
+    pub(super) background: [f32; 3],
+}
+
+/// Samples of some rays.
+pub(super) struct Samples<D: Device> {
+    depths: D::Buffer<f32>,
+    /// Colour and optical depth.
+    pub(super) values: D::Buffer<[f32; 4]>,
+    count: u32,
+}
+
+pub(super) type Outcome<T, D> = Result<T, FieldError<<D as viewfuse_device::Memory>::Error>>;
+
+impl<D: Device> Renderer<'_, D> {
+    /// The colours and depths (along the rays) of some pixels.
+    pub(super) fn render(
+        &self,
+        workspace: &mut Workspace<D>,
+        pixels: &[u32],
+        seen: Option<&Seen<D>>,
+        asked: &mut [Asked; 2],
+    ) -> Outcome<Pixels<D>, D> {
+        let device = self.device;
+        let failed = FieldError::Device;
+        let rays = self.rays(pixels)?;
+        let coarse = self.first_pass(workspace, &rays, seen, &mut asked[0])?;
+        let mut found = self.pixels(pixels.len())?;
+        self.composite(&coarse, &mut found)?;
+        let block = self.fine_block();
+        if block.fine_count() == 0 {
+            return Ok(found);
+        }
+        let (ray_count, fine_count) = (pixels.len(), block.fine_count() as usize);
+        let mut parts = self.zeros(ray_count * coarse.count as usize)?;
+        device.weigh_samples(coarse.count, rays.count, &coarse.values, &mut parts).map_err(failed)?;
+        let mut chances = self.zeros(ray_count * fine_count)?;
+        device.draw_chances(&block, &rays, &mut chances).map_err(failed)?;
+        let mut added = self.zeros(ray_count * fine_count)?;
+        device.fine_depths(&block, &rays, &parts, &found, &chances, &mut added).map_err(failed)?;
+        let count = coarse.count + block.fine_count();
+        let mut fine = self.samples(ray_count, count)?;
+        device.merge_depths(&block, rays.count, &coarse.depths, &added, &mut fine.depths).map_err(failed)?;
+        let Omissions { empty_rays, empty_parts, hidden_samples, .. } = self.omissions;
+        let wanted = (empty_rays || empty_parts || hidden_samples).then_some(WantedBlock {
+            sample_count: count,
+            part_count: coarse.count,
+            least_share: if empty_parts { seen.map_or(LEAST_SHARE, |seen| seen.least_share) } else { 0.0 },
+            settled: if hidden_samples { self.settled } else { -1.0 },
+            least_opacity: if empty_rays { LEAST_OPACITY } else { 0.0 },
+            width: self.cast.camera.width,
+            ..WantedBlock::default()
+        });
+        let list = self.list(&rays, &fine, wanted.as_ref().map(|block| (block, &parts)))?;
+        self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut asked[1])?;
+        self.composite(&fine, &mut found)?;
+        Ok(found)
+    }
+
+    /// Evenly spread samples; where rays were probed, only those that the probes around a ray want.
+    pub(super) fn first_pass(
+        &self,
+        workspace: &mut Workspace<D>,
+        rays: &Rays<D>,
+        seen: Option<&Seen<D>>,
+        asked: &mut Asked,
+    ) -> Outcome<Samples<D>, D> {
+        let block = self.coarse_block();
+        let mut samples = self.samples(rays.count as usize, block.sample_count)?;
+        self.device.coarse_depths(&block, rays, &mut samples.depths).map_err(FieldError::Device)?;
+        let wanted = seen.map(|seen| {
+            let block = WantedBlock {
+                sample_count: block.sample_count,
+                part_count: block.sample_count,
+                least_share: seen.least_share,
+                // What is hidden on the probes' rays is not on a ray that passes beside their surfaces.
+                settled: -1.0,
+                least_opacity: 0.0,
+                step: self.omissions.empty_space,
+                seen_columns: seen.columns,
+                seen_rows: seen.rows,
+                width: self.cast.camera.width,
+            };
+            (block, &seen.values)
+        });
+        let list = self.list(rays, &samples, wanted.as_ref().map(|(block, seen)| (block, *seen)))?;
+        self.ask(&self.coarse, workspace, rays, &mut samples, &list, asked)?;
+        Ok(samples)
+    }
+
+    /// The samples that are wanted: the only numbers that a render brings to the host before it is done, because they
+    /// decide how much work there is.
+    fn list(
+        &self,
+        rays: &Rays<D>,
+        samples: &Samples<D>,
+        wanted: Option<(&WantedBlock, &D::Buffer<[f32; 2]>)>,
+    ) -> Outcome<Vec<u32>, D> {
+        let all = 0..rays.count * samples.count;
+        let Some((block, seen)) = wanted else { return Ok(all.collect()) };
+        let mut marks = self.zeros(all.len())?;
+        self.device.wanted_samples(block, rays, &samples.depths, seen, &mut marks).map_err(FieldError::Device)?;
+        let marks = self.device.download(&marks).map_err(FieldError::Device)?;
+        Ok(all.filter(|sample| marks[*sample as usize] != 0).collect())
+    }
+
+    /// Asks a network about samples, as many at a time as the workspace holds. The others stay empty.
+    fn ask(
+        &self,
+        network: &Network<'_, D>,
+        workspace: &mut Workspace<D>,
+        rays: &Rays<D>,
+        samples: &mut Samples<D>,
+        list: &[u32],
+        asked: &mut Asked,
+    ) -> Outcome<(), D> {
+        let device = self.device;
+        let failed = FieldError::Device;
+        asked.samples += u64::from(rays.count * samples.count);
+        asked.asked += list.len() as u64;
+        for some in list.chunks(workspace.point_count as usize) {
+            progress.check()?;
+            let count = some.len() as u32;
+            let some = device.upload(some).map_err(failed)?;
+            device
+                .place_points(samples.count, count, &some, rays, &samples.depths, &mut workspace.points)
+                .map_err(failed)?;
+            network.ask(workspace, self.views, count).map_err(failed)?;
+            device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values).map_err(failed)?;
+        }
+        Ok(())
+    }
+
+    fn composite(&self, samples: &Samples<D>, pixels: &mut Pixels<D>) -> Outcome<(), D> {
+        // A ray that meets nothing ends where looking ends.
+        let CastBlock { far, .. } = self.cast;
+        let block = CompositeBlock { background: self.background, empty_depth: far, sample_count: samples.count };
+        self.device.composite(&block, &samples.values, &samples.depths, pixels).map_err(FieldError::Device)
+    }
+
+    pub(super) fn rays(&self, pixels: &[u32]) -> Outcome<Rays<D>, D> {
+        let (count, pixel_buffer) = (pixels.len() as u32, self.device.upload(pixels).map_err(FieldError::Device)?);
+        let mut rays = Rays { count, pixels: pixel_buffer, rays: self.zeros(pixels.len())? };
+        self.device.cast_rays(&self.cast, &mut rays).map_err(FieldError::Device)?;
+        Ok(rays)
+    }
+
+    fn samples(&self, ray_count: usize, count: u32) -> Outcome<Samples<D>, D> {
+        let all = ray_count * count as usize;
+        Ok(Samples { depths: self.zeros(all)?, values: self.zeros(all)?, count })
+    }
+
+    fn pixels(&self, count: usize) -> Outcome<Pixels<D>, D> {
+        Ok(Pixels { colours: self.zeros(count)?, depths: self.zeros(count)? })
+    }
+
+    pub(super) fn zeros<T: viewfuse_device::Element>(&self, count: usize) -> Outcome<D::Buffer<T>, D> {
+        self.device.zeros(count).map_err(FieldError::Device)
+    }
+
+    fn coarse_block(&self) -> CoarseBlock {
+        let Sampling { seed, coarse_count, jitter, .. } = self.sampling;
+        CoarseBlock { seed: words(seed), sample_count: coarse_count, jitter }
+    }
+
+    fn fine_block(&self) -> FineBlock {
+        let Sampling { seed, coarse_count, importance_count, depth_count, depth_deviation, published_depth, .. } =
+            self.sampling;
+        FineBlock {
+            seed: words(seed),
+            coarse_count,
+            importance_count,
+            depth_count,
+            depth_deviation,
+            depth_times_opacity: u32::from(published_depth),
+        }
+    }
+}
+
+/// Low and high word.
+fn words(seed: u64) -> [u32; 2] {
+    [seed as u32, (seed >> 32) as u32]
+}

@@ -1,0 +1,102 @@
+//! Probes: a first look along few rays tells where space is empty, and how much of it may count as empty.
+
+use super::network::Workspace;
+use super::options::LEAST_SHARE;
+use super::pass::{Asked, Outcome, Renderer, Seen, rays_at_once};
+use crate::FieldError;
+use viewfuse_core::composite::Compositor;
+use viewfuse_device::Device;
+
+/// Shares of the light below which a part of a ray may count as empty, the largest first. After them comes
+/// [`LEAST_SHARE`], which needs no proof.
+const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
+
+impl<D: Device> Renderer<'_, D> {
+    /// Looks at one ray in every square of `step` pixels, and at those of the last row and column, by the first pass.
+    pub(super) fn probe(&self, workspace: &mut Workspace<D>, step: u32, asked: &mut Asked) -> Outcome<Seen<D>, D> {
+        let failed = FieldError::Device;
+        let (width, height) = (self.cast.camera.width, self.cast.camera.height);
+        let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
+        let place = |index: u32, side: u32| (index * step).min(side - 1);
+        let pixels: Vec<u32> =
+            (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
+        let count = self.sampling.coarse_count;
+        let mut parts = Vec::new();
+        let mut changes = [0.0; SHARES.len()];
+        for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
+            let rays = self.rays(some)?;
+            let samples = self.first_pass(workspace, &rays, None, asked)?;
+            let mut part = self.zeros(some.len() * count as usize)?;
+            self.device.weigh_samples(count, rays.count, &samples.values, &mut part).map_err(failed)?;
+            parts.push(part);
+            if self.omissions.probe_error > 0.0 {
+                let values = self.device.download(&samples.values).map_err(failed)?;
+                for ray in values.chunks(count as usize) {
+                    let own = SHARES.map(|share| change(ray, share, &self.background));
+                    changes.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
+                }
+            }
+        }
+        // Large pictures: the pieces are put together on the host.
+        let values = match <[_; 1]>::try_from(parts) {
+            Ok([all]) => all,
+            Err(parts) => {
+                let mut all = Vec::with_capacity(pixels.len() * count as usize);
+                for part in &parts {
+                    all.extend(self.device.download(part).map_err(failed)?);
+                }
+                self.device.upload(&all).map_err(failed)?
+            }
+        };
+        let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
+        let harmless = changes.iter().position(|change| *change < most);
+        Ok(Seen { values, columns, rows, least_share: harmless.map_or(LEAST_SHARE, |index| SHARES[index]) })
+    }
+}
+
+/// Mean square over the channels of how a ray's colour changes if samples that stop less than `share` of the light are
+/// left out. Samples are colour and optical depth.
+fn change(ray: &[[f32; 4]], share: f32, background: &[f32; 3]) -> f64 {
+    let colour = |least: f32| {
+        let mut compositor = Compositor::<3>::START;
+        for [red, green, blue, optical_depth] in ray {
+            if -(-optical_depth).exp_m1() >= least {
+                compositor.add(&[*red, *green, *blue], *optical_depth, 0.0);
+            }
+        }
+        compositor.finish(background, 0.0).channels
+    };
+    let differences = colour(0.0).into_iter().zip(colour(share)).map(|(all, kept)| f64::from(all - kept).powi(2));
+    differences.sum::<f64>() / 3.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::change;
+
+    const WHITE: [f32; 3] = [1.0; 3];
+
+    fn mist(colour: [f32; 3], optical_depth: f32) -> Vec<[f32; 4]> {
+        vec![[colour[0], colour[1], colour[2], optical_depth]; 64]
+    }
+
+    #[test]
+    fn dark_mist_is_missed_and_white_mist_is_not() {
+        // 64 parts that stop a hundredth each, together 1 - exp(-0.64).
+        let missed = f64::from(1.0 - (-0.64_f32).exp());
+        let found = change(&mist([0.0; 3], 0.01), 1.0 / 64.0, &WHITE);
+        assert!((found - missed * missed).abs() < 1.0e-5, "{found}");
+        assert!(change(&mist(WHITE, 0.01), 1.0 / 64.0, &WHITE) < 1.0e-12);
+        // A share that the parts reach leaves nothing out.
+        assert_eq!(change(&mist([0.0; 3], 0.01), 1.0 / 128.0, &WHITE), 0.0);
+    }
+
+    #[test]
+    fn a_surface_behind_mist_shows_more_without_it() {
+        let mut ray = mist(WHITE, 0.005);
+        ray[40] = [0.0, 0.0, 0.0, 50.0];
+        let expected = f64::from(1.0 - (-0.2_f32).exp()).powi(2);
+        let found = change(&ray, 1.0 / 64.0, &WHITE);
+        assert!((found - expected).abs() < 1.0e-5, "{found} {expected}");
+    }
+}

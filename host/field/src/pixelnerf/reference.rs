@@ -1,0 +1,165 @@
+//! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
+
+use super::encoder::encode;
+use super::network::{Views, Workspace};
+use super::{Architecture, Pass, PixelNerf, Prepared};
+use crate::{Field, FieldError};
+use viewfuse_core::composite::CompositeBlock;
+use viewfuse_core::depths::FineBlock;
+use viewfuse_core::rays::{RayPoint, TargetRay};
+use viewfuse_device::{Device, Pixels, Rays};
+use viewfuse_job::progress::Silent;
+use viewfuse_scene::photographs::SourceImages;
+
+/// Sources on a device, with the network.
+pub struct Reference<'a, D: Device> {
+    field: &'a PixelNerf,
+    device: &'a D,
+    prepared: Prepared<D>,
+}
+
+/// What was seen of rays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeenRays {
+    /// `[ray][sample]`.
+    pub weights: Vec<f32>,
+    /// `[ray]`: red, green, blue over white.
+    pub colours: Vec<[f32; 3]>,
+    /// `[ray]`: the sum of weights times depths, not divided by the weights' sum.
+    pub depths: Vec<f32>,
+}
+
+impl<'a, D: Device> Reference<'a, D> {
+    /// Takes the sources to the device.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn new(field: &'a PixelNerf, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError<D::Error>> {
+        let prepared = field.prepare(device, sources, &Silent)?;
+        Ok(Reference { field, device, prepared })
+    }
+
+    /// The network's sizes.
+    pub fn architecture(&self) -> &Architecture {
+        &self.field.architecture
+    }
+
+    /// How many sources there are.
+    pub fn view_count(&self) -> usize {
+        self.prepared.images.len()
+    }
+
+    /// `[view][row][column][channel]`: the latents of all views.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn latents(&self) -> Result<Vec<f32>, D::Error> {
+        let mut all = Vec::new();
+        for image in &self.prepared.images {
+            let Prepared { parameters, .. } = &self.prepared;
+            let view = encode(self.device, &self.field.architecture, parameters, image, false)?;
+            all.extend(self.device.download(&view.grids[0][0])?);
+        }
+        Ok(all)
+    }
+
+    /// Red, green, blue and density at points (their `length` must be 1, their `sample` their index), with these weights
+    /// of all views.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn radiance(&self, pass: Pass, weights: &[f32], points: &[RayPoint]) -> Result<Vec<[f32; 4]>, D::Error> {
+        let Reference { field, device, prepared } = self;
+        for view in 0..prepared.images.len() {
+            field.encode_view(*device, prepared, view)?;
+        }
+        let views = Views {
+            cameras: device.upload(&prepared.cameras)?,
+            weights: device.upload(weights)?,
+            latents: prepared.latents.iter().filter_map(|latents| latents.get()).collect(),
+        };
+        let maps = field.options.omissions.latent_layers;
+        let mut workspace = Workspace::new(*device, &field.architecture, prepared.images.len(), points.len(), maps)?;
+        let network = field.network(*device, prepared, pass);
+        let mut samples = device.zeros(points.len())?;
+        for some in points.chunks(workspace.point_count as usize) {
+            workspace.points = device.upload(some)?;
+            network.ask(&mut workspace, &views, some.len() as u32)?;
+            device.radiance(some.len() as u32, &workspace.raw, &workspace.points, &mut samples)?;
+        }
+        device.download(&samples)
+    }
+
+    /// What is seen of rays at `depths[ray][sample]`.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn look(&self, pass: Pass, weights: &[f32], rays: &[TargetRay], depths: &[f32]) -> Result<SeenRays, D::Error> {
+        let device = self.device;
+        let sample_count = (depths.len() / rays.len()) as u32;
+        let rays = self.load(rays)?;
+        let depths = device.upload(depths)?;
+        let list: Vec<u32> = (0..rays.count * sample_count).collect();
+        let mut points = device.zeros(list.len())?;
+        let point_count = list.len() as u32;
+        device.place_points(sample_count, point_count, &device.upload(&list)?, &rays, &depths, &mut points)?;
+        let points: Vec<RayPoint> = device.download(&points)?;
+        // The density first, because that is what comes out of a length of 1.
+        let unit: Vec<RayPoint> = points.iter().map(|point| RayPoint { length: 1.0, ..*point }).collect();
+        let mut samples = self.radiance(pass, weights, &unit)?;
+        for (sample, point) in samples.iter_mut().zip(&points) {
+            sample[3] *= point.length;
+        }
+        let samples = device.upload(&samples)?;
+        let mut seen = device.zeros(list.len())?;
+        device.weigh_samples(sample_count, rays.count, &samples, &mut seen)?;
+        let mut pixels: Pixels<D> =
+            Pixels { colours: device.zeros(rays.count as usize)?, depths: device.zeros(rays.count as usize)? };
+        let block = CompositeBlock { background: [1.0; 3], empty_depth: 0.0, sample_count };
+        device.composite(&block, &samples, &depths, &mut pixels)?;
+        let colours = device.download(&pixels.colours)?;
+        let mean_depths = device.download(&pixels.depths)?;
+        Ok(SeenRays {
+            weights: device.download(&seen)?.iter().map(|[weight, _]| *weight).collect(),
+            depths: colours.iter().zip(mean_depths).map(|(colour, depth)| colour[3] * depth).collect(),
+            colours: colours.iter().map(|colour| [colour[0], colour[1], colour[2]]).collect(),
+        })
+    }
+
+    /// Depths of fine samples `[ray][sample]` and all depths in order `[ray][sample]`, from the first pass's
+    /// `coarse_depths[ray][sample]`, `coarse_weights[ray][sample]` and `depths[ray]` (not divided by the weights' sum) and
+    /// the random numbers `chances[ray][fine sample]`.
+    ///
+    /// # Errors
+    /// If the device fails.
+    #[allow(clippy::too_many_arguments)]
+    pub fn fine_depths(
+        &self,
+        block: &FineBlock,
+        rays: &[TargetRay],
+        coarse_depths: &[f32],
+        coarse_weights: &[f32],
+        depths: &[f32],
+        chances: &[[f32; 2]],
+    ) -> Result<[Vec<f32>; 2], D::Error> {
+        let device = self.device;
+        let block = FineBlock { depth_times_opacity: 1, ..*block };
+        let rays = self.load(rays)?;
+        // With an opacity of 1 the depth stays as it is.
+        let pixels: Pixels<D> =
+            Pixels { colours: device.upload(&vec![[1.0; 4]; depths.len()])?, depths: device.upload(depths)? };
+        let seen: Vec<[f32; 2]> = coarse_weights.iter().map(|weight| [*weight, 1.0]).collect();
+        let (seen, chances) = (device.upload(&seen)?, device.upload(chances)?);
+        let mut fine = device.zeros(rays.count as usize * block.fine_count() as usize)?;
+        device.fine_depths(&block, &rays, &seen, &pixels, &chances, &mut fine)?;
+        let mut merged = device.zeros(rays.count as usize * (block.coarse_count + block.fine_count()) as usize)?;
+        device.merge_depths(&block, rays.count, &device.upload(coarse_depths)?, &fine, &mut merged)?;
+        Ok([device.download(&fine)?, device.download(&merged)?])
+    }
+
+    fn load(&self, rays: &[TargetRay]) -> Result<Rays<D>, D::Error> {
+        let count = rays.len() as u32;
+        let pixels: Vec<u32> = (0..count).collect();
+        Ok(Rays { count, pixels: self.device.upload(&pixels)?, rays: self.device.upload(rays)? })
+    }
+}

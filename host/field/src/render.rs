@@ -1,0 +1,401 @@
+//! The way of the data, from a scene to pictures.
+
+use crate::{Field, FieldError, Rendered};
+use image::RgbImage;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use viewfuse_core::camera::{Camera, PinholeError};
+use viewfuse_core::metrics::{psnr, ssim};
+use viewfuse_core::sources::SourcesError;
+use viewfuse_core::weights::{Omission, Weights};
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::few_shot::{FewShot, Target};
+use viewfuse_scene::photographs::{
+    Album, BackgroundChoice, PhotographsError, SourceImage, SourceImages, longest_side, reduced_size, scaled_size,
+    to_rgb8,
+};
+use viewfuse_scene::{Scene, SceneError, View};
+use viewfuse_weighting::Weighting;
+use viewfuse_weighting::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
+
+/// Why a render failed.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError<E: std::error::Error> {
+    /// The scene or a photograph could not be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A photograph could not be prepared.
+    #[error(transparent)]
+    Photographs(#[from] PhotographsError),
+    /// There are too few or too many sources.
+    #[error("{0}")]
+    Sources(SourcesError),
+    /// The size does not fit the scene.
+    #[error(
+        "--size {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
+             for this width it would be {width}x{fitting_height}"
+    )]
+    Shape {
+        /// Asked for.
+        width: u32,
+        /// Asked for.
+        height: u32,
+        /// The views'.
+        view_width: u32,
+        /// The views'.
+        view_height: u32,
+        /// The height that keeps the views' shape.
+        fitting_height: u32,
+    },
+    /// The size is not usable at all.
+    #[error("--size {width}x{height} is not usable: {error}")]
+    Size {
+        /// Asked for.
+        width: u32,
+        /// Asked for.
+        height: u32,
+        /// Why not.
+        error: PinholeError,
+    },
+    /// The silhouettes have no point of space in common.
+    #[error(
+        "{scene}: the silhouettes of the sources have no common object: no point lies inside all of them; check the \
+         poses with `viewfuse inspect` and the background with --background"
+    )]
+    NoObject {
+        /// The scene's path.
+        scene: String,
+    },
+    /// The field failed.
+    #[error(transparent)]
+    Field(#[from] FieldError<E>),
+}
+
+/// What a person can set about a render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Width and height of the pictures; otherwise the views' size, at most the field's [`Field::longest_side`] on a side.
+    pub size: Option<[u32; 2]>,
+    /// What is behind the object.
+    pub background: BackgroundChoice,
+    /// Sources of least weight are left out while their weights together stay at or below this.
+    pub leave_out: f32,
+    /// Transmittance at which a ray may end.
+    pub settled: f32,
+}
+
+/// Largest share of the weight that is left out unless a person says otherwise: it bounds the change of a fusion of all
+/// views at 1 % of the range of its inputs. Where only some views see a point, the bound is this over their weight: for
+/// schemes that give one view nearly everything (cross attention), leaving out 5 % already costs 1 dB where that one view
+/// sees nothing.
+pub const DEFAULT_LEAVE_OUT: f32 = 0.01;
+/// Transmittance at which a ray may end unless a person says otherwise: 1/256 of the range of a channel.
+pub const DEFAULT_SETTLED: f32 = 1.0 / 256.0;
+
+impl Default for RenderOptions {
+    fn default() -> RenderOptions {
+        RenderOptions {
+            size: None,
+            background: BackgroundChoice::Auto,
+            leave_out: DEFAULT_LEAVE_OUT,
+            settled: DEFAULT_SETTLED,
+        }
+    }
+}
+
+/// What the stages took. Those that several frames share are counted once, in their run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageCosts {
+    /// Decoding photographs, taking out backgrounds, resampling.
+    pub photographs: Duration,
+    /// Taking the photographs to the device and finding the object.
+    pub prepare: Duration,
+    /// Encoding the sources, as far as it does not wait for the frames that need them ([`Frame::encode`]).
+    pub encode: Duration,
+    /// What the run was estimated to take of memory, in bytes; see [`Field::memory_estimate`].
+    pub memory_estimate: Option<u64>,
+}
+
+/// One target's picture with all that led to it.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The target.
+    pub target: Target,
+    /// The sources' weights before views were left out.
+    pub weights: SourceWeights,
+    /// What was left out, and the weights that were used.
+    pub omission: Omission<MOST_SOURCES>,
+    /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major.
+    pub colours: Vec<[f32; 4]>,
+    /// The picture.
+    pub picture: RgbImage,
+    /// Depth along the principal axis in world units, 0 where nothing is met, row-major; empty for fields that know no
+    /// depth.
+    pub depths: Vec<f32>,
+    /// The truth at the same size and its scores, where there is a photograph.
+    pub truth: Option<Truth>,
+    /// Time for this frame alone.
+    pub time: Duration,
+    /// The part of it that encoded sources which no frame before it used.
+    pub encode: Duration,
+}
+
+/// A photograph at the target, and how the prediction compares.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    /// The photograph at the frame's size over the run's background.
+    pub picture: RgbImage,
+    /// Peak signal to noise ratio in decibels, of 8-bit values.
+    pub psnr: f64,
+    /// Structural similarity (uniform 7x7 window), if the picture is large enough.
+    pub ssim: Option<f64>,
+}
+
+impl Truth {
+    /// Compares a prediction with the truth.
+    pub fn compare(prediction: &RgbImage, truth: RgbImage) -> Truth {
+        let (width, height) = (truth.width() as usize, truth.height() as usize);
+        Truth { psnr: psnr(prediction, &truth), ssim: ssim(prediction, &truth, width, height, 3), picture: truth }
+    }
+}
+
+/// The longest side of the pictures of a run: what was asked for, or that of the largest photograph, at most `longest`
+/// (a field's [`Field::longest_side`]).
+///
+/// # Errors
+/// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
+pub fn working_side<E: std::error::Error>(
+    scene: &Scene,
+    options: &RenderOptions,
+    longest: u32,
+) -> Result<u32, RenderError<E>> {
+    let Some([width, height]) = options.size else {
+        let largest = scene.views.iter().map(|view| longest_side(&view.camera)).max();
+        return Ok(largest.unwrap_or(longest).min(longest));
+    };
+    if let Some(View { camera, .. }) = scene.views.first() {
+        let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
+        camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
+        if fitting_height.abs_diff(height) > 1 {
+            return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
+        }
+    }
+    Ok(width.max(height))
+}
+
+/// A set of sources on a device: everything that no weighting and no target changes.
+pub struct Stage<'a, D: Device, F: Field<D>> {
+    scene: &'a Scene,
+    album: &'a Album<'a>,
+    device: &'a D,
+    field: &'a F,
+    options: &'a RenderOptions,
+    side: u32,
+    sources: SourcePoses,
+    /// The sources at working size.
+    pub images: Arc<SourceImages>,
+    prepared: F::Prepared,
+    /// What the stages took so far.
+    pub costs: StageCosts,
+}
+
+impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
+    /// Prepares these source views on the device.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn prepare(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        device: &'a D,
+        field: &'a F,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+        let side = working_side(scene, options, field.longest_side())?;
+        let mut photographs = Duration::ZERO;
+        let images = timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background))?;
+        if let Some(warning) = &images.warning {
+            progress.warn(&format!("{}: {warning}", scene.path.display()));
+        }
+        let images = Arc::new(images);
+        let mut stage = Stage::of_images(scene, album, sources, images, device, field, options, progress)?;
+        stage.costs.photographs = photographs;
+        Ok(stage)
+    }
+
+    /// The same with photographs that are prepared already: those of these sources, at the size that the field wants and
+    /// over the options' background.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn of_images(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        images: Arc<SourceImages>,
+        device: &'a D,
+        field: &'a F,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+        let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
+        let side = working_side(scene, options, field.longest_side())?;
+        let mut costs = StageCosts::default();
+        let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
+        let sizes: Vec<[u32; 2]> = images.images.iter().map(size).collect();
+        costs.memory_estimate = field.memory_estimate(device, &sizes);
+        let prepared =
+            timed(&mut costs.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
+                FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
+                error => error.into(),
+            })?;
+        Ok(Stage { scene, album, device, field, options, side, sources: source_poses, images, prepared, costs })
+    }
+
+    /// Encodes the sources under a weighting: each source as a target of the others.
+    ///
+    /// # Errors
+    /// [`RenderError::Field`].
+    pub fn encode(
+        &mut self,
+        weighting: &Weighting,
+        progress: &dyn Progress,
+    ) -> Result<F::Latents, RenderError<D::Error>> {
+        let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
+        let (field, device, prepared) = (self.field, self.device, &self.prepared);
+        let latents = timed(&mut self.costs.encode, || field.encode(device, prepared, &relevance, progress))?;
+        Ok(latents)
+    }
+
+    /// Weighs the sources for a target, leaves out what does not count, renders, and compares with the truth.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn frame(
+        &self,
+        weighting: &Weighting,
+        latents: &F::Latents,
+        target: &Target,
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError<D::Error>> {
+        let start = Instant::now();
+        let weights = weighting.weigh(&self.sources, &target.camera.pose);
+        let omission = weights.without_least(self.options.leave_out);
+        let camera = self.at_working_size(&target.camera)?;
+        let mut encode = Duration::ZERO;
+        timed(&mut encode, || self.field.encode_used(self.device, &self.prepared, latents, &omission.weights))?;
+        let rendered = self.field.render(
+            self.device,
+            &self.prepared,
+            latents,
+            &omission.weights,
+            &camera,
+            self.options.settled,
+            progress,
+        )?;
+        let time = start.elapsed();
+        let Rendered { colours, depths, width, height } = rendered;
+        let picture = to_rgb8(&colours, [width, height]);
+        let truth = match target.truth {
+            Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
+            None => None,
+        };
+        Ok(Frame { target: target.clone(), weights, omission, colours, picture, depths, truth, time, encode })
+    }
+
+    /// A view's photograph at a size, over the run's background.
+    ///
+    /// # Errors
+    /// [`RenderError::Scene`] if it cannot be read.
+    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError<D::Error>> {
+        Ok(self.album.truth(view, size, self.images.background)?)
+    }
+
+    /// Width and height of the picture that is rendered at a view's camera.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError<D::Error>> {
+        let camera = self.at_working_size(&self.scene.views[view].camera)?;
+        Ok([camera.pinhole.width(), camera.pinhole.height()])
+    }
+
+    fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError<D::Error>> {
+        let (width, height) = match (self.options.size, self.scene.views.first()) {
+            (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
+            (Some(_), _) => scaled_size(camera, self.side),
+            (None, _) => reduced_size(camera, self.side),
+        };
+        let pinhole =
+            camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        Ok(Camera { pinhole, ..*camera })
+    }
+}
+
+fn same_size(a: &Camera, b: &Camera) -> bool {
+    a.pinhole.width() == b.pinhole.width() && a.pinhole.height() == b.pinhole.height()
+}
+
+/// The weights of all sources for each source as a target; a source's weight for itself is 0.
+fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32) -> Vec<SourceWeights> {
+    let count = sources.count();
+    (0..count)
+        .map(|view| {
+            // The scheme sees only the others: its own pose would take nearly all the weight.
+            let others: Vec<_> = (0..count).filter(|other| *other != view).map(|other| *sources.pose(other)).collect();
+            let Ok(others) = SourcePoses::new(&others) else {
+                return Weights::mean(count);
+            };
+            let weights = weighting.weigh(&others, sources.pose(view)).without_least(leave_out).weights;
+            let mut scores = [0.0; MOST_SOURCES];
+            for other in 0..count {
+                if other != view {
+                    scores[other as usize] = weights.get(if other < view { other } else { other - 1 });
+                }
+            }
+            Weights::from_scores(&scores, count)
+        })
+        .collect()
+}
+
+/// Renders every target of a job and hands each frame over as soon as it is done. Returns the times of what the frames
+/// share.
+///
+/// # Errors
+/// [`RenderError`]; those of `deliver` pass through.
+#[allow(clippy::too_many_arguments)]
+pub fn render<D: Device, F: Field<D>, X: From<RenderError<D::Error>>>(
+    scene: &Scene,
+    job: &FewShot,
+    weighting: &Weighting,
+    device: &D,
+    field: &F,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+    mut deliver: impl FnMut(&SourceImages, Frame) -> Result<(), X>,
+) -> Result<StageCosts, X> {
+    let truths = job.targets.iter().filter_map(|target| target.truth);
+    let shown = job.sources.iter().copied().chain(truths);
+    let album = Album::open(scene, shown, progress).map_err(RenderError::from)?;
+    let mut stage = Stage::prepare(scene, &album, &job.sources, device, field, options, progress)?;
+    let latents = stage.encode(weighting, progress)?;
+    for target in &job.targets {
+        let frame = stage.frame(weighting, &latents, target, progress)?;
+        deliver(&stage.images, frame)?;
+    }
+    Ok(stage.costs)
+}
+
+/// Runs a piece of work and adds its time.
+fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *total += start.elapsed();
+    result
+}

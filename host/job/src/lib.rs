@@ -1,0 +1,7 @@
+//! What long work needs whoever does it: progress and cancellation through one trait, output files that appear whole or
+//! not at all, digests of inputs.
+#![forbid(unsafe_code)]
+
+pub mod digest;
+pub mod files;
+pub mod progress;

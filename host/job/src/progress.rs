@@ -1,0 +1,42 @@
+//! Progress and cancellation of long work, through one trait: the library reports and asks, whoever calls it decides what
+//! is shown and when to stop.
+
+/// The work was stopped by whoever started it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("interrupted; nothing half-written is left behind")]
+pub struct Interrupted;
+
+/// Whoever started long work: told how far it is, asked whether to go on. Every method has a default that shows nothing
+/// and never stops, so that `impl Progress for MyType {}` is enough to begin with.
+pub trait Progress: Sync {
+    /// So many pieces more will come.
+    fn expect(&self, _pieces: usize) {}
+
+    /// A piece is done.
+    fn step(&self) {}
+
+    /// Something that the result may suffer from; the same warning may come several times.
+    fn warn(&self, _warning: &str) {}
+
+    /// A line of news: a score, a file that was written.
+    fn note(&self, _news: &str) {}
+
+    /// Whether the work should stop.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+
+    /// Long work calls this between pieces and returns the error.
+    ///
+    /// # Errors
+    /// [`Interrupted`] once [`Progress::is_cancelled`] says so.
+    fn check(&self) -> Result<(), Interrupted> {
+        if self.is_cancelled() { Err(Interrupted) } else { Ok(()) }
+    }
+}
+
+/// Shows nothing and never stops.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Silent;
+
+impl Progress for Silent {}

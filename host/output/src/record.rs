@@ -1,0 +1,192 @@
+//! The run record: everything needed to say how a picture came about, as JSON.
+
+use serde::Serialize;
+use std::time::Duration;
+use viewfuse_device::KernelTime;
+use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
+use viewfuse_field::{Denoising, LeftOut};
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::FewShot;
+
+/// A run as written to `run.json`. Times are in seconds.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunRecord {
+    /// Version of the program.
+    pub viewfuse: &'static str,
+    /// The scene's path as given.
+    pub scene: String,
+    /// The device.
+    pub device: String,
+    /// Why it is this one.
+    pub device_reason: String,
+    /// The field.
+    pub field: &'static str,
+    /// Where its network's parameters come from; null for the field that needs none.
+    pub model: Option<String>,
+    /// Whether leaving out was forbidden altogether.
+    pub exact: bool,
+    /// What the field left out, in all frames together.
+    pub left_out: Vec<LeftOut>,
+    /// How the field went from noise to the pictures; null for fields that do not.
+    pub denoising: Option<Denoising>,
+    /// The weighting scheme.
+    pub weighting: String,
+    /// Seed of every random number. The weight-free field draws none.
+    pub seed: u64,
+    /// Width and height of the pictures.
+    pub size: [u32; 2],
+    /// Background as asked for and as used, red green blue in 0..=255.
+    pub background: BackgroundRecord,
+    /// Largest total weight of views that may be left out.
+    pub leave_out: f32,
+    /// Transmittance at which rays may end: no channel changes by more than this times its range.
+    pub settled: f32,
+    /// What was doubtful about the photographs.
+    pub warnings: Vec<String>,
+    /// Names of the source views.
+    pub sources: Vec<String>,
+    /// What it was estimated to take of memory beside photographs and pictures, in bytes; null for fields that cannot tell.
+    pub memory_estimate: Option<u64>,
+    /// Times of what all frames share.
+    pub times: TimesRecord,
+    /// What each kernel took, for devices that tell.
+    pub kernels: Vec<KernelRecord>,
+    /// One entry a target.
+    pub frames: Vec<FrameRecord>,
+}
+
+/// See [`RunRecord::background`].
+#[derive(Clone, Debug, Serialize)]
+pub struct BackgroundRecord {
+    /// As asked for.
+    pub asked: String,
+    /// As used.
+    pub used: [u8; 3],
+}
+
+/// See [`RunRecord::times`].
+#[derive(Clone, Debug, Serialize)]
+pub struct TimesRecord {
+    /// Reading the scene.
+    pub open: f64,
+    /// Taking out backgrounds and resampling.
+    pub photographs: f64,
+    /// Taking the photographs to the device and finding the object.
+    pub prepare: f64,
+    /// Encoding the sources.
+    pub encode: f64,
+    /// All frames together, comparison with the truth included.
+    pub frames: f64,
+    /// Everything, writing the pictures included.
+    pub total: f64,
+}
+
+/// See [`RunRecord::kernels`].
+#[derive(Clone, Debug, Serialize)]
+pub struct KernelRecord {
+    /// Its name.
+    pub kernel: &'static str,
+    /// How many times it was dispatched.
+    pub dispatches: u64,
+    /// How many elements it computed.
+    pub elements: u64,
+    /// Its time on the device.
+    pub seconds: f64,
+    /// Its share of the time of all kernels.
+    pub share: f64,
+}
+
+/// What each kernel took.
+pub fn kernel_records(times: &[KernelTime]) -> Vec<KernelRecord> {
+    let all: f64 = times.iter().map(|time| time.time.as_secs_f64()).sum();
+    let record = |time: &KernelTime| {
+        let seconds = time.time.as_secs_f64();
+        let share = if all > 0.0 { seconds / all } else { 0.0 };
+        KernelRecord { kernel: time.kernel, dispatches: time.dispatches, elements: time.elements, seconds, share }
+    };
+    times.iter().map(record).collect()
+}
+
+/// One target.
+#[derive(Clone, Debug, Serialize)]
+pub struct FrameRecord {
+    /// The target's name.
+    pub target: String,
+    /// Its camera-to-world matrix, OpenCV axes, row-major.
+    pub world_from_camera: [[f32; 4]; 4],
+    /// Weight of each source as used, in the order of `sources`; 0 where it was left out.
+    pub weights: Vec<f32>,
+    /// Weights before views were left out.
+    pub weights_before: Vec<f32>,
+    /// Names of the sources that were left out.
+    pub left_out: Vec<String>,
+    /// Sum of their weights: a bound on what leaving them out changes in a fusion of all views, as a share of the
+    /// range of its inputs.
+    pub left_out_weight: f32,
+    /// Peak signal to noise ratio against the truth, decibels; null for equal pictures or without a truth.
+    pub psnr: Option<f64>,
+    /// Structural similarity with the truth.
+    pub ssim: Option<f64>,
+    /// World units of depth in one step of the 16-bit depth map, whose 0 means that nothing is met; null for fields that
+    /// know no depth.
+    pub depth_step: Option<f32>,
+    /// Time for this frame alone.
+    pub seconds: f64,
+    /// The part of it that encoded sources which no frame before it used.
+    pub encode_seconds: f64,
+}
+
+impl FrameRecord {
+    /// What is to be remembered of a frame whose sources have these names.
+    pub fn of(frame: &Frame, source_names: &[String]) -> FrameRecord {
+        let count = source_names.len();
+        let used = &frame.omission.weights.values()[..count];
+        let before = &frame.weights.values()[..count];
+        FrameRecord {
+            target: frame.target.name.clone(),
+            world_from_camera: frame.target.camera.pose.to_opencv(),
+            weights: used.to_vec(),
+            weights_before: before.to_vec(),
+            left_out: source_names
+                .iter()
+                .zip(used.iter().zip(before))
+                .filter(|(_, (used, before))| **used == 0.0 && **before > 0.0)
+                .map(|(name, _)| name.clone())
+                .collect(),
+            left_out_weight: frame.omission.omitted_weight,
+            psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
+            ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
+            depth_step: (!frame.depths.is_empty()).then(|| depth_step(&frame.depths)),
+            seconds: frame.time.as_secs_f64(),
+            encode_seconds: frame.encode.as_secs_f64(),
+        }
+    }
+}
+
+/// Names of a job's sources.
+pub fn source_names(scene: &Scene, job: &FewShot) -> Vec<String> {
+    job.sources.iter().map(|&view| scene.views[view].name.clone()).collect()
+}
+
+/// The times that frames share, with those that the caller measured.
+pub fn times_record(open: Duration, stages: StageCosts, frames: Duration, total: Duration) -> TimesRecord {
+    TimesRecord {
+        open: open.as_secs_f64(),
+        photographs: stages.photographs.as_secs_f64(),
+        prepare: stages.prepare.as_secs_f64(),
+        encode: stages.encode.as_secs_f64(),
+        frames: frames.as_secs_f64(),
+        total: total.as_secs_f64(),
+    }
+}
+
+/// The background of a run.
+pub fn background_record(options: &RenderOptions, used: [f32; 3]) -> BackgroundRecord {
+    BackgroundRecord { asked: options.background.to_string(), used: used.map(|value| (value * 255.0).round() as u8) }
+}
+
+/// World units of one step of a 16-bit map of these depths.
+pub fn depth_step(depths: &[f32]) -> f32 {
+    let farthest = depths.iter().copied().fold(0.0, f32::max);
+    if farthest > 0.0 { farthest / f32::from(u16::MAX) } else { 1.0 }
+}

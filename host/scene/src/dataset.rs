@@ -1,0 +1,178 @@
+//! Data sets: many scenes of one kind, in folders for training, validation and test.
+//!
+//! What is found where, for the training split of `data/cars` (the others end in `_val` and `_test`):
+//!
+//! ```text
+//! data/cars_train/<object>/                    the path names the data set, as in the code that PixelNeRF was published with
+//! data/cars/cars_train/<object>/               the path is a folder around it
+//! .../chairs_train/chairs_2.0_train/<object>/  one folder more, as in the archive of the chairs
+//! data/cars/<object>/                          a folder of scenes, which then serves every split
+//! ```
+//!
+//! An object is a folder in SRN's layout: one that holds `intrinsics.txt`. Nothing else is read here; a scene is checked
+//! when it is opened ([`crate::Scene::open`]).
+
+use std::ffi::OsStr;
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Which of the scenes of a data set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Split {
+    /// To learn from.
+    Train,
+    /// To watch the learning with.
+    Validation,
+    /// To measure the result with.
+    Test,
+}
+
+/// The name is none of a split.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a split of a data set: train, val or test")]
+pub struct UnknownSplit(String);
+
+impl fmt::Display for Split {
+    /// As folders end: `train`, `val`, `test`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Split::Train => "train",
+            Split::Validation => "val",
+            Split::Test => "test",
+        })
+    }
+}
+
+impl FromStr for Split {
+    type Err = UnknownSplit;
+
+    fn from_str(name: &str) -> Result<Split, UnknownSplit> {
+        let all = [Split::Train, Split::Validation, Split::Test];
+        all.into_iter().find(|split| split.to_string() == name).ok_or_else(|| UnknownSplit(name.to_owned()))
+    }
+}
+
+/// The scenes of one split.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Dataset {
+    /// What people call it: `cars` for `cars_train/`, otherwise the folder's name.
+    pub name: String,
+    /// The folders of the objects, sorted by name; at least one.
+    pub scenes: Vec<PathBuf>,
+}
+
+/// Why a data set was not found.
+#[derive(Debug, thiserror::Error)]
+pub enum DatasetError {
+    /// Nothing at the path looks like a data set.
+    #[error(
+        "{}: no data set: looked for a folder {}, for one folder *_{split} inside, and for folders with intrinsics.txt inside",
+        path.display(), beside.display()
+    )]
+    NotFound {
+        /// The path asked for.
+        path: PathBuf,
+        /// The split asked for.
+        split: Split,
+        /// The folder that the path would be short for.
+        beside: PathBuf,
+    },
+    /// There is more than one data set.
+    #[error("{}: holds several data sets ({}); name one of them", path.display(), names.join(", "))]
+    Several {
+        /// The path asked for.
+        path: PathBuf,
+        /// The folders found.
+        names: Vec<String>,
+    },
+    /// The folder of the split is there, but no scene in it.
+    #[error("{}: no scenes: looked for folders with intrinsics.txt inside", path.display())]
+    NoScenes {
+        /// The folder of the split.
+        path: PathBuf,
+    },
+    /// The file system refused.
+    #[error("{}: cannot be read", path.display())]
+    Io {
+        /// The folder.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+impl Dataset {
+    /// Finds the scenes of a split. Of the places in [the list above](self), the first that is there counts.
+    ///
+    /// # Errors
+    /// [`DatasetError`] with the path and what was looked for.
+    pub fn open(path: impl AsRef<Path>, split: Split) -> Result<Dataset, DatasetError> {
+        let path = path.as_ref();
+        let ending = format!("_{split}");
+        let mut beside = path.components().as_path().as_os_str().to_owned();
+        beside.push(&ending);
+        let beside = PathBuf::from(beside);
+        if beside.is_dir() {
+            return Ok(Dataset { name: name_of(path), scenes: scenes_of_split(&beside, &ending)? });
+        }
+        let not_found = || DatasetError::NotFound { path: path.to_owned(), split, beside: beside.clone() };
+        if !path.is_dir() {
+            return Err(not_found());
+        }
+        let inside = folders(path)?;
+        let of_split: Vec<&PathBuf> = inside.iter().filter(|folder| name_of(folder).ends_with(&ending)).collect();
+        match of_split[..] {
+            [] => {}
+            // What holds scenes is no data set's folder, whatever its scenes are called.
+            _ if inside.iter().any(|folder| is_scene(folder)) => {}
+            [folder] => {
+                let name = name_of(folder).trim_end_matches(&ending).to_owned();
+                return Ok(Dataset { name, scenes: scenes_of_split(folder, &ending)? });
+            }
+            _ => {
+                let names = of_split.iter().map(|folder| name_of(folder)).collect();
+                return Err(DatasetError::Several { path: path.to_owned(), names });
+            }
+        }
+        let scenes: Vec<PathBuf> = inside.into_iter().filter(|folder| is_scene(folder)).collect();
+        if scenes.is_empty() { Err(not_found()) } else { Ok(Dataset { name: name_of(path), scenes }) }
+    }
+}
+
+/// The scenes in a split's folder, or in the one folder inside that ends as it does.
+fn scenes_of_split(folder: &Path, ending: &str) -> Result<Vec<PathBuf>, DatasetError> {
+    let inside = folders(folder)?;
+    let (scenes, others): (Vec<PathBuf>, Vec<PathBuf>) = inside.into_iter().partition(|folder| is_scene(folder));
+    if !scenes.is_empty() {
+        return Ok(scenes);
+    }
+    let extra = others.into_iter().find(|folder| name_of(folder).ends_with(ending));
+    let deeper = extra.map_or(Ok(Vec::new()), |extra| folders(&extra))?;
+    let scenes: Vec<PathBuf> = deeper.into_iter().filter(|folder| is_scene(folder)).collect();
+    if scenes.is_empty() { Err(DatasetError::NoScenes { path: folder.to_owned() }) } else { Ok(scenes) }
+}
+
+fn is_scene(folder: &Path) -> bool {
+    folder.join("intrinsics.txt").is_file()
+}
+
+/// The folders in a folder, sorted by name, without hidden ones: those may be unfinished.
+fn folders(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
+    let failed = |source| DatasetError::Io { path: folder.to_owned(), source };
+    let mut all = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.is_dir() && !name_of(&path).starts_with('.') {
+            all.push(path);
+        }
+    }
+    all.sort();
+    Ok(all)
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or(OsStr::new("")).to_string_lossy().into_owned()
+}

@@ -1,0 +1,278 @@
+//! The job: which views are sources, which cameras are targets.
+//!
+//! Views are chosen by a list of items separated by commas: a view's name, a range `A..B` of names (both ends
+//! included), `all`, and `/STEP` behind either to take every `STEP`-th.
+
+use crate::rig::Rig;
+use crate::{Scene, View};
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::pose::PoseError;
+use viewfuse_weighting::sources::MOST_SOURCES;
+
+/// Why a choice of views is not a job.
+#[derive(Debug, thiserror::Error)]
+pub enum SelectionError {
+    /// A name in a list is no view of the scene.
+    #[error("{scene}: has no view '{name}'; its views are {first} .. {last}")]
+    NoSuchView {
+        /// The scene's path.
+        scene: String,
+        /// What was given.
+        name: String,
+        /// Name of the scene's first view.
+        first: String,
+        /// Name of its last view.
+        last: String,
+    },
+    /// A step is not a positive whole number.
+    #[error("view list '{item}': the step behind '/' must be a whole number of at least 1")]
+    BadStep {
+        /// The item of the list.
+        item: String,
+    },
+    /// A range ends before it starts, or has no start or end.
+    #[error("view list '{item}': a range is FIRST..LAST, both ends included and FIRST not after LAST")]
+    BadRange {
+        /// The item of the list.
+        item: String,
+    },
+    /// A source view has no photograph.
+    #[error("{scene}: view '{name}' has no photograph and cannot be a source")]
+    NoPhotograph {
+        /// The scene's path.
+        scene: String,
+        /// The view.
+        name: String,
+    },
+    /// A view is a target and a source at once.
+    #[error("{scene}: view '{name}' is a target and a source at once; take it out of --sources or of the targets")]
+    TargetIsSource {
+        /// The scene's path.
+        scene: String,
+        /// The view.
+        name: String,
+    },
+    /// There are not enough sources.
+    #[error("{scene}: too few source views: {count}, at least {least} are needed (a target is never a source)")]
+    TooFewSources {
+        /// The scene's path.
+        scene: String,
+        /// How many there are.
+        count: usize,
+        /// How many are needed.
+        least: usize,
+    },
+    /// There are more sources than the program holds.
+    #[error("{scene}: {count} source views; at most {MOST_SOURCES} fit: choose with --sources or --views")]
+    TooManySources {
+        /// The scene's path.
+        scene: String,
+        /// How many there are.
+        count: usize,
+    },
+    /// No target was asked for and none can be guessed.
+    #[error("{scene}: no targets: give --targets NAMES or --orbit N")]
+    NoTargets {
+        /// The scene's path.
+        scene: String,
+    },
+    /// The cameras do not span an orbit.
+    #[error("{scene}: its cameras span no circle: they stand at, or straight above, what they look at; give --targets")]
+    NoOrbit {
+        /// The scene's path.
+        scene: String,
+        /// What was wrong with an orbit camera.
+        error: PoseError,
+    },
+}
+
+/// A camera to render, with its truth if the scene has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    /// Name for files and tables.
+    pub name: String,
+    /// Where to look from.
+    pub camera: Camera,
+    /// The view of the scene that shows the truth, as an index into its views.
+    pub truth: Option<usize>,
+}
+
+/// Sources and targets of one run, as indices into the scene's views.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FewShot {
+    /// Source views, in the order of the scene.
+    pub sources: Vec<usize>,
+    /// Target cameras.
+    pub targets: Vec<Target>,
+}
+
+/// What a person asked for.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Selection {
+    /// `--targets`.
+    pub targets: Option<String>,
+    /// `--orbit`: this many cameras on a circle.
+    pub orbit: Option<usize>,
+    /// `--sources`; otherwise every view with a photograph that is not a target.
+    pub sources: Option<String>,
+    /// `--views`: at most this many of the sources, spread as far apart as possible.
+    pub view_count: Option<usize>,
+}
+
+impl Selection {
+    /// Sources and targets for a render. Without `--targets` and `--orbit` the targets are the scene's target poses.
+    ///
+    /// # Errors
+    /// [`SelectionError`]; `least_sources` is what the field needs.
+    pub fn resolve(&self, scene: &Scene, least_sources: usize) -> Result<FewShot, SelectionError> {
+        let target_views = match &self.targets {
+            Some(list) => view_list(scene, list)?,
+            None if self.orbit.is_some() => Vec::new(),
+            None => (0..scene.views.len()).filter(|&view| scene.views[view].image.is_none()).collect(),
+        };
+        let sources = self.sources_without(scene, &target_views, least_sources)?;
+        let mut targets: Vec<Target> = target_views.iter().map(|&view| target_of(scene, view)).collect();
+        if let Some(count) = self.orbit {
+            targets.extend(orbit(scene, &sources, count)?);
+        }
+        if targets.is_empty() {
+            return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() });
+        }
+        Ok(FewShot { sources, targets })
+    }
+
+    /// The source views when `targets` are rendered.
+    ///
+    /// # Errors
+    /// [`SelectionError`].
+    pub fn sources_without(
+        &self,
+        scene: &Scene,
+        targets: &[usize],
+        least_sources: usize,
+    ) -> Result<Vec<usize>, SelectionError> {
+        let scene_name = || scene.path.display().to_string();
+        let mut sources = match &self.sources {
+            Some(list) => {
+                let sources = view_list(scene, list)?;
+                if let Some(&view) = sources.iter().find(|view| targets.contains(view)) {
+                    let name = scene.views[view].name.clone();
+                    return Err(SelectionError::TargetIsSource { scene: scene_name(), name });
+                }
+                if let Some(&view) = sources.iter().find(|&&view| scene.views[view].image.is_none()) {
+                    let name = scene.views[view].name.clone();
+                    return Err(SelectionError::NoPhotograph { scene: scene_name(), name });
+                }
+                sources
+            }
+            None => (0..scene.views.len())
+                .filter(|view| scene.views[*view].image.is_some() && !targets.contains(view))
+                .collect(),
+        };
+        if let Some(count) = self.view_count {
+            sources = spread(scene, &sources, count);
+        }
+        if sources.len() < least_sources {
+            return Err(SelectionError::TooFewSources {
+                scene: scene_name(),
+                count: sources.len(),
+                least: least_sources,
+            });
+        }
+        if sources.len() > MOST_SOURCES {
+            return Err(SelectionError::TooManySources { scene: scene_name(), count: sources.len() });
+        }
+        Ok(sources)
+    }
+}
+
+/// A view of the scene as a target; its photograph, if it has one, is the truth.
+pub fn target_of(scene: &Scene, view: usize) -> Target {
+    let View { name, camera, image } = &scene.views[view];
+    Target { name: name.clone(), camera: *camera, truth: image.is_some().then_some(view) }
+}
+
+/// The views that a list names, in the order of the scene, each once.
+///
+/// # Errors
+/// [`SelectionError::NoSuchView`], [`SelectionError::BadStep`] or [`SelectionError::BadRange`].
+pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError> {
+    let find = |name: &str| {
+        scene.view_named(name).ok_or_else(|| SelectionError::NoSuchView {
+            scene: scene.path.display().to_string(),
+            name: name.to_owned(),
+            first: scene.views.first().map(|view| view.name.clone()).unwrap_or_default(),
+            last: scene.views.last().map(|view| view.name.clone()).unwrap_or_default(),
+        })
+    };
+    let mut chosen = Vec::new();
+    for item in list.split(',').map(str::trim).filter(|item| !item.is_empty()) {
+        // A view may be called `a/b`: only what is no name is taken apart.
+        if let Some(view) = scene.view_named(item) {
+            chosen.push(view);
+            continue;
+        }
+        let (range, step) = match item.rsplit_once('/') {
+            Some((range, step)) => {
+                let step: usize = step.parse().unwrap_or(0);
+                if step == 0 {
+                    return Err(SelectionError::BadStep { item: item.to_owned() });
+                }
+                (range, step)
+            }
+            None => (item, 1),
+        };
+        if range == "all" {
+            chosen.extend((0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).step_by(step));
+        } else if let Some((first, last)) = range.split_once("..") {
+            let bad_range = || SelectionError::BadRange { item: item.to_owned() };
+            if first.is_empty() || last.is_empty() {
+                return Err(bad_range());
+            }
+            let (first, last) = (find(first)?, find(last)?);
+            if first > last {
+                return Err(bad_range());
+            }
+            chosen.extend((first..=last).step_by(step));
+        } else {
+            chosen.push(find(range)?);
+        }
+    }
+    chosen.sort_unstable();
+    chosen.dedup();
+    Ok(chosen)
+}
+
+/// `count` of the candidates, each next one as far from those before as possible (farthest-point sampling of the
+/// centres, starting with the first candidate), in the order of the scene.
+fn spread(scene: &Scene, candidates: &[usize], count: usize) -> Vec<usize> {
+    let centre = |view: usize| scene.views[view].camera.pose.centre_world();
+    let mut chosen: Vec<usize> = candidates.iter().copied().take(count.min(1)).collect();
+    while chosen.len() < count.min(candidates.len()) {
+        let gap = |view: usize| {
+            chosen.iter().map(|&other| centre(view).distance(centre(other))).fold(f32::INFINITY, f32::min)
+        };
+        let mut rest = candidates.iter().copied().filter(|view| !chosen.contains(view));
+        let Some(first) = rest.next() else { break };
+        let next = rest.fold((first, gap(first)), |best, view| {
+            let gap = gap(view);
+            if gap > best.1 { (view, gap) } else { best }
+        });
+        chosen.push(next.0);
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+fn orbit(scene: &Scene, sources: &[usize], count: usize) -> Result<Vec<Target>, SelectionError> {
+    let cameras: Vec<Camera> = sources.iter().map(|&view| scene.views[view].camera).collect();
+    let pinhole: Pinhole = cameras[0].pinhole;
+    let orbit = Rig::of(&cameras)
+        .orbit(&cameras, pinhole, count)
+        .map_err(|error| SelectionError::NoOrbit { scene: scene.path.display().to_string(), error })?;
+    Ok(orbit
+        .into_iter()
+        .enumerate()
+        .map(|(frame, camera)| Target { name: format!("orbit-{frame:03}"), camera, truth: None })
+        .collect())
+}

@@ -1,0 +1,20 @@
+//! Posed photographs: from folders on disk to source views at working size, and the choice of sources and targets.
+//!
+//! The modules stand in the order of the data; a module uses only modules listed above it:
+//!
+//! ```text
+//! scene         a folder of posed photographs, in any layout: Scene, View, Photograph
+//! dataset       folders of many scenes: Dataset, Split
+//! rig           the cameras as a whole: focus, up, orbits
+//! few_shot      which views are sources, which cameras are targets: FewShot
+//! photographs   sources at working size without their background: SourceImages
+//! ```
+#![forbid(unsafe_code)]
+
+pub mod dataset;
+pub mod few_shot;
+pub mod photographs;
+pub mod rig;
+mod scene;
+
+pub use scene::{IntrinsicsFault, LARGEST_SIDE, Layout, Photograph, Place, Scene, SceneError, View};

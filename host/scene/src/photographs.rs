@@ -1,0 +1,221 @@
+//! Photographs as a field needs them: at working size, premultiplied, with the background taken out.
+
+mod matte;
+mod resample;
+
+pub use matte::BackgroundChoice;
+
+use crate::{Photograph, Scene, SceneError, View};
+use image::RgbImage;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use viewfuse_core::camera::{Camera, PinholeError};
+use viewfuse_job::progress::{Interrupted, Progress};
+
+/// Why photographs could not be prepared.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotographsError {
+    /// A photograph could not be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The working size is unusable.
+    #[error("view '{view}' cannot be resampled to {width}x{height}: {error}")]
+    Size {
+        /// The view.
+        view: String,
+        /// Wanted width.
+        width: u32,
+        /// Wanted height.
+        height: u32,
+        /// What is wrong with it.
+        error: PinholeError,
+    },
+    /// The background covers the whole photograph, or nothing of it.
+    #[error(
+        "{path}: shows no object before the background ({colour}); give the background with --background, or \
+         photographs with an alpha channel"
+    )]
+    NoSilhouette {
+        /// The photograph.
+        path: String,
+        /// The background colour that was assumed.
+        colour: String,
+    },
+    /// The person stopped the work.
+    #[error("interrupted")]
+    Interrupted(#[from] Interrupted),
+}
+
+/// One source at working size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceImage {
+    /// The camera of the resampled image.
+    pub camera: Camera,
+    /// `[row][column]`: premultiplied red, green, blue and alpha in `[0, 1]`.
+    pub texels: Vec<[f32; 4]>,
+}
+
+/// All sources of a run at working size.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SourceImages {
+    /// In the order of the sources.
+    pub images: Vec<SourceImage>,
+    /// What is behind the object, red green blue in `[0, 1]`.
+    pub background: [f32; 3],
+    /// What is doubtful about the background, if anything.
+    pub warning: Option<String>,
+}
+
+impl SourceImages {
+    /// A source over the background.
+    pub fn picture(&self, source: usize) -> RgbImage {
+        let SourceImage { camera, texels } = &self.images[source];
+        let behind = self.background;
+        let over = |t: &[f32; 4]| [0, 1, 2, 3].map(|c| t[c] + if c < 3 { (1.0 - t[3]) * behind[c] } else { 0.0 });
+        let texels: Vec<[f32; 4]> = texels.iter().map(over).collect();
+        to_rgb8(&texels, [camera.pinhole.width(), camera.pinhole.height()])
+    }
+}
+
+/// Most bytes of decoded photographs that are kept. Where a run needs more, each is decoded again whenever it is needed.
+const MOST_KEPT_BYTES: u64 = 512 << 20;
+
+/// Photographs of a scene, decoded once where memory allows.
+pub struct Album<'a> {
+    scene: &'a Scene,
+    kept: Vec<Option<Photograph>>,
+}
+
+impl<'a> Album<'a> {
+    /// Reads the photographs of these views, all cores at once.
+    ///
+    /// # Errors
+    /// [`PhotographsError`] of the first view that cannot be read, or if the work is stopped.
+    pub fn open(
+        scene: &'a Scene,
+        views: impl IntoIterator<Item = usize>,
+        progress: &dyn Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
+        let mut wanted: Vec<usize> = views.into_iter().collect();
+        wanted.sort_unstable();
+        wanted.dedup();
+        let mut kept = vec![None; scene.views.len()];
+        let bytes = |view: &usize| {
+            let pinhole = &scene.views[*view].camera.pinhole;
+            4 * u64::from(pinhole.width()) * u64::from(pinhole.height())
+        };
+        if wanted.iter().map(bytes).sum::<u64>() <= MOST_KEPT_BYTES {
+            progress.expect(wanted.len());
+            let read = |view: usize| {
+                progress.check()?;
+                let photograph = scene.photograph(view)?;
+                progress.step();
+                Ok((view, photograph))
+            };
+            let photographs: Vec<_> = wanted.into_par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
+            for (view, photograph) in photographs {
+                kept[view] = Some(photograph);
+            }
+        }
+        Ok(Album { scene, kept })
+    }
+
+    fn photograph(&self, view: usize) -> Result<Cow<'_, Photograph>, SceneError> {
+        match self.kept.get(view) {
+            Some(Some(photograph)) => Ok(Cow::Borrowed(photograph)),
+            _ => Ok(Cow::Owned(self.scene.photograph(view)?)),
+        }
+    }
+
+    /// The sources, reduced to at most `longest_side` pixels on a side, the background taken out as `choice` says.
+    ///
+    /// # Errors
+    /// [`PhotographsError`].
+    pub fn sources(
+        &self,
+        views: &[usize],
+        longest_side: u32,
+        choice: BackgroundChoice,
+    ) -> Result<SourceImages, PhotographsError> {
+        // Twice over the photographs, so that never more of them than there are threads must be in memory.
+        let look = |&view: &usize| {
+            progress.check()?;
+            Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
+        };
+        let borders: Vec<_> = views.par_iter().map(look).collect::<Result<_, PhotographsError>>()?;
+        let backdrop = matte::Backdrop::of(borders.iter().flatten(), choice);
+        let images = views
+            .par_iter()
+            .zip(&borders)
+            .map(|(&view, border)| {
+                progress.check()?;
+                self.cut_out(view, longest_side, border.as_ref(), &backdrop)
+            })
+            .collect::<Result<_, PhotographsError>>()?;
+        Ok(SourceImages { images, background: backdrop.colour(), warning: backdrop.warning() })
+    }
+
+    fn cut_out(
+        &self,
+        view: usize,
+        longest_side: u32,
+        border: Option<&matte::Border>,
+        backdrop: &matte::Backdrop,
+    ) -> Result<SourceImage, PhotographsError> {
+        let View { name, camera, image } = &self.scene.views[view];
+        let photograph = self.photograph(view)?;
+        // Enlarging a source would add pixels but no detail.
+        let (width, height) = reduced_size(camera, longest_side);
+        let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
+            view: name.clone(),
+            width,
+            height,
+            error,
+        })?;
+        let premultiplied = matte::premultiplied(&photograph, border, backdrop);
+        let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
+        if opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha) {
+            let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
+            return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
+        }
+        let (own_width, own_height) = photograph.pixels.dimensions();
+        let texels = resample::area_average(&premultiplied, [own_width, own_height], [width, height]);
+        Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
+    }
+
+    /// The truth at a view, resampled to a size and laid over a background, rounded to 8 bits.
+    ///
+    /// # Errors
+    /// [`SceneError`] if it cannot be read.
+    pub fn truth(&self, view: usize, size: [u32; 2], background: [f32; 3]) -> Result<RgbImage, SceneError> {
+        let photograph = self.photograph(view)?;
+        let own_size = photograph.pixels.dimensions();
+        let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
+        Ok(to_rgb8(&texels, size))
+    }
+}
+
+/// Longest side of a camera's image in pixels.
+pub fn longest_side(camera: &Camera) -> u32 {
+    camera.pinhole.width().max(camera.pinhole.height())
+}
+
+/// Size of a camera's image with its longest side scaled to `side`; at least one pixel on a side.
+pub fn scaled_size(camera: &Camera, side: u32) -> (u32, u32) {
+    let scale = f64::from(side) / f64::from(longest_side(camera));
+    let scaled = |own: u32| ((f64::from(own) * scale).round() as u32).max(1);
+    (scaled(camera.pinhole.width()), scaled(camera.pinhole.height()))
+}
+
+/// As [`scaled_size`], but never larger than the image is.
+pub fn reduced_size(camera: &Camera, side: u32) -> (u32, u32) {
+    scaled_size(camera, side.min(longest_side(camera)))
+}
+
+/// Values in `[0, 1]` rounded to the nearest of 256 levels; the fourth channel is dropped. NaN becomes 0.
+pub fn to_rgb8(texels: &[[f32; 4]], size: [u32; 2]) -> RgbImage {
+    RgbImage::from_fn(size[0], size[1], |x, y| {
+        let texel = texels[(y * size[0] + x) as usize];
+        image::Rgb([texel[0], texel[1], texel[2]].map(|value| (value * 255.0 + 0.5) as u8))
+    })
+}

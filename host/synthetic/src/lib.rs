@@ -1,0 +1,56 @@
+//! Synthetic scenes: objects described by formulas, and photographs of them.
+//!
+//! A scene of this making has what no photograph has: exact poses, exact alpha, exact depth and no licence but ours.
+//! The repository's sample scene is made here (`cargo run --release -p viewfuse --example make_sample -- FOLDER`).
+//! The modules stand in the order of the data; a module uses only modules listed above it:
+//!
+//! ```text
+//! prism       signed distance of a side view with a width    Prism
+//! shape       signed distances of primitives                 Shape
+//! placement   where a primitive stands in the world          Placement
+//! texture     colour as a function of the point              Texture, Finish
+//! light       lamps                                          Light
+//! object      primitives, placed and painted                 Part, Object
+//! trace       first point of an object on a ray              trace, is_blocked
+//! shade       light on that point                            shade
+//! render      a camera's picture of an object                render
+//! orbit       cameras around an object                       Orbit
+//! folder      pictures and poses on disk, SRN layout         write_scene
+//! toy         the sample: a toy lorry with its load          lorry, training_cameras, test_cameras
+//! cameras     where scenes to learn from are seen from       random_views, spiral_views
+//! kinds       whole distributions: cars, chairs, toys        Kind
+//! collection  many scenes to learn from, on disk             make
+//! ```
+//!
+//! Everything is computed in `f32` from additions, multiplications, divisions and square roots in one stated order,
+//! with the elementary functions of [`viewfuse_core::math`]: a picture is the same bit for bit on every machine and
+//! for any number of threads.
+#![forbid(unsafe_code)]
+
+pub mod cameras;
+pub mod collection;
+pub mod folder;
+pub mod kinds;
+pub mod light;
+pub mod object;
+pub mod orbit;
+pub mod placement;
+pub mod prism;
+pub mod render;
+pub mod shade;
+pub mod shape;
+pub mod texture;
+pub mod toy;
+pub mod trace;
+
+pub use folder::{WriteError, write_scene};
+pub use kinds::Kind;
+pub use light::Light;
+pub use object::{Object, ObjectError, Part};
+pub use orbit::Orbit;
+pub use placement::Placement;
+pub use prism::Prism;
+pub use render::{render, render_with};
+pub use shape::Shape;
+pub use texture::{Finish, Patch, Texture};
+pub use trace::{Hit, trace};

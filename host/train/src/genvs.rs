@@ -1,0 +1,223 @@
+//! GeNVS as a graph that can be differentiated: the family of [`viewfuse_field::genvs`]. From pictures to volumes, from volumes
+//! to the features that a target sees, from features and noise to a picture.
+
+mod denoiser;
+mod encoder;
+mod layers;
+#[cfg(test)]
+mod tests;
+mod views;
+
+pub(crate) use views::{ViewCounts, Views};
+
+use super::TrainError;
+use super::images::enlarge;
+use super::operations::{Apply, Look, LookSizes, Sight};
+use super::parameters::{Contents, Parameters, fan_in, random};
+use candle_core::{DType, Device, Result, Tensor};
+use layers::Layers;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+use viewfuse_core::depths::CoarseBlock;
+use viewfuse_core::rays::cast_ray;
+use viewfuse_core::schedule::Preconditioning;
+use viewfuse_field::genvs::{Architecture, LAST_LENGTH, MLP, cast_block, ray_length};
+use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
+
+/// What the names of the encoder's tensors begin with.
+const ENCODER: &str = "pixel_nerf_net.encoder.";
+/// Density that all of space begins with: light reaches most samples, and every sample a gradient.
+const FIRST_DENSITY: f32 = 2.0;
+/// What the deviation of the density's weights is multiplied by: surfaces have densities of 10 and more.
+const DENSITY_GAIN: f32 = 4.0;
+
+/// The network with its parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct Genvs {
+    pub(crate) architecture: Architecture,
+    pub(crate) parameters: Parameters,
+    /// Whether only the views' weights are differentiated.
+    pub(crate) is_frozen: bool,
+}
+
+/// Names of tensors that no picture depends on: all of switched-off batch norms, and a head without use.
+fn unused(tensors: &[TensorShape]) -> BTreeSet<String> {
+    let norms: Vec<&str> = tensors.iter().filter_map(|tensor| tensor.name.strip_suffix("running_mean")).collect();
+    let is_unused = |name: &str| {
+        name.contains(".segmentation_head.")
+            || norms.iter().any(|norm| name.strip_prefix(norm).is_some_and(|leaf| !leaf.contains('.')))
+    };
+    tensors.iter().map(|tensor| tensor.name.clone()).filter(|name| is_unused(name)).collect()
+}
+
+impl Genvs {
+    /// At the beginning of training: He's initialisation where rectification follows, layers behind which something is added
+    /// zero, as published for the denoiser, whose other layers without a norm in front hand on what they get.
+    pub(crate) fn new(architecture: Architecture, dtype: DType, seed: u64) -> std::result::Result<Genvs, TrainError> {
+        let parameters = Parameters::new(&used(&architecture), dtype, |tensor| {
+            Ok(denoiser::handed_on(&architecture, tensor).unwrap_or_else(|| first_values(tensor, seed)))
+        })?;
+        Ok(Genvs { architecture, parameters, is_frozen: false })
+    }
+
+    /// A trained one, to be left as it is.
+    ///
+    /// # Errors
+    /// [`TrainError`] if the checkpoint is of another family, has no denoiser, or is for pictures of another side.
+    pub(crate) fn frozen(checkpoint: &Checkpoint, side: u32, dtype: DType) -> std::result::Result<Genvs, TrainError> {
+        let architecture = Architecture::of(checkpoint)?;
+        let refuse = |reason: String| Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
+        if architecture.denoiser.is_none() {
+            return refuse("it has no denoiser, without which no picture is made here".to_owned());
+        }
+        let own = architecture.image_side;
+        if own != side as usize {
+            return refuse(format!("it is for pictures of {own}x{own} pixels, and --side is {side}"));
+        }
+        let parameters = Parameters::of(checkpoint, &used(&architecture), dtype)?;
+        Ok(Genvs { architecture, parameters, is_frozen: true })
+    }
+
+    /// Its tensors, with what the file says of it beside them. Those that no picture depends on are zero.
+    pub(crate) fn checkpoint(&self) -> Result<Contents> {
+        let mut tensors = self.parameters.values()?;
+        let all = self.architecture.tensors();
+        let unused = unused(&all);
+        for tensor in all.into_iter().filter(|tensor| unused.contains(&tensor.name)) {
+            let values = vec![0.0; tensor.shape.iter().product()];
+            tensors.push((tensor, values));
+        }
+        Ok((tensors, BTreeMap::new()))
+    }
+
+    fn layers<'a>(&'a self, prefix: &'a str) -> Layers<'a> {
+        Layers { parameters: &self.parameters, prefix, is_frozen: self.is_frozen }
+    }
+
+    /// Volumes `[image][row][column][depth and feature]` of pictures `[image][row][column][3]` in `[-1, 1]`.
+    pub(crate) fn volumes(&self, pictures: &Tensor) -> Result<Tensor> {
+        encoder::volumes(self.layers(ENCODER), &self.architecture.encoder, pictures)
+    }
+
+    /// The features `[object and target][row][column][feature]` that targets see with weights `[object][view]` of the views,
+    /// from volumes `[object and view]`; samples lie on rays as the block says.
+    pub(crate) fn features(
+        &self,
+        volumes: &Tensor,
+        weights: &Tensor,
+        views: &Views,
+        samples: &CoarseBlock,
+    ) -> Result<Tensor> {
+        let side = self.architecture.image_side;
+        let sizes = LookSizes {
+            volume: [side, side, self.architecture.encoder.volume_depth],
+            features: self.architecture.encoder.feature_count,
+            width: self.architecture.mlp_width,
+        };
+        let sight = |object: usize| {
+            let near_far @ [near, far] = views.near_far[object];
+            let cast = |target| {
+                let cast = cast_block(target, near_far, samples.sample_count);
+                (0..cast.camera.width * cast.camera.height).map(move |pixel| cast_ray(&cast, pixel))
+            };
+            Sight {
+                cameras: views.cameras[object].clone(),
+                rays: views.targets[object].iter().flat_map(cast).collect(),
+                near_far,
+                length_scale: ray_length(&views.targets[object][0]) / (far - near),
+            }
+        };
+        let sights: Vec<Sight> = (0..views.cameras.len()).map(sight).collect();
+        let target_count = sights.len() * views.targets[0].len();
+        let operation = Look {
+            sizes,
+            sights: Arc::new(sights),
+            samples: *samples,
+            last_length: LAST_LENGTH,
+            inclusive: true,
+            is_frozen: self.is_frozen,
+        };
+        let seen = volumes.contiguous()?.apply_op3(weights, &self.point_parameters()?, Apply(operation))?;
+        enlarge(&seen.reshape((target_count, side / 2, side / 2, sizes.features))?, side, side)
+    }
+
+    /// The parameters of the network at points in the order of [`LookSizes::parameter_count`].
+    fn point_parameters(&self) -> Result<Tensor> {
+        let layers = self.layers(MLP);
+        let mut all = Vec::new();
+        for layer in 0..3 {
+            for leaf in ["weight", "bias"] {
+                all.push(layers.get(&format!(".{layer}.{leaf}"))?.flatten_all()?);
+            }
+        }
+        Tensor::cat(&all, 0)
+    }
+
+    /// The denoiser's network `F` on noisy pictures `[image][row][column][3]`, each at its own level, with their features.
+    /// What it believes is behind them is `c_skip noisy + c_out F`, see [`Preconditioning`].
+    pub(crate) fn network(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
+        let Some(sizes) = &self.architecture.denoiser else { candle_core::bail!("the network has no denoiser") };
+        let scales = each(at.iter().map(|at| at.input), noisy)?;
+        let inputs = Tensor::cat(&[noisy, features], 3)?.broadcast_mul(&scales)?;
+        let levels: Vec<f32> = at.iter().map(|at| at.noise).collect();
+        denoiser::run(self.layers(""), sizes, &inputs, &levels)
+    }
+
+    /// What the denoiser believes is behind noisy pictures.
+    pub(crate) fn denoised(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
+        let output = self.network(noisy, features, at)?.broadcast_mul(&each(at.iter().map(|at| at.output), noisy)?)?;
+        output + noisy.broadcast_mul(&each(at.iter().map(|at| at.skip), noisy)?)?
+    }
+}
+
+/// A number for each image, to be multiplied with images.
+pub(crate) fn each(values: impl Iterator<Item = f32>, images: &Tensor) -> Result<Tensor> {
+    let values: Vec<f32> = values.collect();
+    let count = values.len();
+    Tensor::from_vec(values, (count, 1, 1, 1), &Device::Cpu)?.to_dtype(images.dtype())
+}
+
+/// The tensors that pictures depend on.
+fn used(architecture: &Architecture) -> Vec<TensorShape> {
+    let mut tensors = architecture.tensors();
+    let unused = unused(&tensors);
+    tensors.retain(|tensor| !unused.contains(&tensor.name));
+    tensors
+}
+
+fn first_values(tensor: &TensorShape, seed: u64) -> Vec<f32> {
+    let TensorShape { name, shape } = tensor;
+    let count: usize = shape.iter().product();
+    let is_denoiser = name.starts_with("denoiser.");
+    let is_last_of_points = name.starts_with(&format!("{MLP}.2."));
+    // The last layer of a residual block, of attention, of the denoiser: nothing is added at first.
+    let zero = if is_denoiser {
+        [".conv1.weight", ".proj.weight", "_aux_conv.weight"].iter().any(|end| name.ends_with(end))
+    } else {
+        name.ends_with(".conv2.weight")
+    };
+    if name.ends_with(".bias") && is_last_of_points {
+        return (0..count).map(|index| if index == 0 { FIRST_DENSITY } else { 0.0 }).collect();
+    }
+    if name.ends_with(".bias") || zero {
+        return vec![0.0; count];
+    }
+    if shape.len() == 1 {
+        // A norm.
+        return vec![1.0; count];
+    }
+    // An output pixel of a transposed convolution sees a single place of every input channel.
+    let inputs = if name.contains("upconv") { shape[0] } else { fan_in(tensor) };
+    let gain = match () {
+        () if name.ends_with(".qkv.weight") => 0.2,
+        () if is_denoiser || is_last_of_points => 1.0,
+        () => 2.0,
+    };
+    let mut values = random(tensor, seed, (gain / inputs as f32).sqrt());
+    if is_last_of_points {
+        // The density's outputs come first.
+        values[..shape[1]].iter_mut().for_each(|value| *value *= DENSITY_GAIN);
+        values[shape[1]..].iter_mut().for_each(|value| *value *= 0.1);
+    }
+    values
+}

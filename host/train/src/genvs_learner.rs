@@ -1,0 +1,196 @@
+//! A small GeNVS, with equal weights of the views as published.
+//!
+//! The loss is that of "Elucidating the design space of diffusion-based generative models" (Karras et al. 2022): noise of a
+//! random level on the truth, the network asked for what it would have to say, all levels of one weight. Two things are for
+//! small data and short runs. The first three features, beside everything else that they may become, are trained to be what
+//! a ray's colour lacks to white, so that volumes learn shapes before the denoiser learns to read them. And a share of the
+//! pictures has the level at which sampling begins, where the best answer is the mean of all pictures that the sources
+//! allow: what a single call gives, and what squared errors ask for.
+
+use super::TrainError;
+use super::draw::{Draw, Purpose};
+use super::genvs::{Genvs, ViewCounts, Views, each};
+use super::parameters::{Contents, Parameters};
+use super::pixelnerf_learner::decibels;
+use super::run::{self, Learner, Outcome, Schedule, Validated};
+use super::scenes::{Data, TrainingScene};
+use candle_core::{DType, Device, Result, Tensor};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use viewfuse_core::depths::CoarseBlock;
+use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
+use viewfuse_field::genvs::Architecture;
+use viewfuse_job::progress::Progress;
+use viewfuse_nn::checkpoint::Checkpoint;
+
+/// What a run is made of beside its schedule and scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GenvsSettings {
+    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that goes on from a file has the
+    /// file's.
+    pub width: usize,
+    /// Side of the pictures.
+    pub side: u32,
+    /// Objects of a step.
+    pub objects: usize,
+    /// Targets of each.
+    pub targets: usize,
+    /// Samples of a ray, as many as a render will have: samples shade themselves, and more of them would be brighter.
+    pub samples: u32,
+}
+
+/// How many sources a step has: drawn from this list.
+const SOURCE_COUNTS: [usize; 4] = [1, 2, 3, 3];
+/// Mean and deviation of the logarithm of noise levels, as published.
+const LEVELS: [f32; 2] = [-1.2, 1.2];
+/// Share of the pictures that have the largest level.
+const SHARE_OF_LARGEST: f32 = 0.25;
+/// Weight of the first features' squared error: at the largest level, that of the picture's has the same.
+const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
+/// Objects that validation looks at, and views of each.
+const VALIDATION_OBJECTS: usize = 24;
+const VALIDATION_VIEWS: ViewCounts = ViewCounts { sources: 3, targets: 1 };
+
+struct GenvsLearner {
+    network: Genvs,
+    scenes: Vec<TrainingScene>,
+    validation: Vec<TrainingScene>,
+    settings: GenvsSettings,
+}
+
+/// Trains a GeNVS in `folder`, or goes on there: from scratch, or from a network that was learned before.
+///
+/// # Errors
+/// [`TrainError`].
+pub fn train_genvs(
+    settings: &GenvsSettings,
+    from: Option<&Checkpoint>,
+    schedule: &Schedule,
+    [scenes, validation]: [&[PathBuf]; 2],
+    folder: &Path,
+    progress: &dyn Progress,
+) -> std::result::Result<Outcome, TrainError> {
+    let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
+    let least_views = most_sources + settings.targets.max(1);
+    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
+    let architecture = Architecture::narrow(settings.side as usize, settings.width);
+    let network = match from {
+        Some(checkpoint) => Genvs { is_frozen: false, ..Genvs::frozen(checkpoint, settings.side, DType::F32)? },
+        None => Genvs::new(architecture, DType::F32, schedule.seed)?,
+    };
+    let denoiser = network.architecture.denoiser.as_ref();
+    let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
+    let settings = GenvsSettings { width, ..*settings };
+    let record = run::settings("genvs", &settings, schedule, &data, from)?;
+    let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings };
+    run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
+}
+
+/// Pictures with noise on them.
+pub(super) struct Noisy {
+    /// `[image][row][column][3]`.
+    pub(super) pictures: Tensor,
+    /// Of each image.
+    pub(super) at: Vec<Preconditioning>,
+}
+
+impl Noisy {
+    /// `truth + level noise`, a level for each picture.
+    pub(super) fn new(truth: &Tensor, levels: &[f32], draw: &Draw) -> Result<Noisy> {
+        let noise: Vec<f32> = (0..truth.elem_count()).map(|index| draw.normal(Purpose::Noise, index)).collect();
+        let noise = Tensor::from_vec(noise, truth.shape(), &Device::Cpu)?.to_dtype(truth.dtype())?;
+        let pictures = (truth + noise.broadcast_mul(&each(levels.iter().copied(), truth)?)?)?;
+        Ok(Noisy { pictures, at: levels.iter().map(|level| Preconditioning::at(*level)).collect() })
+    }
+
+    /// What the network should say: `(truth - c_skip noisy) / c_out`, of variance 1 at every level.
+    fn wanted(&self, truth: &Tensor) -> Result<Tensor> {
+        let skipped = self.pictures.broadcast_mul(&each(self.at.iter().map(|at| at.skip), truth)?)?;
+        (truth - skipped)?.broadcast_div(&each(self.at.iter().map(|at| at.output), truth)?)
+    }
+}
+
+/// The noise levels of a step's pictures.
+fn levels(draw: &Draw, count: usize) -> Vec<f32> {
+    let largest = NoiseSchedule::published().level(0, 2);
+    let level = |index: usize| match draw.uniform(Purpose::NoiseLevel, 2 * index) < SHARE_OF_LARGEST {
+        true => largest,
+        false => (LEVELS[0] + LEVELS[1] * draw.normal(Purpose::NoiseLevel, 2 * index + 1)).exp(),
+    };
+    (0..count).map(level).collect()
+}
+
+/// The picture `[image][row][column][3]` in `[-1, 1]` that the first features tell of: they are what it lacks to white.
+pub(super) fn colours(features: &Tensor) -> Result<Tensor> {
+    1.0 - features.narrow(3, 0, 3)?
+}
+
+/// The loss of some views, whose noise is the draw's.
+pub(super) fn loss(
+    network: &Genvs,
+    views: &Views,
+    weights: &Tensor,
+    samples: &CoarseBlock,
+    draw: &Draw,
+) -> Result<Tensor> {
+    let features = network.features(&network.volumes(&views.pictures)?, weights, views, samples)?;
+    let noisy = Noisy::new(&views.truth, &levels(draw, views.truth.dim(0)?), draw)?;
+    let said = network.network(&noisy.pictures, &features, &noisy.at)?;
+    let error = (said - noisy.wanted(&views.truth)?)?.sqr()?.mean_all()?;
+    let colour_error = (colours(&features)? - &views.truth)?.sqr()?.mean_all()?;
+    error + (colour_error * FEATURES_WEIGHT)?
+}
+
+/// Mean PSNR over scenes of what one call makes of noise of the largest level, and of the colours that the features tell of,
+/// with the weights that `weigh` gives the views: the same views and noise every time, whatever the run's seed.
+pub(super) fn scores(
+    network: &Genvs,
+    scenes: &[TrainingScene],
+    views: ViewCounts,
+    sample_count: u32,
+    weigh: &dyn Fn(&Views) -> Result<Tensor>,
+) -> Result<[f64; 2]> {
+    let count = VALIDATION_OBJECTS.min(scenes.len());
+    let samples = CoarseBlock { seed: [0, 0], sample_count, jitter: 0.0 };
+    let largest = NoiseSchedule::published().level(0, 2);
+    let [mut score, mut colour_score] = [0.0, 0.0];
+    for (index, object) in scenes[..count].iter().enumerate() {
+        let draw = Draw { seed: 0, step: u32::MAX - index as u32 };
+        let views = Views::of(&[object], &draw, views, network.parameters.dtype())?;
+        let volumes = network.volumes(&views.pictures)?.detach();
+        let features = network.features(&volumes, &weigh(&views)?, &views, &samples)?;
+        let noise = Noisy::new(&views.truth.zeros_like()?, &[largest], &draw)?;
+        let picture = network.denoised(&noise.pictures, &features, &noise.at)?;
+        let score_of = |picture: &Tensor| decibels(&((picture - &views.truth)? * 0.5)?.sqr()?.mean_all()?);
+        score += score_of(&picture.clamp(-1.0, 1.0)?)?;
+        colour_score += score_of(&colours(&features)?.clamp(-1.0, 1.0)?)?;
+    }
+    Ok([score, colour_score].map(|sum| sum / count as f64))
+}
+
+impl Learner for GenvsLearner {
+    fn parameters(&self) -> &Parameters {
+        &self.network.parameters
+    }
+
+    fn loss(&self, draw: &Draw) -> Result<Tensor> {
+        let GenvsSettings { objects, targets, samples, .. } = self.settings;
+        let sources = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
+        let views = ViewCounts { sources, targets };
+        let views = Views::draw(&self.scenes, draw, objects, views, self.network.parameters.dtype())?;
+        let samples = CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: samples, jitter: 1.0 };
+        loss(&self.network, &views, &views.mean_weights()?, &samples, draw)
+    }
+
+    fn validate(&self) -> Result<Validated> {
+        let [score, colour_score] =
+            scores(&self.network, &self.validation, VALIDATION_VIEWS, self.settings.samples, &|views| {
+                views.mean_weights()
+            })?;
+        Ok(Validated { score, remark: format!("of the features {colour_score:.3} dB") })
+    }
+
+    fn checkpoint(&self) -> Result<Contents> {
+        self.network.checkpoint()
+    }
+}

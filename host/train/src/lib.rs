@@ -1,0 +1,142 @@
+//! Training: networks from scratch, and the weighting of views for a network that stays as it is.
+//!
+//! Gradients are the library's (candle); what is ours are the networks' graphs, a few operations where the published
+//! networks do what the library cannot or does slowly (`operations`), and a run that can be killed at any moment and goes
+//! on where it was. Everything random is a function of the run's seed and the step (`draw`), and sums run in one order:
+//! a run that was interrupted ends in the same numbers as one that was not.
+//!
+//! ```text
+//! scenes       pictures and cameras in memory            TrainingScene
+//! draw         random numbers of a step                  Draw
+//! batch        sources and target rays of a step         Batch
+//! operations   gradients of our own kernels              Convolution, PointNetwork, Look
+//! images, compositing     parts of the graphs
+//! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
+//! attention    weighting of views as a graph             Attention
+//! parameters, adam, average     what is learned, and how
+//! pixelnerf_learner, genvs_learner, weighting_learner      losses
+//! run          steps, validation, continuing             run, Settings
+//! ```
+#![forbid(unsafe_code)]
+
+mod adam;
+mod attention;
+mod average;
+mod batch;
+mod compositing;
+mod curve;
+mod draw;
+mod genvs;
+mod genvs_learner;
+mod images;
+mod operations;
+mod parameters;
+mod pixelnerf;
+mod pixelnerf_learner;
+mod run;
+mod scenes;
+#[cfg(test)]
+mod slopes;
+mod state;
+mod weighting_learner;
+
+pub use attention::Embedding;
+pub use genvs_learner::{GenvsSettings, train_genvs};
+pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
+pub use run::{Outcome, Schedule};
+pub use weighting_learner::{WeightingSettings, train_weighting};
+
+use std::path::PathBuf;
+use viewfuse_core::camera::PinholeError;
+use viewfuse_job::files::WriteError;
+use viewfuse_job::progress::Interrupted;
+use viewfuse_nn::checkpoint::CheckpointError;
+use viewfuse_scene::SceneError;
+
+/// Why training failed.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// A scene could not be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// Training takes square pictures.
+    #[error("{}: view '{view}' is {width}x{height}; training takes square pictures", path.display())]
+    NotSquare {
+        /// The scene.
+        path: PathBuf,
+        /// The view.
+        view: String,
+        /// Its width.
+        width: u32,
+        /// Its height.
+        height: u32,
+    },
+    /// A scene has too few views for sources and a target.
+    #[error("{}: has {view_count} photographs; {least_views} are needed, as sources and one more", path.display())]
+    FewViews {
+        /// The scene.
+        path: PathBuf,
+        /// Its photographs.
+        view_count: usize,
+        /// How many are needed.
+        least_views: usize,
+    },
+    /// There are no scenes.
+    #[error("there are no scenes to {purpose}")]
+    NoScenes {
+        /// What for.
+        purpose: &'static str,
+    },
+    /// The size of the pictures is unusable.
+    #[error("{}: cannot be resampled: {error}", path.display())]
+    Pinhole {
+        /// The scene.
+        path: PathBuf,
+        /// What is wrong.
+        error: PinholeError,
+    },
+    /// A checkpoint could not be read.
+    #[error(transparent)]
+    Parameters(#[from] CheckpointError),
+    /// A checkpoint is not what can be trained on.
+    #[error("{}: {reason}", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The folder holds a run with other settings.
+    #[error("{}: holds a run with other settings: {difference}; give another folder, or the same settings to go on", path.display())]
+    OtherRun {
+        /// The file with the run's state.
+        path: PathBuf,
+        /// What differs.
+        difference: String,
+    },
+    /// The run's state cannot be used.
+    #[error("{}: is no state of a training run: {reason}", path.display())]
+    State {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// The loss or a parameter became NaN or infinite.
+    #[error("step {step}: the {what} is not finite; a lower --rate may help; the state before it is kept")]
+    NotFinite {
+        /// The step.
+        step: u32,
+        /// What is not finite.
+        what: String,
+    },
+    /// An output could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The library of automatic differentiation refused.
+    #[error("the training graph: {0}")]
+    Graph(#[from] candle_core::Error),
+    /// The person stopped the work.
+    #[error("{0}")]
+    Interrupted(#[from] Interrupted),
+}

@@ -1,0 +1,266 @@
+//! PixelNeRF as a graph that can be differentiated: the family of [`viewfuse_field::pixelnerf`], with batch norms that keep
+//! the statistics they begin with (mean 0, variance 1), so that training and rendering compute the same, and one point
+//! network for both passes.
+
+#[cfg(test)]
+mod tests;
+
+use super::TrainError;
+use super::batch::Batch;
+use super::compositing::{coarse_depths, fine_depths, points, weights as sample_weights};
+use super::draw::{Draw, Purpose};
+use super::images::{convolve, dims4, enlarge, max_pool};
+use super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, Window};
+use super::parameters::{Contents, Parameters, fan_in, random};
+use candle_core::{DType, Device, Result, Tensor};
+use std::sync::Arc;
+use viewfuse_core::pixelnerf::EmbedBlock;
+use viewfuse_core::rays::RayPoint;
+use viewfuse_field::pixelnerf::architecture::Architecture;
+use viewfuse_field::resnet::needs_downsample;
+use viewfuse_nn::checkpoint::Checkpoint;
+
+/// What the field adds to variances.
+const VARIANCE_FLOOR: f64 = 1.0e-5;
+/// Density that all of space begins with: light reaches every sample, and every sample a gradient.
+const FIRST_DENSITY: f32 = 0.3;
+
+/// Samples of a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct SampleCounts {
+    pub(crate) coarse: usize,
+    pub(crate) fine: usize,
+}
+
+/// The network with its parameters.
+#[derive(Clone, Debug)]
+pub(crate) struct PixelNerf {
+    pub(crate) architecture: Architecture,
+    pub(crate) parameters: Parameters,
+    /// Whether only the views' weights are differentiated.
+    pub(crate) is_frozen: bool,
+}
+
+/// Statistics that batch norms keep.
+fn is_statistic(name: &str) -> bool {
+    name.ends_with(".running_mean") || name.ends_with(".running_var")
+}
+
+impl PixelNerf {
+    /// At the beginning of training: He's initialisation, second layers of the blocks zero, as published.
+    pub(crate) fn new(
+        architecture: Architecture,
+        dtype: DType,
+        seed: u64,
+    ) -> std::result::Result<PixelNerf, TrainError> {
+        let mut tensors = architecture.tensors();
+        tensors.retain(|tensor| !is_statistic(&tensor.name));
+        let parameters = Parameters::new(&tensors, dtype, |tensor| {
+            let name = &tensor.name;
+            let is_norm = tensor.shape.len() == 1 && name.ends_with("weight");
+            let count: usize = tensor.shape.iter().product();
+            Ok(match () {
+                () if is_norm => vec![1.0; count],
+                () if name.ends_with("lin_out.bias") => vec![0.0, 0.0, 0.0, FIRST_DENSITY],
+                () if name.ends_with("bias") || name.ends_with("fc_1.weight") => vec![0.0; count],
+                () => random(tensor, seed, (2.0 / fan_in(tensor) as f32).sqrt() * gain(name)),
+            })
+        })?;
+        Ok(PixelNerf { architecture, parameters, is_frozen: false })
+    }
+
+    /// A trained one, to be left as it is.
+    ///
+    /// # Errors
+    /// [`TrainError`] if the checkpoint is of another family, has a second point network, or batch norms with statistics.
+    pub(crate) fn frozen(checkpoint: &Checkpoint, dtype: DType) -> std::result::Result<PixelNerf, TrainError> {
+        let architecture = Architecture::of(checkpoint)?;
+        let refuse = |reason: String| TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason };
+        if architecture.has_fine {
+            return Err(refuse("it has a second point network, which this training does not know".to_owned()));
+        }
+        let mut tensors = architecture.tensors();
+        for tensor in tensors.iter().filter(|tensor| is_statistic(&tensor.name)) {
+            let kept = if tensor.name.ends_with("mean") { 0.0 } else { 1.0 };
+            if checkpoint.tensor(&tensor.name)?.iter().any(|value| *value != kept) {
+                return Err(refuse(format!("{} is not {kept} everywhere; statistics are not known here", tensor.name)));
+            }
+        }
+        tensors.retain(|tensor| !is_statistic(&tensor.name));
+        let parameters = Parameters::of(checkpoint, &tensors, dtype)?;
+        Ok(PixelNerf { architecture, parameters, is_frozen: true })
+    }
+
+    /// Its tensors, with what the file says of it beside them.
+    pub(crate) fn checkpoint(&self) -> Result<Contents> {
+        let mut tensors = self.parameters.values()?;
+        for tensor in self.architecture.tensors().into_iter().filter(|tensor| is_statistic(&tensor.name)) {
+            let kept = if tensor.name.ends_with("mean") { 0.0 } else { 1.0 };
+            let values = vec![kept; tensor.shape.iter().product()];
+            tensors.push((tensor, values));
+        }
+        Ok((tensors, self.architecture.metadata()))
+    }
+
+    fn sizes(&self) -> PointNetworkSizes {
+        let Architecture { width, block_count, injected_count, .. } = self.architecture;
+        PointNetworkSizes { embedded_len: self.architecture.embedded_len(), width, block_count, injected_count }
+    }
+
+    /// A convolution with its batch norm.
+    fn normalised(
+        &self,
+        images: &Tensor,
+        convolution: &str,
+        norm: &str,
+        window: Window,
+        is_first: bool,
+    ) -> Result<Tensor> {
+        let get = |name: &str, leaf: &str| self.parameters.get(&format!("encoder.model.{name}.{leaf}"));
+        let scale = (get(norm, "weight")? / (1.0 + VARIANCE_FLOOR).sqrt())?;
+        let weights = get(convolution, "weight")?.broadcast_mul(&scale.reshape((scale.dim(0)?, 1, 1, 1))?)?;
+        convolve(images, &weights, window, !is_first)?.broadcast_add(get(norm, "bias")?)
+    }
+
+    /// From pictures `[image][row][column][3]` in `[-1, 1]` to what the point network adds to its flow,
+    /// `[image][row][column][block][width]`, rows and columns half as many.
+    pub(crate) fn grids(&self, pictures: &Tensor) -> Result<Tensor> {
+        let stem = Window { size: 7, stride: 2, padding: 3, dilation: 1 };
+        let first = self.normalised(pictures, "conv1", "bn1", stem, true)?.relu()?;
+        let [count, height, width, mut channels] = dims4(&first)?;
+        let mut latents = vec![first.clone()];
+        let mut image = max_pool(&first)?;
+        for (level, sizes) in (1..).zip(&self.architecture.levels) {
+            for block in 0..sizes.block_count {
+                let name = format!("layer{level}.{block}");
+                let stride = if level > 1 && block == 0 { 2 } else { 1 };
+                let window = Window { stride, ..Window::same(3) };
+                let inside =
+                    self.normalised(&image, &format!("{name}.conv1"), &format!("{name}.bn1"), window, false)?;
+                let inside = inside.relu()?;
+                let (conv2, bn2) = (format!("{name}.conv2"), format!("{name}.bn2"));
+                let inside = self.normalised(&inside, &conv2, &bn2, Window::same(3), false)?;
+                let beside = match block == 0 && needs_downsample(level, channels, sizes.channels) {
+                    true => {
+                        let window = Window { size: 1, stride, padding: 0, dilation: 1 };
+                        let (name, norm) = (format!("{name}.downsample.0"), format!("{name}.downsample.1"));
+                        self.normalised(&image, &name, &norm, window, false)?
+                    }
+                    false => image,
+                };
+                image = (inside + beside)?.relu()?;
+                channels = sizes.channels;
+            }
+            latents.push(enlarge(&image, height, width)?);
+        }
+        let latents = Tensor::cat(&latents, 3)?.reshape((count * height * width, ()))?;
+        let layers = |leaf: &str| -> Result<Tensor> {
+            let names = (0..self.architecture.injected_count).map(|block| format!("mlp_coarse.lin_z.{block}.{leaf}"));
+            Tensor::cat(&names.map(|name| self.parameters.get(&name)).collect::<Result<Vec<_>>>()?, 0)
+        };
+        let added = latents.matmul(&layers("weight")?.t()?)?.broadcast_add(&layers("bias")?)?;
+        added.reshape((count, height, width, ()))
+    }
+
+    /// The point network's parameters in the order of [`PointNetworkSizes::parameter_count`].
+    fn point_parameters(&self) -> Result<Tensor> {
+        let mut names = vec!["lin_in".to_owned()];
+        for block in 0..self.architecture.block_count {
+            names.extend([0, 1].map(|layer| format!("blocks.{block}.fc_{layer}")));
+        }
+        names.push("lin_out".to_owned());
+        let mut all = Vec::new();
+        for name in names {
+            for leaf in ["weight", "bias"] {
+                all.push(self.parameters.get(&format!("mlp_coarse.{name}.{leaf}"))?.flatten_all()?);
+            }
+        }
+        Tensor::cat(&all, 0)
+    }
+
+    /// Densities and colours at points `[object][point]`: `[object and point][4]`, not yet rectified or squashed.
+    fn raw(&self, network: &Seen<'_>, points: &[Vec<RayPoint>]) -> Result<Tensor> {
+        let [_, height, width, _] = dims4(network.grids)?;
+        let Architecture { frequency_count, frequency, pixel_centre, .. } = self.architecture;
+        let embed = EmbedBlock { point_count: 0, frequency_count: frequency_count as u32, frequency };
+        let points = Arc::new(Points::new(network.cameras, points, &embed, [height, width], pixel_centre));
+        let operation =
+            PointNetwork { sizes: self.sizes(), points, node_count: height * width, is_frozen: self.is_frozen };
+        network.grids.apply_op3(network.weights, network.parameters, Apply(operation))
+    }
+
+    /// The colours of a batch's rays, `[object and ray][3]` in `[0, 1]`, over white, with weights `[object][view]` of the
+    /// views. The first pass, which decides where the second looks, is not differentiated.
+    pub(crate) fn render(&self, batch: &Batch, weights: &Tensor, draw: &Draw, counts: SampleCounts) -> Result<Tensor> {
+        let (mut grids, mut parameters) = (self.grids(&batch.pictures)?, self.point_parameters()?);
+        if self.is_frozen {
+            (grids, parameters) = (grids.detach(), parameters.detach());
+        }
+        let seen = Seen { cameras: &batch.cameras, grids: &grids, weights, parameters: &parameters };
+        let (plain_grids, plain_weights, plain_parameters) = (grids.detach(), weights.detach(), parameters.detach());
+        let plain = Seen {
+            cameras: &batch.cameras,
+            grids: &plain_grids,
+            weights: &plain_weights,
+            parameters: &plain_parameters,
+        };
+        let rays = batch.rays[0].len();
+        let share = |object: usize, purpose: Purpose| {
+            move |ray: usize, sample: usize| draw.uniform(purpose, ((object * rays + ray) << 7) + sample)
+        };
+        let mut depths: Vec<Vec<f32>> = batch
+            .rays
+            .iter()
+            .enumerate()
+            .map(|(object, rays)| coarse_depths(rays, counts.coarse, share(object, Purpose::Samples)))
+            .collect();
+        if counts.fine > 0 {
+            let (raw, lengths) = self.sampled(&plain, batch, &depths)?;
+            let weights = sample_weights(&density(&raw, &lengths)?, &lengths)?.to_dtype(DType::F32)?;
+            let weights = weights.flatten_all()?.to_vec1::<f32>()?;
+            for (object, (depths, weights)) in depths.iter_mut().zip(weights.chunks(rays * counts.coarse)).enumerate() {
+                let share = share(object, Purpose::FineSamples);
+                *depths = fine_depths(&batch.rays[object], depths, weights, counts.fine, share);
+            }
+        }
+        let (raw, lengths) = self.sampled(&seen, batch, &depths)?;
+        let weights = sample_weights(&density(&raw, &lengths)?, &lengths)?;
+        let colours = logistic(&raw.narrow(1, 0, 3)?)?.reshape((lengths.dim(0)?, lengths.dim(1)?, 3))?;
+        let sum = weights.unsqueeze(1)?.matmul(&colours)?.squeeze(1)?;
+        // What is not stopped is white.
+        sum.broadcast_add(&(1.0 - weights.sum_keepdim(1)?)?)
+    }
+
+    /// What the network says at samples, and the lengths `[object and ray][sample]` that they stand for.
+    fn sampled(&self, seen: &Seen<'_>, batch: &Batch, depths: &[Vec<f32>]) -> Result<(Tensor, Tensor)> {
+        let points: Vec<Vec<RayPoint>> =
+            batch.rays.iter().zip(depths).map(|(rays, depths)| points(rays, depths)).collect();
+        let raw = self.raw(seen, &points)?;
+        let lengths: Vec<f32> = points.iter().flatten().map(|point| point.length).collect();
+        let rays = batch.rays.len() * batch.rays[0].len();
+        let lengths = Tensor::from_vec(lengths, (rays, raw.dim(0)? / rays), &Device::Cpu)?.to_dtype(raw.dtype())?;
+        Ok((raw, lengths))
+    }
+}
+
+/// What the point network is asked with.
+struct Seen<'a> {
+    cameras: &'a [Vec<viewfuse_core::camera::CameraBlock>],
+    grids: &'a Tensor,
+    weights: &'a Tensor,
+    parameters: &'a Tensor,
+}
+
+fn density(raw: &Tensor, lengths: &Tensor) -> Result<Tensor> {
+    raw.narrow(1, 3, 1)?.reshape(lengths.shape())
+}
+
+/// `1 / (1 + e^-x)`.
+fn logistic(values: &Tensor) -> Result<Tensor> {
+    (values.neg()?.exp()? + 1.0)?.recip()
+}
+
+/// What He's deviation is multiplied by: the last layer begins quietly.
+fn gain(name: &str) -> f32 {
+    if name.ends_with("lin_out.weight") { 0.1 } else { 1.0 }
+}

@@ -1,0 +1,123 @@
+//! A small PixelNeRF, with equal weights of the views as published.
+
+use super::TrainError;
+use super::batch::{Batch, BatchSize, Targets};
+use super::draw::{Draw, Purpose};
+use super::parameters::{Contents, Parameters};
+use super::pixelnerf::{PixelNerf, SampleCounts};
+use super::run::{self, Learner, Outcome, Schedule, Validated};
+use super::scenes::{Data, TrainingScene};
+use candle_core::{DType, Result, Tensor};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use viewfuse_field::pixelnerf::architecture::Architecture;
+use viewfuse_job::progress::Progress;
+use viewfuse_nn::checkpoint::Checkpoint;
+
+/// What a run is made of beside its schedule and scenes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PixelNerfSettings {
+    /// Width of the point network; the trunk is as wide as fits to it. A network that goes on from a file has the file's.
+    pub width: usize,
+    /// Side of the pictures.
+    pub side: u32,
+    /// Objects of a step.
+    pub objects: usize,
+    /// Rays of each.
+    pub rays: usize,
+    /// Samples of a ray in the first pass.
+    pub coarse: usize,
+    /// Samples that the second pass adds.
+    pub fine: usize,
+}
+
+/// How many sources a step has: drawn from this list. Mostly three, so that what is learned can do with few, sometimes one
+/// or more, so that it can do with any weights.
+const SOURCE_COUNTS: [usize; 8] = [1, 2, 3, 3, 3, 3, 4, 6];
+/// Objects and rays of each that validation looks at, sources, and samples.
+const VALIDATION: BatchSize = BatchSize { objects: 24, rays: 192 };
+const VALIDATION_SOURCES: usize = 3;
+const VALIDATION_SAMPLES: SampleCounts = SampleCounts { coarse: 64, fine: 32 };
+
+struct PixelNerfLearner {
+    network: PixelNerf,
+    scenes: Vec<TrainingScene>,
+    validation: Vec<TrainingScene>,
+    settings: PixelNerfSettings,
+}
+
+/// Trains a PixelNeRF in `folder`, or goes on there: from scratch, or from a network that was learned before.
+///
+/// # Errors
+/// [`TrainError`].
+pub fn train_pixelnerf(
+    settings: &PixelNerfSettings,
+    from: Option<&Checkpoint>,
+    schedule: &Schedule,
+    [scenes, validation]: [&[PathBuf]; 2],
+    folder: &Path,
+    progress: &dyn Progress,
+) -> std::result::Result<Outcome, TrainError> {
+    let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
+    let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
+    let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
+    let network = match from {
+        Some(checkpoint) => PixelNerf { is_frozen: false, ..PixelNerf::frozen(checkpoint, DType::F32)? },
+        None => PixelNerf::new(architecture, DType::F32, schedule.seed)?,
+    };
+    let settings = PixelNerfSettings { width: network.architecture.width, ..*settings };
+    let record = run::settings("pixelnerf", &settings, schedule, &data, from)?;
+    let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings };
+    run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
+}
+
+/// Ten times the logarithm of one over the mean square.
+pub(super) fn decibels(mean_square: &Tensor) -> Result<f64> {
+    Ok(-10.0 * f64::from(mean_square.to_dtype(DType::F32)?.to_scalar::<f32>()?).log10())
+}
+
+/// Mean PSNR over some rays of scenes, with the weights that `weigh` gives the views: the same rays and sources every time,
+/// whatever the run's seed.
+pub(super) fn score(
+    network: &PixelNerf,
+    scenes: &[TrainingScene],
+    source_count: usize,
+    targets: Targets,
+    weigh: &dyn Fn(&Batch) -> Result<Tensor>,
+) -> Result<f64> {
+    let count = VALIDATION.objects.min(scenes.len());
+    let mut sum = 0.0;
+    for object in 0..count {
+        let draw = Draw { seed: 0, step: u32::MAX - object as u32 };
+        let dtype = network.parameters.dtype();
+        let batch = Batch::of(scenes, &[object], &draw, VALIDATION.rays, source_count, targets, dtype)?;
+        let colours = network.render(&batch, &weigh(&batch)?, &draw, VALIDATION_SAMPLES)?;
+        sum += decibels(&(colours - &batch.truth)?.sqr()?.mean_all()?)?;
+    }
+    Ok(sum / count as f64)
+}
+
+impl Learner for PixelNerfLearner {
+    fn parameters(&self) -> &Parameters {
+        &self.network.parameters
+    }
+
+    fn loss(&self, draw: &Draw) -> Result<Tensor> {
+        let PixelNerfSettings { objects, rays, coarse, fine, .. } = self.settings;
+        let views = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
+        let size = BatchSize { objects, rays };
+        let batch = Batch::draw(&self.scenes, draw, size, views, Targets::Many, self.network.parameters.dtype())?;
+        let colours = self.network.render(&batch, &batch.mean_weights()?, draw, SampleCounts { coarse, fine })?;
+        (colours - &batch.truth)?.sqr()?.mean_all()
+    }
+
+    fn validate(&self) -> Result<Validated> {
+        let score =
+            score(&self.network, &self.validation, VALIDATION_SOURCES, Targets::Many, &|batch| batch.mean_weights())?;
+        Ok(Validated { score, remark: String::new() })
+    }
+
+    fn checkpoint(&self) -> Result<Contents> {
+        self.network.checkpoint()
+    }
+}

@@ -1,0 +1,217 @@
+//! A training run: steps, validation, a state from which it goes on, and what it leaves in its folder.
+//!
+//! ```text
+//! state.safetensors   to go on from
+//! model.safetensors   the learned parameters (their moving average), whenever the state is written
+//! curve.svg           loss and validation over the steps
+//! record.json         settings, times, scores
+//! ```
+
+use super::TrainError;
+use super::adam::Adam;
+use super::average::Average;
+use super::curve;
+use super::draw::Draw;
+use super::parameters::{Contents, Parameters};
+use super::scenes::Data;
+use super::state::{self, Learned, Progressed};
+use candle_core::Tensor;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use viewfuse_job::digest::sha256_of;
+use viewfuse_job::files::write_whole;
+use viewfuse_job::progress::Progress;
+use viewfuse_nn::checkpoint::{Checkpoint, Precision};
+
+/// How long, and how fast.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Schedule {
+    /// Steps of the run.
+    pub steps: u32,
+    /// Learning rate after the first hundred steps, over which it rises; from there it falls along a cosine to
+    /// 3 % of it.
+    pub rate: f64,
+    /// Seed of every random number.
+    pub seed: u64,
+    /// Steps from one validation to the next.
+    pub validate_every: u32,
+    /// Seconds from one writing of the state to the next; changes no number.
+    #[serde(skip)]
+    pub write_every: f64,
+}
+
+/// Steps over which the rate rises.
+const WARM_UP: u32 = 100;
+/// Share of the rate that the run ends with.
+const LAST_RATE: f64 = 0.03;
+/// Steps from one point of the loss curve to the next.
+const LOSS_EVERY: u32 = 50;
+/// Largest norm of a gradient.
+const MOST_GRADIENT: f64 = 1.0;
+/// Share of the average of the parameters that a step leaves.
+const AVERAGING: f64 = 0.999;
+
+impl Schedule {
+    /// Learning rate of a step.
+    pub fn rate_at(&self, step: u32) -> f64 {
+        let rising = f64::from(step + 1) / f64::from(WARM_UP);
+        let done = f64::from(step) / f64::from(self.steps.max(1));
+        let falling = LAST_RATE + (1.0 - LAST_RATE) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos());
+        self.rate * rising.min(falling)
+    }
+}
+
+/// What the numbers of a run hang on: a run goes on only where all of it is the same. Files are told by what is in them,
+/// not by where they lie.
+pub(crate) fn settings(
+    model: &str,
+    own: &impl Serialize,
+    schedule: &Schedule,
+    data: &Data,
+    checkpoint: Option<&Checkpoint>,
+) -> Result<serde_json::Value, TrainError> {
+    let unreadable = |path: &Path, cause: &std::io::Error| TrainError::Checkpoint {
+        path: path.to_path_buf(),
+        reason: format!("cannot be read: {cause}"),
+    };
+    let digest = |path: &Path| sha256_of(path).map_err(|cause| unreadable(path, &cause));
+    let checkpoint = checkpoint.map(|checkpoint| digest(checkpoint.path())).transpose()?;
+    Ok(serde_json::json!({
+        "model": model, "settings": own, "schedule": schedule, "checkpoint": checkpoint,
+        "scenes": data.training.len(), "validation_scenes": data.validation.len(), "data": data.digest(),
+    }))
+}
+
+/// Something that is learned.
+pub(crate) trait Learner {
+    /// What is learned.
+    fn parameters(&self) -> &Parameters;
+
+    /// The loss of a step.
+    fn loss(&self, draw: &Draw) -> candle_core::Result<Tensor>;
+
+    /// How good it is on what it does not learn from; higher is better.
+    fn validate(&self) -> candle_core::Result<Validated>;
+
+    /// The file that it becomes: tensors and metadata.
+    fn checkpoint(&self) -> candle_core::Result<Contents>;
+}
+
+/// What validation found.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Validated {
+    pub(crate) score: f64,
+    /// What else there is to say.
+    pub(crate) remark: String,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The learned parameters.
+    pub model: PathBuf,
+    /// Seconds of all steps, those of earlier parts of the run included.
+    pub seconds: f64,
+    /// Step and score of every validation.
+    pub scores: Vec<(u32, f64)>,
+}
+
+/// Trains, or goes on, until all steps are made. Interrupted, it writes its state first.
+pub(crate) fn run(
+    learner: &dyn Learner,
+    schedule: &Schedule,
+    settings: &serde_json::Value,
+    score_name: &str,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Outcome, TrainError> {
+    let run = Run { learner, schedule, settings, score_name, folder };
+    let average = Average::new(learner.parameters(), AVERAGING)?;
+    let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
+    let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
+    progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
+    let mut written = Instant::now();
+    while so_far.steps < schedule.steps {
+        if interrupt::check().is_err() {
+            run.write(&so_far, &learned)?;
+            progress.check()?;
+        }
+        let start = Instant::now();
+        let step = so_far.steps;
+        let loss = learner.loss(&Draw { seed: schedule.seed, step })?;
+        let value = f64::from(loss.to_dtype(candle_core::DType::F32)?.to_scalar::<f32>()?);
+        if !value.is_finite() {
+            return Err(TrainError::NotFinite { step, what: "loss".to_owned() });
+        }
+        let rate = schedule.rate_at(step);
+        learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MOST_GRADIENT)?;
+        learned.average.step(learner.parameters(), step)?;
+        so_far.steps += 1;
+        so_far.pending = (so_far.pending.0 + value, so_far.pending.1 + 1);
+        if so_far.steps % LOSS_EVERY == 0 {
+            so_far.losses.push((so_far.steps, so_far.pending.0 / f64::from(so_far.pending.1)));
+            so_far.pending = (0.0, 0);
+        }
+        if so_far.steps % schedule.validate_every == 0 || so_far.steps == schedule.steps {
+            let Validated { score, remark } = learned.as_written(|| learner.validate())?;
+            so_far.scores.push((so_far.steps, score));
+            progress.note(&run.status(&so_far, &remark));
+        }
+        so_far.seconds += start.elapsed().as_secs_f64();
+        progress.step();
+        if written.elapsed().as_secs_f64() > schedule.write_every {
+            run.write(&so_far, &learned)?;
+            written = Instant::now();
+        }
+    }
+    run.write(&so_far, &learned)?;
+    Ok(Outcome { model: run.model(), seconds: so_far.seconds, scores: so_far.scores })
+}
+
+struct Run<'a> {
+    learner: &'a dyn Learner,
+    schedule: &'a Schedule,
+    settings: &'a serde_json::Value,
+    score_name: &'a str,
+    folder: &'a Path,
+}
+
+impl Run<'_> {
+    fn state(&self) -> PathBuf {
+        self.folder.join("state.safetensors")
+    }
+
+    fn model(&self) -> PathBuf {
+        self.folder.join("model.safetensors")
+    }
+
+    fn status(&self, so_far: &Progressed, remark: &str) -> String {
+        let loss = so_far.losses.last().map_or(f64::NAN, |(_, loss)| *loss);
+        let score = so_far.scores.last().map_or(f64::NAN, |(_, score)| *score);
+        let remark = if remark.is_empty() { String::new() } else { format!(", {remark}") };
+        format!(
+            "step {}: loss {loss:.5}, {} {score:.3}{remark}, {:.0} s",
+            so_far.steps, self.score_name, so_far.seconds
+        )
+    }
+
+    /// The state last: whoever goes on from it finds the rest.
+    fn write(&self, so_far: &Progressed, learned: &Learned<'_>) -> Result<(), TrainError> {
+        let (tensors, metadata) = learned.as_written(|| self.learner.checkpoint())?;
+        Checkpoint::in_memory("trained", tensors, metadata).write_to_the_end(&self.model(), Precision::Kept)?;
+        write_whole(&self.folder.join("curve.svg"), curve::svg(so_far, self.score_name).as_bytes())?;
+        let record = serde_json::json!({
+            "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),
+            "settings": self.settings,
+            "steps": so_far.steps,
+            "steps_wanted": self.schedule.steps,
+            "seconds": so_far.seconds,
+            "losses": so_far.losses,
+            "score": self.score_name,
+            "scores": so_far.scores,
+        });
+        write_whole(&self.folder.join("record.json"), format!("{record:#}\n").as_bytes())?;
+        state::write(&self.state(), self.settings, so_far, learned)
+    }
+}

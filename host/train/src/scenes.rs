@@ -1,0 +1,154 @@
+//! Scenes to learn from, in memory: pictures over white at the size that is trained at, with their cameras.
+
+use super::TrainError;
+use image::imageops::{FilterType, resize};
+use image::{Rgb, RgbImage};
+use rayon::prelude::*;
+use sha2::{Digest, Sha256};
+use std::path::PathBuf;
+use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_field::learned::default_near_far;
+use viewfuse_job::digest::hexadecimal;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::Scene;
+
+/// What a run learns from, and what it is validated on.
+pub(crate) struct Data {
+    pub(crate) training: Vec<TrainingScene>,
+    pub(crate) validation: Vec<TrainingScene>,
+}
+
+impl Data {
+    /// Reads both lists, `[training, validation]`.
+    ///
+    /// # Errors
+    /// [`TrainError::NoScenes`] if one is empty, otherwise as [`TrainingScene::open_all`].
+    pub(crate) fn open(
+        lists: [&[PathBuf]; 2],
+        side: u32,
+        least_views: usize,
+        progress: &dyn Progress,
+    ) -> Result<Data, TrainError> {
+        for (list, purpose) in lists.iter().zip(["learn from", "validate on"]) {
+            if list.is_empty() {
+                return Err(TrainError::NoScenes { purpose });
+            }
+        }
+        let [training, validation] = lists.map(|list| TrainingScene::open_all(list, side, least_views, progress));
+        Ok(Data { training: training?, validation: validation? })
+    }
+
+    /// SHA-256 of all cameras and pictures as training sees them.
+    pub(crate) fn digest(&self) -> String {
+        let mut digest = Sha256::new();
+        for scene in self.training.iter().chain(&self.validation) {
+            digest.update((scene.pictures.len() as u64).to_le_bytes());
+            digest.update(bytemuck::cast_slice(&scene.blocks));
+            scene.pictures.iter().for_each(|picture| digest.update(picture.as_raw()));
+        }
+        hexadecimal(&digest.finalize())
+    }
+}
+
+/// One object with all its views.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct TrainingScene {
+    /// Where it was read from.
+    pub(crate) path: PathBuf,
+    /// Of the pictures at this size.
+    pub(crate) cameras: Vec<Camera>,
+    /// The same as kernels take them.
+    pub(crate) blocks: Vec<CameraBlock>,
+    /// Over white.
+    pub(crate) pictures: Vec<RgbImage>,
+    /// First and last column and row of what is not white in each picture; all of an empty one.
+    pub(crate) bounds: Vec<[u32; 4]>,
+    /// Where rays begin and end.
+    pub(crate) near_far: [f32; 2],
+}
+
+impl TrainingScene {
+    /// Reads all photographs of a scene at `side` x `side`.
+    ///
+    /// # Errors
+    /// [`TrainError`] if the scene or a photograph cannot be read, or if the pictures are not square.
+    pub(crate) fn open(path: &PathBuf, side: u32) -> Result<TrainingScene, TrainError> {
+        let scene = Scene::open(path)?;
+        let (mut cameras, mut pictures) = (Vec::new(), Vec::new());
+        for (index, view) in scene.views.iter().enumerate().filter(|(_, view)| view.image.is_some()) {
+            progress.check()?;
+            let pinhole = &view.camera.pinhole;
+            if pinhole.width() != pinhole.height() {
+                let (path, view) = (path.clone(), view.name.clone());
+                return Err(TrainError::NotSquare { path, view, width: pinhole.width(), height: pinhole.height() });
+            }
+            let mut picture = over_white(&scene.photograph(index)?.pixels);
+            if pinhole.width() != side {
+                picture = resize(&picture, side, side, FilterType::Triangle);
+            }
+            let pinhole =
+                pinhole.resized(side, side).map_err(|error| TrainError::Pinhole { path: path.clone(), error })?;
+            cameras.push(Camera { pose: view.camera.pose, pinhole });
+            pictures.push(picture);
+        }
+        Ok(TrainingScene {
+            path: path.clone(),
+            blocks: cameras.iter().map(|camera| camera.block(0)).collect(),
+            bounds: pictures.iter().map(bounds).collect(),
+            near_far: default_near_far(&cameras),
+            cameras,
+            pictures,
+        })
+    }
+
+    /// Reads many, all cores at once.
+    ///
+    /// # Errors
+    /// As [`TrainingScene::open`], and [`TrainError::FewViews`] where one has fewer than `least_views`.
+    pub(crate) fn open_all(
+        paths: &[PathBuf],
+        side: u32,
+        least_views: usize,
+        progress: &dyn Progress,
+    ) -> Result<Vec<TrainingScene>, TrainError> {
+        progress.expect(paths.len());
+        let open = |path: &PathBuf| {
+            let scene = TrainingScene::open(path, side)?;
+            if scene.cameras.len() < least_views {
+                let (path, view_count) = (path.clone(), scene.cameras.len());
+                return Err(TrainError::FewViews { path, view_count, least_views });
+            }
+            progress.step();
+            Ok(scene)
+        };
+        paths.par_iter().map(open).collect()
+    }
+
+    /// Red, green, blue in `[0, 1]`.
+    pub(crate) fn colour(&self, view: usize, column: u32, row: u32) -> [f32; 3] {
+        self.pictures[view].get_pixel(column, row).0.map(|value| f32::from(value) / 255.0)
+    }
+
+    /// A picture as networks are shown it: `[row][column][channel]`, in `[-1, 1]`.
+    pub(crate) fn shown(&self, view: usize) -> impl Iterator<Item = f32> + '_ {
+        self.pictures[view].as_raw().iter().map(|value| f32::from(*value) / 127.5 - 1.0)
+    }
+}
+
+fn over_white(pixels: &image::RgbaImage) -> RgbImage {
+    RgbImage::from_fn(pixels.width(), pixels.height(), |column, row| {
+        let [red, green, blue, alpha] = pixels.get_pixel(column, row).0.map(u32::from);
+        Rgb([red, green, blue].map(|colour| ((colour * alpha + 255 * (255 - alpha) + 127) / 255) as u8))
+    })
+}
+
+fn bounds(picture: &RgbImage) -> [u32; 4] {
+    let mut bounds = [u32::MAX, u32::MAX, 0, 0];
+    for (column, row, pixel) in picture.enumerate_pixels() {
+        // What is left of a white background after resampling is no object.
+        if pixel.0.iter().any(|value| *value < 250) {
+            bounds = [bounds[0].min(column), bounds[1].min(row), bounds[2].max(column), bounds[3].max(row)];
+        }
+    }
+    if bounds[0] > bounds[2] { [0, 0, picture.width() - 1, picture.height() - 1] } else { bounds }
+}

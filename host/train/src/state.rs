@@ -1,0 +1,140 @@
+//! What a run needs to go on: parameters, the optimiser's moments, and the curves so far, in one file that appears whole.
+
+use super::TrainError;
+use super::adam::Adam;
+use super::average::Average;
+use super::parameters::Parameters;
+use candle_core::{DType, Device, Tensor, Var};
+use safetensors::SafeTensors;
+use safetensors::tensor::{Dtype, TensorView};
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+use viewfuse_job::files::write_whole;
+
+/// What has happened so far.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Progressed {
+    /// Steps that were made.
+    pub(crate) steps: u32,
+    /// Time that they took, seconds.
+    pub(crate) seconds: f64,
+    /// Step and mean loss since the entry before.
+    pub(crate) losses: Vec<(u32, f64)>,
+    /// Sum and count of the losses since the last entry.
+    pub(crate) pending: (f64, u32),
+    /// Step and score in validation.
+    pub(crate) scores: Vec<(u32, f64)>,
+}
+
+const SETTINGS: &str = "settings";
+const PROGRESSED: &str = "progressed";
+
+/// What a run changes.
+pub(crate) struct Learned<'a> {
+    pub(crate) parameters: &'a Parameters,
+    pub(crate) adam: Adam,
+    pub(crate) average: Average,
+}
+
+impl Learned<'_> {
+    /// Does something while the parameters are what the run's model is: their average.
+    pub(crate) fn as_written<R>(&self, work: impl FnOnce() -> candle_core::Result<R>) -> candle_core::Result<R> {
+        self.average.during(self.parameters, work)
+    }
+
+    /// Every tensor by its name in the file.
+    fn tensors(&self) -> Vec<(String, &Var)> {
+        let mut all = Vec::new();
+        for (name, variable) in self.parameters.iter() {
+            let [mean, square] = &self.adam.moments[name];
+            let average = &self.average.values[name];
+            let own = [("parameter", variable), ("mean", mean), ("square", square), ("average", average)];
+            all.extend(own.map(|(prefix, own)| (format!("{prefix}.{name}"), own)));
+        }
+        all
+    }
+}
+
+/// Writes the state.
+pub(crate) fn write(
+    path: &Path,
+    settings: &serde_json::Value,
+    progressed: &Progressed,
+    learned: &Learned<'_>,
+) -> Result<(), TrainError> {
+    let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
+    let mut bytes: Vec<(String, Vec<usize>, Vec<u8>)> = Vec::new();
+    for (name, tensor) in learned.tensors() {
+        let values = tensor.flatten_all()?.to_dtype(DType::F64)?.to_vec1::<f64>()?;
+        // The numbers are of 32 bits in every run; the wider ones are the tests'.
+        let values: Vec<u8> = values.iter().flat_map(|value| (*value as f32).to_le_bytes()).collect();
+        bytes.push((name, tensor.dims().to_vec(), values));
+    }
+    let mut views = BTreeMap::new();
+    for (name, shape, bytes) in &bytes {
+        let view = TensorView::new(Dtype::F32, shape.clone(), bytes).map_err(|error| wrong(error.to_string()))?;
+        views.insert(name.clone(), view);
+    }
+    let progressed = serde_json::to_string(progressed).map_err(|error| wrong(error.to_string()))?;
+    let metadata = HashMap::from([(SETTINGS.to_owned(), settings.to_string()), (PROGRESSED.to_owned(), progressed)]);
+    let file = safetensors::serialize(&views, Some(metadata)).map_err(|error| wrong(error.to_string()))?;
+    Ok(write_whole(path, &file)?)
+}
+
+/// Reads the state into the parameters and moments, if there is one.
+///
+/// # Errors
+/// [`TrainError::OtherRun`] if it is that of other settings, [`TrainError::State`] if it cannot be used.
+pub(crate) fn read(
+    path: &Path,
+    settings: &serde_json::Value,
+    learned: &Learned<'_>,
+) -> Result<Option<Progressed>, TrainError> {
+    let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
+    let bytes = match std::fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(cause) => return Err(wrong(cause.to_string())),
+    };
+    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| wrong(error.to_string()))?;
+    let file = SafeTensors::deserialize(&bytes).map_err(|error| wrong(error.to_string()))?;
+    let metadata = header.metadata().as_ref();
+    let text = |key: &str| metadata.and_then(|all| all.get(key)).ok_or_else(|| wrong(format!("it has no {key}")));
+    let earlier: serde_json::Value = serde_json::from_str(text(SETTINGS)?).map_err(|error| wrong(error.to_string()))?;
+    if let Some(difference) = difference(&earlier, settings) {
+        return Err(TrainError::OtherRun { path: path.to_path_buf(), difference });
+    }
+    let progressed = serde_json::from_str(text(PROGRESSED)?).map_err(|error| wrong(error.to_string()))?;
+    let value = |name: String, like: &Tensor| -> Result<Tensor, TrainError> {
+        let view = file.tensor(&name).map_err(|_| wrong(format!("it has no tensor '{name}'")))?;
+        if view.dtype() != Dtype::F32 || view.shape() != like.dims() {
+            let shape = like.dims();
+            return Err(wrong(format!(
+                "its tensor '{name}' is {:?} {:?} instead of F32 {shape:?}",
+                view.dtype(),
+                view.shape()
+            )));
+        }
+        let numbers =
+            view.data().chunks_exact(4).map(|bytes| f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]));
+        Ok(Tensor::from_vec(numbers.collect::<Vec<f32>>(), like.shape(), &Device::Cpu)?.to_dtype(like.dtype())?)
+    };
+    for (name, variable) in learned.tensors() {
+        variable.set(&value(name, variable)?)?;
+    }
+    Ok(Some(progressed))
+}
+
+/// The first setting that differs, in words.
+fn difference(earlier: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
+    let (Some(earlier), Some(now)) = (earlier.as_object(), now.as_object()) else {
+        return (earlier != now).then(|| "its settings are no list".to_owned());
+    };
+    let keys = earlier.keys().chain(now.keys());
+    let differing = keys.into_iter().find(|key| earlier.get(*key) != now.get(*key))?;
+    let shown = |settings: &serde_json::Map<String, serde_json::Value>| {
+        settings.get(differing).map_or("nothing".to_owned(), ToString::to_string)
+    };
+    Some(format!("{differing} was {} and is {}", shown(earlier), shown(now)))
+}
