@@ -182,7 +182,7 @@ fn made_of_the_formula_with_two_gains() {
     // Written and read again it is the same network.
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("small.safetensors");
-    checkpoint.write_safetensors(&path, Precision::Kept).expect("a file");
+    checkpoint.write_safetensors(&path, Precision::Kept, &Silent).expect("a file");
     let read = Checkpoint::open(&path).expect("a checkpoint");
     assert_eq!(Architecture::of(&read).expect("a member of the family"), Architecture::small());
 }

@@ -204,7 +204,7 @@ fn every_input_has_a_control() -> Result<(), Failed> {
 
 /// A device whose results of a kernel are off by 1e-3 breaches its tolerance.
 fn a_fault_is_reported(kernel: Kernel) -> Result<(), Failed> {
-    let report = check_kernel(&Faulty { kernel }, Role::Other, kernel, 1)?;
+    let report = check_kernel(&Faulty { kernel }, Role::Other, kernel, 1, &Silent)?;
     match (report.breach, report.versus_cpu) {
         (Some(_), Some(versus)) if versus.absolute > 0.0 && versus.equal < 1.0 => Ok(()),
         (breach, versus) => Err(format!("reported: {breach:?}, {versus:?}").into()),

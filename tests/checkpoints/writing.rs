@@ -18,7 +18,7 @@ fn what_pytorch_wrote_comes_back() {
     let path = folder.path().join("new/file.safetensors");
     for name in ["zip.pth", "training.pth"] {
         let before = data(name);
-        let written = before.write_safetensors(&path, Precision::Kept).expect("written");
+        let written = before.write_safetensors(&path, Precision::Kept, &Silent).expect("written");
         let after = Checkpoint::open(&path).expect("opened");
         assert_eq!((after.shapes(), after.metadata()), (before.shapes(), before.metadata()));
         for tensor in before.shapes().keys() {
@@ -47,7 +47,7 @@ fn in_half_precision() {
     // Halfway between 1 and its neighbour 1 + 2^-10, and a third of the smallest number of 16 bits.
     let tensors = [tensor("a", &[1.0 + 0.5f32.powi(11), 65504.0]), tensor("b", &[0.5f32.powi(24) / 3.0, 0.0])];
     let checkpoint = Checkpoint::in_memory("it", tensors, BTreeMap::new());
-    let written = checkpoint.write_safetensors(&path, Precision::Half).expect("written");
+    let written = checkpoint.write_safetensors(&path, Precision::Half, &Silent).expect("written");
     let expected = 0.5f64.powi(11) / (1.0 + 0.5f64.powi(11));
     assert!((written.relative_error - expected).abs() < 1.0e-12, "{written:?}");
     assert_eq!(written.tiny_count, 1);
@@ -57,7 +57,7 @@ fn in_half_precision() {
     assert_eq!(after.tensor("a").expect("a"), [1.0, 65504.0]);
     assert_eq!(after.tensor("b").expect("b"), [0.0, 0.0]);
     // Integers stay what they are.
-    data("zip.pth").write_safetensors(&path, Precision::Half).expect("written");
+    data("zip.pth").write_safetensors(&path, Precision::Half, &Silent).expect("written");
     let after = Checkpoint::open(&path).expect("opened");
     assert_eq!(after.element("1.num_batches_tracked"), Some(Element::I64));
     assert_eq!(after.element("double"), Some(Element::F16));
@@ -67,7 +67,7 @@ fn in_half_precision() {
 #[track_caller]
 fn assert_not_written(checkpoint: &Checkpoint, precision: Precision, part: &str) {
     let folder = tempfile::tempdir().expect("a folder");
-    let outcome = checkpoint.write_safetensors(&folder.path().join("out.safetensors"), precision);
+    let outcome = checkpoint.write_safetensors(&folder.path().join("out.safetensors"), precision, &Silent);
     let message = outcome.expect_err("must fail").to_string();
     assert!(message.contains(part), "{message}");
     assert_eq!(std::fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing is left");
@@ -97,6 +97,6 @@ fn a_file_in_place_of_itself() {
     let claims = pair();
     let (_folder, path) = file(&archive(&state_dict(&claims), &claims));
     let checkpoint = Checkpoint::open(&path).expect("opened");
-    checkpoint.write_safetensors(&path, Precision::Kept).expect("written");
+    checkpoint.write_safetensors(&path, Precision::Kept, &Silent).expect("written");
     assert_eq!(Checkpoint::open(&path).expect("opened").origin(), "safetensors");
 }

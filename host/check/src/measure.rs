@@ -38,7 +38,7 @@ pub fn check_device<D: Device>(
     progress.expect(Kernel::ALL.len());
     let mut kernels = Vec::new();
     for kernel in Kernel::ALL {
-        kernels.push(check_kernel(device, role, kernel, seed_count)?);
+        kernels.push(check_kernel(device, role, kernel, seed_count, progress)?);
         progress.step();
     }
     Ok(DeviceReport { device: device.name(), kernels, picture: None })
@@ -53,14 +53,16 @@ pub fn check_kernel<D: Device>(
     role: Role,
     kernel: Kernel,
     seed_count: u32,
+    progress: &dyn Progress,
 ) -> Result<KernelReport, CheckError> {
-    visit(kernel, Check { device, role, seed_count })
+    visit(kernel, Check { device, role, seed_count, progress })
 }
 
 struct Check<'a, D> {
     device: &'a D,
     role: Role,
     seed_count: u32,
+    progress: &'a dyn Progress,
 }
 
 impl<D: Device> Visitor for Check<'_, D> {
@@ -74,7 +76,7 @@ impl<D: Device> Visitor for Check<'_, D> {
         let mut expected: Vec<Option<Bounded>> = Vec::new();
         for seed in 1..=u64::from(self.seed_count) {
             for size in SIZES {
-                progress.check()?;
+                self.progress.check()?;
                 let inputs = C::inputs(seed, size);
                 actual.extend(C::results(self.device, &inputs).map_err(failed)?);
                 expected.extend(C::expected(&inputs));

@@ -16,7 +16,7 @@ use viewfuse_device::cpu::Cpu;
 use viewfuse_field::Field;
 use viewfuse_field::photo::PhotoField;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, render};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Selection};
 use viewfuse_scene::photographs::longest_side;
@@ -128,7 +128,7 @@ fn synthetic() -> Result<TempDir, AnyError> {
         Ok(Camera { pinhole: camera.pinhole.resized(SYNTHETIC_SIDE, SYNTHETIC_SIDE)?, ..camera })
     };
     let cameras: Vec<Camera> = cameras.map(smaller).collect::<Result<_, _>>()?;
-    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE)?;
+    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE, &Silent)?;
     Ok(folder)
 }
 

@@ -164,7 +164,7 @@ fn object_of(
         return Err("fewer than two photographs: the object cannot be found".to_owned());
     }
     let album = Album::open(scene, views.iter().copied(), progress).map_err(|error| error.to_string())?;
-    let images = album.sources(&views, LOOK_SIDE, background).map_err(|error| error.to_string())?;
+    let images = album.sources(&views, LOOK_SIDE, background, progress).map_err(|error| error.to_string())?;
     warnings.extend(images.warning.clone());
     find_object(&images).ok_or_else(|| {
         "the silhouettes have no common object: wrong poses, or a background that is not of one colour".to_owned()

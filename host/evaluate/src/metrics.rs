@@ -18,9 +18,11 @@
 pub mod convention;
 pub mod dists;
 pub mod features;
+#[cfg(feature = "fid")]
 pub mod frechet;
 pub mod heads;
 pub mod interval;
+#[cfg(feature = "fid")]
 pub mod kernel;
 pub mod lpips;
 pub mod similarity;

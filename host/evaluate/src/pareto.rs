@@ -10,6 +10,7 @@
 pub mod difference;
 pub mod enlarged;
 pub mod front;
+#[cfg(feature = "plot")]
 pub mod plot;
 pub mod record;
 pub mod settings;
@@ -151,7 +152,7 @@ impl Subject<'_> {
         for Setting { field, options, .. } in settings {
             let side = field.source_side(working_side(scene, options, field.longest_side())?);
             if !known.iter().any(|(known_side, _)| *known_side == side) {
-                let prepared = album.sources(&job.sources, side, options.background)?;
+                let prepared = album.sources(&job.sources, side, options.background, progress)?;
                 if let Some(warning) = &prepared.warning {
                     progress.warn(&format!("{}: {warning}", scene.path.display()));
                 }

@@ -19,12 +19,12 @@ pub mod reference;
 pub mod sampling;
 mod volume;
 
-pub(crate) use architecture::MLP;
+pub use architecture::MLP;
 pub use architecture::{
     ASPP_RATES, Architecture, Block, COLOUR_CHANNELS, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Encoder,
     Level, Resampling, group_count,
 };
-pub(crate) use feature_image::{LAST_LENGTH, cast_block, ray_length};
+pub use feature_image::{LAST_LENGTH, cast_block, ray_length};
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{default_near_far, over_white};
@@ -270,7 +270,14 @@ impl<D: Device> Field<D> for Genvs {
         device.finish().map_err(FieldError::Device)
     }
 
-    fn encode_used(&self, device: &D, prepared: &Prepared<D>, (): &(), weights: &SourceWeights) -> Outcome<(), D> {
+    fn encode_used(
+        &self,
+        device: &D,
+        prepared: &Prepared<D>,
+        (): &(),
+        weights: &SourceWeights,
+        progress: &dyn Progress,
+    ) -> Outcome<(), D> {
         let encoded_views = self.counts().encoded_views;
         for view in self.used_views(prepared, weights) {
             progress.check()?;
@@ -294,7 +301,7 @@ impl<D: Device> Field<D> for Genvs {
     ) -> Outcome<Rendered, D> {
         let failed = FieldError::Device;
         let looking = self.looking::<D>(prepared.near_far, target)?;
-        self.encode_used(device, prepared, &(), weights)?;
+        self.encode_used(device, prepared, &(), weights, progress)?;
         let used = self.used_views(prepared, weights);
         let cameras: Vec<CameraBlock> = used.iter().map(|view| prepared.images[*view].camera).collect();
         let view_weights: Vec<f32> = used.iter().map(|view| weights.get(*view as u32)).collect();
@@ -313,7 +320,7 @@ impl<D: Device> Field<D> for Genvs {
             volumes: volumes.iter().filter_map(|volume| volume.as_ref()).collect(),
         };
         let mut scratch = Scratch::new(device);
-        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking)?;
+        let features = prepared.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
         let sampled = {
             let earlier = prepared.earlier.borrow();
             let start = match (&*earlier, self.options.omissions.reuse) {

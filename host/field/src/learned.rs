@@ -9,7 +9,7 @@ const NEAR_FAR_SHARES: [f32; 2] = [8.0 / 13.0, 18.0 / 13.0];
 
 /// Where rays begin and end unless a person says so: by the mean distance of the cameras from what they look at. A single
 /// camera does not show that: its distance from the world's origin counts then, where SRN's objects stand.
-pub(crate) fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
+pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
     let distance = match cameras {
         [camera] => camera.pose.centre_world().length(),
         cameras => Rig::of(cameras).distance,

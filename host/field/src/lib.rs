@@ -7,11 +7,11 @@
 pub mod family;
 pub mod finite;
 pub mod genvs;
-pub(crate) mod learned;
+pub mod learned;
 pub mod photo;
 pub mod pixelnerf;
 pub mod render;
-pub(crate) mod resnet;
+pub mod resnet;
 
 use finite::NotFinite;
 use viewfuse_core::camera::Camera;
@@ -178,6 +178,7 @@ pub trait Field<D: Device> {
         _prepared: &Self::Prepared,
         _latents: &Self::Latents,
         _weights: &SourceWeights,
+        _progress: &dyn Progress,
     ) -> Result<(), FieldError<D::Error>> {
         Ok(())
     }

@@ -4,7 +4,7 @@
 //! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined by weights
 //! where the published network takes their mean.
 
-pub(crate) mod architecture;
+pub mod architecture;
 mod encoder;
 pub mod made;
 mod memory;
@@ -194,6 +194,7 @@ impl<D: Device> Field<D> for PixelNerf {
         prepared: &Prepared<D>,
         (): &(),
         weights: &SourceWeights,
+        progress: &dyn Progress,
     ) -> Result<(), FieldError<D::Error>> {
         let encoded_views = self.counts().encoded_views;
         for view in self.used_views(prepared, weights) {
@@ -217,7 +218,7 @@ impl<D: Device> Field<D> for PixelNerf {
         progress: &dyn Progress,
     ) -> Result<Rendered, FieldError<D::Error>> {
         let failed = FieldError::Device;
-        self.encode_used(device, prepared, &(), weights)?;
+        self.encode_used(device, prepared, &(), weights, progress)?;
         let used = self.used_views(prepared, weights);
         let cameras: Vec<CameraBlock> = used.iter().map(|view| prepared.cameras[*view]).collect();
         let view_weights: Vec<f32> = used.iter().map(|view| weights.get(*view as u32)).collect();
@@ -243,6 +244,7 @@ impl<D: Device> Field<D> for PixelNerf {
                 along_axis: 0,
             },
             background: prepared.background,
+            progress,
         };
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let pixels: Vec<u32> = (0..width * height).collect();

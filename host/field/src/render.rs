@@ -217,7 +217,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
         let side = working_side(scene, options, field.longest_side())?;
         let mut photographs = Duration::ZERO;
-        let images = timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background))?;
+        let images =
+            timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background, progress))?;
         if let Some(warning) = &images.warning {
             progress.warn(&format!("{}: {warning}", scene.path.display()));
         }
@@ -289,7 +290,9 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let omission = weights.without_least(self.options.leave_out);
         let camera = self.at_working_size(&target.camera)?;
         let mut encode = Duration::ZERO;
-        timed(&mut encode, || self.field.encode_used(self.device, &self.prepared, latents, &omission.weights))?;
+        timed(&mut encode, || {
+            self.field.encode_used(self.device, &self.prepared, latents, &omission.weights, progress)
+        })?;
         let rendered = self.field.render(
             self.device,
             &self.prepared,

@@ -13,12 +13,12 @@ pub struct Level {
 
 /// Whether the first block of level `level` (counted from 1) has a convolution beside it: where the level halves the image
 /// or, in a trunk that stops halving, is meant to, and where it changes the channels.
-pub(crate) fn needs_downsample(level: usize, in_channels: usize, out_channels: usize) -> bool {
+pub fn needs_downsample(level: usize, in_channels: usize, out_channels: usize) -> bool {
     level > 1 || in_channels != out_channels
 }
 
 /// Every tensor of a trunk, in the order of the data; the names begin with `prefix` and a dot.
-pub(crate) fn tensors(prefix: &str, stem_channels: usize, levels: &[Level]) -> Vec<TensorShape> {
+pub fn tensors(prefix: &str, stem_channels: usize, levels: &[Level]) -> Vec<TensorShape> {
     let mut tensors = Vec::new();
     let mut convolution = |name: &str, norm: &str, shape: [usize; 4]| {
         tensors.push(TensorShape { name: format!("{prefix}.{name}.weight"), shape: shape.to_vec() });
@@ -42,7 +42,7 @@ pub(crate) fn tensors(prefix: &str, stem_channels: usize, levels: &[Level]) -> V
 }
 
 /// The tensors of a batch norm.
-pub(crate) fn batch_norm(tensors: &mut Vec<TensorShape>, name: &str, channels: usize) {
+pub fn batch_norm(tensors: &mut Vec<TensorShape>, name: &str, channels: usize) {
     for leaf in ["weight", "bias", "running_mean", "running_var"] {
         tensors.push(TensorShape { name: format!("{name}.{leaf}"), shape: vec![channels] });
     }

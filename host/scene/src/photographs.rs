@@ -136,6 +136,7 @@ impl<'a> Album<'a> {
         views: &[usize],
         longest_side: u32,
         choice: BackgroundChoice,
+        progress: &dyn Progress,
     ) -> Result<SourceImages, PhotographsError> {
         // Twice over the photographs, so that never more of them than there are threads must be in memory.
         let look = |&view: &usize| {

@@ -202,7 +202,7 @@ pub fn make(
             random = random_views(&sphere, settings.seed, job.index, settings.views)?;
             &random
         };
-        write_scene(&job.folder, &object, cameras, RAYS_PER_SIDE)?;
+        write_scene(&job.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
         progress.step();
         Ok::<(), MakeError>(())
     })?;

@@ -17,7 +17,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_job::progress::Interrupted;
+use viewfuse_job::progress::{Interrupted, Progress};
 
 /// Most views in a folder: their names have six digits.
 pub const LARGEST_VIEW_COUNT: usize = 1_000_000;
@@ -79,11 +79,17 @@ pub enum WriteError {
 
 /// Renders `object` from every camera and writes the scene to `folder`, which must not exist; its parent is created
 /// where it is missing. Views are named by the index of their camera. A pixel is the mean of `rays_per_side` squared rays
-/// ([`render_with`]). Looks between the views whether a stop was asked for.
+/// ([`render_with`]). Between the views it asks `progress` whether to go on.
 ///
 /// # Errors
 /// [`WriteError`], always with the path.
-pub fn write_scene(folder: &Path, object: &Object, cameras: &[Camera], rays_per_side: u32) -> Result<(), WriteError> {
+pub fn write_scene(
+    folder: &Path,
+    object: &Object,
+    cameras: &[Camera],
+    rays_per_side: u32,
+    progress: &dyn Progress,
+) -> Result<(), WriteError> {
     let pinhole = shared_pinhole(folder, cameras)?;
     let name = folder.file_name().ok_or_else(|| WriteError::NoName { path: folder.to_owned() })?;
     // `symlink_metadata`: a dangling link is something that stands there, too.

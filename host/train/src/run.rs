@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use viewfuse_job::digest::sha256_of;
 use viewfuse_job::files::write_whole;
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
 
 /// How long, and how fast.
@@ -133,7 +133,7 @@ pub(crate) fn run(
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();
     while so_far.steps < schedule.steps {
-        if interrupt::check().is_err() {
+        if progress.is_cancelled() {
             run.write(&so_far, &learned)?;
             progress.check()?;
         }
@@ -199,7 +199,11 @@ impl Run<'_> {
     /// The state last: whoever goes on from it finds the rest.
     fn write(&self, so_far: &Progressed, learned: &Learned<'_>) -> Result<(), TrainError> {
         let (tensors, metadata) = learned.as_written(|| self.learner.checkpoint())?;
-        Checkpoint::in_memory("trained", tensors, metadata).write_to_the_end(&self.model(), Precision::Kept)?;
+        Checkpoint::in_memory("trained", tensors, metadata).write_safetensors(
+            &self.model(),
+            Precision::Kept,
+            &Silent,
+        )?;
         write_whole(&self.folder.join("curve.svg"), curve::svg(so_far, self.score_name).as_bytes())?;
         let record = serde_json::json!({
             "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),

@@ -72,7 +72,7 @@ impl TrainingScene {
     ///
     /// # Errors
     /// [`TrainError`] if the scene or a photograph cannot be read, or if the pictures are not square.
-    pub(crate) fn open(path: &PathBuf, side: u32) -> Result<TrainingScene, TrainError> {
+    pub(crate) fn open(path: &PathBuf, side: u32, progress: &dyn Progress) -> Result<TrainingScene, TrainError> {
         let scene = Scene::open(path)?;
         let (mut cameras, mut pictures) = (Vec::new(), Vec::new());
         for (index, view) in scene.views.iter().enumerate().filter(|(_, view)| view.image.is_some()) {
@@ -113,7 +113,7 @@ impl TrainingScene {
     ) -> Result<Vec<TrainingScene>, TrainError> {
         progress.expect(paths.len());
         let open = |path: &PathBuf| {
-            let scene = TrainingScene::open(path, side)?;
+            let scene = TrainingScene::open(path, side, progress)?;
             if scene.cameras.len() < least_views {
                 let (path, view_count) = (path.clone(), scene.cameras.len());
                 return Err(TrainError::FewViews { path, view_count, least_views });

@@ -11,6 +11,7 @@ use viewfuse_device::Device;
 use viewfuse_evaluate::metrics::MetricError;
 use viewfuse_evaluate::metrics::dists::Dists;
 use viewfuse_evaluate::metrics::features::Features;
+#[cfg(feature = "fid")]
 use viewfuse_evaluate::metrics::frechet::frechet_distance;
 use viewfuse_evaluate::metrics::lpips::{Lpips, LpipsTrunk};
 use viewfuse_evaluate::metrics::similarity::ssim_gaussian;
@@ -57,7 +58,15 @@ fn doubles(file: &File<'_>, name: &str) -> Result<Vec<f64>, VerifyError> {
     Ok(view.data().as_chunks::<8>().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
 }
 
+/// A build without the feature `fid` computes no distances of sets.
+#[cfg(not(feature = "fid"))]
+fn frechet(file: &File<'_>, name: &str, _title: &str, _report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    let reason = "is a Frechet distance, which this build leaves out: it is in builds with the feature `fid`";
+    Err(file.wrong(name, reason.to_owned()))
+}
+
 /// The distance of the sets `NAME_x` and `NAME_y`.
+#[cfg(feature = "fid")]
 fn frechet(file: &File<'_>, name: &str, title: &str, report: &mut Report) -> Result<Vec<String>, VerifyError> {
     let names = ["x", "y"].map(|set| format!("{name}_{set}"));
     let set = |name: &str| {

@@ -2,6 +2,7 @@
 
 use super::say;
 use super::table::table;
+use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -34,7 +35,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let progress = Progress::new("checking");
+    let progress = Terminal::new("checking");
     let picture = Picture::new(arguments.scene.as_deref(), &progress)?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
     let mut report = Report {

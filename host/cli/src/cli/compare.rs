@@ -4,6 +4,7 @@ use super::metrics_options::MetricOptions;
 use super::options::DeviceOptions;
 use super::say;
 use super::table::table;
+use super::terminal::Terminal;
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use image::RgbImage;
@@ -88,7 +89,7 @@ fn opened(path: &Path) -> anyhow::Result<RgbImage> {
 
 fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyhow::Result<()> {
     let metrics = arguments.metrics.open(device)?;
-    let progress = Progress::new("comparing");
+    let progress = Terminal::new("comparing");
     progress.expect(pairs.len());
     let (mut scores, mut pictures) = (Vec::new(), Vec::new());
     for pair in pairs {

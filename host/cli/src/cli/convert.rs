@@ -2,6 +2,7 @@
 
 use super::say;
 use super::table::table;
+use super::terminal::Terminal;
 use anyhow::{bail, ensure};
 use clap::Args;
 use std::path::PathBuf;
@@ -57,7 +58,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     check_writable(output)?;
     let checkpoint = Checkpoint::open(&arguments.input)?;
     let precision = if arguments.half { Precision::Half } else { Precision::Kept };
-    let written = checkpoint.write_safetensors(output, precision)?;
+    let written = checkpoint.write_safetensors(output, precision, &Terminal::new("converting"))?;
     let mut rows = table(["tensor", "type", "shape", "bytes"].map(str::to_owned));
     for (name, element, shape, bytes) in &written.tensors {
         rows.add_row([name.clone(), element.name().to_owned(), format!("{shape:?}"), bytes.to_string()]);

@@ -11,6 +11,7 @@ mod tables;
 use super::metrics_options::MetricOptions;
 use super::model::{ModelOptions, Work};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::Args;
 use protocol::ProtocolOptions;
@@ -112,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in paths.iter().zip(&scenes) {
-        let progress = Progress::new("evaluating");
+        let progress = Terminal::new("evaluating");
         let job = Job {
             scene,
             selection: &selection,

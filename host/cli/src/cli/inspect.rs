@@ -1,13 +1,13 @@
 //! `viewfuse inspect`.
 
 use super::say;
+use super::terminal::Terminal;
 use clap::Args;
 use image::DynamicImage;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_evaluate::inspect::{Inspection, camera_map, inspect};
 use viewfuse_job::files::check_writable;
-use viewfuse_job::progress::Progress;
 use viewfuse_output::png::write_png;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -31,7 +31,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
-    let progress = Progress::new("reading");
+    let progress = Terminal::new("reading");
     let inspection = inspect(&scene, arguments.background, &progress)?;
     drop(progress);
     if arguments.json {

@@ -3,6 +3,7 @@
 use super::model::{AnyField, NetworkOptions};
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
+use super::terminal::Terminal;
 use super::{on_threads, say, wrong};
 use clap::Args;
 use comfy_table::CellAlignment;
@@ -77,7 +78,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
 
-    let progress = Progress::new("measuring");
+    let progress = Terminal::new("measuring");
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let album = Album::open(&scene, job.sources.iter().copied().chain(truths), &progress)?;
     let subject = Subject { scene: &scene, album: &album, job: &job, weighting: &weighting };

@@ -3,6 +3,7 @@
 use super::model::{GENVS, ModelOptions, Work, parse_level};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::parse::parse_count;
+use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::Args;
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
@@ -14,7 +15,6 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_field::Field;
 use viewfuse_field::render::{Frame, RenderOptions, render};
 use viewfuse_job::files::{check_writable, remove_if_there, write_whole};
-use viewfuse_job::progress::Progress;
 use viewfuse_output::png::write_png;
 use viewfuse_output::record::{
     FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
@@ -99,7 +99,7 @@ impl Work for Run<'_> {
         let names = source_names(self.scene, self.job);
         // An old record beside new pictures would lie: it goes before the first of them appears.
         let record_path = self.arguments.output.join("run.json");
-        let progress = Progress::new("rendering");
+        let progress = Terminal::new("rendering");
         let mut frames = Vec::new();
         let mut frame_time = Duration::ZERO;
         let (mut size, mut background, mut warning) = ([0, 0], [0.0; 3], None);

@@ -1,10 +1,10 @@
 //! `viewfuse scenes`.
 
+use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_job::progress::Progress;
 use viewfuse_synthetic::collection::{LARGEST_OBJECT_COUNT, ObjectCounts, Settings, make};
 use viewfuse_synthetic::kinds::Kind;
 
@@ -84,7 +84,7 @@ fn run_make(arguments: &MakeArguments) -> anyhow::Result<ExitCode> {
     let MakeArguments { kind, out, train, val, test, views, test_views, size, seed, threads } = arguments;
     let settings = Settings::new(*kind, *seed, *size, *views, *test_views);
     let counts = ObjectCounts { train: *train, validation: *val, test: *test };
-    let progress = Progress::new("making");
+    let progress = Terminal::new("making");
     let made = on_threads(*threads, || make(out, *kind, &settings, counts, &progress))??;
     drop(progress);
     say(format_args!("{}: {} new scenes, {} were there", out.display(), made.new_count, made.kept_count))?;

@@ -1,10 +1,10 @@
 //! `viewfuse train`.
 
+use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_train::{
@@ -183,7 +183,7 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     let settings =
         PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
     let [train, validation] = scenes(&run.data)?;
-    let progress = Progress::new("training");
+    let progress = Terminal::new("training");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
     let train_it =
         || train_pixelnerf(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
@@ -197,7 +197,7 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
     let settings =
         GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
     let [train, validation] = scenes(&run.data)?;
-    let progress = Progress::new("training");
+    let progress = Terminal::new("training");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
     let train_it =
         || train_genvs(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
@@ -215,7 +215,7 @@ fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
     let settings = WeightingSettings { embedding, side: *side, objects: *objects, rays: *rays };
     let [train, validation] = scenes(&run.data)?;
     let checkpoint = Checkpoint::open(model)?;
-    let progress = Progress::new("training");
+    let progress = Terminal::new("training");
     let (schedule, scenes) = (run.schedule(), [&train[..], &validation[..]]);
     let train_it = || train_weighting(&settings, &checkpoint, &schedule, scenes, &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;

@@ -73,8 +73,9 @@ impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
         prepared: &F::Prepared,
         latents: &F::Latents,
         weights: &SourceWeights,
+        progress: &dyn Progress,
     ) -> Result<(), FieldError<D::Error>> {
-        self.field.encode_used(device, prepared, latents, weights)
+        self.field.encode_used(device, prepared, latents, weights, progress)
     }
 
     fn render(

@@ -26,7 +26,7 @@ pub(super) const IMAGE_SIDE: &str = "viewfuse.image_side";
 const ENCODER_STRIDE: usize = 16;
 
 /// What the names of the tensors of the network at points begin with; a number follows.
-pub(crate) const MLP: &str = "pixel_nerf_net.mlp.layers";
+pub const MLP: &str = "pixel_nerf_net.mlp.layers";
 
 /// Sizes of a member of the family.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -16,11 +16,12 @@ use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::rays::CastBlock;
 use viewfuse_device::{Device, Layer, Rays};
+use viewfuse_job::progress::Progress;
 
 /// Rays that the CPU takes at once: their points' activations stay in its caches.
 const LEAST_RAYS: usize = 64;
 /// Length of the last sample as published: whatever is there is opaque.
-pub(crate) const LAST_LENGTH: f32 = 1.0e10;
+pub const LAST_LENGTH: f32 = 1.0e10;
 
 type Outcome<T, D> = Result<T, FieldError<<D as viewfuse_device::Memory>::Error>>;
 
@@ -87,6 +88,7 @@ pub(super) fn render<D: Device>(
     views: &Views<'_, D>,
     target: &CameraBlock,
     looking: &Looking,
+    progress: &dyn Progress,
 ) -> Outcome<Image<D>, D> {
     let failed = FieldError::Device;
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
@@ -112,7 +114,7 @@ pub(super) fn render<D: Device>(
 
 /// Rays through a grid whose corners are the picture's corners (published: `linspace(-1, 1)` over half the pixels), with
 /// this many samples between two depths along the target's principal axis. Rows and columns of the target are even.
-pub(crate) fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_count: u32) -> CastBlock {
+pub fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_count: u32) -> CastBlock {
     let [width, height] = [target.width / 2, target.height / 2];
     let scale = |nodes: u32, pixels: u32| nodes.saturating_sub(1).max(1) as f32 / pixels as f32;
     let (across, down) = (scale(width, target.width), scale(height, target.height));
@@ -130,7 +132,7 @@ pub(crate) fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_cou
 
 /// How long a ray is from its first to its last sample in the lengths that the network's densities are for, unless a person
 /// says otherwise: as published for SRN, 1 over the focal length in halves of the image's height.
-pub(crate) fn ray_length(target: &CameraBlock) -> f32 {
+pub fn ray_length(target: &CameraBlock) -> f32 {
     target.height as f32 / (2.0 * target.intrinsics[1])
 }
 

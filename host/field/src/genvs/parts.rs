@@ -89,8 +89,9 @@ impl<D: Device> Parts<D> {
         views: &Views<'_, D>,
         target: &CameraBlock,
         looking: &Looking,
+        progress: &dyn Progress,
     ) -> Outcome<Image<D>, D> {
-        render(device, scratch, &self.points, views, target, looking)
+        render(device, scratch, &self.points, views, target, looking, progress)
     }
 
     /// The network at points.

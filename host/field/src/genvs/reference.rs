@@ -118,7 +118,7 @@ impl<'a, D: Device> Reference<'a, D> {
             volumes: volumes.iter().filter_map(|volume| volume.as_ref()).collect(),
         };
         let mut scratch = Scratch::new(*device);
-        let image = prepared.parts.features(*device, &mut scratch, &views, target, &looking)?;
+        let image = prepared.parts.features(*device, &mut scratch, &views, target, &looking, &Silent)?;
         device.download(&image.values).map_err(failed)
     }
 

@@ -8,6 +8,7 @@ use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::rays::CastBlock;
 use viewfuse_core::wanted::WantedBlock;
 use viewfuse_device::{Device, Pixels, Rays};
+use viewfuse_job::progress::Progress;
 
 /// Most rays at a time.
 pub(super) const MOST_RAYS: usize = 4096;
@@ -56,6 +57,7 @@ pub(super) struct Renderer<'a, D: Device> {
     pub(super) settled: f32,
     pub(super) cast: CastBlock,
     pub(super) background: [f32; 3],
+    pub(super) progress: &'a dyn Progress,
 }
 
 /// Samples of some rays.
@@ -175,7 +177,7 @@ impl<D: Device> Renderer<'_, D> {
         asked.samples += u64::from(rays.count * samples.count);
         asked.asked += list.len() as u64;
         for some in list.chunks(workspace.point_count as usize) {
-            progress.check()?;
+            self.progress.check()?;
             let count = some.len() as u32;
             let some = device.upload(some).map_err(failed)?;
             device

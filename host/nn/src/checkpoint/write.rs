@@ -13,7 +13,7 @@ use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::Path;
 use viewfuse_job::files::WholeFile;
-use viewfuse_job::progress::Interrupted;
+use viewfuse_job::progress::Progress;
 
 /// The key of what is no tensor.
 const METADATA: &str = "__metadata__";
@@ -59,23 +59,11 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError`] if a tensor cannot be read, holds a NaN or an infinity or a number that the precision cannot
     /// hold, or if the file cannot be written, or if the work is stopped.
-    pub fn write_safetensors(&self, path: &Path, precision: Precision) -> Result<Written, CheckpointError> {
-        self.write(path, precision, interrupt::check)
-    }
-
-    /// As [`Checkpoint::write_safetensors`], also when the work is to be stopped: what stops writes what it has.
-    ///
-    /// # Errors
-    /// [`CheckpointError`].
-    pub(crate) fn write_to_the_end(&self, path: &Path, precision: Precision) -> Result<Written, CheckpointError> {
-        self.write(path, precision, || Ok(()))
-    }
-
-    fn write(
+    pub fn write_safetensors(
         &self,
         path: &Path,
         precision: Precision,
-        may_go_on: impl Fn() -> Result<(), Interrupted>,
+        progress: &dyn Progress,
     ) -> Result<Written, CheckpointError> {
         let target = |element: Element| match precision {
             Precision::Half if element.is_float() => Element::F16,
@@ -105,7 +93,7 @@ impl Checkpoint {
         let bytes = 8 + header.len() as u64 + tensors.iter().map(|(_, _, _, bytes)| bytes).sum::<u64>();
         let mut written = Written { tensors, bytes, relative_error: 0.0, tiny_count: 0, tiny_error: 0.0 };
         for index in 0..written.tensors.len() {
-            may_go_on().map_err(CheckpointError::Interrupted)?;
+            progress.check().map_err(CheckpointError::Interrupted)?;
             let (name, target) = (written.tensors[index].0.clone(), written.tensors[index].1);
             let mut done = 0;
             self.read(&name, |element, bytes| {

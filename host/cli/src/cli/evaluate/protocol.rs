@@ -1,5 +1,6 @@
 //! `viewfuse evaluate --protocol`.
 
+use super::super::terminal::Terminal;
 use super::Arguments;
 use super::tables::{csv_of, print_table};
 use crate::cli::metrics_options::MetricOptions;
@@ -95,7 +96,7 @@ pub(super) fn run(
     let Chosen { device, reason } = arguments.device.open()?;
     let shard = arguments.protocol.shard.unwrap_or(Shard::ALL);
 
-    let progress = Progress::new("evaluating");
+    let progress = Terminal::new("evaluating");
     let work = Jobs {
         path: folder,
         settings: &settings,

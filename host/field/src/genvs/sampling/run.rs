@@ -168,7 +168,7 @@ where
 
     /// A call of the denoiser. What it says is finite.
     fn call(&mut self, state: &D::Buffer<f32>, sigma: f32) -> Outcome<Denoised<D>, D> {
-        progress.check()?;
+        self.progress.check()?;
         let mut buffer = self.buffer()?;
         (self.denoise)(state, sigma, &mut buffer)?;
         let values = download_finite(self.device, &buffer, &format!("denoising at level {sigma}"), "denoised picture")?;

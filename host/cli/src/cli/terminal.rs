@@ -1,0 +1,76 @@
+//! The person at the terminal: a bar of progress, warnings, news, and Ctrl-C.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+use viewfuse_job::progress::Progress;
+
+/// Set by Ctrl-C and by a polite kill.
+static CANCELLED: AtomicBool = AtomicBool::new(false);
+
+/// Makes Ctrl-C (and a polite kill) set the flag instead of ending the process. A second one ends it at once.
+///
+/// # Errors
+/// If another handler is already installed.
+pub(crate) fn listen() -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(|| {
+        if CANCELLED.swap(true, Ordering::SeqCst) {
+            std::process::exit(130);
+        }
+    })
+}
+
+/// A bar on a terminal, nothing elsewhere; warnings on standard error, news on standard output.
+pub(crate) struct Terminal {
+    bar: ProgressBar,
+    /// Warnings that were shown.
+    told: Mutex<Vec<String>>,
+}
+
+impl Terminal {
+    /// A bar with a label; its length grows by [`Progress::expect`]. Hidden when standard error is not a terminal.
+    pub(crate) fn new(label: &str) -> Terminal {
+        let bar = ProgressBar::new(0);
+        let template = "{msg:>12} [{wide_bar:.blue}] {pos}/{len} {eta}";
+        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_message(label.to_owned());
+        bar.enable_steady_tick(Duration::from_millis(200));
+        Terminal { bar, told: Mutex::default() }
+    }
+}
+
+impl Progress for Terminal {
+    fn expect(&self, pieces: usize) {
+        self.bar.inc_length(pieces as u64);
+    }
+
+    fn step(&self) {
+        self.bar.inc(1);
+    }
+
+    /// Once, however often it is given.
+    fn warn(&self, warning: &str) {
+        let Ok(mut told) = self.told.lock() else { return };
+        if !told.iter().any(|earlier| earlier == warning) {
+            self.bar.suspend(|| eprintln!("viewfuse: warning: {warning}"));
+            told.push(warning.to_owned());
+        }
+    }
+
+    /// A reader that has gone away is no reason to stop.
+    fn note(&self, news: &str) {
+        self.bar.suspend(|| writeln!(std::io::stdout().lock(), "{news}").ok());
+    }
+
+    fn is_cancelled(&self) -> bool {
+        CANCELLED.load(Ordering::SeqCst)
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
