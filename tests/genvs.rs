@@ -18,7 +18,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
 use viewfuse::field::{Field, FieldError, Rendered};
-use viewfuse::job::progress::Silent;
+use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
 use viewfuse_core::camera::Camera;
@@ -64,10 +64,19 @@ fn try_picture(
     weights: &SourceWeights,
     target: &Camera,
 ) -> Result<Rendered, FieldError<Infallible>> {
-    let quiet = Silent;
-    let prepared = field.prepare(&Cpu, sources, &quiet)?;
-    field.encode(&Cpu, &prepared, &[], &quiet)?;
-    field.render(&Cpu, &prepared, &(), weights, target, 0.0, &quiet)
+    try_picture_with(field, sources, weights, target, &Silent)
+}
+
+fn try_picture_with(
+    field: &Genvs,
+    sources: &SourceImages,
+    weights: &SourceWeights,
+    target: &Camera,
+    progress: &dyn Progress,
+) -> Result<Rendered, FieldError<Infallible>> {
+    let prepared = field.prepare(&Cpu, sources, progress)?;
+    field.encode(&Cpu, &prepared, &[], progress)?;
+    field.render(&Cpu, &prepared, &(), weights, target, 0.0, progress)
 }
 
 fn picture_with(field: &Genvs, sources: &SourceImages, weights: &SourceWeights, target: &Camera) -> Rendered {

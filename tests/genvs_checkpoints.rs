@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use viewfuse::field::genvs::{
     Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Level, Resampling, group_count, made,
 };
+use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
 use viewfuse::nn::formula;
 

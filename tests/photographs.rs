@@ -16,11 +16,11 @@ fn photographs_that_are_not_kept_are_read_when_they_are_needed() {
     let views: Vec<usize> = (0..6).collect();
     let kept = Album::open(&scene, views.iter().copied(), &Silent).expect("photographs");
     let none = Album::open(&scene, [], &Silent).expect("no photograph");
-    let sources = |album: &Album| album.sources(&views, 48, BackgroundChoice::Auto).expect("sources");
+    let sources = |album: &Album| album.sources(&views, 48, BackgroundChoice::Auto, &Silent).expect("sources");
     assert_eq!(sources(&kept), sources(&none));
     let truth = |album: &Album| album.truth(7, [40, 40], [0.25; 3]).expect("a truth");
     assert_eq!(truth(&kept), truth(&none));
-    assert_ne!(sources(&kept), kept.sources(&views, 47, BackgroundChoice::Auto).expect("sources"));
+    assert_ne!(sources(&kept), kept.sources(&views, 47, BackgroundChoice::Auto, &Silent).expect("sources"));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::pair;
 use safetensors::SafeTensors;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Element, Precision, TensorShape};
 use viewfuse_tests::checkpoints::{archive, file, state_dict};
 

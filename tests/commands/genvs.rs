@@ -5,6 +5,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse::field::{genvs, pixelnerf};
+use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::Precision;
 use viewfuse_tests::command::{
     Outcome, assert_refused, assert_wrong_arguments, command, f32_bytes, names_in, safetensors, toy,

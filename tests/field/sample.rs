@@ -138,7 +138,7 @@ fn a_photograph_of_nothing_is_named() {
     let scene = Scene::open(folder.path()).expect("a scene");
     let album = Album::open(&scene, 0..20, &Silent).expect("photographs");
     let sources: Vec<usize> = (0..20).collect();
-    match album.sources(&sources, 128, BackgroundChoice::Auto) {
+    match album.sources(&sources, 128, BackgroundChoice::Auto, &Silent) {
         Err(PhotographsError::NoSilhouette { path, colour }) => {
             assert!(path.ends_with("000007.png"), "{path}");
             assert!(colour.contains("255,255,255"), "{colour}");

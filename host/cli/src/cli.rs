@@ -24,6 +24,13 @@ mod train;
 mod verify;
 mod weights;
 
+#[cfg(not(feature = "pareto"))]
+use left_out::pareto;
+#[cfg(not(feature = "report"))]
+use left_out::report;
+#[cfg(not(feature = "train"))]
+use left_out::train;
+
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Display;
@@ -58,27 +65,15 @@ enum Command {
     /// Compare weighting schemes on views that are left out of the sources.
     Evaluate(evaluate::Arguments),
     /// Measure error against run time over what can be left out, on each device.
-    #[cfg(feature = "pareto")]
     Pareto(pareto::Arguments),
-    /// (Not in this build) Measure error against run time over what can be left out, on each device.
-    #[cfg(not(feature = "pareto"))]
-    Pareto(left_out::Arguments),
     /// Score pictures against what they should be.
     Compare(compare::Arguments),
     /// Learn a network, or the weighting of views for one, from scenes.
-    #[cfg(feature = "train")]
     Train(train::Arguments),
-    /// (Not in this build) Learn a network, or the weighting of views for one, from scenes.
-    #[cfg(not(feature = "train"))]
-    Train(left_out::Arguments),
     /// Make scenes to learn from.
     Scenes(scenes::Arguments),
     /// Write evaluations, run times and trainings as one HTML page.
-    #[cfg(feature = "report")]
     Report(report::Arguments),
-    /// (Not in this build) Write evaluations, run times and trainings as one HTML page.
-    #[cfg(not(feature = "report"))]
-    Report(left_out::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// List the devices that kernels can run on, and what those that cannot be used lack.
@@ -100,20 +95,11 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),
-        #[cfg(feature = "pareto")]
         Command::Pareto(arguments) => pareto::run(&arguments),
-        #[cfg(not(feature = "pareto"))]
-        Command::Pareto(arguments) => left_out::run("pareto", &arguments),
         Command::Compare(arguments) => compare::run(&arguments),
-        #[cfg(feature = "train")]
         Command::Train(arguments) => train::run(&arguments),
-        #[cfg(not(feature = "train"))]
-        Command::Train(arguments) => left_out::run("train", &arguments),
         Command::Scenes(arguments) => scenes::run(&arguments),
-        #[cfg(feature = "report")]
         Command::Report(arguments) => report::run(&arguments),
-        #[cfg(not(feature = "report"))]
-        Command::Report(arguments) => left_out::run("report", &arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),

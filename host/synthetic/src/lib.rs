@@ -1,7 +1,7 @@
 //! Synthetic scenes: objects described by formulas, and photographs of them.
 //!
 //! A scene of this making has what no photograph has: exact poses, exact alpha, exact depth and no licence but ours.
-//! The repository's sample scene is made here (`cargo run --release -p viewfuse --example make_sample -- FOLDER`).
+//! The repository's sample scene is made here (`cargo run --release -p viewfuse-synthetic --example make_sample -- FOLDER`).
 //! The modules stand in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text

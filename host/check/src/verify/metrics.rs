@@ -10,6 +10,7 @@ use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_device::Device;
 use viewfuse_evaluate::metrics::MetricError;
 use viewfuse_evaluate::metrics::dists::Dists;
+#[cfg(feature = "fid")]
 use viewfuse_evaluate::metrics::features::Features;
 #[cfg(feature = "fid")]
 use viewfuse_evaluate::metrics::frechet::frechet_distance;

@@ -12,8 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, Chosen};
-use viewfuse_evaluate::metrics::frechet::frechet_distance;
-use viewfuse_evaluate::metrics::kernel::kernel_distance;
+use viewfuse_evaluate::metrics::features::Features;
 use viewfuse_evaluate::metrics::trunk::InceptionKind;
 use viewfuse_evaluate::metrics::{Metrics, Scored};
 use viewfuse_job::progress::Progress;
@@ -151,7 +150,7 @@ fn print_distances<D: Device>(
     let predictions = metrics.features_of_predictions(device, pictures.iter().map(|[prediction, _]| prediction))?;
     let truths = metrics.features_of_truths(device, pictures.iter().map(|[_, truth]| truth))?;
     let (Some(predictions), Some(truths)) = (predictions, truths) else { return Ok(()) };
-    let (fid, kid) = (frechet_distance(&predictions, &truths)?, kernel_distance(&predictions, &truths, seed)?);
+    let [fid, kid] = distances(&predictions, &truths, seed)?;
     let network = match kind {
         InceptionKind::Fid => "the Inception that FID is defined with",
         InceptionKind::Torchvision => "torchvision's Inception: not the numbers of tables",
@@ -161,4 +160,18 @@ fn print_distances<D: Device>(
         say(format_args!("FID of {} pictures says little; KID does not depend on their number", pictures.len()))?;
     }
     Ok(())
+}
+
+/// FID and KID of two sets.
+#[cfg(feature = "fid")]
+fn distances(predictions: &Features, truths: &Features, seed: u64) -> anyhow::Result<[f64; 2]> {
+    use viewfuse_evaluate::metrics::frechet::frechet_distance;
+    use viewfuse_evaluate::metrics::kernel::kernel_distance;
+    Ok([frechet_distance(predictions, truths)?, kernel_distance(predictions, truths, seed)?])
+}
+
+/// `--fid` was refused before ([`MetricOptions::open`]).
+#[cfg(not(feature = "fid"))]
+fn distances(_: &Features, _: &Features, _: u64) -> anyhow::Result<[f64; 2]> {
+    Err(super::left_out::in_feature("FID and KID", "fid"))
 }

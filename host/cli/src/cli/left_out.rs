@@ -1,22 +1,38 @@
-//! Commands that this build leaves out: what they would compile costs most and serves fewest.
+//! Commands that a build leaves out: what compiling them costs most and serves fewest. They say in one line how to get them.
 
 use super::wrong;
-use clap::Args;
-use std::ffi::OsString;
-use std::process::ExitCode;
+use std::fmt::Display;
 
-/// Whatever the command would take.
-#[derive(Args)]
-#[command(disable_help_flag = true)]
-pub(crate) struct Arguments {
-    #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
-    _all: Vec<OsString>,
+/// What a person who asked for something of a feature is told.
+pub(crate) fn in_feature(what: impl Display, feature: &str) -> anyhow::Error {
+    wrong(format_args!(
+        "this build has no {what}; `cargo run --release --features {feature} -- ...` has it, and so has \
+         `cargo install viewfuse-cli --features {feature}`"
+    ))
 }
 
-/// Says how to get the command, whose feature has its name.
-pub(crate) fn run(command: &str, _arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    Err(wrong(format_args!(
-        "this build has no `{command}`: run `cargo run --release --features {command} -- {command} ...`, or install it \
-         with `cargo install viewfuse-cli --features {command}`"
-    )))
+/// A stand-in for each command, in a module of its name, if the build leaves it out.
+macro_rules! stand_ins {
+    ($($command:ident $feature:literal),*) => {$(
+        #[cfg(not(feature = $feature))]
+        pub(crate) mod $command {
+            use clap::Args;
+            use std::ffi::OsString;
+            use std::process::ExitCode;
+
+            /// Whatever the command would take.
+            #[derive(Args)]
+            #[command(disable_help_flag = true)]
+            pub(crate) struct Arguments {
+                #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+                _all: Vec<OsString>,
+            }
+
+            pub(crate) fn run(_arguments: &Arguments) -> anyhow::Result<ExitCode> {
+                Err(super::in_feature(concat!("command `", $feature, "`"), $feature))
+            }
+        }
+    )*};
 }
+
+stand_ins!(pareto "pareto", report "report", train "train");

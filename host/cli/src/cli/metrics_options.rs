@@ -1,5 +1,6 @@
 //! Which metrics score pictures, and where their networks' parameters are.
 
+use super::left_out::in_feature;
 use super::wrong;
 use anyhow::Context;
 use clap::Args;
@@ -72,6 +73,9 @@ impl MetricOptions {
 
     /// Reads the networks and takes them to a device.
     pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
+        if self.fid.is_some() && cfg!(not(feature = "fid")) {
+            return Err(in_feature("FID and KID", "fid"));
+        }
         let mut lpips: Vec<Lpips<D>> = Vec::new();
         for (kind, files) in &self.lpips {
             if lpips.iter().any(|other| other.kind() == *kind) {

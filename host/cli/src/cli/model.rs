@@ -133,6 +133,7 @@ impl NetworkOptions {
     }
 
     /// Reads the field, as it is unless a person says otherwise.
+    #[cfg(feature = "pareto")]
     pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
         match self.unset()? {
             None => Ok(AnyField::Photo(PhotoField::default())),

@@ -84,12 +84,18 @@ impl Features {
     }
 
     /// The numbers of a picture.
-    pub(super) fn row(&self, picture: usize) -> &[f64] {
+    ///
+    /// # Panics
+    /// If there is no such picture.
+    pub fn row(&self, picture: usize) -> &[f64] {
         &self.values[picture * self.dimension..][..self.dimension]
     }
 
-    /// Two sets that have a distance.
-    pub(super) fn comparable(&self, other: &Features) -> Result<(), SetError> {
+    /// Whether two sets have a distance.
+    ///
+    /// # Errors
+    /// [`SetError::Dimensions`], [`SetError::Few`].
+    pub fn comparable(&self, other: &Features) -> Result<(), SetError> {
         if self.dimension != other.dimension {
             return Err(SetError::Dimensions(self.dimension, other.dimension));
         }
