@@ -16,10 +16,10 @@ use viewfuse::check::cases::visit;
 use viewfuse::check::measure::Role;
 use viewfuse::check::{Report, check_device, check_kernel};
 use viewfuse::device::Device;
-use viewfuse::device::choice::vulkan_devices;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::job::progress::Silent;
+use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_vulkan::kernel::{Access, Kernel};
 

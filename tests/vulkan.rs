@@ -41,7 +41,7 @@ use std::collections::BTreeSet;
 use std::env;
 use std::process::ExitCode;
 use std::sync::Arc;
-use viewfuse::device::choice::vulkan_devices;
+use viewfuse_tests::devices::vulkan_devices;
 
 const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 

@@ -10,6 +10,7 @@ pub use viewfuse_evaluate as evaluate;
 pub use viewfuse_field as field;
 pub use viewfuse_job as job;
 pub use viewfuse_nn as nn;
+#[cfg(feature = "output")]
 pub use viewfuse_output as output;
 pub use viewfuse_scene as scene;
 #[cfg(feature = "synthetic")]

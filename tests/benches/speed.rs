@@ -14,7 +14,6 @@ use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_mai
 use std::hint::black_box;
 use std::path::Path;
 use viewfuse::device::Device;
-use viewfuse::device::choice::vulkan_devices;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::field::photo::{PhotoField, find_object};
@@ -30,6 +29,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
+use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_vulkan::GpuOptions;
 
 /// Cameras spread over the upper part of a sphere, looking at the origin.

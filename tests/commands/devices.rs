@@ -3,8 +3,8 @@
 
 use super::{BINARY, done};
 use serde_json::{Value, json};
-use viewfuse::device::choice::vulkan_devices;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_below, toy};
+use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::scenes::Folder;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Missing};

@@ -5,6 +5,7 @@
 pub mod checkpoints;
 pub mod command;
 pub mod contract;
+pub mod devices;
 pub mod emulator;
 pub mod lorry;
 pub mod mixture;

@@ -8,9 +8,9 @@ use std::error::Error;
 use std::process::{Command, ExitCode};
 use std::time::Duration;
 use std::{env, fs};
-use viewfuse::device::choice::vulkan_devices;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_tests::command::Outcome;
+use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_vulkan::kernel::{Kernel, WORKGROUP};
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Instance, VulkanError};
 

@@ -4,7 +4,9 @@ mod check;
 mod compare;
 mod convert;
 mod devices;
+mod environment;
 mod evaluate;
+mod hints;
 mod inspect;
 mod left_out;
 mod metrics_options;
@@ -83,6 +85,8 @@ enum Command {
     /// Check how closely each device agrees with the mathematics, kernel by kernel.
     Check(check::Arguments),
 }
+
+pub(crate) use hints::hint;
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {

@@ -18,7 +18,10 @@ fn main() -> ExitCode {
                 eprint!("{wrong}");
                 return ExitCode::from(2);
             }
-            eprintln!("viewfuse: {error:#}");
+            match cli::hint(&error) {
+                Some(hint) => eprintln!("viewfuse: {error:#}; {hint}"),
+                None => eprintln!("viewfuse: {error:#}"),
+            }
             ExitCode::from(1)
         }
     }

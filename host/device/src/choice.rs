@@ -3,12 +3,9 @@
 use super::cpu::Cpu;
 use super::memory::Memory;
 use super::vulkan::Vulkan;
-use std::env;
 use std::fmt;
-use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
-use std::time::Duration;
 use viewfuse_vulkan::{Adapter, GpuOptions, Instance, InstanceOptions, VulkanError};
 
 /// The device that a person asks for.
@@ -78,18 +75,27 @@ pub struct Chosen {
     pub reason: String,
 }
 
+/// How devices are found and opened.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceOptions {
+    /// Which Vulkan, and whether it is watched by validation layers.
+    pub instance: InstanceOptions,
+    /// How a Vulkan device works.
+    pub gpu: GpuOptions,
+}
+
 /// Opens what a person asked for.
 ///
 /// # Errors
 /// [`VulkanError`] if a Vulkan device was asked for and cannot be had; the automatic choice falls back on the CPU.
-pub fn open(choice: &DeviceChoice, options: &GpuOptions) -> Result<Chosen, VulkanError> {
+pub fn open(choice: &DeviceChoice, options: &DeviceOptions) -> Result<Chosen, VulkanError> {
     let cpu = |reason: String| Chosen { device: AnyDevice::Cpu(Cpu), reason };
     match choice {
         DeviceChoice::Cpu => Ok(cpu("asked for".to_owned())),
         DeviceChoice::Vulkan(wanted) => {
-            let (instance, adapters) = vulkan_devices()?;
+            let (instance, adapters) = vulkan_devices(&options.instance)?;
             let adapter = Adapter::choose(&adapters, wanted)?;
-            let device = Vulkan::open(&instance, adapter, options)?;
+            let device = Vulkan::open(&instance, adapter, &options.gpu)?;
             Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "asked for".to_owned() })
         }
         DeviceChoice::Auto => Ok(match automatic(options) {
@@ -117,17 +123,17 @@ pub struct Several {
 ///
 /// # Errors
 /// [`VulkanError`] if a device was asked for and cannot be had.
-pub fn open_several(asked: &[DeviceChoice], options: &GpuOptions) -> Result<Several, VulkanError> {
+pub fn open_several(asked: &[DeviceChoice], options: &DeviceOptions) -> Result<Several, VulkanError> {
     let mut several = Several::default();
     if !asked.is_empty() {
         several.devices = asked.iter().map(|choice| Ok(open(choice, options)?.device)).collect::<Result<_, _>>()?;
         return Ok(several);
     }
     several.devices.push(AnyDevice::Cpu(Cpu));
-    match vulkan_devices() {
+    match vulkan_devices(&options.instance) {
         Ok((instance, adapters)) => {
             for adapter in &adapters {
-                match Vulkan::open(&instance, adapter, options) {
+                match Vulkan::open(&instance, adapter, &options.gpu) {
                     Ok(device) => several.devices.push(AnyDevice::Vulkan(Box::new(device))),
                     Err(error @ VulkanError::Missing { .. }) => several.notes.push(format!("left aside: {error}")),
                     Err(error) => several.failures.push(error.to_string()),
@@ -141,15 +147,16 @@ pub fn open_several(asked: &[DeviceChoice], options: &GpuOptions) -> Result<Seve
 }
 
 /// The first graphics processor that can do the work, or why there is none.
-fn automatic(options: &GpuOptions) -> Result<Vulkan, String> {
-    let (instance, adapters) = vulkan_devices().map_err(|error| format!("because there is {error}"))?;
+fn automatic(options: &DeviceOptions) -> Result<Vulkan, String> {
+    let (instance, adapters) =
+        vulkan_devices(&options.instance).map_err(|error| format!("because there is {error}"))?;
     let mut reasons = Vec::new();
     for adapter in &adapters {
         if !adapter.kind.is_gpu() {
             reasons.push(format!("{} is no graphics processor", adapter.name));
             continue;
         }
-        match Vulkan::open(&instance, adapter, options) {
+        match Vulkan::open(&instance, adapter, &options.gpu) {
             Ok(device) => return Ok(device),
             Err(error) => reasons.push(error.to_string()),
         }
@@ -157,21 +164,12 @@ fn automatic(options: &GpuOptions) -> Result<Vulkan, String> {
     Err(format!("because {}", reasons.join(" and ")))
 }
 
-/// Vulkan with its devices, the ones to prefer first. Two environment variables are heeded: `VIEWFUSE_VULKAN_LOADER`, the
-/// path of another loader, and `VIEWFUSE_VALIDATION=1` for the validation layers, each of whose messages is an error.
+/// Vulkan with its devices, the ones to prefer first.
 ///
 /// # Errors
 /// [`VulkanError`] without a loader, a driver or a device.
-pub fn vulkan_devices() -> Result<(Arc<Instance>, Vec<Adapter>), VulkanError> {
-    let instance = Instance::load(&InstanceOptions {
-        loader: env::var_os("VIEWFUSE_VULKAN_LOADER").map(PathBuf::from),
-        validation: env::var_os("VIEWFUSE_VALIDATION").is_some_and(|value| value == "1"),
-    })?;
+pub fn vulkan_devices(options: &InstanceOptions) -> Result<(Arc<Instance>, Vec<Adapter>), VulkanError> {
+    let instance = Instance::load(options)?;
     let adapters = instance.adapters()?;
     Ok((instance, adapters))
-}
-
-/// Options with a time limit in seconds.
-pub fn gpu_options(time_limit: Duration) -> GpuOptions {
-    GpuOptions { time_limit, ..GpuOptions::default() }
 }

@@ -70,7 +70,7 @@ pub enum FolderError {
         job: usize,
     },
     /// Another process does the same shard.
-    #[error("{}: another process is writing to it; give each its own --shard", path.display())]
+    #[error("{}: another process is writing to it", path.display())]
     Busy {
         /// The journal.
         path: PathBuf,

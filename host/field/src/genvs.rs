@@ -367,7 +367,7 @@ impl<D: Device> Field<D> for Genvs {
                 ends || reuse.is_some(),
                 planned_calls - calls,
                 planned_calls,
-                "changes of a pixel that cannot be seen; with --reuse see `viewfuse pareto`",
+                "changes of a pixel that cannot be seen; what starting from the frame before costs, only a measurement tells",
             ),
         ]
     }

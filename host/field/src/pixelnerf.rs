@@ -301,7 +301,7 @@ impl<D: Device> Field<D> for PixelNerf {
                 empty_rays || empty_parts || hidden_samples,
                 unasked(fine),
                 fine.samples,
-                "what the first pass missed; a ray's light behind is at most --settled",
+                "what the first pass missed; the light behind is at most the transmittance at which rays end",
             ),
         ]
     }

@@ -33,7 +33,7 @@ pub enum RenderError<E: std::error::Error> {
     Sources(SourcesError),
     /// The size does not fit the scene.
     #[error(
-        "--size {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
+        "a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
              for this width it would be {width}x{fitting_height}"
     )]
     Shape {
@@ -49,7 +49,7 @@ pub enum RenderError<E: std::error::Error> {
         fitting_height: u32,
     },
     /// The size is not usable at all.
-    #[error("--size {width}x{height} is not usable: {error}")]
+    #[error("a size of {width}x{height} is not usable: {error}")]
     Size {
         /// Asked for.
         width: u32,
@@ -61,7 +61,7 @@ pub enum RenderError<E: std::error::Error> {
     /// The silhouettes have no point of space in common.
     #[error(
         "{scene}: the silhouettes of the sources have no common object: no point lies inside all of them; check the \
-         poses with `viewfuse inspect` and the background with --background"
+         poses and the background"
     )]
     NoObject {
         /// The scene's path.

@@ -2,6 +2,7 @@
 //! not at all, digests of inputs.
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "digest")]
 pub mod digest;
 pub mod files;
 pub mod progress;

@@ -45,7 +45,7 @@ pub enum SelectionError {
         name: String,
     },
     /// A view is a target and a source at once.
-    #[error("{scene}: view '{name}' is a target and a source at once; take it out of --sources or of the targets")]
+    #[error("{scene}: view '{name}' is a target and a source at once")]
     TargetIsSource {
         /// The scene's path.
         scene: String,
@@ -63,7 +63,7 @@ pub enum SelectionError {
         least: usize,
     },
     /// There are more sources than the program holds.
-    #[error("{scene}: {count} source views; at most {MOST_SOURCES} fit: choose with --sources or --views")]
+    #[error("{scene}: {count} source views; at most {MOST_SOURCES} fit")]
     TooManySources {
         /// The scene's path.
         scene: String,
@@ -71,13 +71,13 @@ pub enum SelectionError {
         count: usize,
     },
     /// No target was asked for and none can be guessed.
-    #[error("{scene}: no targets: give --targets NAMES or --orbit N")]
+    #[error("{scene}: no targets were chosen, and the scene has no poses without photographs")]
     NoTargets {
         /// The scene's path.
         scene: String,
     },
     /// The cameras do not span an orbit.
-    #[error("{scene}: its cameras span no circle: they stand at, or straight above, what they look at; give --targets")]
+    #[error("{scene}: its cameras span no circle: they stand at, or straight above, what they look at")]
     NoOrbit {
         /// The scene's path.
         scene: String,

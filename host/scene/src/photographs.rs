@@ -32,8 +32,8 @@ pub enum PhotographsError {
     },
     /// The background covers the whole photograph, or nothing of it.
     #[error(
-        "{path}: shows no object before the background ({colour}); give the background with --background, or \
-         photographs with an alpha channel"
+        "{path}: shows no object before the background ({colour}); give the background's colour, or photographs with an \
+         alpha channel"
     )]
     NoSilhouette {
         /// The photograph.

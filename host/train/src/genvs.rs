@@ -72,7 +72,7 @@ impl Genvs {
         }
         let own = architecture.image_side;
         if own != side as usize {
-            return refuse(format!("it is for pictures of {own}x{own} pixels, and --side is {side}"));
+            return refuse(format!("it is for pictures of {own}x{own} pixels, not of {side}x{side}"));
         }
         let parameters = Parameters::of(checkpoint, &used(&architecture), dtype)?;
         Ok(Genvs { architecture, parameters, is_frozen: true })

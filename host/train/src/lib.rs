@@ -123,7 +123,7 @@ pub enum TrainError {
         reason: String,
     },
     /// The loss or a parameter became NaN or infinite.
-    #[error("step {step}: the {what} is not finite; a lower --rate may help; the state before it is kept")]
+    #[error("step {step}: the {what} is not finite; the state before it is kept")]
     NotFinite {
         /// The step.
         step: u32,

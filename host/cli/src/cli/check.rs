@@ -1,5 +1,6 @@
 //! `viewfuse check`.
 
+use super::environment::device_options;
 use super::say;
 use super::table::table;
 use super::terminal::Terminal;
@@ -37,7 +38,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let progress = Terminal::new("checking");
     let picture = Picture::new(arguments.scene.as_deref(), &progress)?;
-    let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
+    let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
     let mut report = Report {
         viewfuse: env!("CARGO_PKG_VERSION"),
         seed_count: arguments.seeds,

@@ -1,5 +1,6 @@
 //! `viewfuse devices`.
 
+use super::environment::instance_options;
 use super::say;
 use super::table::table;
 use clap::Args;
@@ -22,7 +23,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     // A machine without Vulkan is no failure: it is what was asked about.
-    let (adapters, problem) = match vulkan_devices() {
+    let (adapters, problem) = match vulkan_devices(&instance_options()) {
         Ok((_, adapters)) => (adapters, None),
         Err(error) => (Vec::new(), Some(error.to_string())),
     };

@@ -1,5 +1,6 @@
 //! Options that several commands share.
 
+use super::environment::device_options;
 use super::model::AnyField;
 use super::parse::{parse_count, parse_seconds, parse_share, parse_size};
 use super::wrong;
@@ -10,7 +11,7 @@ use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::render::{DEFAULT_LEAVE_OUT, DEFAULT_SETTLED, RenderOptions};
 use viewfuse_scene::few_shot::Selection;
 use viewfuse_scene::photographs::BackgroundChoice;
-use viewfuse_vulkan::VulkanError;
+use viewfuse_vulkan::{GpuOptions, VulkanError};
 
 /// How pictures are made.
 #[derive(Args)]
@@ -58,7 +59,7 @@ pub(crate) struct DeviceOptions {
 
 impl DeviceOptions {
     pub(crate) fn open(&self) -> Result<Chosen, VulkanError> {
-        choice::open(&self.device, &choice::gpu_options(self.time_limit))
+        choice::open(&self.device, &device_options(GpuOptions { time_limit: self.time_limit, ..GpuOptions::default() }))
     }
 }
 

@@ -1,5 +1,6 @@
 //! `viewfuse pareto`.
 
+use super::environment::device_options;
 use super::model::{AnyField, NetworkOptions};
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
@@ -76,7 +77,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let options = arguments.picture.to_render_options(false, &field)?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
-    let Several { devices, notes, failures } = open_several(&arguments.device, &GpuOptions::default())?;
+    let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
 
     let progress = Terminal::new("measuring");
     let truths = job.targets.iter().filter_map(|target| target.truth);

@@ -1,0 +1,66 @@
+//! What a person can do about an error of the library, which knows no options: the words behind the error's.
+
+use std::convert::Infallible;
+use viewfuse_evaluate::run_folder::FolderError;
+use viewfuse_field::render::RenderError;
+use viewfuse_scene::few_shot::SelectionError;
+use viewfuse_scene::photographs::PhotographsError;
+use viewfuse_vulkan::VulkanError;
+
+/// The option, if there is one, that may help with an error or one of its causes.
+pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
+    error.chain().find_map(|cause| {
+        let few_shot = cause.downcast_ref::<SelectionError>().and_then(of_few_shot);
+        let photographs = cause.downcast_ref::<PhotographsError>().and_then(of_photographs);
+        let folder = cause.downcast_ref::<FolderError>().and_then(of_run_folder);
+        let on_cpu = cause.downcast_ref::<RenderError<Infallible>>().and_then(of_render);
+        let on_vulkan = cause.downcast_ref::<RenderError<VulkanError>>().and_then(of_render);
+        few_shot.or(photographs).or(folder).or(on_cpu).or(on_vulkan).or_else(|| of_training(cause))
+    })
+}
+
+fn of_few_shot(error: &SelectionError) -> Option<&'static str> {
+    match error {
+        SelectionError::TargetIsSource { .. } => Some("take it out of --sources or of --targets"),
+        SelectionError::TooManySources { .. } => Some("choose with --sources or --views"),
+        SelectionError::NoTargets { .. } => Some("give --targets NAMES or --orbit N"),
+        SelectionError::NoOrbit { .. } => Some("give --targets"),
+        _ => None,
+    }
+}
+
+fn of_photographs(error: &PhotographsError) -> Option<&'static str> {
+    match error {
+        PhotographsError::NoSilhouette { .. } => Some("the colour is an option: --background"),
+        _ => None,
+    }
+}
+
+fn of_run_folder(error: &FolderError) -> Option<&'static str> {
+    match error {
+        FolderError::Busy { .. } => Some("give each its own --shard"),
+        _ => None,
+    }
+}
+
+fn of_render<E: std::error::Error>(error: &RenderError<E>) -> Option<&'static str> {
+    match error {
+        RenderError::Shape { .. } | RenderError::Size { .. } => Some("give another --size"),
+        RenderError::NoObject { .. } => Some("`viewfuse inspect` shows the poses, --background takes the background"),
+        RenderError::Photographs(error) => of_photographs(error),
+        _ => None,
+    }
+}
+
+#[cfg(feature = "train")]
+fn of_training(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    match cause.downcast_ref::<viewfuse_train::TrainError>() {
+        Some(viewfuse_train::TrainError::NotFinite { .. }) => Some("a lower --rate may help"),
+        _ => None,
+    }
+}
+
+#[cfg(not(feature = "train"))]
+fn of_training(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    None
+}
