@@ -8,7 +8,7 @@ use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, safetens
 
 /// A file of `tests/data/checkpoints`.
 fn data(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data/checkpoints").join(name)
+    viewfuse_tests::places::data("checkpoints").join(name)
 }
 
 /// What the program in `tests/data/checkpoints.md` put into each of its files.

@@ -7,7 +7,7 @@ use viewfuse_tests::checkpoints::{Claim, Pickle, archive, file, legacy, snapshot
 
 /// A file of `tests/data/checkpoints`.
 fn data(name: &str) -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data/checkpoints").join(name)
+    viewfuse_tests::places::data("checkpoints").join(name)
 }
 
 /// The only module of a file, under the key that snapshots have.

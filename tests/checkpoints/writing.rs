@@ -3,13 +3,12 @@
 use super::pair;
 use safetensors::SafeTensors;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Element, Precision, TensorShape};
 use viewfuse_tests::checkpoints::{archive, file, state_dict};
 
 fn data(name: &str) -> Checkpoint {
-    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data/checkpoints").join(name);
+    let path = viewfuse_tests::places::data("checkpoints").join(name);
     Checkpoint::open(&path).expect(name)
 }
 

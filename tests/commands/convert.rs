@@ -4,12 +4,13 @@ use super::{BINARY, done};
 use std::path::Path;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse_tests::command::{assert_refused, files_below};
+use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 
 /// A folder with a training checkpoint that PyTorch wrote.
 fn training() -> Folder {
     let folder = Folder::new();
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/data/checkpoints/training.pth");
+    let file = data("checkpoints/training.pth");
     std::fs::copy(file, folder.path().join("training.pth")).expect("the checkpoint");
     folder
 }
@@ -61,7 +62,7 @@ fn refusals() {
 #[test]
 fn learned_attention_becomes_a_header() {
     let folder = Folder::new();
-    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+    let models = repository().join("host/models");
     for (name, from) in [("learned", "attention"), ("flat", "attention_flat")] {
         let from = models.join(format!("pixelnerf_cars_{from}.safetensors"));
         std::fs::copy(from, folder.path().join(format!("{name}.safetensors"))).expect("a weighting");

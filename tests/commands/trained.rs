@@ -3,13 +3,8 @@
 use super::done;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use viewfuse_tests::places::repository;
 use viewfuse_tests::scenes::Folder;
-
-/// Everything is named from the repository's root, as in the README.
-fn repository() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
 
 /// PSNR by scheme of some targets of the car, from three sources.
 fn scores(network: &str, weightings: &[&str]) -> BTreeMap<String, f64> {

@@ -1,18 +1,11 @@
 //! A device that computes on the CPU and gets one kernel wrong.
 
-#[path = "faulty/matrices.rs"]
 mod matrices;
-#[path = "faulty/network.rs"]
 mod network;
-#[path = "faulty/normalise.rs"]
 mod normalise;
-#[path = "faulty/points.rs"]
 mod points;
-#[path = "faulty/rays.rs"]
 mod rays;
-#[path = "faulty/sampler.rs"]
 mod sampler;
-#[path = "faulty/volumes.rs"]
 mod volumes;
 
 use std::convert::Infallible;

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use crate::places::data;
 use crate::scenes::Folder;
 
 /// What a command printed and returned.
@@ -112,7 +113,7 @@ pub fn names_in(folder: &Path) -> Vec<String> {
 /// A folder that holds a copy of the sample scene as `toy`.
 pub fn toy() -> Folder {
     let folder = Folder::new();
-    let sample = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/toy");
+    let sample = data("toy");
     for (path, _) in files_below(&sample).into_iter().filter(|(path, _)| path.is_file()) {
         let name = path.strip_prefix(&sample).expect("a file of the sample");
         fs::copy(&path, folder.file(&Path::new("toy").join(name).to_string_lossy())).expect("a copy");

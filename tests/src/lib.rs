@@ -2,6 +2,7 @@
 //! cannot slip through and the evaluations in `f64` are the program's own, in `viewfuse::check`.
 #![forbid(unsafe_code)]
 
+pub mod alone;
 pub mod checkpoints;
 pub mod command;
 pub mod contract;
@@ -10,4 +11,6 @@ pub mod emulator;
 pub mod lorry;
 pub mod mixture;
 pub mod module;
+pub mod places;
 pub mod scenes;
+pub mod trials;

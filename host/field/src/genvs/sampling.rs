@@ -1,7 +1,7 @@
 //! From noise to a picture: the driver of the samplers in [`viewfuse_core::sampler`], for any device and any denoiser.
 //!
 //! A denoiser is a function from a noisy picture and its level to the picture that it believes is behind; a call of it is
-//! what costs. The state is in `f32` (`tests/numerics_sampler.rs` measures what that costs against `f64`).
+//! what costs. The state is in `f32` (`tests/numerics/sampler.rs` measures what that costs against `f64`).
 //!
 //! ```text
 //! plan    which sampler, which levels, which noise       Plan, Steps

@@ -1,4 +1,4 @@
-//! The calls that are measured, one after another. Nothing is measured in here: `tests/firmware.rs` reads the
+//! The calls that are measured, one after another. Nothing is measured in here: `tests/embedded/firmware.rs` reads the
 //! emulator's trace, from the first instruction of a function named `measured_...` to its return, so that the counts
 //! have no overhead in them.
 #![no_std]

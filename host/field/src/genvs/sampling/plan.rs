@@ -48,7 +48,7 @@ impl Plan {
 
     /// The default: `ipndm` with 10 calls, a fifth of the published run's, and an end when nothing visible changes any more.
     /// On mixtures of normal distributions with deviations of 0.1 and 0.2 to 0.3 its error is 0.032 and 0.033, that of the
-    /// published run 0.006 and 0.010 (`tests/numerics_sampler.rs`); with 18 calls it is 0.009 and 0.008. Where data are much
+    /// published run 0.006 and 0.010 (`tests/numerics/sampler.rs`); with 18 calls it is 0.009 and 0.008. Where data are much
     /// narrower, [`Plan::careful`] is better.
     pub fn fast(seed: u64) -> Plan {
         let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 10 };

@@ -1,0 +1,349 @@
+//! GeNVS's family of networks: sizes are read off the tensors, and what is no member is refused.
+
+use std::collections::BTreeMap;
+use viewfuse::field::genvs::{
+    Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Level, Resampling, group_count, made,
+};
+use viewfuse::job::progress::Silent;
+use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
+use viewfuse::nn::formula;
+
+/// The tensors of a made network, without values as long as nobody changes them.
+struct Tensors {
+    shapes: BTreeMap<String, Vec<usize>>,
+    values: BTreeMap<String, Vec<f32>>,
+    metadata: BTreeMap<String, String>,
+}
+
+impl Tensors {
+    fn of(architecture: &Architecture) -> Tensors {
+        let made = made::by_formula(architecture);
+        Tensors { shapes: made.shapes().clone(), values: BTreeMap::new(), metadata: made.metadata().clone() }
+    }
+
+    fn small() -> Tensors {
+        Tensors::of(&Architecture::small())
+    }
+
+    fn with(mut self, name: &str, shape: &[usize]) -> Tensors {
+        self.shapes.insert(name.to_owned(), shape.to_vec());
+        self
+    }
+
+    fn without(mut self, beginning: &str) -> Tensors {
+        let count = self.shapes.len();
+        self.shapes.retain(|name, _| !name.starts_with(beginning));
+        assert!(self.shapes.len() < count, "nothing begins with {beginning}");
+        self
+    }
+
+    fn filled(mut self, name: &str, shape: &[usize], value: f32) -> Tensors {
+        self.values.insert(name.to_owned(), vec![value; shape.iter().product()]);
+        self.with(name, shape)
+    }
+
+    fn saying(mut self, key: &str, value: &str) -> Tensors {
+        self.metadata.insert(key.to_owned(), value.to_owned());
+        self
+    }
+
+    fn checkpoint(self) -> Checkpoint {
+        let tensors = self.shapes.into_iter().map(|(name, shape)| TensorShape { name, shape });
+        let values = self.values;
+        Checkpoint::computed("it", tensors, self.metadata, move |tensor| {
+            values.get(&tensor.name).cloned().unwrap_or_else(|| formula::tensor(&tensor.name, &tensor.shape))
+        })
+    }
+
+    /// Refused in one line that has this in it.
+    #[track_caller]
+    fn refused(self, part: &str) {
+        let message = Architecture::of(&self.checkpoint()).expect_err("must be refused").to_string();
+        println!("{message}");
+        assert!(message.starts_with("it: ") && !message.contains('\n') && message.len() < 1200, "{message}");
+        assert!(message.contains(part), "no {part:?} in: {message}");
+    }
+}
+
+/// The tensors of a list: a line a module, with the name and the shape of each of its tensors.
+fn listed(name: &str) -> Vec<TensorShape> {
+    let path = viewfuse_tests::places::data(name);
+    let text = std::fs::read_to_string(path).expect("the list");
+    let mut listed = Vec::new();
+    for line in text.lines() {
+        let mut words = line.split(' ');
+        let module = words.next().expect("a module");
+        while let (Some(leaf), Some(shape)) = (words.next(), words.next()) {
+            let shape = shape.split('x').map(|length| length.parse().expect("a length")).collect();
+            listed.push(TensorShape { name: format!("{module}.{leaf}"), shape });
+        }
+    }
+    listed
+}
+
+#[track_caller]
+fn assert_listed(architecture: &Architecture, name: &str) {
+    let listed = listed(name);
+    for (ours, theirs) in architecture.tensors().iter().zip(&listed) {
+        assert_eq!(ours, theirs);
+    }
+    assert_eq!(architecture.tensors().len(), listed.len());
+}
+
+#[test]
+fn the_published_network() {
+    let published = Architecture::published();
+    assert_listed(&published, "genvs_tensors.txt");
+    assert_eq!((published.tensors().len(), published.parameter_count()), (950, 102_783_749));
+}
+
+#[test]
+fn the_small_network() {
+    let small = Architecture::small();
+    let count = small.parameter_count();
+    println!("the small network has {count} numbers");
+    assert!((1_000_000..5_000_000).contains(&count), "{count}");
+    assert_listed(&small, "genvs_small_tensors.txt");
+    // All kinds of tensors of the published one are there.
+    let kinds = |architecture: &Architecture| {
+        let leaf = |name: &str| name.split('.').rev().take(2).collect::<Vec<_>>().join(".");
+        let names = architecture.tensors().into_iter().map(|tensor| tensor.name);
+        names
+            .map(|name| leaf(&name.replace(|c: char| c.is_ascii_digit(), "")))
+            .collect::<std::collections::BTreeSet<_>>()
+    };
+    assert_eq!(kinds(&small), kinds(&Architecture::published()));
+}
+
+#[test]
+fn sizes_come_from_the_checkpoint() {
+    let small = Architecture::small();
+    let denoiser = small.denoiser.clone().expect("a denoiser");
+    let level = |channels, has_attention| DenoiserLevel { channels, has_attention };
+    let trunk = |channels, block_count| Level { channels, block_count };
+    let levels = [trunk(4, 1), trunk(4, 2), trunk(12, 3), trunk(8, 1)];
+    let other = Encoder {
+        stem_channels: 4,
+        levels,
+        decoder_channels: 10,
+        high_resolution_channels: 3,
+        ..small.encoder.clone()
+    };
+    let volume = Encoder { feature_count: 5, volume_depth: 7, ..small.encoder.clone() };
+    for architecture in [
+        Architecture::published(),
+        small.clone(),
+        Architecture { encoder: other, mlp_width: 9, ..small.clone() },
+        Architecture {
+            encoder: volume,
+            denoiser: Some(Denoiser { in_channels: 8, ..denoiser.clone() }),
+            ..small.clone()
+        },
+        Architecture { denoiser: None, image_side: 48, ..small.clone() },
+        Architecture { denoiser: None, ..Architecture::published() },
+        Architecture {
+            image_side: 32,
+            denoiser: Some(Denoiser {
+                image_side: 32,
+                base_channels: 8,
+                noise_channels: 6,
+                embedding_channels: 20,
+                levels: vec![level(16, true), level(8, false), level(24, true), level(12, false)],
+                block_count: 1,
+                ..denoiser.clone()
+            }),
+            ..small.clone()
+        },
+        Architecture {
+            denoiser: Some(Denoiser { levels: vec![level(4, false)], block_count: 3, ..denoiser }),
+            ..small
+        },
+    ] {
+        let checkpoint = made::by_formula(&architecture);
+        assert_eq!(Architecture::of(&checkpoint).expect("a member of the family"), architecture);
+        let count: usize = checkpoint.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
+        assert_eq!(architecture.parameter_count(), count);
+    }
+}
+
+#[test]
+fn made_of_the_formula_with_two_gains() {
+    let checkpoint = made::by_formula(&Architecture::small());
+    for (name, gain) in [
+        ("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0),
+        ("pixel_nerf_net.mlp.layers.2.weight", 4.0),
+        ("pixel_nerf_net.mlp.layers.2.bias", 1.0),
+        ("denoiser.model.enc.64x64_conv.weight", 1.0),
+        ("denoiser.model.enc.64x64_block0.norm0.weight", 1.0),
+    ] {
+        let plain = formula::tensor(name, &checkpoint.shapes()[name]);
+        let gained: Vec<f32> = plain.iter().map(|value| gain * value).collect();
+        assert_eq!(checkpoint.tensor(name).expect(name), gained, "{name}");
+    }
+    // Written and read again it is the same network.
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("small.safetensors");
+    checkpoint.write_safetensors(&path, Precision::Kept, &Silent).expect("a file");
+    let read = Checkpoint::open(&path).expect("a checkpoint");
+    assert_eq!(Architecture::of(&read).expect("a member of the family"), Architecture::small());
+}
+
+/// What joins on the way up is what was kept on the way down, all of it, newest first, at its side.
+#[test]
+fn the_way_up_uses_what_the_way_down_kept() {
+    for architecture in [Architecture::published(), Architecture::small()] {
+        let denoiser = architecture.denoiser.expect("a denoiser");
+        let (mut kept, mut channels, mut side, mut residual) =
+            (Vec::new(), denoiser.in_channels, denoiser.image_side, denoiser.in_channels);
+        for step in denoiser.down() {
+            match step {
+                DenoiserStep::Convolution(convolution) => {
+                    assert_eq!((convolution.in_channels, convolution.side), (channels, side));
+                    channels = convolution.out_channels;
+                    kept.push((channels, side));
+                }
+                DenoiserStep::Block(block) => {
+                    side /= if block.resampling == Resampling::Down { 2 } else { 1 };
+                    assert_eq!((block.in_channels, block.joined_channels, block.side), (channels, 0, side));
+                    channels = block.out_channels;
+                    kept.push((channels, side));
+                }
+                DenoiserStep::Residual(convolution) => {
+                    assert_eq!(convolution.in_channels, residual);
+                    assert_eq!(kept.last(), Some(&(convolution.out_channels, convolution.side)), "replaces the last");
+                    residual = convolution.out_channels;
+                }
+            }
+        }
+        for block in denoiser.up() {
+            side *= if block.resampling == Resampling::Up { 2 } else { 1 };
+            if block.joined_channels > 0 {
+                assert_eq!(kept.pop(), Some((block.joined_channels, side)), "{}", block.name);
+            }
+            assert_eq!((block.in_channels, block.side), (channels + block.joined_channels, side), "{}", block.name);
+            channels = block.out_channels;
+        }
+        assert_eq!(kept, []);
+        let (norm, convolution) = denoiser.exit();
+        assert!(norm.ends_with("_aux_norm"));
+        assert_eq!(
+            (convolution.in_channels, convolution.out_channels, convolution.side),
+            (channels, 3, denoiser.image_side)
+        );
+    }
+}
+
+#[test]
+fn where_the_published_denoiser_attends() {
+    let denoiser = Architecture::published().denoiser.expect("a denoiser");
+    let attends =
+        |block: &Block| block.has_attention.then(|| block.name.trim_start_matches("denoiser.model.").to_owned());
+    let down = denoiser.down().into_iter().filter_map(|step| match step {
+        DenoiserStep::Block(block) => attends(&block),
+        _ => None,
+    });
+    let names: Vec<String> = down.chain(denoiser.up().iter().filter_map(attends)).collect();
+    let expected: [&str; 6] = [
+        "enc.16x16_block0",
+        "enc.16x16_block1",
+        "enc.16x16_block2",
+        "enc.16x16_block3",
+        "dec.8x8_in0",
+        "dec.16x16_block4",
+    ];
+    assert_eq!(names, expected);
+    assert_eq!([4, 8, 96, 128, 256, 512].map(group_count), [1, 2, 24, 32, 32, 32]);
+}
+
+#[test]
+fn what_real_checkpoints_have_besides_is_accepted() {
+    const FILTER: &str = "denoiser.model.enc.32x32_down.conv0.resample_filter";
+    let checkpoint = Tensors::small()
+        .filled(FILTER, &[1, 1, 2, 2], 0.25)
+        .filled("denoiser.model.dec.64x64_up.skip.resample_filter", &[1, 1, 2, 2], 0.25)
+        .with("denoiser.model.map_augment.weight", &[32, 6])
+        .with("pixel_nerf_net.cam_weighter.query_layer.weight", &[42, 42])
+        .with("pixel_nerf_net.cam_weighter.positional_encoder._freqs", &[1, 12, 1])
+        .with("pixel_nerf_net.encoder.encoder.bn1.num_batches_tracked", &[])
+        .checkpoint();
+    assert_eq!(Architecture::of(&checkpoint).expect("a member of the family"), Architecture::small());
+    let other = format!("is no GeNVS: {FILTER}, of shape [1, 1, 4, 4], is not the mean of 2x2 pixels");
+    Tensors::small().filled(FILTER, &[1, 1, 4, 4], 0.0625).refused(&other);
+    Tensors::small().filled(FILTER, &[1, 1, 2, 2], 0.5).refused("of shape [1, 1, 2, 2], is not the mean of 2x2 pixels");
+    // The noise levels of the other variant of the denoiser.
+    let fourier = "denoiser.model.map_noise.freqs";
+    Tensors::small()
+        .with(fourier, &[16])
+        .refused("not the tensors of this architecture; unexpected: denoiser.model.map_noise.freqs");
+}
+
+#[test]
+fn without_a_denoiser() {
+    let network = || Tensors::of(&Architecture { denoiser: None, ..Architecture::published() });
+    let side = |tensors: Tensors| Architecture::of(&tensors.checkpoint()).map(|architecture| architecture.image_side);
+    assert_eq!(side(network()).expect("as it says"), 128);
+    assert_eq!(side(network().saying("viewfuse.image_side", "256")).expect("as it says"), 256);
+    let unsaid = Tensors { metadata: BTreeMap::new(), ..network() };
+    assert_eq!(side(unsaid).expect("as published"), 128);
+    network()
+        .saying("viewfuse.image_side", "-3")
+        .refused("viewfuse.image_side = '-3', which is no number from 1 to 4096");
+    network()
+        .saying("viewfuse.image_side", "40")
+        .refused("images of 40 pixels on a side; the encoder takes multiples of 16");
+    network().with("denoiser.model.map_augment.weight", &[32, 6]).refused("no first convolution that tells the side");
+}
+
+#[test]
+fn what_is_no_member_is_refused() {
+    let nothing = Tensors { shapes: BTreeMap::new(), values: BTreeMap::new(), metadata: BTreeMap::new() };
+    nothing.refused("is no GeNVS: it has no tensor pixel_nerf_net.mlp.layers.0.weight");
+    let small = Tensors::small;
+    small()
+        .without("pixel_nerf_net.encoder.encoder.layer4")
+        .refused("has no tensor pixel_nerf_net.encoder.encoder.layer4.0.conv1.weight");
+    small().without("pixel_nerf_net.encoder.decoder.modified_up.upconv2").refused(
+        "missing: pixel_nerf_net.encoder.decoder.modified_up.upconv2.0.weight, \
+         pixel_nerf_net.encoder.decoder.modified_up.upconv2.0.bias",
+    );
+    small()
+        .with("pixel_nerf_net.encoder.encoder.layer5.0.conv1.weight", &[8, 8, 3, 3])
+        .refused("unexpected: pixel_nerf_net.encoder.encoder.layer5");
+    small()
+        .with("pixel_nerf_net.mlp.layers.1.weight", &[32, 31])
+        .refused("pixel_nerf_net.mlp.layers.1.weight is [32, 31], not [32, 32]");
+    small().with("pixel_nerf_net.mlp.layers.0.weight", &[32]).refused("has the shape [32] instead of 2 dimensions");
+    small()
+        .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 0])
+        .refused("has the size 0 on axis 1; 1 to 16384 is usable");
+    small()
+        .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 7])
+        .refused("makes 512 channels, which are no voxels of 7 features");
+    small()
+        .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 8])
+        .refused("the denoiser takes 19 channels, not 3 colours and the 8 features");
+    small().without("denoiser.model.dec.16x16_in1").refused("missing: denoiser.model.dec.16x16_in1.norm0.weight");
+    small()
+        .without("denoiser.model.enc.32x32_aux_residual")
+        .refused("missing: denoiser.model.enc.32x32_aux_residual.weight");
+    small().without("denoiser.model.enc.64x64_block0").refused("the denoiser has 0 levels and 0 blocks in the first");
+    small()
+        .with("denoiser.model.map_layer0.weight", &[128, 31])
+        .refused("noise levels as 31 numbers, which are not as many cosines as sines");
+    small()
+        .with("denoiser.model.enc.32x32_block0.conv0.weight", &[45, 32, 3, 3])
+        .refused("a norm of denoiser.model.enc.32x32_block0 is to take 45 channels in 11 groups of one size");
+    let many = (0..80).fold(small(), |tensors, block| {
+        tensors.with(&format!("denoiser.model.enc.64x64_block{block}.conv0.weight"), &[32, 32, 3, 3])
+    });
+    many.refused("3 levels and 80 blocks in the first; at least one of each is needed, and at most 64 blocks");
+    let odd = Tensors::of(&Architecture { denoiser: None, ..Architecture::small() })
+        .with("denoiser.model.enc.48x48_conv.weight", &[32, 19, 3, 3])
+        .with("denoiser.model.enc.48x48_block0.conv0.weight", &[32, 32, 3, 3])
+        .with("denoiser.model.map_layer0.weight", &[128, 32]);
+    let odd = (1..6).fold(odd, |tensors, level| {
+        let side = 48 >> level;
+        tensors.with(&format!("denoiser.model.enc.{side}x{side}_block0.conv0.weight"), &[32, 32, 3, 3])
+    });
+    odd.refused("6 levels, for which 48 pixels cannot be halved often enough");
+}

@@ -1,0 +1,80 @@
+//! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
+
+mod check;
+mod compare;
+mod convert;
+mod devices;
+mod errors;
+mod genvs;
+mod inspect;
+mod interrupt;
+mod memory;
+mod pareto;
+mod protocols;
+mod readme;
+mod render;
+mod scenes;
+mod tables;
+mod train;
+mod trained;
+mod verify;
+
+use serde_json::Value;
+use std::path::Path;
+use viewfuse_tests::command;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
+
+/// Runs the command in a folder; it must succeed and say nothing on standard error.
+#[track_caller]
+fn done(folder: &Path, arguments: &str) -> String {
+    command::done(BINARY, folder, arguments)
+}
+
+/// The numbers of a JSON list.
+#[track_caller]
+fn numbers(list: &Value) -> Vec<f64> {
+    list.as_array().expect("a list").iter().map(|number| number.as_f64().expect("a number")).collect()
+}
+
+/// The texts of a JSON list.
+#[track_caller]
+fn texts(list: &Value) -> Vec<&str> {
+    list.as_array().expect("a list").iter().map(|text| text.as_str().expect("a text")).collect()
+}
+
+#[track_caller]
+fn assert_near(value: f64, expected: f64, tolerance: f64) {
+    assert!((value - expected).abs() <= tolerance, "{value} is not {expected} to within {tolerance}");
+}
+
+#[test]
+fn help_fits_and_gives_examples() {
+    let here = Path::new(".");
+    let version = done(here, "--version");
+    assert_eq!(version.split_whitespace().next(), Some("viewfuse"), "{version}");
+    let commands = [
+        "",
+        "render",
+        "weights",
+        "inspect",
+        "evaluate",
+        "pareto",
+        "report",
+        "compare",
+        "train",
+        "scenes make",
+        "devices",
+        "verify",
+        "check",
+    ];
+    for name in commands {
+        let help = done(here, &format!("{name} --help"));
+        assert!(name.is_empty() || help.contains(&format!("viewfuse {name} ")), "an example of {name}:\n{help}");
+        assert!(name.is_empty() || help.contains("Example"), "an example of {name}:\n{help}");
+        for line in help.lines() {
+            assert!(line.chars().count() <= 110, "{line:?} is too long");
+        }
+    }
+    assert!(done(here, "--help").contains("Exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted."));
+}

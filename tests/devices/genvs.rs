@@ -1,0 +1,104 @@
+//! A small GeNVS on each device: the reference values, and whole pictures with everything and with nothing left out.
+
+use crate::candidate::{Candidate, Test};
+use libtest_mimic::Failed;
+use std::error::Error;
+use viewfuse::check::verify::verify;
+use viewfuse::device::Device;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::genvs::sampling::{Plan, Steps};
+use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
+use viewfuse::field::{Field, FieldError};
+use viewfuse::job::progress::Silent;
+use viewfuse_core::sampler::Sampler;
+use viewfuse_core::weights::Weights;
+use viewfuse_tests::lorry::{photographs, target};
+use viewfuse_tests::places::data;
+use viewfuse_vulkan::GpuOptions;
+use viewfuse_vulkan::kernel::Kernel;
+
+pub(crate) const TESTS: &[Test] = &[
+    Test::new("genvs_has_the_reference_values", genvs_has_the_reference_values),
+    Test::new("genvss_pictures_are_the_cpus", genvss_pictures_are_the_cpus),
+    Test::new("genvs_without_denoiser_runs_no_kernel_of_it", genvs_without_denoiser_runs_no_kernel_of_it),
+];
+
+/// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's, through three
+/// calls of the denoiser.
+const LARGEST_DIFFERENCE: f32 = 1.0e-3;
+
+/// What only the denoiser needs.
+const DENOISERS: [Kernel; 4] = [Kernel::DenoiserInput, Kernel::Normalise, Kernel::MixPictures, Kernel::AddNoise];
+
+fn genvs_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let file = data("genvs_small.safetensors");
+    let report = verify(&file, &device)?;
+    assert_eq!(report.quantities.len(), 10);
+    match report.quantities.iter().find(|quantity| !quantity.passes()) {
+        Some(worst) => Err(format!("{worst:?}").into()),
+        None => Ok(()),
+    }
+}
+
+/// A picture from three sources, of which one has no weight.
+fn picture<D: Device>(
+    device: &D,
+    omissions: Omissions,
+    has_denoiser: bool,
+) -> Result<Vec<[f32; 4]>, FieldError<D::Error>> {
+    let mut architecture = Architecture::small();
+    if !has_denoiser {
+        architecture.denoiser = None;
+    }
+    let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 3 };
+    let plan = Plan { steps, ..Plan::published(0) };
+    let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
+    let field = Genvs::new(made::by_formula(&architecture), options)?;
+    let quiet = Silent;
+    let prepared = field.prepare(device, &photographs(3, 30), &quiet)?;
+    field.encode(device, &prepared, &[], &quiet)?;
+    let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+    (scores[0], scores[2]) = (0.7, 0.3);
+    let weights = Weights::from_scores(&scores, 3);
+    Ok(field.render(device, &prepared, &(), &weights, &target(22), 0.0, &quiet)?.colours)
+}
+
+/// An error with its cause.
+fn said(error: impl Error) -> Failed {
+    match error.source() {
+        Some(cause) => format!("{error}: {cause}").into(),
+        None => error.to_string().into(),
+    }
+}
+
+fn compare(ours: &[[f32; 4]], reference: &[[f32; 4]]) -> Result<(), Failed> {
+    assert_eq!(ours.len(), reference.len());
+    let differences = ours.iter().flatten().zip(reference.iter().flatten()).map(|(a, e)| (a - e).abs());
+    let worst = differences.fold(0.0, |worst: f32, difference| if difference <= worst { worst } else { difference });
+    println!("a channel differs by {worst:.1e}");
+    if worst <= LARGEST_DIFFERENCE { Ok(()) } else { Err(format!("a channel differs by {worst}").into()) }
+}
+
+fn genvss_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let reference = picture(&Cpu, Omissions::NONE, true).expect("a picture on the CPU");
+    for omissions in [Omissions::NONE, Omissions::EXACT] {
+        compare(&picture(&device, omissions, true).map_err(said)?, &reference)?;
+    }
+    Ok(())
+}
+
+fn genvs_without_denoiser_runs_no_kernel_of_it(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let reference = picture(&Cpu, Omissions::EXACT, false).expect("a picture on the CPU");
+    compare(&picture(&device, Omissions::EXACT, false).map_err(said)?, &reference)?;
+    for kernel in DENOISERS {
+        assert_eq!(device.tally(kernel).dispatches, 0, "{}", kernel.name());
+    }
+    picture(&device, Omissions::EXACT, true).map_err(said)?;
+    for kernel in DENOISERS {
+        assert!(device.tally(kernel).dispatches > 0, "{} is not the denoiser's", kernel.name());
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! Vulkan devices under bad conditions: nothing there, lowered limits, no memory, no time, wrong arguments; and good ones
+//! under validation. Each ends in its typed error or in the right picture, never in a crash or in a wrong one.
+//!
+//! One trial for each test and device. Without a device they are ignored and say why; with `VIEWFUSE_REQUIRE_VULKAN=1`
+//! nothing is ignored, and with `VIEWFUSE_REQUIRE_DRIVERS=N` devices of so many drivers must be there.
+
+mod arguments;
+mod candidate;
+mod child;
+mod genvs;
+mod layers;
+mod limits;
+mod loader;
+mod memory;
+mod metrics;
+mod picture;
+mod pixelnerf;
+mod sampling;
+mod time;
+mod transfers;
+mod validation;
+
+use candidate::{Candidate, Test};
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::collections::BTreeSet;
+use std::env;
+use std::process::ExitCode;
+use std::sync::Arc;
+use viewfuse_tests::devices::vulkan_devices;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
+
+fn main() -> ExitCode {
+    if let Some(code) = child::run() {
+        return code;
+    }
+    let arguments = Arguments::from_args();
+    let (candidates, problem) = match vulkan_devices() {
+        Ok((instance, adapters)) => {
+            (adapters.into_iter().map(|adapter| Arc::new(Candidate::new(&instance, adapter))).collect(), None)
+        }
+        Err(error) => (Vec::new(), Some(error.to_string())),
+    };
+    let drivers: BTreeSet<String> = candidates.iter().map(|candidate| candidate.adapter.driver.clone()).collect();
+    let mut trials = vec![Trial::test("so_many_drivers_as_required", move || enough_drivers(&drivers))];
+    trials.extend(loader::TESTS.iter().map(|(name, test)| Trial::test(*name, test)));
+    let tests: Vec<Test> = [
+        arguments::TESTS,
+        transfers::TESTS,
+        memory::TESTS,
+        time::TESTS,
+        layers::TESTS,
+        picture::TESTS,
+        pixelnerf::TESTS,
+        genvs::TESTS,
+        metrics::TESTS,
+        sampling::TESTS,
+        limits::TESTS,
+    ]
+    .concat()
+    .into_iter()
+    .chain(validation::tests())
+    .collect();
+    for candidate in &candidates {
+        for test in &tests {
+            let (work, candidate) = (test.work, candidate.clone());
+            let name = format!("{}::{}", candidate.adapter.name, test.name);
+            let missing = candidate.problem().or_else(|| test.missing.clone());
+            trials.push(needing(missing, Trial::test(name, move || work(&candidate))));
+        }
+    }
+    if let Some(problem) = problem {
+        let gone = tests.iter().map(|test| {
+            let problem_here = problem.clone();
+            let trial = Trial::test(format!("vulkan::{}", test.name), move || Err(problem_here.into()));
+            needing(Some(problem.clone()), trial)
+        });
+        trials.extend(gone);
+    }
+    libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+/// A trial that is ignored, with the reason before its name, where something is missing; unless nothing may be missing.
+fn needing(missing: Option<String>, trial: Trial) -> Trial {
+    match missing {
+        Some(missing) if !is_required() => trial.with_kind(missing).with_ignored_flag(true),
+        _ => trial,
+    }
+}
+
+fn is_required() -> bool {
+    env::var("VIEWFUSE_REQUIRE_VULKAN").is_ok_and(|value| value == "1")
+}
+
+fn enough_drivers(drivers: &BTreeSet<String>) -> Result<(), Failed> {
+    let Ok(required) = env::var("VIEWFUSE_REQUIRE_DRIVERS") else { return Ok(()) };
+    let required: usize = required.parse()?;
+    match drivers.len() >= required {
+        true => Ok(()),
+        false => Err(format!("{required} drivers are required; there are {drivers:?}").into()),
+    }
+}

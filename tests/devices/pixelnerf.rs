@@ -1,0 +1,76 @@
+//! A small PixelNeRF on each device: the reference values, and whole pictures with everything and with nothing left out.
+
+use crate::candidate::{Candidate, Test};
+use libtest_mimic::Failed;
+use viewfuse::check::verify::verify;
+use viewfuse::device::Device;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, made};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::Selection;
+use viewfuse_tests::places::data;
+use viewfuse_vulkan::{GpuOptions, Limits};
+
+pub(crate) const TESTS: &[Test] = &[
+    Test::new("pixelnerf_has_the_reference_values", pixelnerf_has_the_reference_values),
+    Test::new("pixelnerfs_pictures_are_the_cpus", pixelnerfs_pictures_are_the_cpus),
+];
+
+const SIDE: u32 = 20;
+/// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's; a fine sample
+/// that falls into the next part of a ray for it moves by a 64th of the ray, which changes a pixel by little.
+const LARGEST_DIFFERENCE: f32 = 4.0e-3;
+
+fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
+    let device = candidate.vulkan(&GpuOptions::default())?;
+    let report = verify(&data("pixelnerf_small.safetensors"), &device)?;
+    assert_eq!(report.quantities.len(), 39);
+    match report.quantities.iter().find(|quantity| !quantity.passes()) {
+        Some(worst) => Err(format!("{worst:?}").into()),
+        None => Ok(()),
+    }
+}
+
+fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>, RenderError<D::Error>> {
+    let scene = Scene::open(data("toy"))?;
+    let selection =
+        Selection { targets: Some("20".to_owned()), sources: Some("1,7,13".to_owned()), ..Selection::default() };
+    let job = selection.resolve(&scene, 1).expect("views of it");
+    let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
+    let sampling = Sampling { coarse_count: 32, importance_count: 8, depth_count: 8, ..Sampling::default() };
+    let body = made::body(&Architecture::small(16));
+    let field = PixelNerf::new(&body, PixelNerfOptions { sampling, omissions }).expect("a made network");
+    let mut colours = Vec::new();
+    let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {
+        colours = frame.colours;
+        Ok(())
+    };
+    let weighting = "error:alpha=1".parse().expect("a scheme");
+    render(&scene, &job, &weighting, device, &field, &options, &Silent, keep)?;
+    Ok(colours)
+}
+
+fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
+    // With its own limits, and with buffers so short that rays and points are taken in several pieces.
+    let own = GpuOptions::default();
+    let short = GpuOptions { limits: Limits { buffer_range: 260 << 10, ..own.limits }, ..own };
+    for omissions in [Omissions::NONE, Omissions::default()] {
+        let reference = picture(&Cpu, omissions).expect("a picture on the CPU");
+        let opaque = reference.iter().filter(|colour| colour[3] > 0.9).count();
+        assert!(opaque > 20 && opaque < reference.len() / 2, "a body before nothing: {opaque}");
+        for options in if omissions == Omissions::NONE { vec![own] } else { vec![own, short] } {
+            let device = candidate.vulkan(&options)?;
+            let ours = picture(&device, omissions).map_err(|error| format!("{error:?}"))?;
+            assert_eq!(ours.len(), reference.len());
+            let differences = ours.iter().flatten().zip(reference.iter().flatten()).map(|(a, e)| (a - e).abs());
+            let worst =
+                differences.fold(0.0, |worst: f32, difference| if difference <= worst { worst } else { difference });
+            if !(worst <= LARGEST_DIFFERENCE) {
+                return Err(format!("{omissions:?}: a channel differs by {worst}").into());
+            }
+        }
+    }
+    Ok(())
+}

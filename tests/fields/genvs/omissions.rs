@@ -1,0 +1,145 @@
+//! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
+
+use super::{
+    assert_sound, exact, largest_difference, leaving_out, made, picture, picture_with, sources, target, weights,
+    without_denoiser,
+};
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::genvs::reference::Reference;
+use viewfuse::field::genvs::sampling::{Plan, Steps};
+use viewfuse::field::genvs::{Genvs, GenvsOptions, Omissions};
+use viewfuse::field::{Field, LeftOut};
+use viewfuse::job::progress::Silent;
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::sampler::Sampler;
+use viewfuse_core::weights::Weights;
+
+fn in_18_calls() -> Plan {
+    let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 18 };
+    Plan { steps, ..Plan::fast(0) }
+}
+
+fn line(field: &Genvs, what: &str) -> LeftOut {
+    let lines = Field::<Cpu>::left_out(field);
+    *lines.iter().find(|line| line.what == what).unwrap_or_else(|| panic!("no line '{what}'"))
+}
+
+#[test]
+fn nothing_is_left_out_where_nothing_may() {
+    let field = made(exact());
+    picture(&field, &sources(3), &target(16));
+    for line in Field::<Cpu>::left_out(&field) {
+        assert!(!line.switch && line.left_out == 0 && line.of > 0, "{line:?}");
+    }
+    assert_eq!(line(&field, "encoded views").of, 3);
+    assert_eq!(line(&field, "volume rows").of, 3 * 32);
+    assert_eq!(line(&field, "denoiser calls").of, 3);
+}
+
+#[test]
+fn views_that_no_target_uses_are_not_encoded() {
+    let (sources, target, weights) = (sources(4), target(16), weights([0.0, 0.25, 0.0, 0.75], 4));
+    let reference = picture_with(&made(exact()), &sources, &weights, &target);
+    let field = made(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
+    assert_eq!(picture_with(&field, &sources, &weights, &target), reference, "zeros are added exactly");
+    let LeftOut { left_out, of, switch, .. } = line(&field, "encoded views");
+    assert_eq!((left_out, of, switch), (2, 4, true));
+}
+
+#[test]
+fn rows_that_no_ray_reaches_are_not_computed() {
+    let sources = sources(3);
+    // It sees the upper part of what a camera of its place would see whole, then the lower part, then all.
+    let camera = target(32);
+    let part = |principal_y: f32, height: u32| {
+        let pinhole = Pinhole::new(camera.pinhole.focal(), [16.0, principal_y], 32, height).expect("sound intrinsics");
+        Camera { pinhole, ..camera }
+    };
+    let targets = [part(16.0, 8), part(-12.0, 4), part(16.0, 32)];
+    let quiet = Silent;
+    let with = |omissions| {
+        let field = without_denoiser(leaving_out(omissions));
+        let prepared = field.prepare(&Cpu, &sources, &quiet).expect("sources on the device");
+        field.encode(&Cpu, &prepared, &[], &quiet).expect("volumes");
+        let render = |target: &Camera| {
+            let picture = field.render(&Cpu, &prepared, &(), &Weights::mean(3), target, 0.0, &quiet);
+            (picture.expect("a picture"), line(&field, "volume rows").left_out)
+        };
+        targets.iter().map(render).collect::<Vec<_>>()
+    };
+    let exact = with(Omissions::NONE);
+    let few = with(Omissions { unseen_rows: true, ..Omissions::NONE });
+    for ((exact, none), (few, left_out)) in exact.iter().zip(&few) {
+        assert_eq!(few, exact, "rows that nobody sees");
+        println!("{left_out} of {} rows left out", 3 * 32);
+        assert_eq!(*none, 0);
+    }
+    assert!(few[0].1 > 20 && few[1].1 < few[0].1 && few[2].1 <= few[1].1, "what was there is not computed again");
+}
+
+#[test]
+fn an_earlier_frame_saves_calls() {
+    let sources = sources(2);
+    let cameras = [
+        target(16),
+        Camera {
+            pinhole: target(16).pinhole,
+            ..viewfuse_tests::lorry::orbit(16).camera(2.02, 0.35).expect("a camera")
+        },
+    ];
+    let quiet = Silent;
+    let frames = |reuse| {
+        let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
+        let field = made(GenvsOptions { plan: Plan { settled: None, ..in_18_calls() }, ..options });
+        let prepared = field.prepare(&Cpu, &sources, &quiet).expect("sources on the device");
+        field.encode(&Cpu, &prepared, &[], &quiet).expect("volumes");
+        let render = |camera| field.render(&Cpu, &prepared, &(), &Weights::mean(2), camera, 0.0, &quiet);
+        let frames = cameras.each_ref().map(|camera| render(camera).expect("a picture"));
+        // A frame of another size begins anew.
+        let smaller = render(&target(8)).expect("a picture");
+        assert_sound(&smaller);
+        (frames, line(&field, "denoiser calls"))
+    };
+    let (whole, all) = frames(None);
+    assert_eq!((all.left_out, all.of, all.switch), (0, 3 * 18, false));
+    let (with, some) = frames(Some(1.0));
+    assert!(some.switch && some.of == all.of && (5..18).contains(&some.left_out), "{some:?}");
+    assert_eq!(with[0], whole[0], "the first frame has none before it");
+    assert!(with[1] != whole[1], "the second one started elsewhere");
+    assert_sound(&with[1]);
+    // Above the largest level nothing is left out.
+    let (_, none) = frames(Some(1.0e6));
+    assert_eq!(none.left_out, 0);
+}
+
+#[test]
+fn a_settled_picture_ends_early() {
+    let (sources, target) = (sources(2), target(16));
+    let with = |settled| {
+        let field = made(GenvsOptions { plan: Plan { settled, ..in_18_calls() }, ..exact() });
+        (picture(&field, &sources, &target), line(&field, "denoiser calls"))
+    };
+    let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).settled));
+    let difference = largest_difference(&whole, &early);
+    println!("{} of {} calls left out, largest difference {difference:.1e}", calls.left_out, calls.of);
+    assert!(calls.left_out > 0 && calls.of == 18);
+    assert!(difference <= 0.5 / 255.0 + 1.0e-6, "half a level: {difference}");
+}
+
+#[test]
+fn without_denoiser_the_first_features_are_the_picture() {
+    let (sources, target) = (sources(2), target(32));
+    let mut options = exact();
+    (options.rays.near_far, options.rays.length) = (Some([0.8, 1.8]), Some(0.5));
+    let field = without_denoiser(options);
+    let picture = picture(&field, &sources, &target);
+    assert_sound(&picture);
+    let reference = Reference::new(&field, &Cpu, &sources).expect("sources on the device");
+    let features = reference.features(&[0.5, 0.5], &target.block(0), [0.8, 1.8], 0.5).expect("features");
+    for (colour, features) in picture.colours.iter().zip(features.chunks_exact(16)) {
+        let expected = [0, 1, 2].map(|channel| (0.5 * (features[channel] + 1.0)).clamp(0.0, 1.0));
+        assert_eq!(colour[..3], expected);
+    }
+    let calls = line(&field, "denoiser calls");
+    assert_eq!((calls.left_out, calls.of), (0, 0));
+}

@@ -1,0 +1,92 @@
+//! Views that nobody would take on purpose: results stay finite and in range.
+
+use super::worlds::{Run, assert_shows_an_object, assert_sound, ball, ball_views, orbit, source, target, views};
+use image::{Rgba, RgbaImage};
+use viewfuse::field::FieldError;
+use viewfuse::scene::photographs::SourceImages;
+use viewfuse::synthetic::render;
+use viewfuse_core::camera::Camera;
+
+#[test]
+fn identical_sources() {
+    let mut sources = ball_views(32);
+    let again = sources.images[..3].to_vec();
+    sources.images.extend(again);
+    let picture = Run::default().picture(&sources, &target(32)).expect("a picture");
+    assert_sound(&picture);
+    assert_shows_an_object(&picture);
+
+    // One camera twice says nothing about where along its rays the object is.
+    sources.images = vec![sources.images[0].clone(); 2];
+    let outcome = Run::default().picture(&sources, &target(32));
+    assert!(matches!(outcome, Err(FieldError::NoObject)), "{:?}", outcome.map(|picture| picture.width));
+}
+
+#[test]
+fn a_target_that_is_a_source_looks_like_it() {
+    let sources = ball_views(48);
+    let picture = Run::default().picture(&sources, &sources.images[3].camera).expect("a picture");
+    assert_sound(&picture);
+    let over_white = sources.images[3].texels.iter().map(|t| [0, 1, 2].map(|c| t[c] + (1.0 - t[3])));
+    let squares = picture.colours.iter().zip(over_white).flat_map(|(a, b)| [0, 1, 2].map(|c| (a[c] - b[c]).powi(2)));
+    let psnr = -10.0 * (squares.sum::<f32>() / (3 * picture.colours.len()) as f32).log10();
+    println!("a source from its own place: {psnr:.1} dB");
+    assert!(psnr > 28.0, "{psnr} dB");
+}
+
+#[test]
+fn sources_of_unequal_sizes() {
+    let mut cameras = orbit(32).spiral(8, [-0.5, 0.8]).expect("cameras");
+    for (index, camera) in cameras.iter_mut().enumerate() {
+        camera.pinhole = camera.pinhole.resized(24 + 7 * index as u32, 40 - 2 * index as u32).expect("a size");
+    }
+    let picture = Run::default().picture(&views(&ball(), &cameras), &target(40)).expect("a picture");
+    assert_sound(&picture);
+    assert_shows_an_object(&picture);
+}
+
+#[test]
+fn a_white_object_on_white() {
+    let mut sources = ball_views(32);
+    for texel in sources.images.iter_mut().flat_map(|image| &mut image.texels) {
+        *texel = [texel[3]; 4];
+    }
+    let picture = Run::default().picture(&sources, &target(32)).expect("a picture");
+    assert_sound(&picture);
+    assert_shows_an_object(&picture);
+    let darkest = picture.colours.iter().flat_map(|colour| &colour[..3]).copied().fold(1.0, f32::min);
+    assert!(darkest > 1.0 - 1.0e-5, "white became {darkest}");
+}
+
+#[test]
+fn photographs_without_any_background() {
+    let cameras = orbit(24).spiral(6, [-0.5, 0.8]).expect("cameras");
+    let full = |camera: &Camera| source(*camera, &RgbaImage::from_pixel(24, 24, Rgba([90, 120, 30, 255])));
+    let sources = SourceImages { images: cameras.iter().map(full).collect(), background: [0.0; 3], warning: None };
+    assert_sound(&Run::default().picture(&sources, &target(24)).expect("a picture"));
+}
+
+#[test]
+fn pictures_of_hardly_any_pixels() {
+    for side in [1, 2, 3] {
+        let cameras = orbit(side).spiral(6, [-0.5, 0.8]).expect("cameras");
+        let images = cameras.iter().map(|camera| source(*camera, &render(&ball(), camera))).collect();
+        let sources = SourceImages { images, background: [1.0; 3], warning: None };
+        for target_side in [1, 5] {
+            match Run::default().picture(&sources, &target(target_side)) {
+                Ok(picture) => assert_sound(&picture),
+                Err(error) => println!("{side} x {side}: {error}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn every_weighting_scheme() {
+    let sources = ball_views(24);
+    for scheme in viewfuse::weighting::SCHEME_NAMES {
+        let picture = Run { scheme, ..Run::default() }.picture(&sources, &target(24)).expect("a picture");
+        assert_sound(&picture);
+        assert_shows_an_object(&picture);
+    }
+}

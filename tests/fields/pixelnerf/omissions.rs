@@ -1,0 +1,146 @@
+//! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
+
+use super::{body, exact, largest_difference, leaving_out, mist, picture, picture_with, sources, target};
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions};
+use viewfuse::field::{Field, LeftOut, Rendered};
+use viewfuse::weighting::sources::MOST_SOURCES;
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::weights::Weights;
+
+fn line(field: &PixelNerf, what: &str) -> LeftOut {
+    let lines = Field::<Cpu>::left_out(field);
+    *lines.iter().find(|line| line.what == what).unwrap_or_else(|| panic!("no line '{what}'"))
+}
+
+/// Difference from the exact picture of the body, and the share of the samples of a pass that was left out.
+fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
+    let (sources, target) = (sources(3), target(32));
+    let reference = picture(&body(exact()), &sources, &target);
+    let field = body(leaving_out(omissions));
+    let difference = largest_difference(&picture(&field, &sources, &target), &reference);
+    let LeftOut { left_out, of, switch, .. } = line(&field, what);
+    assert!(switch && of > 0);
+    let share = left_out as f64 / of as f64;
+    println!("{what}: {share:.3} left out, largest difference {difference:.1e}");
+    (difference, share)
+}
+
+#[test]
+fn nothing_is_left_out_where_nothing_may() {
+    let field = body(exact());
+    picture(&field, &sources(3), &target(16));
+    for line in Field::<Cpu>::left_out(&field) {
+        assert!(!line.switch && line.left_out == 0 && line.of > 0, "{line:?}");
+    }
+}
+
+#[test]
+fn views_that_no_target_uses_are_not_encoded() {
+    let (sources, target) = (sources(4), target(16));
+    let mut scores = [0.0; MOST_SOURCES];
+    (scores[1], scores[3]) = (0.25, 0.75);
+    let weights = Weights::from_scores(&scores, 4);
+    let reference = picture_with(&body(exact()), &sources, &weights, &target, 0.0);
+    let field = body(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
+    assert_eq!(picture_with(&field, &sources, &weights, &target, 0.0), reference, "zeros are added exactly");
+    let LeftOut { left_out, of, .. } = line(&field, "encoded views");
+    assert_eq!((left_out, of), (2, 4));
+}
+
+#[test]
+fn latent_layers_on_the_grid_are_only_rounding() {
+    // Mist, so that every sample counts.
+    let (sources, target) = (sources(3), target(24));
+    let reference = picture(&mist(exact()), &sources, &target);
+    let field = mist(leaving_out(Omissions { latent_layers: true, ..Omissions::NONE }));
+    let difference = largest_difference(&picture(&field, &sources, &target), &reference);
+    println!("latent layers on the grid: {difference:.1e}");
+    assert!(difference > 0.0, "the same bits: the layers were not moved");
+    // A fine sample may fall into the next part where two sums round apart.
+    assert!(difference < 2.0e-3, "{difference}");
+    let LeftOut { left_out, of, .. } = line(&field, "latent layers at points");
+    assert!(left_out == of && of > 0);
+}
+
+#[test]
+fn empty_space_is_found_by_probes() {
+    for (step, least_share) in [(2, 0.55), (4, 0.7), (8, 0.55)] {
+        let omissions = Omissions { empty_space: step, ..Omissions::NONE };
+        let (difference, share) = cost_and_gain(omissions, "first-pass samples");
+        assert!(share > least_share, "step {step}");
+        assert!(difference < if step < 8 { 0.02 } else { 0.2 }, "step {step}");
+    }
+}
+
+#[test]
+fn probes_stand_at_the_last_row_and_column_too() {
+    let (sources, camera) = (sources(3), target(31));
+    // The body in the last corner, cut by the picture's border.
+    let pinhole = Pinhole::new(camera.pinhole.focal(), [28.0, 28.0], 31, 31).expect("sound intrinsics");
+    let camera = Camera { pinhole, ..camera };
+    let reference = picture(&body(exact()), &sources, &camera);
+    let opaque = |picture: &Rendered| picture.colours.iter().filter(|colour| colour[3] > 0.5).count();
+    assert!(reference.colours[31 * 31 - 1][3] > 0.9 && opaque(&reference) > 60, "cut by the border");
+    // From 16 pixels on, only the probe in the last corner can meet it.
+    for (step, share) in [(4, 1.0), (16, 0.5), (64, 0.5)] {
+        let field = body(leaving_out(Omissions { empty_space: step, ..Omissions::NONE }));
+        let seen = opaque(&picture(&field, &sources, &camera));
+        assert!(seen as f64 >= share * opaque(&reference) as f64, "step {step}: {seen} of {}", opaque(&reference));
+    }
+}
+
+#[test]
+fn empty_rays_take_no_second_pass() {
+    let (difference, share) = cost_and_gain(Omissions { empty_rays: true, ..Omissions::NONE }, "second-pass samples");
+    assert!(share > 0.5);
+    assert!(difference < 0.02);
+}
+
+#[test]
+fn empty_parts_take_no_second_pass() {
+    let (difference, share) = cost_and_gain(Omissions { empty_parts: true, ..Omissions::NONE }, "second-pass samples");
+    assert!(share > 0.5);
+    assert!(difference < 0.02);
+}
+
+#[test]
+fn what_is_hidden_takes_no_second_pass() {
+    let omissions = Omissions { hidden_samples: true, ..Omissions::NONE };
+    let (difference, share) = cost_and_gain(omissions, "second-pass samples");
+    assert!(share > 0.05);
+    assert!(difference < 0.02);
+}
+
+#[test]
+fn all_together_save_most_and_cost_little() {
+    let (sources, target) = (sources(3), target(32));
+    let reference = picture(&body(exact()), &sources, &target);
+    let field = body(PixelNerfOptions::default());
+    let default = picture(&field, &sources, &target);
+    let squares =
+        default.colours.iter().flatten().zip(reference.colours.iter().flatten()).map(|(a, b)| (a - b).powi(2));
+    let psnr = -10.0 * (squares.map(f64::from).sum::<f64>() / (4 * default.colours.len()) as f64).log10();
+    println!("everything together: {psnr:.1} dB");
+    assert!(psnr > 50.0, "{psnr} dB");
+    let unasked: u64 =
+        ["first-pass samples", "second-pass samples"].iter().map(|what| line(&field, what).left_out).sum();
+    let all: u64 = ["first-pass samples", "second-pass samples"].iter().map(|what| line(&field, what).of).sum();
+    assert!(unasked as f64 > 0.8 * all as f64, "{unasked} of {all}");
+}
+
+#[test]
+fn a_higher_limit_for_settled_rays_saves_more_and_costs_more() {
+    let (sources, target) = (sources(3), target(24));
+    let reference = picture(&body(exact()), &sources, &target);
+    let weights = Weights::mean(3);
+    let with = |settled| {
+        let field = body(leaving_out(Omissions { hidden_samples: true, ..Omissions::NONE }));
+        let picture = picture_with(&field, &sources, &weights, &target, settled);
+        (largest_difference(&picture, &reference), line(&field, "second-pass samples").left_out)
+    };
+    let (strict, loose) = (with(1.0e-4), with(0.5));
+    println!("settled at 1e-4: {:.1e}, {} left out; at 0.5: {:.1e}, {} left out", strict.0, strict.1, loose.0, loose.1);
+    assert!(strict.1 < loose.1 && strict.0 <= loose.0);
+    assert!(strict.0 < 5.0e-3);
+}

@@ -1,0 +1,85 @@
+//! Other members of the family: sizes are read off the tensors.
+
+use super::{assert_sound, exact, picture, sources, target};
+use std::collections::BTreeMap;
+use viewfuse::field::pixelnerf::{Architecture, Level, PixelNerf, made};
+use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
+
+fn with_changes(change: impl FnOnce(&mut Vec<(TensorShape, Vec<f32>)>)) -> Checkpoint {
+    let made = made::by_formula(&Architecture::small(16));
+    let mut tensors: Vec<(TensorShape, Vec<f32>)> = made
+        .shapes()
+        .iter()
+        .map(|(name, shape)| {
+            (TensorShape { name: name.clone(), shape: shape.clone() }, made.tensor(name).expect("values"))
+        })
+        .collect();
+    change(&mut tensors);
+    Checkpoint::in_memory("changed", tensors, BTreeMap::new())
+}
+
+fn refusal(checkpoint: &Checkpoint) -> String {
+    match PixelNerf::new(checkpoint, exact()) {
+        Ok(_) => panic!("is taken for a PixelNeRF"),
+        Err(error) => error.to_string(),
+    }
+}
+
+#[test]
+fn sizes_come_from_the_checkpoint() {
+    let level = |channels, block_count| Level { channels, block_count };
+    let small = Architecture::small(16);
+    for architecture in [
+        Architecture::published(),
+        small.clone(),
+        Architecture { levels: vec![level(4, 2)], ..small.clone() },
+        Architecture { levels: vec![level(8, 1), level(4, 1), level(12, 2), level(4, 1)], ..small.clone() },
+        Architecture { width: 40, block_count: 2, injected_count: 2, ..small.clone() },
+        Architecture { block_count: 1, injected_count: 1, frequency_count: 1, has_fine: false, ..small },
+    ] {
+        let checkpoint = made::by_formula(&architecture);
+        let field = PixelNerf::new(&checkpoint, exact()).expect("a member of the family");
+        assert_eq!(*field.architecture(), architecture);
+        if architecture.width < 512 {
+            assert_sound(&picture(&field, &sources(2), &target(6)));
+        }
+    }
+}
+
+#[test]
+fn what_official_checkpoints_have_besides_is_accepted() {
+    let tensor = |name: &str, shape: &[usize]| {
+        let count = shape.iter().product();
+        (TensorShape { name: name.to_owned(), shape: shape.to_vec() }, vec![0.5; count])
+    };
+    let checkpoint = with_changes(|tensors| {
+        tensors.push(tensor("encoder.model.layer3.0.conv1.weight", &[16, 8, 3, 3]));
+        tensors.push(tensor("encoder.model.bn1.num_batches_tracked", &[]));
+        let frequencies = (0..12).map(|index| 1.5 * 2.0_f32.powi(index / 2)).collect();
+        let shape = TensorShape { name: "code._freqs".to_owned(), shape: vec![1, 12, 1] };
+        tensors.push((shape, frequencies));
+        tensors.push(tensor("code._phases", &[1, 12, 1]));
+    });
+    assert!(PixelNerf::new(&checkpoint, exact()).is_ok());
+}
+
+#[test]
+fn what_is_no_member_is_refused_with_the_reason() {
+    let renamed = with_changes(|tensors| tensors[0].0.name.push('x'));
+    let text = refusal(&renamed);
+    let name = renamed.shapes().keys().find(|name| name.ends_with('x')).expect("the renamed tensor");
+    assert!(text.contains("changed") && text.contains(name) && text.contains(&name[..name.len() - 1]), "{text}");
+    let missing = with_changes(|tensors| tensors.retain(|(tensor, _)| tensor.name != "mlp_fine.blocks.4.fc_1.bias"));
+    let text = refusal(&missing);
+    assert!(text.contains("mlp_fine.blocks.4.fc_1.bias"), "{text}");
+    let misshapen = with_changes(|tensors| {
+        for (tensor, values) in tensors.iter_mut().filter(|(tensor, _)| tensor.name == "mlp_coarse.lin_out.weight") {
+            tensor.shape = vec![5, 16];
+            values.resize(80, 0.0);
+        }
+    });
+    let text = refusal(&misshapen);
+    assert!(text.contains("mlp_coarse.lin_out.weight") && text.contains('5'), "{text}");
+    let text = refusal(&Checkpoint::in_memory("nothing", [], BTreeMap::new()));
+    assert!(text.contains("nothing") && text.contains("encoder.model.conv1.weight"), "{text}");
+}

@@ -1,0 +1,23 @@
+//! Arithmetic against `f64`, known answers and the published codes: every function of core, its errors and its ends.
+
+mod agreement;
+mod attention;
+mod camera;
+mod compare;
+mod halves;
+mod layers;
+mod light;
+mod math;
+mod metrics;
+mod network;
+mod normalise;
+mod photo_parts;
+mod points;
+mod published;
+mod rays;
+mod sampler;
+mod sampling;
+mod schedule;
+mod volumes;
+mod weighting;
+mod weights;

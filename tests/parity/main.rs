@@ -1,0 +1,235 @@
+//! Every kernel on every device against `f64`, and the negative controls: an input that is off by 1 % must show.
+//!
+//! One trial for each kernel and device. A device that is not there gives ignored trials, or, where
+//! `VIEWFUSE_REQUIRE_VULKAN=1` asks for it, failing ones.
+
+mod faulty;
+
+use faulty::Faulty;
+use libtest_mimic::{Arguments, Failed, Trial};
+use std::process::ExitCode;
+use viewfuse::check::agreement::{Disagreement, measure};
+use viewfuse::check::bounded::Bounded;
+use viewfuse::check::case::{Case, Visitor};
+use viewfuse::check::cases::visit;
+use viewfuse::check::measure::Role;
+use viewfuse::check::{Report, check_device, check_kernel};
+use viewfuse::device::Device;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::device::vulkan::Vulkan;
+use viewfuse::job::progress::Silent;
+use viewfuse_tests::devices::vulkan_devices;
+use viewfuse_vulkan::GpuOptions;
+use viewfuse_vulkan::kernel::{Access, Kernel};
+
+/// A device under test. Every trial opens it for itself: its counters then are the trial's own.
+struct Candidate<D, F: Fn() -> Result<D, String>> {
+    name: String,
+    open: F,
+    /// Why there is no such device here, if there is none.
+    missing: Option<String>,
+    /// How often it ran a kernel, if it counts.
+    dispatch_count: fn(&D, Kernel) -> Option<u64>,
+}
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let mut trials = Vec::new();
+    // The CPU has no dispatches to count.
+    let cpu = Candidate { name: "cpu".to_owned(), open: || Ok(Cpu), missing: None, dispatch_count: |_, _| None };
+    trials.extend(trials_of(&cpu));
+    match vulkan_devices() {
+        Ok((instance, adapters)) => {
+            for adapter in adapters {
+                let (instance, name) = (instance.clone(), adapter.name.clone());
+                trials.extend(trials_of(&Candidate {
+                    open: move || {
+                        Vulkan::open(&instance, &adapter, &GpuOptions::default()).map_err(|error| error.to_string())
+                    },
+                    name,
+                    missing: None,
+                    dispatch_count: vulkan_dispatches,
+                }));
+            }
+        }
+        Err(error) => trials.extend(trials_of(&Candidate {
+            name: "vulkan".to_owned(),
+            open: || Err::<Vulkan, _>("there is no device".to_owned()),
+            missing: Some(error.to_string()),
+            dispatch_count: vulkan_dispatches,
+        })),
+    }
+    trials.push(Trial::test("every_input_has_a_control", every_input_has_a_control));
+    for kernel in Kernel::ALL {
+        let name = format!("check_reports_a_faulty::{}", kernel.name());
+        trials.push(Trial::test(name, move || a_fault_is_reported(kernel)));
+    }
+    trials.push(Trial::test("a_faulty_device_fails_the_check", a_faulty_device_fails_the_check));
+    libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+fn vulkan_dispatches(device: &Vulkan, kernel: Kernel) -> Option<u64> {
+    Some(device.tally(kernel).dispatches)
+}
+
+/// The trials of a device, one for each kernel. Without the device they are ignored, or fail where it is required.
+fn trials_of<D: Device + 'static, F>(candidate: &Candidate<D, F>) -> Vec<Trial>
+where
+    F: Fn() -> Result<D, String> + Clone + Send + 'static,
+{
+    let is_required = std::env::var("VIEWFUSE_REQUIRE_VULKAN").is_ok_and(|value| value == "1");
+    let dispatch_count = candidate.dispatch_count;
+    let trial = |kernel: Kernel| {
+        let name = format!("{}::{}", candidate.name, kernel.name());
+        let open = candidate.open.clone();
+        match candidate.missing.clone() {
+            None => Trial::test(name, move || parity(&open()?, kernel, dispatch_count)),
+            Some(missing) => Trial::test(name, move || Err(missing.into())).with_ignored_flag(!is_required),
+        }
+    };
+    Kernel::ALL.into_iter().map(trial).collect()
+}
+
+/// What a kernel must stand, beyond agreeing: a kernel that is not listed here does not compile.
+fn seed_count(kernel: Kernel) -> u64 {
+    match kernel {
+        // As many as give every scheme every number of sources.
+        Kernel::Weigh => 32,
+        Kernel::Attend | Kernel::FuseViews | Kernel::Composite => 8,
+        Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth | Kernel::HullEntry | Kernel::MatchCost => 4,
+        Kernel::EmbedPose | Kernel::March => 3,
+        // As many as give every shape every combination of addend and rectification.
+        Kernel::Product | Kernel::Convolve | Kernel::ConvolveTransposed | Kernel::MultiplyMatrices => 8,
+        // As many as give every shape floors, offsets and distances of all kinds.
+        Kernel::PartMoments | Kernel::MergeMoments | Kernel::Normalise => 8,
+        Kernel::GatherVolume | Kernel::GatherHalves | Kernel::WeighFeatures | Kernel::SumFeatures => 8,
+        Kernel::ConvolveDepthwise | Kernel::ChannelMeans | Kernel::SoftmaxRows | Kernel::DenoiserInput => 4,
+        Kernel::CastRays | Kernel::CoarseDepths | Kernel::PlacePoints | Kernel::EmbedPoints => 4,
+        Kernel::VisibleWeights | Kernel::GatherLatents | Kernel::Radiance => 8,
+        Kernel::MaxPool | Kernel::Upsample => 4,
+        Kernel::WeighSamples | Kernel::DrawChances | Kernel::MergeDepths => 4,
+        Kernel::FineDepths | Kernel::WantedSamples => 8,
+        Kernel::MixPictures | Kernel::AddNoise | Kernel::PackHalves => 8,
+    }
+}
+
+/// Sizes of the trials: one element, an odd number, and several workgroups with a rest.
+const SIZES: [u32; 3] = [1, 7, 500];
+
+fn parity<D: Device>(device: &D, kernel: Kernel, count: fn(&D, Kernel) -> Option<u64>) -> Result<(), Failed> {
+    let before = count(device, kernel);
+    visit(kernel, Parity { device })?;
+    // The kernel really ran: nobody answered for it.
+    match (before, count(device, kernel)) {
+        (Some(before), Some(after)) if after <= before => Err("the kernel was never dispatched".into()),
+        _ => Ok(()),
+    }
+}
+
+struct Parity<'a, D> {
+    device: &'a D,
+}
+
+impl<D: Device> Visitor for Parity<'_, D> {
+    type Output = Result<(), Failed>;
+
+    fn visit<C: Case>(self) -> Result<(), Failed> {
+        let seeds = 1..=seed_count(C::KERNEL);
+        let inputs: Vec<C::Inputs> = seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
+        let expected: Vec<Vec<Option<Bounded>>> = inputs.iter().map(C::expected).collect();
+        let mut actual = Vec::new();
+        for inputs in &inputs {
+            actual.extend(C::results(self.device, inputs)?);
+        }
+        if let Some(disagreement) = measure(&actual, &expected.concat(), C::LIMITS).disagreement {
+            return Err(disagreement.to_string().into());
+        }
+        // The last world has several workgroups, the first ones may be too small to show anything.
+        let last = inputs.len() - 1;
+        for (input, spoil) in C::SPOILERS {
+            let mut spoilt = inputs[last].clone();
+            spoil(&mut spoilt);
+            let outcome = measure(&C::results(self.device, &spoilt)?, &expected[last], C::LIMITS).disagreement;
+            if !matches!(outcome, Some(Disagreement::Mismatch { .. })) {
+                return Err(format!("{input} off by 1 %: {outcome:?}").into());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Every array that a kernel reads is put off by 1 % in a negative control, and so are its parameters.
+fn every_input_has_a_control() -> Result<(), Failed> {
+    struct Controls;
+    impl Visitor for Controls {
+        type Output = Vec<&'static str>;
+        fn visit<C: Case>(self) -> Vec<&'static str> {
+            C::SPOILERS.iter().map(|(input, _)| *input).collect()
+        }
+    }
+    for kernel in Kernel::ALL {
+        let controls = visit(kernel, Controls);
+        let read = kernel.arrays().iter().filter(|array| array.access == Access::Read).map(|array| array.name);
+        // Of the cameras this one takes only where their pixels are.
+        let read: Vec<&str> = read.filter(|array| (kernel, *array) != (Kernel::PickDepth, "views")).collect();
+        let missing: Vec<&&str> = read.iter().filter(|array| !controls.contains(array)).collect();
+        let unknown: Vec<&&str> =
+            controls.iter().filter(|control| **control != "parameters" && !read.contains(control)).collect();
+        if !missing.is_empty() || !unknown.is_empty() {
+            return Err(format!("{}: without a control {missing:?}, unknown {unknown:?}", kernel.name()).into());
+        }
+        let has_numbers = match kernel {
+            // Which view, how many sources, the shape of a band: whole numbers, or none at all.
+            Kernel::EmbedPose | Kernel::Attend | Kernel::FuseViews | Kernel::HullEntry => false,
+            Kernel::SumRow | Kernel::MeanColumn => false,
+            Kernel::PlacePoints | Kernel::VisibleWeights | Kernel::MaxPool | Kernel::Upsample => false,
+            Kernel::ConvolveDepthwise | Kernel::ConvolveTransposed | Kernel::SoftmaxRows => false,
+            // A floor of variances and a length are there for another kernel.
+            Kernel::ChannelMeans | Kernel::PartMoments | Kernel::Normalise | Kernel::SumFeatures => false,
+            Kernel::Product | Kernel::Radiance | Kernel::WeighSamples | Kernel::DrawChances => false,
+            Kernel::MergeDepths | Kernel::PackHalves => false,
+            Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
+            Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
+            Kernel::FineDepths | Kernel::WantedSamples | Kernel::MixPictures | Kernel::AddNoise => true,
+            Kernel::Convolve | Kernel::MergeMoments | Kernel::MultiplyMatrices | Kernel::GatherVolume => true,
+            Kernel::GatherHalves | Kernel::WeighFeatures | Kernel::DenoiserInput => true,
+        };
+        if controls.contains(&"parameters") != has_numbers {
+            return Err(format!("{}: parameters", kernel.name()).into());
+        }
+    }
+    Ok(())
+}
+
+/// A device whose results of a kernel are off by 1e-3 breaches its tolerance.
+fn a_fault_is_reported(kernel: Kernel) -> Result<(), Failed> {
+    let report = check_kernel(&Faulty { kernel }, Role::Other, kernel, 1, &Silent)?;
+    match (report.breach, report.versus_cpu) {
+        (Some(_), Some(versus)) if versus.absolute > 0.0 && versus.equal < 1.0 => Ok(()),
+        (breach, versus) => Err(format!("reported: {breach:?}, {versus:?}").into()),
+    }
+}
+
+/// And no other kernel's; the whole check fails with it.
+fn a_faulty_device_fails_the_check() -> Result<(), Failed> {
+    let device = Faulty { kernel: Kernel::FuseViews };
+    let checked = check_device(&device, Role::Other, 1, &Silent)?;
+    let breaches = checked.breaches();
+    let others_equal = checked
+        .kernels
+        .iter()
+        .all(|report| report.kernel == "fuse_views" || report.versus_cpu.is_some_and(|versus| versus.equal == 1.0));
+    let report = Report {
+        viewfuse: "",
+        seed_count: 1,
+        sizes: Vec::new(),
+        devices: vec![checked],
+        failures: Vec::new(),
+        notes: Vec::new(),
+    };
+    if breaches != ["fuse_views"] || !others_equal || report.exit_code() != 1 {
+        return Err(format!("reported: {breaches:?}, exit code {}", report.exit_code()).into());
+    }
+    let nothing = Report { devices: Vec::new(), ..report };
+    if nothing.passes() { Err("nothing was checked, and that passes".into()) } else { Ok(()) }
+}

@@ -1,0 +1,279 @@
+//! `viewfuse report`: the page as text, and as a browser shows it.
+//!
+//! The browser is Chromium or Chrome: `VIEWFUSE_BROWSER`, or the first that is found. Without one its tests are ignored and
+//! say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
+//! `tmp/report` of the target folder.
+
+mod browser;
+
+use browser::Browser;
+use libtest_mimic::{Arguments, Failed, Trial};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, names_in, toy};
+use viewfuse_tests::scenes::Folder;
+
+const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
+const SMALL: &str =
+    "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
+
+/// A test that needs the browser.
+type InBrowser = fn(&Browser);
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let mut trials = vec![
+        Trial::test("the_page_holds_everything", || checked(the_page_holds_everything)),
+        Trial::test("evaluations_under_way_are_shown", || checked(evaluations_under_way_are_shown)),
+        Trial::test("what_is_no_record_is_refused", || checked(what_is_no_record_is_refused)),
+    ];
+    let browser = Browser::find().map(Arc::new);
+    let tests: [(&str, InBrowser); 3] = [
+        ("browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
+        ("browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
+        ("browser::light_and_dark", light_and_dark),
+    ];
+    let is_required = std::env::var("VIEWFUSE_REQUIRE_BROWSER").is_ok_and(|value| value == "1");
+    for (name, test) in tests {
+        trials.push(match browser.clone() {
+            Ok(browser) => Trial::test(name, move || checked(|| test(&browser))),
+            Err(missing) if is_required => Trial::test(name, move || Err(Failed::from(missing))),
+            Err(missing) => Trial::test(name, || Ok(())).with_kind(missing).with_ignored_flag(true),
+        });
+    }
+    libtest_mimic::run(&arguments, trials).exit_code()
+}
+
+/// A test that panics where something is wrong.
+fn checked(test: impl FnOnce()) -> Result<(), Failed> {
+    test();
+    Ok(())
+}
+
+/// The sample scene twice, three evaluations of it, a sweep and a training.
+fn runs() -> Folder {
+    let folder = toy();
+    let path = folder.path();
+    let copy = |name: &str| {
+        for kind in ["rgb", "pose"] {
+            for file in names_in(&path.join("toy").join(kind)) {
+                fs::copy(path.join("toy").join(kind).join(&file), folder.file(&format!("{name}/{kind}/{file}")))
+                    .expect("a copy");
+            }
+        }
+        fs::copy(path.join("toy/intrinsics.txt"), folder.file(&format!("{name}/intrinsics.txt"))).expect("a copy");
+    };
+    copy("lorry");
+    done(BINARY, path, &format!("evaluate toy lorry --protocol count:sources=2+4+8 {SMALL} -o count"));
+    done(BINARY, path, &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    done(BINARY, path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    folder.write(
+        "trained/record.json",
+        json!({"steps": 12, "settings": {"rate": 0.001}, "scores": (0..20).collect::<Vec<_>>()}).to_string(),
+    );
+    folder.write(
+        "trained/curve.svg",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"90\" height=\"48\"><path d=\"M0 0L90 48\"/></svg>",
+    );
+    folder
+}
+
+const REPORT: &str = "report count random --pareto sweep/pareto.json --training trained -o page.html";
+
+fn page(folder: &Path) -> String {
+    fs::read_to_string(folder.join("page.html")).expect("a page")
+}
+
+fn the_page_holds_everything() {
+    let folder = runs();
+    let said = done(BINARY, folder.path(), REPORT);
+    assert!(said.starts_with("page.html: "), "{said}");
+    let first = page(folder.path());
+    // No address but those that hold what they point to, and those on the page.
+    for attribute in ["src=\"", "href=\"", "url("] {
+        for rest in first.split(attribute).skip(1) {
+            assert!(
+                rest.starts_with("data:") || rest.starts_with('#'),
+                "{attribute}{}",
+                rest.chars().take(60).collect::<String>()
+            );
+        }
+    }
+    assert!(!first.contains("<script") && first.contains("Content-Security-Policy"));
+    // Three jobs of one scene with 2, 4 and 8 sources, one of the other scene, one of the other evaluation.
+    let sources = 2 + 4 + 8 + 2 + 3;
+    assert_eq!(first.matches("data:image/png;base64,").count(), sources + 5 * (1 + 3));
+    assert_eq!(first.matches("data:image/svg+xml;base64,").count(), 1);
+    for part in [
+        "<h2>Number of sources</h2>",
+        "<h2>Random sources and targets</h2>",
+        "<h2>Error over run time: photo</h2>",
+        "<h2>Training: trained</h2>",
+        "count:sources=2+4+8",
+        "<th scope=\"row\">--size</th><td>24x24</td>",
+        "<th scope=\"row\">settings.rate</th><td>0.001</td>",
+        "<td>20 entries, the last 19</td>",
+    ] {
+        assert!(first.contains(part), "no {part}");
+    }
+    // The same again is the same page, and the records alone are one as well.
+    done(BINARY, folder.path(), REPORT);
+    assert_eq!(page(folder.path()), first);
+    done(BINARY, folder.path(), "report --training trained --title <b>&amp; -o page.html");
+    assert!(page(folder.path()).contains("<h1>&lt;b&gt;&amp;amp;</h1>"));
+}
+
+fn evaluations_under_way_are_shown() {
+    let folder = toy();
+    let path = folder.path();
+    done(BINARY, path, &format!("evaluate toy --protocol random --trials 5 {SMALL} --shard 1/2 -o half"));
+    done(BINARY, path, "report half -o page.html");
+    assert!(page(path).contains("<strong>Not finished: </strong>2 of 5 jobs"), "{}", page(path));
+    assert!(page(path).contains("Missing: 0, 2, 4."));
+    // Nothing at all is done yet.
+    fs::remove_file(path.join("half/scores-1-of-2.jsonl")).expect("a journal");
+    done(BINARY, path, "report half -o page.html");
+    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("nearest copy"));
+}
+
+fn what_is_no_record_is_refused() {
+    let folder = toy();
+    let path = folder.path();
+    let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, path, arguments, parts);
+    refused("report toy -o page.html", &["toy/run.json: cannot be read"]);
+    refused(
+        "report --pareto toy/intrinsics.txt -o page.html",
+        &["toy/intrinsics.txt: is not a record of viewfuse pareto"],
+    );
+    refused("report --training toy -o page.html", &["toy/record.json: cannot be read"]);
+    refused("report --training toy -o toy", &["toy: cannot be written: it is a folder"]);
+    assert_wrong_arguments(BINARY, path, "report -o page.html", &["required"]);
+    done(BINARY, path, &format!("evaluate toy --protocol random {SMALL} -o out"));
+    fs::remove_file(path.join("out/pictures/job-00000-truth.png")).expect("a picture");
+    refused("report out -o page.html", &["out/pictures/job-00000-truth.png: cannot be read"]);
+    fs::write(path.join("out/pictures/job-00000.json"), "{}").expect("a file");
+    refused("report out -o page.html", &["out/pictures/job-00000.json: does not describe pictures"]);
+}
+
+/// The number that a cell begins with.
+fn number(text: &str) -> f64 {
+    let first = text.split_whitespace().next().unwrap_or_default();
+    first.parse().unwrap_or_else(|_| panic!("{text:?} is no number"))
+}
+
+/// Best values are bold, the next underlined, nothing else is either; as the browser shows it.
+#[track_caller]
+fn assert_marks(table: &Value) {
+    let header: Vec<&str> = table["header"].as_array().expect("a header").iter().filter_map(Value::as_str).collect();
+    let rows: Vec<&Vec<Value>> = table["rows"].as_array().expect("rows").iter().filter_map(Value::as_array).collect();
+    assert!(rows.len() > 3 || !header[0].contains("weighting"), "{table}");
+    for (column, title) in header.iter().enumerate() {
+        let larger_is_better = title.ends_with('↑');
+        if !larger_is_better && !title.ends_with('↓') {
+            assert!(
+                rows.iter().all(|row| row[column]["bold"].is_null() && row[column]["underlined"].is_null()),
+                "{title}: {table}"
+            );
+            continue;
+        }
+        let key = |row: &&Vec<Value>| {
+            let value = number(row[column]["text"].as_str().expect("a text"));
+            if larger_is_better { -value } else { value }
+        };
+        let mut keys: Vec<f64> = rows.iter().map(key).collect();
+        keys.sort_by(f64::total_cmp);
+        keys.dedup();
+        for row in &rows {
+            let place = keys.iter().position(|own| *own == key(row)).expect("a place");
+            let cell = &row[column];
+            assert_eq!(
+                (!cell["bold"].is_null(), !cell["underlined"].is_null()),
+                (place == 0, place == 1),
+                "{title}: {cell}"
+            );
+        }
+    }
+}
+
+fn a_person_sees_what_was_measured(browser: &Browser) {
+    let folder = runs();
+    done(BINARY, folder.path(), REPORT);
+    let page = page(folder.path());
+    let seen = browser.look(&page);
+    assert_eq!(seen.console, "", "the browser complains");
+    let views = seen.views.as_array().expect("a view for each width");
+    assert_eq!(views.iter().map(|view| view["width"].as_u64()).collect::<Vec<_>>(), [Some(360), Some(768), Some(1280)]);
+    for view in views {
+        let width = &view["width"];
+        assert!(view["scrollWidth"].as_u64() <= width.as_u64(), "wider than its {width}: {}", view["scrollWidth"]);
+        assert_eq!(
+            (&view["wide"], &view["broken"], &view["resources"]),
+            (&json!([]), &json!([]), &json!([])),
+            "at {width}"
+        );
+        assert_eq!(view["images"], page.matches("<img ").count(), "at {width}");
+        // Two metrics with a figure and one of differences each, and the sweep.
+        assert_eq!((&view["scripts"], &view["figures"]), (&json!(0), &json!(5)), "at {width}");
+        assert!(view["smallestText"].as_f64().is_some_and(|size| size >= 11.0), "{}", view["smallestText"]);
+        let tables = view["tables"].as_array().expect("tables");
+        assert_eq!(tables.len(), 3 + 1 + 1);
+        tables.iter().for_each(|table| assert_marks(table));
+    }
+    // The cells are the table's that the command prints.
+    let printed =
+        done(BINARY, folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
+    let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
+    let words = |text: &str| text.replace('*', "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
+    let own = rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
+    let shown: Vec<String> = own.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();
+    assert_eq!(shown, words(row));
+}
+
+/// The negative control: pages on which something is wrong are not taken for good ones.
+fn the_looks_at_the_page_can_fail(browser: &Browser) {
+    let folder = toy();
+    done(BINARY, folder.path(), &format!("evaluate toy --protocol random {SMALL} --pictures 0 -o out"));
+    done(BINARY, folder.path(), "report out -o page.html");
+    let good = page(folder.path());
+    let with = |addition: &str| browser.look(&good.replace("</main>", &format!("{addition}</main>")));
+    let wide = with("<p style=\"width: 400px\">x</p>");
+    assert_eq!(wide.views[0]["wide"], json!(["P."]));
+    assert!(wide.views[0]["scrollWidth"].as_u64() > Some(360));
+    // The page's own policy keeps the network out, and the browser says so.
+    let foreign = with("<img alt=\"foreign\" src=\"http://example.invalid/x.png\">");
+    assert_eq!(foreign.views[0]["broken"], json!(["foreign"]));
+    assert!(foreign.console.contains("Content Security Policy"), "{:?}", foreign.console);
+    // Without the policy it would be asked for.
+    let open = good.replace("default-src 'none'", "default-src *").replace("img-src data:", "img-src *");
+    let asked = browser.look(&open.replace("</main>", "<img src=\"http://example.invalid/x.png\"></main>"));
+    assert_eq!(asked.views[0]["resources"], json!(["http://example.invalid/x.png"]));
+    // A mark in the wrong place.
+    let table = &browser.look(&good.replacen("<td>", "<td><b>0</b> ", 1)).views[0]["tables"][0];
+    assert!(std::panic::catch_unwind(|| assert_marks(table)).is_err());
+}
+
+fn light_and_dark(browser: &Browser) {
+    let folder = runs();
+    done(BINARY, folder.path(), REPORT);
+    let pictures = Path::new(env!("CARGO_TARGET_TMPDIR")).join("report");
+    fs::create_dir_all(&pictures).expect("a folder");
+    for (name, width, is_dark) in
+        [("phone", 360, false), ("phone-dark", 360, true), ("desktop", 1280, false), ("desktop-dark", 1280, true)]
+    {
+        let file = pictures.join(format!("{name}.png"));
+        let picture = browser.picture(&folder.path().join("page.html"), &file, width, is_dark);
+        assert_eq!(picture.width(), width, "{name}");
+        // The page's margin is its background; somewhere on it there are words.
+        let background = picture.get_pixel(2, 2).0.map(u32::from);
+        let brightness = (background[0] + background[1] + background[2]) / 3;
+        assert!(if is_dark { brightness < 60 } else { brightness > 240 }, "{name}: {background:?}");
+        let far = |pixel: &image::Rgb<u8>| {
+            pixel.0.iter().zip(background).any(|(own, other)| u32::from(*own).abs_diff(other) > 120)
+        };
+        assert!(picture.pixels().filter(|pixel| far(pixel)).count() > 1000, "{name} shows nothing");
+    }
+}
