@@ -10,3 +10,13 @@ pub mod lorry;
 pub mod mixture;
 pub mod module;
 pub mod scenes;
+
+/// The examples of the main README and of core's, compiled and run. Core's sources are what the compiled kernels were made
+/// from, so its README is not included there.
+#[cfg(doctest)]
+mod readmes {
+    #[doc = include_str!("../../README.md")]
+    struct Main;
+    #[doc = include_str!("../../core/README.md")]
+    struct Core;
+}
