@@ -19,3 +19,8 @@ pub use viewfuse_synthetic as synthetic;
 pub use viewfuse_train as train;
 pub use viewfuse_vulkan as vulkan;
 pub use viewfuse_weighting as weighting;
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

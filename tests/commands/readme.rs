@@ -1,113 +1,280 @@
-//! The README's commands are run as they stand there, and its claims about itself hold.
+//! The READMEs: their commands are run as they stand there, their links lead somewhere, their tables are what the program
+//! prints, and every published package has its own.
 
+use serde_json::Value;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use viewfuse_tests::places::repository;
 
-fn readme() -> String {
-    std::fs::read_to_string(repository().join("README.md")).expect("the README")
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The lines of all `sh` blocks.
+fn readme() -> String {
+    read(&repository().join("README.md"))
+}
+
+/// The README of the repository, then those of all folders in the order of their paths; not what lies in target folders.
+fn readmes() -> Vec<PathBuf> {
+    fn below(folder: &Path, found: &mut Vec<PathBuf>) {
+        let mut entries: Vec<PathBuf> =
+            std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
+        entries.sort();
+        for path in entries {
+            let name = path.file_name().unwrap_or_default();
+            if path.is_dir() && name != "target" {
+                below(&path, found);
+            } else if name == "README.md" {
+                found.push(path);
+            }
+        }
+    }
+    let mut found = vec![repository().join("README.md")];
+    for folder in ["core", "vulkan", "host", "tests"] {
+        below(&repository().join(folder), &mut found);
+    }
+    found
+}
+
+/// The lines of all `sh` blocks of all READMEs, each once.
 fn commands() -> Vec<String> {
-    let mut inside = false;
-    let mut commands = Vec::new();
-    for line in readme().lines() {
-        match line {
-            "```sh" => inside = true,
-            "```" => inside = false,
-            _ if inside => commands.push(line.to_owned()),
-            _ => {}
+    let mut commands: Vec<String> = Vec::new();
+    for path in readmes() {
+        let mut inside = false;
+        for line in read(&path).lines() {
+            match line {
+                "```sh" => inside = true,
+                "```" => inside = false,
+                _ if inside && !commands.iter().any(|known| known == line) => commands.push(line.to_owned()),
+                _ => {}
+            }
         }
     }
     commands
 }
 
+/// Lines of `sh` blocks that are not run here: how they begin, and why.
+const NOT_RUN: [(&str, &str); 9] = [
+    ("#", "a comment"),
+    ("tests/run", "it runs this test"),
+    ("cargo build --profile firmware -p viewfuse-capi", "the test `capi` runs it"),
+    ("cc ", "the test `capi` compiles the program"),
+    ("cargo install", "it would change the machine"),
+    ("viewfuse ", "on files of a person, or hours of training"),
+    ("seq ", "GNU parallel may not be there; the tests of protocols run shards"),
+    ("srun ", "Slurm is not there"),
+    ("  --shard ", "Slurm is not there"),
+];
+
+/// The arguments of the command, and the features of the package that it needs.
+fn ours(line: &str) -> Option<(&str, &str)> {
+    let rest = line.strip_prefix("cargo run --release ")?;
+    match rest.strip_prefix("-- ") {
+        Some(arguments) => Some((arguments, "")),
+        None => rest.strip_prefix("--features ")?.split_once(" -- ").map(|(features, arguments)| (arguments, features)),
+    }
+}
+
+/// Whether the binary under test was built with it.
+fn is_built_with(feature: &str) -> bool {
+    match feature {
+        "" => true,
+        "fid" => cfg!(feature = "fid"),
+        "pareto" => cfg!(feature = "pareto"),
+        "report" => cfg!(feature = "report"),
+        "train" => cfg!(feature = "train"),
+        _ => panic!("no feature '{feature}' is known here"),
+    }
+}
+
+fn run(arguments: &[String]) -> String {
+    let output = Command::new(env!("CARGO_BIN_EXE_viewfuse"))
+        .args(arguments)
+        .current_dir(repository())
+        .output()
+        .expect("the command starts");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
 #[test]
 fn every_command_runs() {
-    const PREFIX: &str = "cargo run --release -- ";
     let folder = tempfile::tempdir().expect("a folder");
-    let ours: Vec<String> = commands().iter().filter_map(|line| Some(line.strip_prefix(PREFIX)?.to_owned())).collect();
-    assert!(ours.len() >= 5, "{ours:?}");
-    for command in ours {
-        let out = folder.path().join("out").display().to_string();
-        let arguments: Vec<String> =
-            command
-                .split_whitespace()
-                .map(|word| {
-                    if word == "out" || word.starts_with("out/") { word.replacen("out", &out, 1) } else { word.into() }
-                })
-                .collect();
-        let output = Command::new(env!("CARGO_BIN_EXE_viewfuse"))
-            .args(&arguments)
-            .current_dir(repository())
-            .output()
-            .expect("the command starts");
-        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    let out = folder.path().join("out");
+    let in_folder = |word: &str| match word == "out" || word.starts_with("out/") {
+        true => word.replacen("out", &out.display().to_string(), 1),
+        false => word.to_owned(),
+    };
+    let mut count = 0;
+    for line in commands() {
+        let Some((arguments, features)) = ours(&line) else {
+            let is_known = line.trim().is_empty() || NOT_RUN.iter().any(|(start, _)| line.starts_with(start));
+            assert!(is_known, "neither run here nor in the list of what is not: {line}");
+            continue;
+        };
+        count += 1;
+        let arguments: Vec<String> = arguments.split_whitespace().map(in_folder).collect();
+        if features.split(',').all(is_built_with) {
+            run(&arguments);
+        } else {
+            println!("left out, the binary was built without {features}: {line}");
+        }
     }
-    let pictures = ["000048.png", "000048_depth.png", "000048_sheet.png", "run.json", "toy/000021.png"];
-    for file in pictures.into_iter().chain(["cameras.png", "scores.csv", "weighting/model.safetensors", "report.html"])
+    assert!(count >= 20, "{count}");
+    let files = ["000048.png", "000048_depth.png", "000048_sheet.png", "run.json", "toy/000021.png", "cameras.png"];
+    for file in files.into_iter().chain(["scores.csv", "attention.h"]) {
+        assert!(out.join(file).exists(), "{file}");
+    }
+    for (feature, file) in
+        [("train", "weighting/model.safetensors"), ("report", "report.html"), ("pareto", "pareto/pareto.svg")]
     {
-        assert!(folder.path().join("out").join(file).exists(), "{file}");
+        assert_eq!(out.join(file).exists(), is_built_with(feature), "{file}");
     }
 }
 
 #[test]
 fn the_test_command_is_the_one_that_ci_runs() {
     let test = "tests/run";
-    assert!(commands().iter().any(|line| line == test), "{test} is not in the README");
+    assert!(readme().lines().any(|line| line == test), "{test} is not in the README");
     assert!(repository().join(test).is_file(), "{test}");
-    let ci = std::fs::read_to_string(repository().join(".ci/run")).expect("the CI script");
-    // CI asks for more by environment variables, which the README explains.
+    let ci = read(&repository().join(".ci/run"));
+    // CI asks for more by environment variables, which the tests' README explains.
     let runs_it = |line: &&str| line.split_whitespace().find(|word| !word.contains('=')) == Some(test);
     let line = ci.lines().find(runs_it).expect("CI runs it");
-    let readme = readme();
-    for variable in line.split_whitespace().filter_map(|word| word.split_once('=')) {
-        assert!(readme.contains(&format!("{}={}", variable.0, variable.1)), "{variable:?}");
+    let explained = read(&repository().join("tests/README.md"));
+    for variable in line.split_whitespace().filter(|word| word.contains('=')) {
+        assert!(explained.contains(&format!("`{variable}`")), "{variable}");
     }
 }
 
 #[test]
-fn what_it_links_to_is_there() {
-    let text = readme();
-    let links: Vec<&str> = text.split("](").skip(1).filter_map(|rest| rest.split(')').next()).collect();
-    assert!(!links.is_empty());
-    // Within the page: what a heading is called there.
-    let headings: Vec<String> = text
-        .lines()
-        .filter_map(|line| {
-            Some(line.trim_start_matches('#').trim().to_lowercase().replace(' ', "-")).filter(|_| line.starts_with('#'))
-        })
-        .collect();
-    let (inside, links): (Vec<&str>, Vec<&str>) = links.into_iter().partition(|link| link.starts_with('#'));
-    for link in inside {
-        assert!(headings.iter().any(|heading| *heading == link[1..]), "{link}");
+fn the_readme_is_short() {
+    let size = readme().len();
+    assert!(size <= 10_000, "{size} bytes");
+}
+
+/// What headings are called in links.
+fn headings(text: &str) -> Vec<String> {
+    let kept = |c: &char| c.is_alphanumeric() || ['-', '_'].contains(c);
+    let heading = |line: &str| line.trim_start_matches('#').trim().to_lowercase().replace(' ', "-");
+    text.lines().filter(|line| line.starts_with('#')).map(|line| heading(line).chars().filter(kept).collect()).collect()
+}
+
+#[test]
+fn links_lead_somewhere() {
+    const OURS: [&str; 2] =
+        ["https://github.com/viewfuse/viewfuse/tree/main/", "https://github.com/viewfuse/viewfuse/blob/main/"];
+    let mut count = 0;
+    for path in readmes() {
+        let text = read(&path);
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let inside = OURS.iter().find_map(|start| link.strip_prefix(start)).map(|rest| repository().join(rest));
+            if inside.is_none() && link.starts_with("https://") {
+                continue;
+            }
+            let target = inside.unwrap_or_else(|| path.with_file_name("").join(link)).display().to_string();
+            let (file, heading) = target.split_once('#').map_or((&*target, None), |(file, name)| (file, Some(name)));
+            let file = if link.starts_with('#') { path.clone() } else { PathBuf::from(file) };
+            assert!(file.exists(), "{}: {link}", path.display());
+            if let Some(heading) = heading {
+                let page = if file.is_dir() { file.join("README.md") } else { file };
+                assert!(headings(&read(&page)).iter().any(|name| name == heading), "{}: {link}", path.display());
+            }
+            count += 1;
+        }
     }
-    for link in links {
-        assert!(repository().join(link).exists(), "{link}");
+    assert!(count >= 30, "{count}");
+}
+
+/// A table's words without its numbers: what must be the same on every machine.
+fn structure(table: &str) -> Vec<Vec<String>> {
+    let is_word = |word: &&str| *word != "*" && !word.trim_matches(['(', '+', '%']).parse::<f64>().is_ok();
+    table.lines().map(|line| line.split_whitespace().filter(is_word).map(str::to_owned).collect()).collect()
+}
+
+/// The numbers of a line but for its last, which is a time.
+fn numbers(line: &str) -> Vec<f64> {
+    let mut numbers: Vec<f64> = line.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    numbers.pop();
+    numbers
+}
+
+#[test]
+fn tables_are_what_the_program_prints() {
+    // Numbers of pictures are the same everywhere but for roundings; those of `check` are times and the worst of many.
+    for (file, difference) in [("host/evaluate/tables/toy.txt", 0.05), ("host/check/tables/cpu.txt", f64::INFINITY)] {
+        let path = repository().join(file);
+        let stored = read(&path);
+        let (command, table) = stored.split_once('\n').expect("lines");
+        let arguments: Vec<String> =
+            command.strip_prefix("$ viewfuse ").expect("a command").split_whitespace().map(str::to_owned).collect();
+        let printed: String = run(&arguments).lines().map(|line| format!("{}\n", line.trim_end())).collect();
+        if std::env::var_os("VIEWFUSE_WRITE_TABLES").is_some() {
+            std::fs::write(&path, format!("{command}\n{printed}")).expect("the table");
+            continue;
+        }
+        let stale = "is stale: VIEWFUSE_WRITE_TABLES=1 writes it";
+        assert_eq!(structure(table), structure(&printed), "{file} {stale}");
+        for (old, new) in table.lines().zip(printed.lines()) {
+            let differs = |(a, b): (f64, f64)| (a - b).abs() > difference;
+            assert!(!numbers(old).into_iter().zip(numbers(new)).any(differs), "{file} {stale}:\n{old}\n{new}");
+        }
     }
+}
+
+fn cargo(arguments: &[&str]) -> String {
+    let output = Command::new(env!("CARGO"))
+        .args(arguments)
+        .args(["--offline", "--locked"])
+        .current_dir(repository())
+        .output()
+        .expect("cargo");
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn every_package_can_stand_alone() {
+    let metadata: Value =
+        serde_json::from_str(&cargo(&["metadata", "--no-deps", "--format-version", "1"])).expect("JSON");
+    let licences = |folder: &Path| ["LICENSE-MIT", "LICENSE-APACHE"].map(|name| read(&folder.join(name)));
+    let ours = licences(&repository().join("host"));
+    // The core's and the main README are compiled with the tests' library.
+    let elsewhere = read(&repository().join("tests/src/lib.rs"));
+    let mut count = 0;
+    for package in metadata["packages"].as_array().expect("packages") {
+        let name = package["name"].as_str().expect("a name");
+        if package["publish"].is_array() {
+            continue;
+        }
+        count += 1;
+        let folder = Path::new(package["manifest_path"].as_str().expect("a path")).with_file_name("");
+        assert_eq!(package["license"], "MIT OR Apache-2.0", "{name}");
+        assert!(licences(&folder) == ours, "{name}");
+        for field in ["description", "repository"] {
+            assert!(package[field].is_string(), "{name}: {field}");
+        }
+        for field in ["keywords", "categories"] {
+            assert!((1..=5).contains(&package[field].as_array().map_or(0, Vec::len)), "{name}: {field}");
+        }
+        assert!(package["metadata"]["docs"]["rs"].is_object(), "{name}: docs.rs");
+        assert_eq!(package["readme"], "README.md", "{name}");
+        let targets = package["targets"].as_array().expect("targets");
+        if targets.iter().any(|target| target["kind"] == serde_json::json!(["lib"])) {
+            assert!(read(&folder.join("README.md")).contains("```rust"), "{name}: no example");
+            let its_own = read(&folder.join("src/lib.rs")).contains("include_str!(\"../README.md\")");
+            let included = its_own || (name == "viewfuse-core" && elsewhere.contains("../../core/README.md"));
+            assert!(included, "{name}: the README is not compiled");
+        }
+    }
+    assert!(count >= 15, "{count}");
 }
 
 #[test]
 fn core_depends_on_mathematics_only() {
     let tree = |extra: &[&str]| {
-        let output = Command::new(env!("CARGO"))
-            .args([
-                "tree",
-                "--offline",
-                "--locked",
-                "-p",
-                "viewfuse-core",
-                "-e",
-                "normal,no-proc-macro",
-                "--prefix",
-                "none",
-            ])
-            .args(extra)
-            .current_dir(repository())
-            .output()
-            .expect("cargo");
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).expect("text")
+        let arguments = ["tree", "-p", "viewfuse-core", "-e", "normal,no-proc-macro", "--prefix", "none"];
+        cargo(&[&arguments, extra].concat())
     };
     let packages = tree(&[]);
     let names: Vec<&str> = packages.lines().filter_map(|line| line.split_whitespace().next()).collect();

@@ -201,7 +201,7 @@ fn nothing_that_is_linked_can_panic() {
 }
 
 fn the_example_of_the_readme_runs() {
-    let readme = std::fs::read_to_string(repository().join("README.md")).expect("the README");
+    let readme = std::fs::read_to_string(repository().join("core/capi/README.md")).expect("the README");
     let block = |language: &str, from: usize| {
         let start = readme[from..].find(&format!("```{language}\n")).expect("a block") + from + language.len() + 4;
         let length = readme[start..].find("```").expect("its end");

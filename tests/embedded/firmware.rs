@@ -267,10 +267,10 @@ fn markdown((title, numbers): &Row) -> String {
 /// Which of a row's numbers is the code for size.
 const CODE_FOR_SIZE: usize = 2;
 
-/// The README's rows are rows of the table, to a fifth: another compiler gives a few instructions more or less. The code is
-/// as small as they say only where Rust's library is compiled for size as well.
+/// The rows of core's README are rows of the table, to a fifth: another compiler gives a few instructions more or less.
+/// The code is as small as they say only where Rust's library is compiled for size as well.
 fn the_readme_says_so(rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
-    let readme = std::fs::read_to_string(repository().join("README.md"))?;
+    let readme = std::fs::read_to_string(repository().join("core/README.md"))?;
     let mut found = 0;
     for (title, numbers) in rows {
         let Some(line) = readme.lines().find(|line| line.starts_with(&format!("| {title} |"))) else { continue };

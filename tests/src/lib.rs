@@ -14,3 +14,13 @@ pub mod module;
 pub mod places;
 pub mod scenes;
 pub mod trials;
+
+/// The examples of the main README and of core's, compiled and run. Core's sources are what the compiled kernels were made
+/// from, so its README is not included there.
+#[cfg(doctest)]
+mod readmes {
+    #[doc = include_str!("../../README.md")]
+    struct Main;
+    #[doc = include_str!("../../core/README.md")]
+    struct Core;
+}

@@ -33,3 +33,8 @@ pub use error::{Missing, VulkanError, version};
 pub use gpu::{Gpu, GpuOptions, Tally};
 pub use instance::{Instance, InstanceOptions};
 pub use messages::Messages;
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

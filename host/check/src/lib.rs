@@ -48,3 +48,8 @@ pub mod world;
 
 pub use measure::{check_device, check_kernel};
 pub use report::{CheckError, DeviceReport, KernelReport, PictureReport, Report};
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

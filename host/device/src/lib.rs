@@ -16,3 +16,8 @@ pub use kernels::{
     Pixels, PointKernels, RayKernels, Rays, SamplerKernels, VolumeKernels, WeightingKernels,
 };
 pub use memory::{Element, KernelTime, Memory};
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

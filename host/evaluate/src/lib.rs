@@ -13,3 +13,8 @@ pub mod run_folder;
 pub mod summary;
 
 pub use evaluator::*;
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

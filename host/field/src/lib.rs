@@ -22,6 +22,11 @@ use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// Longest side of a picture whose size nobody asked for.
 pub const LONGEST_DEFAULT_SIDE: u32 = 512;
 

@@ -3,3 +3,8 @@
 
 pub mod checkpoint;
 pub mod formula;
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -5,3 +5,8 @@ pub mod canvas;
 pub mod png;
 pub mod record;
 pub mod sheet;
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -18,3 +18,8 @@ pub mod rig;
 mod scene;
 
 pub use scene::{IntrinsicsFault, LARGEST_SIDE, Layout, Photograph, Place, Scene, SceneError, View};
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

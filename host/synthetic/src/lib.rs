@@ -54,3 +54,8 @@ pub use render::{render, render_with};
 pub use shape::Shape;
 pub use texture::{Finish, Patch, Texture};
 pub use trace::{Hit, trace};
+
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

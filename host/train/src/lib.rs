@@ -53,6 +53,11 @@ use viewfuse_job::progress::Interrupted;
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_scene::SceneError;
 
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// Why training failed.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {

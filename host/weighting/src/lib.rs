@@ -14,6 +14,11 @@ use viewfuse_core::attention::published_cross_attention;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
 
+/// The examples of the README, compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 /// Every scheme that needs no file, with its default parameters: the rows of tables over all schemes.
 pub const SCHEME_NAMES: [&str; 12] = [
     "mean",
