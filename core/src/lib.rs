@@ -26,6 +26,7 @@
 //! sampler           ... with few calls of the denoiser            Sampler, Mix, History, Churn, verdict
 //! photo             the field that needs no weights file          matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
+//! kernels           the list of kernels, one row each             Kernel, for_each_kernel
 //! ```
 //!
 //! A module uses only modules listed above it. Types that are checked when they are built ([`pose::Pose`],
@@ -40,6 +41,7 @@ pub mod depths;
 pub mod fuse;
 pub mod genvs;
 pub mod half;
+pub mod kernels;
 pub mod lookup;
 pub mod math;
 pub mod metrics;

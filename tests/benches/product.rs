@@ -11,7 +11,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{Layer, LayerShape, NetworkKernels};
+use viewfuse::device::{Device, Layer, LayerShape};
 use viewfuse_core::network::product::ProductBlock;
 
 const ROUNDS: usize = 40;
@@ -125,7 +125,7 @@ impl Product {
         let repeats = (3.0e9 / operations).clamp(1.0, 200.0) as u32;
         let time = timed(|| {
             for _ in 0..repeats {
-                let Ok(()) = Cpu.product(block, inputs, layer, addend.as_ref(), outputs);
+                let Ok(()) = Cpu.product(block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs);
             }
             black_box(&outputs[..]);
         });

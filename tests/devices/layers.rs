@@ -6,7 +6,7 @@ use libtest_mimic::Failed;
 use viewfuse::check::world::Numbers;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::device::{Layer, LayerShape, MatrixKernels, NetworkKernels};
+use viewfuse::device::{Device, Layer, LayerShape};
 use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::product::ProductBlock;
@@ -59,7 +59,7 @@ impl Numbered {
     }
 
     /// Outputs of a device, with one number behind the last.
-    fn on<D: NetworkKernels>(
+    fn on<D: Device>(
         &self,
         device: &D,
         run: impl FnOnce(&D::Buffer<f32>, &Layer<D>, &D::Buffer<f32>, &mut D::Buffer<f32>) -> Result<(), D::Error>,
@@ -109,11 +109,11 @@ fn products_of_any_size_are_the_cpus(candidate: &Candidate) -> Result<(), Failed
             let block =
                 ProductBlock { row_count, inner_count, column_count, relu_inputs, relu_outputs, ..Default::default() };
             let expected = numbers.on(&Cpu, |inputs, layer, addend, outputs| {
-                Cpu.product(&block, inputs, layer, has_addend.then_some(addend), outputs)
+                Cpu.product(&block, inputs, &layer.weights, &layer.bias, has_addend.then_some(addend), outputs)
             })?;
             for device in &devices {
                 let actual = numbers.on(device, |inputs, layer, addend, outputs| {
-                    device.product(&block, inputs, layer, has_addend.then_some(addend), outputs)
+                    device.product(&block, inputs, &layer.weights, &layer.bias, has_addend.then_some(addend), outputs)
                 })?;
                 assert_equal(&actual, &expected, inner_count, &format!("{block:?}, addend {has_addend}"))?;
             }
@@ -171,11 +171,18 @@ fn convolutions_of_any_shape_are_the_cpus(candidate: &Candidate) -> Result<(), F
             for [has_addend, relu_outputs, _] in variants().take(4) {
                 let block = ConvolveBlock { relu_outputs: relu_outputs.into(), ..block };
                 let expected = numbers.on(&Cpu, |inputs, layer, addend, outputs| {
-                    Cpu.convolve(&block, inputs, layer, has_addend.then_some(addend), outputs)
+                    Cpu.convolve(&block, inputs, &layer.weights, &layer.bias, has_addend.then_some(addend), outputs)
                 })?;
                 for device in &devices {
                     let actual = numbers.on(device, |inputs, layer, addend, outputs| {
-                        device.convolve(&block, inputs, layer, has_addend.then_some(addend), outputs)
+                        device.convolve(
+                            &block,
+                            inputs,
+                            &layer.weights,
+                            &layer.bias,
+                            has_addend.then_some(addend),
+                            outputs,
+                        )
                     })?;
                     assert_equal(&actual, &expected, block.patch_len(), &format!("{block:?}, addend {has_addend}"))?;
                 }
@@ -205,11 +212,12 @@ fn transposed_convolutions_are_the_cpus(candidate: &Candidate) -> Result<(), Fai
             let input_count = block.in_first + block.pixel_count() * block.in_pitch;
             let output_count = block.out_first + block.pixel_count() * size * size * block.out_pitch;
             let numbers = Numbered::new(input_count, [in_channels, block.column_count()], output_count, 1);
-            let expected = numbers
-                .on(&Cpu, |inputs, layer, _, outputs| Cpu.convolve_transposed(&block, inputs, layer, outputs))?;
+            let expected = numbers.on(&Cpu, |inputs, layer, _, outputs| {
+                Cpu.convolve_transposed(&block, inputs, &layer.weights, &layer.bias, outputs)
+            })?;
             for device in &devices {
                 let actual = numbers.on(device, |inputs, layer, _, outputs| {
-                    device.convolve_transposed(&block, inputs, layer, outputs)
+                    device.convolve_transposed(&block, inputs, &layer.weights, &layer.bias, outputs)
                 })?;
                 assert_equal(&actual, &expected, in_channels, &format!("{block:?}"))?;
             }

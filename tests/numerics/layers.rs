@@ -3,7 +3,7 @@
 
 use viewfuse::check::poses::Random;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{Layer, LayerShape, Memory, NetworkKernels};
+use viewfuse::device::{Device, Layer, LayerShape, Memory};
 use viewfuse_core::network::attend::{MatrixBlock, matrix_element};
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
@@ -223,7 +223,7 @@ fn convolution_errors(
         let shape = LayerShape { inner_count: 9 * channels, column_count: columns, has_wide_images };
         let Ok(layer) = Layer::new(&Cpu, &shape, &weights, &vec![0.0; columns]);
         let Ok(mut outputs) = Cpu.zeros(expected.len());
-        let Ok(()) = Cpu.convolve(&block, &inputs, &layer, None, &mut outputs);
+        let Ok(()) = Cpu.convolve(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs);
         let unit = magnitudes.iter().copied().fold(0.0, f64::max) / 16_777_216.0;
         let errors =
             outputs.iter().zip(&expected).map(|(output, expected)| (f64::from(*output) - expected).abs() / unit);

@@ -3,8 +3,8 @@
 use std::array::from_fn;
 use viewfuse::check::compare::relative_units;
 use viewfuse::check::poses::Random;
+use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{MatrixKernels, NormaliseKernels};
 use viewfuse_core::network::attend::{softmax_scale, softmax_value};
 use viewfuse_core::network::normalise::{
     MeanBlock, NormaliseBlock, channel_mean, merged_moments, normalised_element, part_moments, silu,
@@ -196,7 +196,7 @@ fn softmax(scores: &[f32]) -> [Vec<f32>; 2] {
     let scale = softmax_scale(&rows[..], scores.len(), scores.len() as u32);
     let by_body = scores.iter().map(|score| softmax_value(*score, scale)).collect();
     let mut weights = vec![0.0; rows.len()];
-    let Ok(()) = Cpu.softmax_rows(3, scores.len() as u32, &rows, &mut weights);
+    let Ok(()) = Cpu.softmax_rows(&(scores.len() as u32), 3, &rows, &mut weights);
     [by_body, weights[scores.len()..2 * scores.len()].to_vec()]
 }
 

@@ -1,24 +1,10 @@
 //! A device that computes on the CPU and gets one kernel wrong.
 
-mod matrices;
-mod network;
-mod normalise;
-mod points;
-mod rays;
-mod sampler;
-mod volumes;
-
 use std::convert::Infallible;
-use std::ops::Range;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::device::{Element, KernelTime, LightKernels, Memory, PhotoKernels, PhotoScene, Pixels, WeightingKernels};
-use viewfuse_core::composite::CompositeBlock;
-use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::photo::march::MarchBlock;
-use viewfuse_core::photo::sweep::SweepBlock;
-use viewfuse_core::pose::PoseBlock;
-use viewfuse_core::weighting::WeighBlock;
-use viewfuse_vulkan::kernel::Kernel;
+use viewfuse::device::{Device, Element, KernelTime, LayerShape, Memory};
+use viewfuse_core::for_each_kernel;
+use viewfuse_core::kernels::*;
 
 /// The CPU, with one kernel's results too large by 1e-3.
 pub(crate) struct Faulty {
@@ -26,37 +12,44 @@ pub(crate) struct Faulty {
     pub(crate) kernel: Kernel,
 }
 
-impl Faulty {
-    fn spoil<'a>(&self, kernel: Kernel, values: impl IntoIterator<Item = &'a mut f32>) {
-        if kernel == self.kernel {
-            values.into_iter().for_each(|value| *value *= 1.001);
-        }
+/// Results that can be wrong.
+trait Spoil {
+    /// Makes all of them too large by 1e-3.
+    fn spoil(values: &mut [Self])
+    where
+        Self: Sized;
+}
+
+impl Spoil for f32 {
+    fn spoil(values: &mut [f32]) {
+        values.iter_mut().for_each(|value| *value *= 1.001);
     }
 }
 
-/// The same scene for the CPU.
-fn on_cpu(scene: &PhotoScene<Faulty>) -> PhotoScene<Cpu> {
-    PhotoScene {
-        object_buffer: scene.object_buffer.clone(),
-        object: scene.object,
-        cameras: scene.cameras.clone(),
-        views: scene.views.clone(),
-        footprints: scene.footprints.clone(),
-        texels: scene.texels.clone(),
+impl<const N: usize> Spoil for [f32; N] {
+    fn spoil(values: &mut [[f32; N]]) {
+        f32::spoil(values.as_flattened_mut());
     }
 }
 
-/// The same pixels for the CPU.
-fn on_cpu_pixels(pixels: &Pixels<Faulty>) -> Pixels<Cpu> {
-    Pixels { colours: pixels.colours.clone(), depths: pixels.depths.clone() }
+/// There is no thousandth of a yes, nor one of a word: in one of a thousand, from the first on, the last bit is the other
+/// one.
+impl Spoil for u32 {
+    fn spoil(values: &mut [u32]) {
+        values.iter_mut().step_by(1000).for_each(|value| *value ^= 1);
+    }
 }
 
-/// Runs something on the CPU's kind of pixels.
-fn with_pixels(pixels: &mut Pixels<Faulty>, run: impl FnOnce(&mut Pixels<Cpu>) -> Result<(), Infallible>) {
-    let (colours, depths) = (std::mem::take(&mut pixels.colours), std::mem::take(&mut pixels.depths));
-    let mut on_cpu = Pixels::<Cpu> { colours, depths };
-    let Ok(()) = run(&mut on_cpu);
-    (pixels.colours, pixels.depths) = (on_cpu.colours, on_cpu.depths);
+impl Spoil for TargetRay {
+    fn spoil(values: &mut [TargetRay]) {
+        values.iter_mut().for_each(|ray| f32::spoil(&mut ray.direction));
+    }
+}
+
+impl Spoil for RayPoint {
+    fn spoil(values: &mut [RayPoint]) {
+        values.iter_mut().for_each(|point| f32::spoil(&mut point.position));
+    }
 }
 
 impl Memory for Faulty {
@@ -96,135 +89,57 @@ impl Memory for Faulty {
     }
 }
 
-impl WeightingKernels for Faulty {
-    fn weigh(
-        &self,
-        block: &WeighBlock,
-        sources: &Vec<PoseBlock>,
-        targets: &Vec<PoseBlock>,
-        weights: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.weigh(block, sources, targets, weights)?;
-        self.spoil(Kernel::Weigh, weights);
-        Ok(())
-    }
-
-    fn embed_pose(
-        &self,
-        embedding: &Vec<f32>,
-        poses: &Vec<PoseBlock>,
-        embedded: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.embed_pose(embedding, poses, embedded)?;
-        self.spoil(Kernel::EmbedPose, embedded);
-        Ok(())
-    }
-
-    fn attend(
-        &self,
-        source_count: u32,
-        queries: &Vec<f32>,
-        keys: &Vec<f32>,
-        weights: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.attend(source_count, queries, keys, weights)?;
-        self.spoil(Kernel::Attend, weights);
-        Ok(())
-    }
+/// How the device's method takes an array of a row.
+macro_rules! argument {
+    (layer $host:ty) => { &<Cpu as Device>::Weights };
+    (optional $host:ty) => { Option<&Vec<$host>> };
+    (write $host:ty) => { &mut Vec<$host> };
+    (write_paged $host:ty) => { &mut Vec<$host> };
+    ($kind:ident $host:ty) => { &Vec<$host> };
 }
 
-impl LightKernels for Faulty {
-    fn fuse_views(
-        &self,
-        block: &FuseBlock,
-        element_count: u32,
-        weights: &Vec<f32>,
-        latents: &Vec<f32>,
-        fused: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.fuse_views(block, element_count, weights, latents, fused)?;
-        self.spoil(Kernel::FuseViews, fused);
-        Ok(())
-    }
-
-    fn composite(
-        &self,
-        block: &CompositeBlock,
-        samples: &Vec<[f32; 4]>,
-        sample_depths: &Vec<f32>,
-        pixels: &mut Pixels<Self>,
-    ) -> Result<(), Infallible> {
-        with_pixels(pixels, |pixels| Cpu.composite(block, samples, sample_depths, pixels));
-        self.spoil(Kernel::Composite, pixels.colours.as_flattened_mut());
-        Ok(())
-    }
+/// Spoils what is written.
+macro_rules! spoil {
+    (write $array:ident) => {
+        Spoil::spoil(&mut $array[..])
+    };
+    (write_paged $array:ident) => {
+        Spoil::spoil(&mut $array[..])
+    };
+    ($kind:ident $array:ident) => {};
 }
 
-impl PhotoKernels for Faulty {
-    fn hull_entry(&self, scene: &PhotoScene<Self>, view: u32, entries: &mut Vec<f32>) -> Result<(), Infallible> {
-        Cpu.hull_entry(&on_cpu(scene), view, entries)?;
-        self.spoil(Kernel::HullEntry, entries);
-        Ok(())
-    }
+macro_rules! forward {
+    ($(
+        $(#[$doc:meta])*
+        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
+        by $($body:ident)::+ $(, $way:ident)* {
+            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
+        }
+    )+) => {
+        impl Device for Faulty {
+            type Weights = <Cpu as Device>::Weights;
 
-    fn match_cost(
-        &self,
-        scene: &PhotoScene<Self>,
-        sweep: &SweepBlock,
-        entries: &Vec<f32>,
-        pair_weights: &Vec<f32>,
-        costs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.match_cost(&on_cpu(scene), sweep, entries, pair_weights, costs)?;
-        self.spoil(Kernel::MatchCost, costs);
-        Ok(())
-    }
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, Infallible> {
+                Cpu.weights(shape, weights)
+            }
 
-    fn sum_row(&self, sweep: &SweepBlock, costs: &Vec<f32>, row_sums: &mut Vec<[f32; 2]>) -> Result<(), Infallible> {
-        Cpu.sum_row(sweep, costs, row_sums)?;
-        self.spoil(Kernel::SumRow, row_sums.as_flattened_mut());
-        Ok(())
-    }
-
-    fn mean_column(
-        &self,
-        sweep: &SweepBlock,
-        costs: &Vec<f32>,
-        row_sums: &Vec<[f32; 2]>,
-        means: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.mean_column(sweep, costs, row_sums, means)?;
-        self.spoil(Kernel::MeanColumn, means);
-        Ok(())
-    }
-
-    fn pick_depth(
-        &self,
-        scene: &PhotoScene<Self>,
-        sweep: &SweepBlock,
-        means: &Vec<f32>,
-        entries: &Vec<f32>,
-        guess: &Vec<f32>,
-        rows: Range<u32>,
-        picked: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        Cpu.pick_depth(&on_cpu(scene), sweep, means, entries, guess, rows, picked)?;
-        self.spoil(Kernel::PickDepth, picked);
-        Ok(())
-    }
-
-    fn march(
-        &self,
-        scene: &PhotoScene<Self>,
-        depths: &Vec<f32>,
-        weights: &Vec<f32>,
-        target: &MarchBlock,
-        first_row: u32,
-        row_count: u32,
-        pixels: &mut Pixels<Self>,
-    ) -> Result<(), Infallible> {
-        with_pixels(pixels, |pixels| Cpu.march(&on_cpu(scene), depths, weights, target, first_row, row_count, pixels));
-        self.spoil(Kernel::March, pixels.colours.as_flattened_mut());
-        Ok(())
-    }
+            $(
+                fn $method(
+                    &self,
+                    $($block: &$Block,)?
+                    $($($count: u32,)+)?
+                    $($array: argument!($kind $host),)+
+                ) -> Result<(), Infallible> {
+                    Cpu.$method($($block,)? $($($count,)+)? $($array),+)?;
+                    if self.kernel == Kernel::$Kernel {
+                        $(spoil!($kind $array);)+
+                    }
+                    Ok(())
+                }
+            )+
+        }
+    };
 }
+
+for_each_kernel!(forward);

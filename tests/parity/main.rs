@@ -90,29 +90,6 @@ where
     Kernel::ALL.into_iter().map(trial).collect()
 }
 
-/// What a kernel must stand, beyond agreeing: a kernel that is not listed here does not compile.
-fn seed_count(kernel: Kernel) -> u64 {
-    match kernel {
-        // As many as give every scheme every number of sources.
-        Kernel::Weigh => 32,
-        Kernel::Attend | Kernel::FuseViews | Kernel::Composite => 8,
-        Kernel::SumRow | Kernel::MeanColumn | Kernel::PickDepth | Kernel::HullEntry | Kernel::MatchCost => 4,
-        Kernel::EmbedPose | Kernel::March => 3,
-        // As many as give every shape every combination of addend and rectification.
-        Kernel::Product | Kernel::Convolve | Kernel::ConvolveTransposed | Kernel::MultiplyMatrices => 8,
-        // As many as give every shape floors, offsets and distances of all kinds.
-        Kernel::PartMoments | Kernel::MergeMoments | Kernel::Normalise => 8,
-        Kernel::GatherVolume | Kernel::GatherHalves | Kernel::WeighFeatures | Kernel::SumFeatures => 8,
-        Kernel::ConvolveDepthwise | Kernel::ChannelMeans | Kernel::SoftmaxRows | Kernel::DenoiserInput => 4,
-        Kernel::CastRays | Kernel::CoarseDepths | Kernel::PlacePoints | Kernel::EmbedPoints => 4,
-        Kernel::VisibleWeights | Kernel::GatherLatents | Kernel::Radiance => 8,
-        Kernel::MaxPool | Kernel::Upsample => 4,
-        Kernel::WeighSamples | Kernel::DrawChances | Kernel::MergeDepths => 4,
-        Kernel::FineDepths | Kernel::WantedSamples => 8,
-        Kernel::MixPictures | Kernel::AddNoise | Kernel::PackHalves => 8,
-    }
-}
-
 /// Sizes of the trials: one element, an odd number, and several workgroups with a rest.
 const SIZES: [u32; 3] = [1, 7, 500];
 
@@ -134,7 +111,7 @@ impl<D: Device> Visitor for Parity<'_, D> {
     type Output = Result<(), Failed>;
 
     fn visit<C: Case>(self) -> Result<(), Failed> {
-        let seeds = 1..=seed_count(C::KERNEL);
+        let seeds = 1..=C::SEED_COUNT;
         let inputs: Vec<C::Inputs> = seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
         let expected: Vec<Vec<Option<Bounded>>> = inputs.iter().map(C::expected).collect();
         let mut actual = Vec::new();
@@ -162,43 +139,25 @@ impl<D: Device> Visitor for Parity<'_, D> {
 fn every_input_has_a_control() -> Result<(), Failed> {
     struct Controls;
     impl Visitor for Controls {
-        type Output = Vec<&'static str>;
-        fn visit<C: Case>(self) -> Vec<&'static str> {
-            C::SPOILERS.iter().map(|(input, _)| *input).collect()
+        type Output = Result<(), Failed>;
+        fn visit<C: Case>(self) -> Result<(), Failed> {
+            let kernel = C::KERNEL;
+            let controls: Vec<&str> = C::SPOILERS.iter().map(|(input, _)| *input).collect();
+            let read = kernel.arrays().iter().filter(|array| array.access == Access::Read).map(|array| array.name);
+            let read: Vec<&str> = read.filter(|array| !C::SHAPES_ONLY.contains(array)).collect();
+            let missing: Vec<&&str> = read.iter().filter(|array| !controls.contains(array)).collect();
+            let unknown: Vec<&&str> =
+                controls.iter().filter(|control| **control != "parameters" && !read.contains(control)).collect();
+            if !missing.is_empty() || !unknown.is_empty() {
+                return Err(format!("{}: without a control {missing:?}, unknown {unknown:?}", kernel.name()).into());
+            }
+            match controls.contains(&"parameters") == C::HAS_REAL_PARAMETERS {
+                true => Ok(()),
+                false => Err(format!("{}: parameters", kernel.name()).into()),
+            }
         }
     }
-    for kernel in Kernel::ALL {
-        let controls = visit(kernel, Controls);
-        let read = kernel.arrays().iter().filter(|array| array.access == Access::Read).map(|array| array.name);
-        // Of the cameras this one takes only where their pixels are.
-        let read: Vec<&str> = read.filter(|array| (kernel, *array) != (Kernel::PickDepth, "views")).collect();
-        let missing: Vec<&&str> = read.iter().filter(|array| !controls.contains(array)).collect();
-        let unknown: Vec<&&str> =
-            controls.iter().filter(|control| **control != "parameters" && !read.contains(control)).collect();
-        if !missing.is_empty() || !unknown.is_empty() {
-            return Err(format!("{}: without a control {missing:?}, unknown {unknown:?}", kernel.name()).into());
-        }
-        let has_numbers = match kernel {
-            // Which view, how many sources, the shape of a band: whole numbers, or none at all.
-            Kernel::EmbedPose | Kernel::Attend | Kernel::FuseViews | Kernel::HullEntry => false,
-            Kernel::SumRow | Kernel::MeanColumn => false,
-            Kernel::PlacePoints | Kernel::VisibleWeights | Kernel::MaxPool | Kernel::Upsample => false,
-            Kernel::ConvolveDepthwise | Kernel::ConvolveTransposed | Kernel::SoftmaxRows => false,
-            // A floor of variances and a length are there for another kernel.
-            Kernel::ChannelMeans | Kernel::PartMoments | Kernel::Normalise | Kernel::SumFeatures => false,
-            Kernel::Product | Kernel::Radiance | Kernel::WeighSamples | Kernel::DrawChances => false,
-            Kernel::MergeDepths | Kernel::PackHalves => false,
-            Kernel::Weigh | Kernel::Composite | Kernel::MatchCost | Kernel::PickDepth | Kernel::March => true,
-            Kernel::CastRays | Kernel::CoarseDepths | Kernel::EmbedPoints | Kernel::GatherLatents => true,
-            Kernel::FineDepths | Kernel::WantedSamples | Kernel::MixPictures | Kernel::AddNoise => true,
-            Kernel::Convolve | Kernel::MergeMoments | Kernel::MultiplyMatrices | Kernel::GatherVolume => true,
-            Kernel::GatherHalves | Kernel::WeighFeatures | Kernel::DenoiserInput => true,
-        };
-        if controls.contains(&"parameters") != has_numbers {
-            return Err(format!("{}: parameters", kernel.name()).into());
-        }
-    }
-    Ok(())
+    Kernel::ALL.into_iter().try_for_each(|kernel| visit(kernel, Controls))
 }
 
 /// A device whose results of a kernel are off by 1e-3 breaches its tolerance.

@@ -7,7 +7,6 @@ use rspirv::spirv::{
     Op, Scope, StorageClass, Word,
 };
 use std::collections::{BTreeMap, BTreeSet};
-use viewfuse_core::attention::FourierEmbedding;
 use viewfuse_vulkan::kernel::{Access, Array, Kernel, Layout, SHARED_BYTES, WORKGROUP};
 
 /// `Sqrt` of `GLSL.std.450`: the only function that is the device's.
@@ -158,7 +157,7 @@ impl Breaches<'_> {
                 format!("{name}: binding {number} ({}): {access:?}, not {:?}", array.name, array.access)
             });
             let content = self.declarations.content(buffer);
-            self.unless(content == wanted_content(kernel, array), || {
+            self.unless(content == wanted_content(array), || {
                 format!("{name}: binding {number} ({}): {content:?}, not {} bytes", array.name, array.stride)
             });
         }
@@ -242,16 +241,11 @@ impl Breaches<'_> {
     }
 }
 
-/// What a binding should hold. Blocks that exist once are no arrays.
-fn wanted_content(kernel: Kernel, array: &Array) -> Content {
-    let single = match (kernel, array.name) {
-        (Kernel::EmbedPose, "embedding") => Some(FourierEmbedding::PARAMETERS * array.stride),
-        (_, "object") => Some(array.stride),
-        _ => None,
-    };
-    match (single, array.layout) {
-        (Some(bytes), Layout::Whole) => Content::Fixed { bytes },
-        _ => Content::Elements { stride: array.stride },
+/// What a binding should hold. Structs that exist once are no arrays.
+fn wanted_content(array: &Array) -> Content {
+    match array.layout {
+        Layout::One => Content::Fixed { bytes: array.least_bytes },
+        Layout::Whole | Layout::Pages => Content::Elements { stride: array.stride },
     }
 }
 

@@ -85,10 +85,10 @@ pub(crate) struct Range {
 /// The ranges that an array is bound as: itself, or its pages; pages that it does not have are its first one again.
 pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Range> {
     let page_len = match (layout, page_shift) {
-        (Layout::Whole, _) | (_, 0) => array.len,
+        (Layout::Whole | Layout::One, _) | (_, 0) => array.len,
         (Layout::Pages, shift) => 1 << shift,
     };
-    let binding_count = if layout == Layout::Whole { 1 } else { MOST_PAGES };
+    let binding_count = if layout == Layout::Pages { MOST_PAGES } else { 1 };
     (0..binding_count)
         .map(|page| {
             let first = if page * page_len < array.len { page * page_len } else { 0 };

@@ -313,7 +313,7 @@ impl Gpu {
             let (len, stride) = (bound.0.len, bound.0.stride);
             // Pages are counted in elements: there they must be the kernel's own.
             let fits = match array.layout {
-                Layout::Whole => array.stride % stride == 0,
+                Layout::Whole | Layout::One => array.stride % stride == 0,
                 Layout::Pages => array.stride == stride,
             };
             if !fits {
@@ -334,8 +334,8 @@ impl Gpu {
             }
             let page_bytes = (len.min(1 << self.page_shift) * stride) as u64;
             match array.layout {
-                Layout::Whole if bytes > range => return limit("maxStorageBufferRange", bytes, range),
-                Layout::Whole if bound.0.chunks.len() > 1 => {
+                Layout::Whole | Layout::One if bytes > range => return limit("maxStorageBufferRange", bytes, range),
+                Layout::Whole | Layout::One if bound.0.chunks.len() > 1 => {
                     return limit("maxMemoryAllocationSize", bytes, allocation);
                 }
                 // Pages have a least length, for their offsets.

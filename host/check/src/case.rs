@@ -20,6 +20,13 @@ pub trait Case {
     const LIMITS: Limits;
     /// Where the tolerance comes from.
     const REASON: &'static str;
+    /// How many seeds a test of parity takes: as many as give every shape and variant of the inputs.
+    const SEED_COUNT: u64;
+    /// Whether the parameters hold numbers that a change of 1 % must show in; otherwise they are counts, shapes and
+    /// choices, or there are none.
+    const HAS_REAL_PARAMETERS: bool;
+    /// Arrays of which the kernel takes only shapes: a change of 1 % shows nowhere.
+    const SHAPES_ONLY: &'static [&'static str] = &[];
     /// One entry for each input that a change of 1 % must show in.
     const SPOILERS: &'static [Spoiler<Self::Inputs>];
 

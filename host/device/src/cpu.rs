@@ -1,21 +1,40 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
+//!
+//! A kernel's form here is a function of its name in one of the modules, on slices. Most call the kernel's body; where the
+//! row says `twin`, the form has its own, faster order of work, and the body in `viewfuse-core` is the definition that it
+//! is tested against.
 
 mod light;
+mod linear;
 mod matrices;
 mod network;
 mod normalise;
 mod photo;
 mod points;
-mod product;
 mod rays;
-mod room;
 mod sampler;
+mod scratch;
 mod volumes;
 mod weighting;
 mod winograd;
 
+use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
+use light::*;
+use matrices::*;
+use network::*;
+use normalise::*;
+use photo::*;
+use points::*;
+use rays::*;
+use sampler::*;
 use std::convert::Infallible;
+use viewfuse_core::for_each_kernel;
+use viewfuse_core::kernels::*;
+use volumes::*;
+use weighting::*;
+
+pub use network::Weights;
 
 /// All cores of this machine. Buffers are vectors.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,3 +76,54 @@ impl Memory for Cpu {
         Ok(buffer.clone())
     }
 }
+
+/// How the CPU's method takes an array of a row.
+macro_rules! argument {
+    (layer $host:ty) => { &Weights };
+    (optional $host:ty) => { Option<&Vec<$host>> };
+    (write $host:ty) => { &mut Vec<$host> };
+    (write_paged $host:ty) => { &mut Vec<$host> };
+    ($kind:ident $host:ty) => { &Vec<$host> };
+}
+
+/// How a form takes it: as a slice.
+macro_rules! lend {
+    (optional $array:ident) => {
+        $array.map(Vec::as_slice)
+    };
+    ($kind:ident $array:ident) => {
+        $array
+    };
+}
+
+macro_rules! forms {
+    ($(
+        $(#[$doc:meta])*
+        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
+        by $($body:ident)::+ $(, $way:ident)* {
+            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
+        }
+    )+) => {
+        impl Device for Cpu {
+            type Weights = Weights;
+
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, Infallible> {
+                Ok(Weights::new(shape, weights))
+            }
+
+            $(
+                fn $method(
+                    &self,
+                    $($block: &$Block,)?
+                    $($($count: u32,)+)?
+                    $($array: argument!($kind $host),)+
+                ) -> Result<(), Infallible> {
+                    $method($($block,)? $($($count,)+)? $(lend!($kind $array)),+);
+                    Ok(())
+                }
+            )+
+        }
+    };
+}
+
+for_each_kernel!(forms);

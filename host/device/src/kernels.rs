@@ -1,52 +1,67 @@
-//! The kernels of a device, in the order of the data.
+//! What a device runs: a method for every kernel, from the kernels' rows.
 
-pub mod light;
-pub mod matrices;
-pub mod network;
-pub mod normalise;
-pub mod photo;
-pub mod points;
-pub mod rays;
-pub mod sampler;
-pub mod volumes;
-pub mod weighting;
+use super::memory::Memory;
+use viewfuse_core::for_each_kernel;
+use viewfuse_core::kernels::*;
 
-pub use light::{LightKernels, Pixels};
-pub use matrices::MatrixKernels;
-pub use network::{Layer, LayerShape, NetworkKernels};
-pub use normalise::NormaliseKernels;
-pub use photo::{PhotoKernels, PhotoScene};
-pub use points::PointKernels;
-pub use rays::{RayKernels, Rays};
-pub use sampler::SamplerKernels;
-pub use volumes::VolumeKernels;
-pub use weighting::WeightingKernels;
-
-/// Something that runs every kernel.
-pub trait Device:
-    WeightingKernels
-    + RayKernels
-    + PointKernels
-    + VolumeKernels
-    + NetworkKernels
-    + NormaliseKernels
-    + MatrixKernels
-    + LightKernels
-    + PhotoKernels
-    + SamplerKernels
-{
+/// The sizes of a layer's weights, and what they are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LayerShape {
+    /// Numbers that an output is made of: channels of the input, times places of the window.
+    pub inner_count: usize,
+    /// Output channels; for a transposed convolution times places of the square.
+    pub column_count: usize,
+    /// Whether it is used by nothing but convolutions with windows of 3x3 without gaps at every pixel of images that are
+    /// large (32x32 or more). A device may have another way for these.
+    pub has_wide_images: bool,
 }
 
-impl<D> Device for D where
-    D: WeightingKernels
-        + RayKernels
-        + PointKernels
-        + VolumeKernels
-        + NetworkKernels
-        + NormaliseKernels
-        + MatrixKernels
-        + LightKernels
-        + PhotoKernels
-        + SamplerKernels
-{
+/// How a device's method takes an array of a row.
+macro_rules! argument {
+    (layer $host:ty) => { &Self::Weights };
+    (optional $host:ty) => { Option<&Self::Buffer<$host>> };
+    (write $host:ty) => { &mut Self::Buffer<$host> };
+    (write_paged $host:ty) => { &mut Self::Buffer<$host> };
+    ($kind:ident $host:ty) => { &Self::Buffer<$host> };
 }
+
+macro_rules! device {
+    ($(
+        $(#[$doc:meta])*
+        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
+        by $($body:ident)::+ $(, $way:ident)* {
+            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
+        }
+    )+) => {
+        /// Something that runs every kernel: a method for each row of [`viewfuse_core::kernels`], so that a kernel that
+        /// exists on one device only does not compile. A method takes the kernel's parameters, the numbers that say how
+        /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters say.
+        pub trait Device: Memory {
+            /// A layer's weights as the device wants them.
+            type Weights: Send + Sync;
+
+            /// Puts `weights[inner][column]` (for a convolution `[row of the window][column of the window][input
+            /// channel][output channel]`) where and how the kernels need them; they may be longer than the shape says.
+            ///
+            /// # Errors
+            /// If the device has no memory left.
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, Self::Error>;
+
+            $(
+                $(#[$doc])*
+                ///
+                /// # Errors
+                /// If the device is lost.
+                #[allow(clippy::too_many_arguments)]
+                fn $method(
+                    &self,
+                    $($block: &$Block,)?
+                    $($($count: u32,)+)?
+                    $($array: argument!($kind $host),)+
+                ) -> Result<(), Self::Error>;
+            )+
+        }
+    };
+}
+
+for_each_kernel!(device);

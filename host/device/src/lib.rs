@@ -1,20 +1,20 @@
 //! Devices: where kernels run.
 //!
-//! A device holds buffers ([`Memory`]) and runs kernels on them, one method per kernel, grouped by what they are for
-//! ([`kernels`]), so that a kernel that exists on one device only does not compile. The body of every kernel is a function
-//! in `viewfuse-core`; a device decides how its elements are spread over cores or invocations.
+//! A device holds buffers ([`Memory`]) and runs kernels on them, one method per kernel ([`Device`]), made from the rows of
+//! [`viewfuse_core::kernels`], so that a kernel that exists on one device only does not compile. The body of every kernel
+//! is a function in `viewfuse-core`; a device decides how its elements are spread over cores or invocations.
 #![forbid(unsafe_code)]
 
+pub mod bundles;
 pub mod choice;
 pub mod cpu;
 pub mod kernels;
 pub mod memory;
+pub mod parallel;
 pub mod vulkan;
 
-pub use kernels::{
-    Device, Layer, LayerShape, LightKernels, MatrixKernels, NetworkKernels, NormaliseKernels, PhotoKernels, PhotoScene,
-    Pixels, PointKernels, RayKernels, Rays, SamplerKernels, VolumeKernels, WeightingKernels,
-};
+pub use bundles::{Layer, PhotoScene, Pixels, Rays};
+pub use kernels::{Device, LayerShape};
 pub use memory::{Element, KernelTime, Memory};
 
 /// The examples of the README, compiled and run.

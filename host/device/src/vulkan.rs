@@ -1,19 +1,11 @@
-//! Vulkan devices: every kernel a dispatch; the work is in `viewfuse-vulkan`.
+//! Vulkan devices: every kernel a dispatch, as its row says; the work is in `viewfuse-vulkan`.
 
-mod light;
-mod matrices;
-mod network;
-mod normalise;
-mod photo;
-mod points;
-mod rays;
-mod sampler;
-mod volumes;
-mod weighting;
-
+use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
+use bytemuck::bytes_of;
 use std::sync::Arc;
-use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_core::for_each_kernel;
+use viewfuse_core::kernels::*;
 use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
 /// A Vulkan device. Calls return when their work is on its way; only a download waits for it.
@@ -37,10 +29,6 @@ impl Vulkan {
     pub fn tally(&self, kernel: Kernel) -> Tally {
         self.gpu.tally(kernel)
     }
-}
-
-fn count_of(len: usize) -> u32 {
-    u32::try_from(len).unwrap_or(u32::MAX)
 }
 
 impl Memory for Vulkan {
@@ -82,3 +70,69 @@ impl Memory for Vulkan {
         self.gpu.download(buffer)
     }
 }
+
+/// How a Vulkan device's method takes an array of a row.
+macro_rules! argument {
+    (layer $host:ty) => { &Buffer<$host> };
+    (optional $host:ty) => { Option<&Buffer<$host>> };
+    (write $host:ty) => { &mut Buffer<$host> };
+    (write_paged $host:ty) => { &mut Buffer<$host> };
+    ($kind:ident $host:ty) => { &Buffer<$host> };
+}
+
+/// How it is bound. Something must be bound also where an optional array is left out.
+macro_rules! bind {
+    (optional $array:ident $other:ident) => {
+        $array.map_or_else(|| $other.bind(), Buffer::bind)
+    };
+    ($kind:ident $array:ident) => {
+        $array.bind()
+    };
+}
+
+/// The bytes of a kernel's parameters.
+macro_rules! parameters {
+    () => {
+        &[]
+    };
+    ($block:ident) => {
+        bytes_of($block)
+    };
+}
+
+macro_rules! dispatches {
+    ($(
+        $(#[$doc:meta])*
+        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
+        by $($body:ident)::+ $(, $way:ident)* {
+            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
+        }
+    )+) => {
+        impl Device for Vulkan {
+            type Weights = Buffer<f32>;
+
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Buffer<f32>, VulkanError> {
+                self.upload(&weights[..shape.inner_count * shape.column_count])
+            }
+
+            $(
+                fn $method(
+                    &self,
+                    $($block: &$Block,)?
+                    $($($count: u32,)+)?
+                    $($array: argument!($kind $host),)+
+                ) -> Result<(), VulkanError> {
+                    $($(
+                        let mut told = *$told;
+                        told.$flag = u32::from($array.is_some());
+                        let $told = &told;
+                    )?)+
+                    let arrays = [$(bind!($kind $array $($other)?)),+];
+                    self.gpu.dispatch(Kernel::$Kernel, parameters!($($block)?), $elements, &arrays)
+                }
+            )+
+        }
+    };
+}
+
+for_each_kernel!(dispatches);

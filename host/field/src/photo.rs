@@ -82,7 +82,10 @@ impl<D: Device> Field<D> for PhotoField {
         progress.expect(scene.cameras.len());
         for view in 0..object.view_count {
             progress.check()?;
-            device.hull_entry(&scene, view, &mut entries).map_err(failed)?;
+            let PhotoScene { object_buffer, views, texels, cameras, .. } = &scene;
+            let camera = &cameras[view as usize];
+            let pixel_count = camera.width * camera.height;
+            device.hull_entry(&view, pixel_count, object_buffer, views, texels, &mut entries).map_err(failed)?;
             progress.step();
         }
         device.finish().map_err(failed)?;
@@ -97,6 +100,7 @@ impl<D: Device> Field<D> for PhotoField {
         progress: &dyn Progress,
     ) -> Result<D::Buffer<f32>, FieldError<D::Error>> {
         let scene = &prepared.scene;
+        let PhotoScene { object_buffer: object, views, texels, .. } = scene;
         let view_count = scene.object.view_count;
         let failed = FieldError::Device;
         let pair_weights: Vec<f32> =
@@ -118,15 +122,15 @@ impl<D: Device> Field<D> for PhotoField {
                 let mut row_sums = device.zeros(count).map_err(failed)?;
                 let mut means = device.zeros(count).map_err(failed)?;
                 let entries = &prepared.entries;
-                device.match_cost(scene, &sweep, entries, &pair_weights, &mut costs).map_err(failed)?;
+                device.match_cost(&sweep, object, views, texels, entries, &pair_weights, &mut costs).map_err(failed)?;
                 device.sum_row(&sweep, &costs, &mut row_sums).map_err(failed)?;
                 device.mean_column(&sweep, &costs, &row_sums, &mut means).map_err(failed)?;
-                let all_rows = 0..sweep.row_count;
                 device
-                    .pick_depth(scene, &sweep, &means, entries, &nothing, all_rows, &mut first_guess)
+                    .pick_depth(&sweep, 0, sweep.row_count, object, views, &means, entries, &nothing, &mut first_guess)
                     .map_err(failed)?;
+                let (first, count) = (kept_rows.start, kept_rows.len() as u32);
                 device
-                    .pick_depth(scene, &sweep, &means, entries, &first_guess, kept_rows, &mut depths)
+                    .pick_depth(&sweep, first, count, object, views, &means, entries, &first_guess, &mut depths)
                     .map_err(failed)?;
             }
             progress.step();
@@ -151,15 +155,29 @@ impl<D: Device> Field<D> for PhotoField {
         let view_count = prepared.scene.object.view_count as usize;
         let weights = device.upload(&weights.values()[..view_count]).map_err(failed)?;
         let target = MarchBlock { target: target.block(0), background: prepared.background, settled };
-        let mut pixels =
+        let mut pixels: Pixels<D> =
             Pixels { colours: device.zeros(count).map_err(failed)?, depths: device.zeros(count).map_err(failed)? };
         let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
         progress.expect(height.div_ceil(band_rows) as usize);
         for first_row in (0..height).step_by(band_rows as usize) {
             progress.check()?;
             let row_count = band_rows.min(height - first_row);
+            let PhotoScene { object_buffer, views, footprints, texels, .. } = &prepared.scene;
+            let Pixels { colours, depths: pixel_depths } = &mut pixels;
             device
-                .march(&prepared.scene, depths, &weights, &target, first_row, row_count, &mut pixels)
+                .march(
+                    &target,
+                    first_row,
+                    row_count,
+                    object_buffer,
+                    views,
+                    footprints,
+                    texels,
+                    depths,
+                    &weights,
+                    colours,
+                    pixel_depths,
+                )
                 .map_err(failed)?;
             progress.step();
         }

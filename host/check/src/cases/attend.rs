@@ -24,6 +24,8 @@ pub enum Attend {}
 
 impl Case for Attend {
     const KERNEL: Kernel = Kernel::Attend;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 3.0e-5, least: 1.0e-30 };
     const REASON: &'static str = "an error of a logit is a relative error of its weight: differences from the largest \
         logit, five roundings, then the exponential";
@@ -62,9 +64,9 @@ impl Case for Attend {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter()
-            .zip(loaded)
-            .try_for_each(|(job, (queries, keys, weights))| device.attend(job.source_count, queries, keys, weights))
+        jobs.iter().zip(loaded).try_for_each(|(job, (queries, keys, weights))| {
+            device.attend(&job.source_count, (job.queries.len() / EMBEDDING) as u32, queries, keys, weights)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

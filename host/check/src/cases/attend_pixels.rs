@@ -38,6 +38,8 @@ pub enum MultiplyMatrices {}
 
 impl Case for MultiplyMatrices {
     const KERNEL: Kernel = Kernel::MultiplyMatrices;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n products, in whatever order they are summed, and one more product";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
@@ -158,6 +160,8 @@ pub enum SoftmaxRows {}
 
 impl Case for SoftmaxRows {
     const KERNEL: Kernel = Kernel::SoftmaxRows;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-30 };
     const REASON: &'static str = "a difference from the largest score, of up to some 10^2, is an error of the exponent; two \
         exponentials, n units (2^-24) of their sum, a division and a product";
@@ -196,7 +200,7 @@ impl Case for SoftmaxRows {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Scores>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, [scores, weights])| {
-            device.softmax_rows(job.row_count(), job.column_count, scores, weights)
+            device.softmax_rows(&job.column_count, job.row_count(), scores, weights)
         })
     }
 

@@ -56,6 +56,8 @@ pub enum Composite {}
 
 impl Case for Composite {
     const KERNEL: Kernel = Kernel::Composite;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, each as \
         far as what is seen changes there; depths as 1 / opacity";
@@ -91,7 +93,9 @@ impl Case for Composite {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { samples, sample_depths, pixels })| {
-            device.composite(&job.block, samples, sample_depths, pixels)
+            let ray_count = job.samples.len() as u32 / job.block.sample_count;
+            let Pixels { colours, depths } = pixels;
+            device.composite(&job.block, ray_count, samples, sample_depths, colours, depths)
         })
     }
 

@@ -75,6 +75,9 @@ pub enum Convolve {}
 
 impl Case for Convolve {
     const KERNEL: Kernel = Kernel::Convolve;
+    // As many as give every shape every combination of addend and rectification.
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n summands, in whatever order; of layers for \
         large images channels + 14 units of the magnitudes in Winograd's transforms, whose factors come to about 10^2";
@@ -153,7 +156,7 @@ impl Case for Convolve {
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
-            device.convolve(&job.block, inputs, layer, addend.as_ref(), outputs)
+            device.convolve(&job.block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
         })
     }
 
@@ -181,6 +184,9 @@ pub enum ConvolveTransposed {}
 
 impl Case for ConvolveTransposed {
     const KERNEL: Kernel = Kernel::ConvolveTransposed;
+    // As many as give every shape every combination of addend and rectification.
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = Product::REASON;
     const SPOILERS: &'static [Spoiler<Vec<Job<TransposedBlock>>>] = &[
@@ -240,7 +246,7 @@ impl Case for ConvolveTransposed {
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, outputs, .. })| {
-            device.convolve_transposed(&job.block, inputs, layer, outputs)
+            device.convolve_transposed(&job.block, inputs, &layer.weights, &layer.bias, outputs)
         })
     }
 

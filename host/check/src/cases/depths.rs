@@ -30,6 +30,8 @@ pub enum CoarseDepths {}
 
 impl Case for CoarseDepths {
     const KERNEL: Kernel = Kernel::CoarseDepths;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a share of the interval: five roundings and a division, then its product and sum";
     const SPOILERS: &'static [Spoiler<Vec<Job<CoarseBlock>>>] = &[
@@ -65,7 +67,9 @@ impl Case for CoarseDepths {
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (rays, depths))| device.coarse_depths(&job.block, rays, depths))
+        jobs.iter().zip(loaded).try_for_each(|(job, (Rays { count, pixels, rays }, depths))| {
+            device.coarse_depths(&job.block, *count, rays, pixels, depths)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
@@ -91,6 +95,8 @@ pub enum DrawChances {}
 
 impl Case for DrawChances {
     const KERNEL: Kernel = Kernel::DrawChances;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "an addition and a division; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
         9e-8 of the cosine, two roundings of its argument of up to a turn";
@@ -124,7 +130,9 @@ impl Case for DrawChances {
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (rays, chances))| device.draw_chances(&job.block, rays, chances))
+        jobs.iter().zip(loaded).try_for_each(|(job, (Rays { count, pixels, .. }, chances))| {
+            device.draw_chances(&job.block, *count, pixels, chances)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

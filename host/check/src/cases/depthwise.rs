@@ -44,6 +44,8 @@ pub enum ConvolveDepthwise {}
 
 impl Case for ConvolveDepthwise {
     const KERNEL: Kernel = Kernel::ConvolveDepthwise;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n summands, as many as places of the window";

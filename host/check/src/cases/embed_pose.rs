@@ -34,6 +34,8 @@ pub enum EmbedPose {}
 
 impl Case for EmbedPose {
     const KERNEL: Kernel = Kernel::EmbedPose;
+    const SEED_COUNT: u64 = 3;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "sines of arguments that are rounded at up to 48 times a centre, then sums over 42, 64 and \
         64 inputs, every rounding counted as if none cancelled";
@@ -58,8 +60,8 @@ impl Case for EmbedPose {
         Ok((device.upload(&inputs.embedding)?, device.upload(&inputs.poses)?, embedded))
     }
 
-    fn run<D: Device>(device: &D, _: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        device.embed_pose(&loaded.0, &loaded.1, &mut loaded.2)
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        device.embed_pose(inputs.poses.len() as u32, &loaded.0, &loaded.1, &mut loaded.2)
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

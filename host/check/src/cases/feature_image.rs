@@ -55,6 +55,8 @@ pub enum WeighFeatures {}
 
 impl Case for WeighFeatures {
     const KERNEL: Kernel = Kernel::WeighFeatures;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of two exponentials, a \
         difference";
@@ -149,6 +151,9 @@ pub enum SumFeatures {}
 
 impl Case for SumFeatures {
     const KERNEL: Kernel = Kernel::SumFeatures;
+    const SEED_COUNT: u64 = 8;
+    // A floor of variances and a length are there for another kernel.
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str =
         "n + 2 units (2^-24) of the sum of magnitudes of n summands, each a product with a sum of two";
@@ -238,6 +243,8 @@ pub enum DenoiserInput {}
 
 impl Case for DenoiserInput {
     const KERNEL: Kernel = Kernel::DenoiserInput;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "one product";
     const SPOILERS: &'static [Spoiler<Vec<Pictures>>] = &[

@@ -94,6 +94,8 @@ pub enum FineDepths {}
 
 impl Case for FineDepths {
     const KERNEL: Kernel = Kernel::FineDepths;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a place in a part: a division, a product, two sums; undecided where the random number \
         hits the border of a part to within the sums of weights";
@@ -140,7 +142,8 @@ impl Case for FineDepths {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { rays, seen, pixels, chances, depths })| {
-            device.fine_depths(&job.block, rays, seen, pixels, chances, depths)
+            let Pixels { colours, depths: pixel_depths } = pixels;
+            device.fine_depths(&job.block, rays.count, seen, &rays.rays, colours, pixel_depths, chances, depths)
         })
     }
 
@@ -184,6 +187,8 @@ pub enum MergeDepths {}
 
 impl Case for MergeDepths {
     const KERNEL: Kernel = Kernel::MergeDepths;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-2 };
     const REASON: &'static str = "the same numbers in order: exact";
     const SPOILERS: &'static [Spoiler<Vec<Passes>>] = &[

@@ -24,6 +24,8 @@ pub enum FuseViews {}
 
 impl Case for FuseViews {
     const KERNEL: Kernel = Kernel::FuseViews;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition a view, two roundings each";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[

@@ -68,6 +68,8 @@ pub enum GatherLatents {}
 
 impl Case for GatherLatents {
     const KERNEL: Kernel = Kernel::GatherLatents;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "errors of a projection, in pixels, times the change of the grid over a node; two mixtures; \
         undecided where a point is on the view's plane to within rounding";

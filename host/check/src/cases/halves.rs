@@ -36,6 +36,8 @@ pub struct LoadedNumbers<D: Device> {
 
 impl Case for PackHalves {
     const KERNEL: Kernel = Kernel::PackHalves;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-4 };
     const REASON: &'static str = "the nearest number of 16 bits, of two the even one: exact";
     const SPOILERS: &'static [Spoiler<Vec<Vec<f32>>>] =
@@ -74,7 +76,7 @@ impl Case for PackHalves {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Vec<f32>>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         for (job, LoadedNumbers { numbers, words }) in jobs.iter().zip(loaded) {
-            device.pack_halves(job.len() as u32, numbers, words)?;
+            device.pack_halves(&(job.len() as u32), numbers, words)?;
         }
         Ok(())
     }
@@ -113,6 +115,8 @@ pub struct LoadedJob<D: Device> {
 
 impl Case for GatherHalves {
     const KERNEL: Kernel = Kernel::GatherHalves;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = volumes::LIMITS;
     const REASON: &'static str = "as gather_volume: numbers of 16 bits are read exactly";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = volumes::SPOILERS;

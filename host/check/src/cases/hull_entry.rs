@@ -14,6 +14,8 @@ pub enum HullEntry {}
 
 impl Case for HullEntry {
     const KERNEL: Kernel = Kernel::HullEntry;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "up to 60 additions of a step to a depth of 3";
     const SPOILERS: &'static [Spoiler<World>] =
@@ -34,8 +36,11 @@ impl Case for HullEntry {
         Ok((world.load(device)?, device.zeros(world.texels.len())?))
     }
 
-    fn run<D: Device>(device: &D, world: &World, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        (0..world.object.view_count).try_for_each(|view| device.hull_entry(&loaded.0, view, &mut loaded.1))
+    fn run<D: Device>(device: &D, _: &World, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+        let (PhotoScene { object_buffer, views, texels, cameras, .. }, entries) = loaded;
+        (0..).zip(&*cameras).try_for_each(|(view, camera)| {
+            device.hull_entry(&view, camera.width * camera.height, object_buffer, views, texels, entries)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

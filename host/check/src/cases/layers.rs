@@ -117,6 +117,9 @@ pub enum Product {}
 
 impl Case for Product {
     const KERNEL: Kernel = Kernel::Product;
+    // As many as give every shape every combination of addend and rectification.
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n summands, in whatever order they are summed";
@@ -169,7 +172,7 @@ impl Case for Product {
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
-            device.product(&job.block, inputs, layer, addend.as_ref(), outputs)
+            device.product(&job.block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
         })
     }
 

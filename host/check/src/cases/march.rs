@@ -30,6 +30,8 @@ pub enum March {}
 
 impl Case for March {
     const KERNEL: Kernel = Kernel::March;
+    const SEED_COUNT: u64 = 3;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis from the image coordinates to the sum along the ray; numbers whose \
         bound is larger than a step of 8 bits are undecided";
@@ -73,7 +75,20 @@ impl Case for March {
         let middle = height / 2;
         for (first_row, row_count) in [(0, middle), (middle, height - middle)] {
             if row_count > 0 {
-                device.march(scene, depths, weights, &inputs.block, first_row, row_count, pixels)?;
+                let PhotoScene { object_buffer, views, footprints, texels, .. } = &*scene;
+                device.march(
+                    &inputs.block,
+                    first_row,
+                    row_count,
+                    object_buffer,
+                    views,
+                    footprints,
+                    texels,
+                    depths,
+                    weights,
+                    &mut pixels.colours,
+                    &mut pixels.depths,
+                )?;
             }
         }
         Ok(())

@@ -30,6 +30,8 @@ pub enum MatchCost {}
 
 impl Case for MatchCost {
     const KERNEL: Kernel = Kernel::MatchCost;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "colours as a look-up (ten roundings of an image coordinate, times the image's slope) over \
         an alpha of at least 0.3, times shares of at most 1 / NO_WITNESS";
@@ -67,7 +69,8 @@ impl Case for MatchCost {
 
     fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         let Loaded { scene, entries, pair_weights, costs } = loaded;
-        device.match_cost(scene, &inputs.sweep, entries, pair_weights, costs)
+        let PhotoScene { object_buffer, views, texels, .. } = scene;
+        device.match_cost(&inputs.sweep, object_buffer, views, texels, entries, pair_weights, costs)
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

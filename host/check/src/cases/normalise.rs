@@ -65,6 +65,9 @@ pub enum ChannelMeans {}
 
 impl Case for ChannelMeans {
     const KERNEL: Kernel = Kernel::ChannelMeans;
+    const SEED_COUNT: u64 = 4;
+    // A floor of variances and a length are there for another kernel.
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n pixels, in whatever order, and a division";
@@ -117,6 +120,10 @@ pub enum PartMoments {}
 
 impl Case for PartMoments {
     const KERNEL: Kernel = Kernel::PartMoments;
+    // As many as give every shape floors, offsets and distances of all kinds.
+    const SEED_COUNT: u64 = 8;
+    // A floor of variances and a length are there for another kernel.
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of n differences from one of the values, a rounding of the \
         mean; n + 3 units of the sum of squares, which is up to 10^4";
@@ -168,6 +175,9 @@ pub enum MergeMoments {}
 
 impl Case for MergeMoments {
     const KERNEL: Kernel = Kernel::MergeMoments;
+    // As many as give every shape floors, offsets and distances of all kinds.
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis of one part after the other: a rounding of the mean each, which is \
         up to 10^3 deviations, and what that makes of the squares between the parts; the reciprocal of a square root";
@@ -276,6 +286,10 @@ pub enum Normalise {}
 
 impl Case for Normalise {
     const KERNEL: Kernel = Kernel::Normalise;
+    // As many as give every shape floors, offsets and distances of all kinds.
+    const SEED_COUNT: u64 = 8;
+    // A floor of variances and a length are there for another kernel.
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "a difference from the mean, up to 10^3 deviations, two products and a sum; of SiLU an \
         exponential, a sum and a division";

@@ -41,6 +41,10 @@ pub enum PickDepth {}
 
 impl Case for PickDepth {
     const KERNEL: Kernel = Kernel::PickDepth;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = true;
+    // Of the cameras it takes only where their pixels are.
+    const SHAPES_ONLY: &'static [&'static str] = &["views"];
     const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis of costs, of the parabola through the least three and its quotient; \
         undecided where two planes cost the same to within it";
@@ -90,7 +94,9 @@ impl Case for PickDepth {
         let Loaded { scene, entries, means, guesses } = loaded;
         for (guess, picked) in guesses {
             for ((sweep, _), means) in inputs.bands.iter().zip(&*means) {
-                device.pick_depth(scene, sweep, means, entries, guess, rows(sweep), picked)?;
+                let PhotoScene { object_buffer, views, .. } = &*scene;
+                let (first, count) = (rows(sweep).start, rows(sweep).len() as u32);
+                device.pick_depth(sweep, first, count, object_buffer, views, means, entries, guess, picked)?;
             }
         }
         Ok(())

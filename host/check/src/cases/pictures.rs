@@ -27,6 +27,8 @@ type LoadedMix<B> = (B, [B; MOST_RESULTS], B);
 
 impl Case for MixPictures {
     const KERNEL: Kernel = Kernel::MixPictures;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition an array, two roundings each";
     const SPOILERS: &'static [Spoiler<Vec<MixJob>>] = &[
@@ -73,7 +75,8 @@ impl Case for MixPictures {
 
     fn run<D: Device>(device: &D, jobs: &Vec<MixJob>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, (state, results, mixed))| {
-            device.mix_pictures(&job.mix, state, results.each_ref(), mixed)
+            let [newest, second, third, fourth] = results.each_ref();
+            device.mix_pictures(&job.mix, job.element_count as u32, state, newest, second, third, fourth, mixed)
         })
     }
 
@@ -113,6 +116,8 @@ pub enum AddNoise {}
 
 impl Case for AddNoise {
     const KERNEL: Kernel = Kernel::AddNoise;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition; for normal numbers 2 ULP of the logarithm, 4.5 ULP of the root, \
         9e-8 of the cosine, two roundings of its argument of up to a turn";
@@ -143,7 +148,9 @@ impl Case for AddNoise {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<NoiseJob>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (picture, noisy))| device.add_noise(&job.block, picture, noisy))
+        jobs.iter().zip(loaded).try_for_each(|(job, (picture, noisy))| {
+            device.add_noise(&job.block, job.picture.len() as u32, picture, noisy)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

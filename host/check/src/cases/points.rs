@@ -40,6 +40,8 @@ pub enum EmbedPoints {}
 
 impl Case for EmbedPoints {
     const KERNEL: Kernel = Kernel::EmbedPoints;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-2 };
     const REASON: &'static str = "a rotation: three products and their sum; an angle is its product with up to 48, a sine \
         adds 9e-8";
@@ -120,6 +122,8 @@ pub enum VisibleWeights {}
 
 impl Case for VisibleWeights {
     const KERNEL: Kernel = Kernel::VisibleWeights;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-3 };
     const REASON: &'static str = "a sum over views and a division by it; undecided where a point is on a view's plane to \
         within a rotation's rounding";
@@ -163,7 +167,7 @@ impl Case for VisibleWeights {
     fn run<D: Device>(device: &D, jobs: &Vec<Visible>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, (views, weights, points, visible))| {
             let (view_count, point_count) = (job.views.len() as u32, job.points.len() as u32);
-            device.visible_weights(view_count, point_count, views, weights, points, visible)
+            device.visible_weights(&view_count, point_count, views, weights, points, visible)
         })
     }
 
@@ -196,6 +200,8 @@ pub enum Radiance {}
 
 impl Case for Radiance {
     const KERNEL: Kernel = Kernel::Radiance;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "2 ULP of the exponential, an addition and a division; a product";
     const SPOILERS: &'static [Spoiler<Said>] = &[

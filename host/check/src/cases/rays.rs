@@ -23,6 +23,8 @@ pub enum CastRays {}
 
 impl Case for CastRays {
     const KERNEL: Kernel = Kernel::CastRays;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "quotients of image coordinates by the focal length, three products with the axes, a norm \
         (1 where depths are along the axis) and a division by it";
@@ -62,7 +64,9 @@ impl Case for CastRays {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Cast>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter().zip(loaded).try_for_each(|(job, rays)| device.cast_rays(&job.block, rays))
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, Rays { count, pixels, rays })| device.cast_rays(&job.block, *count, pixels, rays))
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
@@ -103,6 +107,8 @@ pub enum PlacePoints {}
 
 impl Case for PlacePoints {
     const KERNEL: Kernel = Kernel::PlacePoints;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "a product and an addition a coordinate, a difference of depths";
     const SPOILERS: &'static [Spoiler<Vec<Placed>>] = &[
@@ -155,7 +161,7 @@ impl Case for PlacePoints {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Placed>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, (rays, depths, samples, points))| {
-            device.place_points(job.sample_count, job.samples.len() as u32, samples, rays, depths, points)
+            device.place_points(&job.sample_count, job.samples.len() as u32, samples, &rays.rays, depths, points)
         })
     }
 

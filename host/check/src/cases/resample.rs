@@ -44,6 +44,8 @@ pub enum MaxPool {}
 
 impl Case for MaxPool {
     const KERNEL: Kernel = Kernel::MaxPool;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-2 };
     const REASON: &'static str = "one of the inputs: exact";
     const SPOILERS: &'static [Spoiler<Vec<Job<PoolBlock>>>] =
@@ -111,6 +113,8 @@ pub enum Upsample {}
 
 impl Case for Upsample {
     const KERNEL: Kernel = Kernel::Upsample;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "a place among the inputs: a division, a product and a sum, times the change between \
         neighbours; two mixtures";

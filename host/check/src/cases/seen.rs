@@ -31,6 +31,8 @@ pub enum WeighSamples {}
 
 impl Case for WeighSamples {
     const KERNEL: Kernel = Kernel::WeighSamples;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
     const REASON: &'static str = "roundings of the optical depth times the transmittance, 2 ULP of the exponential, on both \
         sides of a sample";
@@ -71,9 +73,9 @@ impl Case for WeighSamples {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Samples>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter()
-            .zip(loaded)
-            .try_for_each(|(job, (samples, seen))| device.weigh_samples(job.sample_count, job.ray_count, samples, seen))
+        jobs.iter().zip(loaded).try_for_each(|(job, (samples, seen))| {
+            device.weigh_samples(&job.sample_count, job.ray_count, samples, seen)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
@@ -148,6 +150,8 @@ pub enum WantedSamples {}
 
 impl Case for WantedSamples {
     const KERNEL: Kernel = Kernel::WantedSamples;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 0.5 };
     const REASON: &'static str = "yes or no, undecided where a sample lies on the border of a part or a share on its \
         threshold to within rounding";
@@ -189,7 +193,7 @@ impl Case for WantedSamples {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Looks>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedLooks { rays, depths, seen, wanted })| {
-            device.wanted_samples(&job.block, rays, depths, seen, wanted)
+            device.wanted_samples(&job.block, rays.count, seen, &rays.rays, &rays.pixels, depths, wanted)
         })
     }
 

@@ -96,6 +96,8 @@ pub enum GatherVolume {}
 
 impl Case for GatherVolume {
     const KERNEL: Kernel = Kernel::GatherVolume;
+    const SEED_COUNT: u64 = 8;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = LIMITS;
     const REASON: &'static str = "errors of a projection and of the depth, in nodes, times the change of the volume over a \
         node; eight products; undecided where a point is on the view's plane to within rounding";

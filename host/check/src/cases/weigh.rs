@@ -52,6 +52,9 @@ pub enum Weigh {}
 
 impl Case for Weigh {
     const KERNEL: Kernel = Kernel::Weigh;
+    // As many as give every scheme every number of sources.
+    const SEED_COUNT: u64 = 32;
+    const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-30 };
     const REASON: &'static str = "relative, counted for each scheme: roundings on the way to an error and its quotients, \
         divisions as 2.5 ULP, roots as 4.5 ULP";
@@ -95,9 +98,9 @@ impl Case for Weigh {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
-        jobs.iter()
-            .zip(loaded)
-            .try_for_each(|(job, (sources, targets, weights))| device.weigh(&job.block, sources, targets, weights))
+        jobs.iter().zip(loaded).try_for_each(|(job, (sources, targets, weights))| {
+            device.weigh(&job.block, job.targets.len() as u32, sources, targets, weights)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {

@@ -43,6 +43,8 @@ pub enum SumRow {}
 
 impl Case for SumRow {
     const KERNEL: Kernel = Kernel::SumRow;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "at most five additions of costs of at most 0.2";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[("costs", Inputs::spoil_costs)];
@@ -83,6 +85,8 @@ pub enum MeanColumn {}
 
 impl Case for MeanColumn {
     const KERNEL: Kernel = Kernel::MeanColumn;
+    const SEED_COUNT: u64 = 4;
+    const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "at most 25 additions of costs of at most 0.2, a division of 2.5 ULP";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[

@@ -1,51 +1,37 @@
 //! The views become one, samples become a pixel.
 
-use super::Cpu;
-use crate::kernels::light::{LightKernels, Pixels};
-use rayon::prelude::*;
-use std::convert::Infallible;
+use crate::parallel::{for_each_row, for_each_row_of_two};
 use viewfuse_core::composite::{CompositeBlock, composite_samples};
 use viewfuse_core::fuse::FuseBlock;
 
-impl LightKernels for Cpu {
-    fn fuse_views(
-        &self,
-        block: &FuseBlock,
-        element_count: u32,
-        weights: &Vec<f32>,
-        latents: &Vec<f32>,
-        fused: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        // A point's channels together: they have the same weights. Sums in the order of `fuse_element`.
-        let channels = block.channel_count.max(1) as usize;
-        fused[..element_count as usize].par_chunks_mut(channels).enumerate().for_each(|(point, fused)| {
-            let weights = &weights[block.first_weight(point * channels)..][..block.view_count as usize];
-            fused.fill(0.0);
-            for (view, weight) in weights.iter().enumerate() {
-                let latents = &latents[view * block.stride as usize + point * channels..];
-                for (fused, latent) in fused.iter_mut().zip(latents) {
-                    *fused += weight * latent;
-                }
+pub(super) fn fuse_views(block: &FuseBlock, element_count: u32, weights: &[f32], latents: &[f32], fused: &mut [f32]) {
+    // A point's channels together: they have the same weights. Sums in the order of `fuse_element`.
+    let channels = block.channel_count.max(1) as usize;
+    for_each_row(&mut fused[..element_count as usize], channels, 16384, |point, fused| {
+        let weights = &weights[block.first_weight(point * channels)..][..block.view_count as usize];
+        fused.fill(0.0);
+        for (view, weight) in weights.iter().enumerate() {
+            let latents = &latents[view * block.stride as usize + point * channels..];
+            for (fused, latent) in fused.iter_mut().zip(latents) {
+                *fused += weight * latent;
             }
-        });
-        Ok(())
-    }
+        }
+    });
+}
 
-    fn composite(
-        &self,
-        block: &CompositeBlock,
-        samples: &Vec<[f32; 4]>,
-        sample_depths: &Vec<f32>,
-        pixels: &mut Pixels<Self>,
-    ) -> Result<(), Infallible> {
-        let count = block.sample_count as usize;
-        let rays = samples.par_chunks(count).zip(sample_depths.par_chunks(count));
-        let pixels = pixels.colours.par_iter_mut().zip(&mut pixels.depths);
-        pixels.zip(rays).for_each(|((colour, depth), (samples, depths))| {
-            let seen = composite_samples(samples, depths, block);
-            *colour = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
-            *depth = seen.depth;
-        });
-        Ok(())
-    }
+pub(super) fn composite(
+    block: &CompositeBlock,
+    ray_count: u32,
+    samples: &[[f32; 4]],
+    sample_depths: &[f32],
+    colours: &mut [[f32; 4]],
+    depths: &mut [f32],
+) {
+    let (rays, count) = (ray_count as usize, block.sample_count as usize);
+    for_each_row_of_two(&mut colours[..rays], &mut depths[..rays], 1, 64, |ray, colour, depth| {
+        let own = ray * count..(ray + 1) * count;
+        let seen = composite_samples(&samples[own.clone()], &sample_depths[own], block);
+        colour[0] = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
+        depth[0] = seen.depth;
+    });
 }

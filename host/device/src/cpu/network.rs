@@ -1,14 +1,12 @@
 //! Layers of networks: blocked matrix products, convolutions as products of the image's patches or by Winograd's way, rows
 //! spread over the cores.
 
-use super::Cpu;
-use super::product::{Ending, Panels, Rows};
-use super::room::with_room;
+use super::linear::{Ending, Panels, Rows};
+use super::scratch::with_scratch;
 use super::winograd::Winograd;
-use crate::kernels::network::{Layer, LayerShape, NetworkKernels};
+use crate::kernels::LayerShape;
+use crate::parallel::{for_each, for_each_part, for_each_row};
 use pulp::Arch;
-use rayon::prelude::*;
-use std::convert::Infallible;
 use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
 use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_core::network::product::ProductBlock;
@@ -30,6 +28,15 @@ pub enum Weights {
 }
 
 impl Weights {
+    /// Those of `weights[inner][column]`, which may be longer.
+    pub(super) fn new(shape: &LayerShape, weights: &[f32]) -> Weights {
+        let LayerShape { inner_count, column_count, has_wide_images } = *shape;
+        match has_wide_images {
+            true => Weights::Winograd(Winograd::new(weights, inner_count / 9, column_count)),
+            false => Weights::Product(Panels::new(weights, inner_count, column_count)),
+        }
+    }
+
     fn panels(&self, inner: usize, columns: usize) -> &Panels {
         match self {
             Weights::Product(panels) => {
@@ -41,163 +48,125 @@ impl Weights {
     }
 }
 
-impl NetworkKernels for Cpu {
-    type Weights = Weights;
-
-    fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, Infallible> {
-        let LayerShape { inner_count, column_count, has_wide_images } = *shape;
-        Ok(match has_wide_images {
-            true => Weights::Winograd(Winograd::new(weights, inner_count / 9, column_count)),
-            false => Weights::Product(Panels::new(weights, inner_count, column_count)),
-        })
+pub(super) fn convolve(
+    block: &ConvolveBlock,
+    inputs: &[f32],
+    weights: &Weights,
+    bias: &[f32],
+    addend: Option<&[f32]>,
+    outputs: &mut [f32],
+) {
+    let (pixel_count, columns) = (block.pixel_count() as usize, block.out_channels as usize);
+    let ending = Ending {
+        bias: &bias[..columns],
+        addend: addend.map(|addend| (&addend[block.addend_first as usize..], block.addend_pitch as usize)),
+        scale: block.scale,
+        relu: block.relu_outputs,
+    };
+    let out_pitch = block.out_pitch as usize;
+    let outputs = window(outputs, block.out_first, pixel_count, out_pitch, columns);
+    if let Weights::Winograd(winograd) = weights {
+        winograd.convolve(block, inputs, ending, outputs);
+        return;
     }
-
-    fn convolve(
-        &self,
-        block: &ConvolveBlock,
-        inputs: &Vec<f32>,
-        layer: &Layer<Self>,
-        addend: Option<&Vec<f32>>,
-        outputs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let (pixel_count, columns) = (block.pixel_count() as usize, block.out_channels as usize);
-        let ending = Ending {
-            bias: &layer.bias[..columns],
-            addend: addend.map(|addend| (&addend[block.addend_first as usize..], block.addend_pitch as usize)),
-            scale: block.scale,
-            relu: block.relu_outputs,
+    let patch_len = block.patch_len() as usize;
+    let panels = weights.panels(patch_len, columns);
+    let rows = chunk_rows(pixel_count);
+    // Windows of one pixel are what lies in the image already.
+    let is_plain = [block.size, block.stride, block.enlarge, block.padding] == [1, 1, 1, 0];
+    let run = |patches: &mut [f32], chunk: usize, outputs: &mut [f32]| {
+        let first = chunk * rows;
+        let row_count = rows.min(pixel_count - first);
+        let (inputs, in_pitch) = if is_plain {
+            (&inputs[block.in_first as usize + first * block.in_pitch as usize..], block.in_pitch as usize)
+        } else {
+            for (pixel, patch) in (first..).zip(patches.chunks_exact_mut(patch_len).take(row_count)) {
+                read_patch(block, inputs, pixel as u32, patch);
+            }
+            (&*patches, patch_len)
         };
-        let out_pitch = block.out_pitch as usize;
-        let outputs = window(outputs, block.out_first, pixel_count, out_pitch, columns);
-        if let Weights::Winograd(winograd) = &layer.weights {
-            winograd.convolve(block, inputs, ending, outputs);
-            return Ok(());
+        let ending = ending.rows_from(first);
+        panels.multiply(Rows { row_count, inputs, in_pitch, relu_inputs: 0, ending, outputs, out_pitch });
+    };
+    let len = if is_plain { 0 } else { rows * patch_len };
+    for_each_part(outputs, rows * out_pitch, &|chunk, outputs| {
+        with_scratch(len, |patches| run(patches, chunk, outputs));
+    });
+}
+
+pub(super) fn convolve_depthwise(block: &DepthwiseBlock, inputs: &[f32], weights: &[f32], outputs: &mut [f32]) {
+    let channels = block.channels as usize;
+    let outputs = &mut outputs[..block.pixel_count() as usize * channels];
+    for_each_row(outputs, channels, 2048, |pixel, outputs| {
+        Arch::new().dispatch(
+            #[inline(always)]
+            || filter_pixel(block, inputs, weights, pixel as u32, outputs),
+        );
+    });
+}
+
+pub(super) fn convolve_transposed(
+    block: &TransposedBlock,
+    inputs: &[f32],
+    weights: &Weights,
+    bias: &[f32],
+    outputs: &mut [f32],
+) {
+    let (width, columns) = (block.in_width as usize, block.column_count() as usize);
+    let panels = weights.panels(block.in_channels as usize, columns);
+    let (size, channels, pitch) = (block.size as usize, block.out_channels as usize, block.out_pitch as usize);
+    let pixels = block.pixel_count() as usize * size * size;
+    let bias = bias[..channels].repeat(size * size);
+    let ending = Ending { bias: &bias, addend: None, scale: 1.0, relu: block.relu_outputs };
+    // A row of the input becomes some whole rows of the output.
+    let outputs = window(outputs, block.out_first, pixels, pitch, channels);
+    let run = |results: &mut [f32], row: usize, outputs: &mut [f32]| {
+        let in_pitch = block.in_pitch as usize;
+        let inputs = &inputs[block.in_first as usize + row * width * in_pitch..];
+        let product =
+            Rows { row_count: width, inputs, in_pitch, relu_inputs: 0, ending, outputs: results, out_pitch: columns };
+        panels.multiply(product);
+        for (column, result) in results.chunks_exact(columns).enumerate() {
+            for (corner, result) in result.chunks_exact(channels).enumerate() {
+                let place = (corner / size * width + column) * size + corner % size;
+                outputs[place * pitch..place * pitch + channels].copy_from_slice(result);
+            }
         }
-        let patch_len = block.patch_len() as usize;
-        let panels = layer.weights.panels(patch_len, columns);
-        let rows = chunk_rows(pixel_count);
-        // Windows of one pixel are what lies in the image already.
-        let is_plain = [block.size, block.stride, block.enlarge, block.padding] == [1, 1, 1, 0];
-        let run = |patches: &mut [f32], chunk: usize, outputs: &mut [f32]| {
-            let first = chunk * rows;
-            let row_count = rows.min(pixel_count - first);
-            let (inputs, in_pitch) = if is_plain {
-                (&inputs[block.in_first as usize + first * block.in_pitch as usize..], block.in_pitch as usize)
-            } else {
-                for (pixel, patch) in (first..).zip(patches.chunks_exact_mut(patch_len).take(row_count)) {
-                    read_patch(block, inputs, pixel as u32, patch);
-                }
-                (&*patches, patch_len)
-            };
-            let ending = ending.rows_from(first);
-            panels.multiply(Rows { row_count, inputs, in_pitch, relu_inputs: 0, ending, outputs, out_pitch });
-        };
-        let len = if is_plain { 0 } else { rows * patch_len };
-        let chunks = outputs.par_chunks_mut(rows * out_pitch).enumerate();
-        chunks.for_each(|(chunk, outputs)| with_room(len, |patches| run(patches, chunk, outputs)));
-        Ok(())
-    }
+    };
+    for_each_part(outputs, width * size * size * pitch, &|row, outputs| {
+        with_scratch(width * columns, |results| run(results, row, outputs));
+    });
+}
 
-    fn convolve_depthwise(
-        &self,
-        block: &DepthwiseBlock,
-        inputs: &Vec<f32>,
-        weights: &Vec<f32>,
-        outputs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let channels = block.channels as usize;
-        let outputs = &mut outputs[..block.pixel_count() as usize * channels];
-        outputs.par_chunks_mut(channels).enumerate().for_each(|(pixel, outputs)| {
-            Arch::new().dispatch(
-                #[inline(always)]
-                || filter_pixel(block, inputs, weights, pixel as u32, outputs),
-            );
-        });
-        Ok(())
-    }
+pub(super) fn max_pool(block: &PoolBlock, inputs: &[f32], outputs: &mut [f32]) {
+    let count = (block.out_height * block.out_width * block.channels) as usize;
+    for_each(&mut outputs[..count], 1024, |element, output| *output = pooled_element(inputs, block, element));
+}
 
-    fn convolve_transposed(
-        &self,
-        block: &TransposedBlock,
-        inputs: &Vec<f32>,
-        layer: &Layer<Self>,
-        outputs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let (width, columns) = (block.in_width as usize, block.column_count() as usize);
-        let panels = layer.weights.panels(block.in_channels as usize, columns);
-        let (size, channels, pitch) = (block.size as usize, block.out_channels as usize, block.out_pitch as usize);
-        let pixels = block.pixel_count() as usize * size * size;
-        let bias = layer.bias[..channels].repeat(size * size);
-        let ending = Ending { bias: &bias, addend: None, scale: 1.0, relu: block.relu_outputs };
-        // A row of the input becomes some whole rows of the output.
-        let outputs = window(outputs, block.out_first, pixels, pitch, channels);
-        let run = |results: &mut [f32], row: usize, outputs: &mut [f32]| {
-            let in_pitch = block.in_pitch as usize;
-            let inputs = &inputs[block.in_first as usize + row * width * in_pitch..];
-            let product = Rows {
-                row_count: width,
-                inputs,
-                in_pitch,
-                relu_inputs: 0,
-                ending,
-                outputs: results,
-                out_pitch: columns,
-            };
-            panels.multiply(product);
-            for (column, result) in results.chunks_exact(columns).enumerate() {
-                for (corner, result) in result.chunks_exact(channels).enumerate() {
-                    let place = (corner / size * width + column) * size + corner % size;
-                    outputs[place * pitch..place * pitch + channels].copy_from_slice(result);
-                }
-            }
-        };
-        let rows = outputs.par_chunks_mut(width * size * size * pitch).enumerate();
-        rows.for_each(|(row, outputs)| with_room(width * columns, |results| run(results, row, outputs)));
-        Ok(())
-    }
+pub(super) fn upsample(block: &UpsampleBlock, inputs: &[f32], outputs: &mut [f32]) {
+    let (in_channels, out_channels) = (block.in_channels as usize, block.out_channels as usize);
+    let pixel_count = (block.out_height * block.out_width) as usize;
+    for_each_row(&mut outputs[..pixel_count * out_channels], out_channels, 4096, |pixel, outputs| {
+        let first = block.first_channel as usize;
+        for (channel, output) in outputs[first..first + in_channels].iter_mut().enumerate() {
+            *output = upsampled_element(inputs, block, pixel * in_channels + channel);
+        }
+    });
+}
 
-    fn max_pool(&self, block: &PoolBlock, inputs: &Vec<f32>, outputs: &mut Vec<f32>) -> Result<(), Infallible> {
-        let count = (block.out_height * block.out_width * block.channels) as usize;
-        outputs[..count]
-            .par_iter_mut()
-            .enumerate()
-            .with_min_len(1024)
-            .for_each(|(element, output)| *output = pooled_element(&inputs[..], block, element));
-        Ok(())
-    }
-
-    fn upsample(&self, block: &UpsampleBlock, inputs: &Vec<f32>, outputs: &mut Vec<f32>) -> Result<(), Infallible> {
-        let (in_channels, out_channels) = (block.in_channels as usize, block.out_channels as usize);
-        let pixel_count = (block.out_height * block.out_width) as usize;
-        outputs[..pixel_count * out_channels].par_chunks_mut(out_channels).enumerate().for_each(|(pixel, outputs)| {
-            let first = block.first_channel as usize;
-            for (channel, output) in outputs[first..first + in_channels].iter_mut().enumerate() {
-                *output = upsampled_element(&inputs[..], block, pixel * in_channels + channel);
-            }
-        });
-        Ok(())
-    }
-
-    fn product(
-        &self,
-        block: &ProductBlock,
-        inputs: &Vec<f32>,
-        layer: &Layer<Self>,
-        addend: Option<&Vec<f32>>,
-        outputs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let inner = block.inner_count as usize;
-        let (row_count, columns) = (block.row_count as usize, block.column_count as usize);
-        let panels = layer.weights.panels(inner, columns);
-        let ending = Ending {
-            bias: &layer.bias,
-            addend: addend.map(|addend| (&addend[..], columns)),
-            scale: 1.0,
-            relu: block.relu_outputs,
-        };
-        multiply(panels, inputs, inner, block.relu_inputs, ending, &mut outputs[..row_count * columns]);
-        Ok(())
-    }
+pub(super) fn product(
+    block: &ProductBlock,
+    inputs: &[f32],
+    weights: &Weights,
+    bias: &[f32],
+    addend: Option<&[f32]>,
+    outputs: &mut [f32],
+) {
+    let inner = block.inner_count as usize;
+    let (row_count, columns) = (block.row_count as usize, block.column_count as usize);
+    let panels = weights.panels(inner, columns);
+    let ending = Ending { bias, addend: addend.map(|addend| (addend, columns)), scale: 1.0, relu: block.relu_outputs };
+    multiply(panels, inputs, inner, block.relu_inputs, ending, &mut outputs[..row_count * columns]);
 }
 
 /// A product of rows that lie side by side, spread over the cores.
@@ -211,7 +180,7 @@ pub(super) fn multiply(
 ) {
     let [_, columns] = panels.size();
     let rows = chunk_rows(outputs.len() / columns);
-    outputs.par_chunks_mut(rows * columns).enumerate().for_each(|(chunk, outputs)| {
+    for_each_part(outputs, rows * columns, &|chunk, outputs| {
         let first = chunk * rows;
         panels.multiply(Rows {
             row_count: outputs.len() / columns,

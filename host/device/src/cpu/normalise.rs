@@ -1,71 +1,52 @@
 //! Means of images and normalisation by them, all channels of a pixel together.
 
-use super::Cpu;
-use crate::kernels::normalise::NormaliseKernels;
+use super::scratch::with_scratch;
+use crate::parallel::{for_each_row, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
-use std::convert::Infallible;
 use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock, PART, merged_moments, silu};
 
-impl NormaliseKernels for Cpu {
-    fn channel_means(&self, block: &MeanBlock, inputs: &Vec<f32>, means: &mut Vec<f32>) -> Result<(), Infallible> {
-        let means = &mut means[..block.channels as usize];
-        means.fill(0.0);
-        // The same sums, all channels of a pixel at once.
-        for row in inputs.chunks_exact(means.len()).take(block.pixel_count as usize) {
-            means.iter_mut().zip(row).for_each(|(sum, input)| *sum += input);
-        }
-        means.iter_mut().for_each(|mean| *mean /= block.pixel_count as f32);
-        Ok(())
+pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]) {
+    let means = &mut means[..block.channels as usize];
+    means.fill(0.0);
+    // The same sums, all channels of a pixel at once.
+    for row in inputs.chunks_exact(means.len()).take(block.pixel_count as usize) {
+        means.iter_mut().zip(row).for_each(|(sum, input)| *sum += input);
     }
+    means.iter_mut().for_each(|mean| *mean /= block.pixel_count as f32);
+}
 
-    fn part_moments(
-        &self,
-        block: &NormaliseBlock,
-        inputs: &Vec<f32>,
-        parts: &mut Vec<[f32; 2]>,
-    ) -> Result<(), Infallible> {
-        let groups = block.group_count as usize;
-        let parts = &mut parts[..block.part_count() as usize * groups];
-        parts.par_chunks_mut(groups).enumerate().for_each_init(Vec::new, |sums, (part, moments)| {
+pub(super) fn part_moments(block: &NormaliseBlock, inputs: &[f32], parts: &mut [[f32; 2]]) {
+    let groups = block.group_count as usize;
+    // A part of an image is work enough for a core.
+    for_each_row(&mut parts[..block.part_count() as usize * groups], groups, 1, |part, moments| {
+        with_scratch(2 * block.channels as usize, |sums| {
             Arch::new().dispatch(PartMoments { block, inputs, part, sums, moments });
         });
-        Ok(())
-    }
+    });
+}
 
-    fn merge_moments(
-        &self,
-        block: &NormaliseBlock,
-        parts: &Vec<[f32; 2]>,
-        moments: &mut Vec<[f32; 2]>,
-    ) -> Result<(), Infallible> {
-        for (group, moments) in moments[..block.group_count as usize].iter_mut().enumerate() {
-            *moments = merged_moments(&parts[..], block, group);
-        }
-        Ok(())
+pub(super) fn merge_moments(block: &NormaliseBlock, parts: &[[f32; 2]], moments: &mut [[f32; 2]]) {
+    for (group, moments) in moments[..block.group_count as usize].iter_mut().enumerate() {
+        *moments = merged_moments(parts, block, group);
     }
+}
 
-    fn normalise(
-        &self,
-        block: &NormaliseBlock,
-        inputs: &Vec<f32>,
-        moments: &Vec<[f32; 2]>,
-        weights: &Vec<f32>,
-        bias: &Vec<f32>,
-        outputs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let (channels, pixel_count) = (block.channels as usize, block.pixel_count as usize);
-        let of_channel = |channel: usize| moments[channel / block.group_channels() as usize];
-        let mean: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[0]).collect();
-        let factor: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[1] * weights[channel]).collect();
-        let pixels = (4096 / channels).max(1);
-        let outputs = outputs[..pixel_count * channels].par_chunks_mut(pixels * channels).enumerate();
-        outputs.for_each(|(chunk, outputs)| {
-            let first_pixel = chunk * pixels;
-            Arch::new().dispatch(Normalise { block, inputs, first_pixel, mean: &mean, factor: &factor, bias, outputs });
-        });
-        Ok(())
-    }
+pub(super) fn normalise(
+    block: &NormaliseBlock,
+    inputs: &[f32],
+    moments: &[[f32; 2]],
+    weights: &[f32],
+    bias: &[f32],
+    outputs: &mut [f32],
+) {
+    let (channels, pixel_count) = (block.channels as usize, block.pixel_count as usize);
+    let of_channel = |channel: usize| moments[channel / block.group_channels() as usize];
+    let mean: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[0]).collect();
+    let factor: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[1] * weights[channel]).collect();
+    let outputs = &mut outputs[..pixel_count * channels];
+    for_each_rows(outputs, channels, 4096, &|first_pixel, outputs| {
+        Arch::new().dispatch(Normalise { block, inputs, first_pixel, mean: &mean, factor: &factor, bias, outputs });
+    });
 }
 
 /// Some pixels, as [`viewfuse_core::network::normalise::normalised_element`] defines them. A struct and not a closure, as
@@ -111,8 +92,8 @@ struct PartMoments<'a> {
     block: &'a NormaliseBlock,
     inputs: &'a [f32],
     part: usize,
-    /// Room for sums.
-    sums: &'a mut Vec<f32>,
+    /// Scratch, two numbers a channel.
+    sums: &'a mut [f32],
     /// `[group]`.
     moments: &'a mut [[f32; 2]],
 }
@@ -127,9 +108,8 @@ impl WithSimd for PartMoments<'_> {
         let first = part * PART as usize;
         let pixels = first..block.pixel_count.min((first + PART as usize) as u32) as usize;
         let count = (pixels.len() * own) as f32;
-        sums.clear();
-        sums.resize(2 * channels, 0.0);
         let (sums, means) = sums.split_at_mut(channels);
+        sums.fill(0.0);
         // First the group's first value, then its mean.
         for (means, inputs) in means.chunks_mut(own).zip(row_of(block, inputs, first).chunks(own)) {
             means.fill(inputs[0]);

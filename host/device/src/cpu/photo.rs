@@ -1,139 +1,120 @@
-//! The field that needs no weights file.
+//! The training-free field.
 
-use super::Cpu;
-use crate::kernels::light::Pixels;
-use crate::kernels::photo::{PhotoKernels, PhotoScene};
-use rayon::prelude::*;
-use std::convert::Infallible;
-use std::ops::Range;
-use viewfuse_core::photo::hull::hull_entry;
-use viewfuse_core::photo::march::{MarchBlock, march};
-use viewfuse_core::photo::sweep::{OUTSIDE, SweepBlock, SweptPixel, mean_column, pick_depth, sum_row};
+use crate::parallel::{for_each_row, for_each_row_of_two};
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::photo::ObjectBlock;
+use viewfuse_core::photo::hull;
+use viewfuse_core::photo::march::{self, MarchBlock};
+use viewfuse_core::photo::sweep::{self, OUTSIDE, SweepBlock, SweptPixel};
 
-impl PhotoKernels for Cpu {
-    fn hull_entry(&self, scene: &PhotoScene<Self>, view: u32, entries: &mut Vec<f32>) -> Result<(), Infallible> {
-        let width = scene.cameras[view as usize].width as usize;
-        let rows = of_view_mut(scene, view, entries).par_chunks_mut(width);
-        rows.enumerate().for_each(|(row, entries)| {
-            for (column, entry) in entries.iter_mut().enumerate() {
-                let pixel = (row * width + column) as u32;
-                *entry = hull_entry(&scene.object, &scene.views, &scene.texels[..], view, pixel);
-            }
-        });
-        Ok(())
-    }
-
-    fn match_cost(
-        &self,
-        scene: &PhotoScene<Self>,
-        sweep: &SweepBlock,
-        entries: &Vec<f32>,
-        pair_weights: &Vec<f32>,
-        costs: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let (width, texels, entries) = (sweep.width, &scene.texels[..], &entries[..]);
-        for_each_pixel(sweep, costs, |pixel, costs| {
-            let swept = SweptPixel::new(sweep, &scene.views, texels, entries, sweep.first_row * width + pixel);
-            let (first, end) = swept.planes(&scene.object, sweep);
-            costs.fill(OUTSIDE);
-            for (cost, plane) in costs[first as usize..end as usize].iter_mut().zip(first..) {
-                *cost = swept.match_cost(&scene.object, sweep, &scene.views, texels, entries, pair_weights, plane);
-            }
-        });
-        Ok(())
-    }
-
-    fn sum_row(&self, sweep: &SweepBlock, costs: &Vec<f32>, row_sums: &mut Vec<[f32; 2]>) -> Result<(), Infallible> {
-        for_each_plane(sweep, row_sums, |pixel, plane, sums| {
-            *sums = sum_row(sweep, costs, pixel, plane);
-        });
-        Ok(())
-    }
-
-    fn mean_column(
-        &self,
-        sweep: &SweepBlock,
-        costs: &Vec<f32>,
-        row_sums: &Vec<[f32; 2]>,
-        means: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        for_each_plane(sweep, means, |pixel, plane, mean| {
-            *mean = mean_column(sweep, costs, row_sums, pixel, plane);
-        });
-        Ok(())
-    }
-
-    fn pick_depth(
-        &self,
-        scene: &PhotoScene<Self>,
-        sweep: &SweepBlock,
-        means: &Vec<f32>,
-        entries: &Vec<f32>,
-        guess: &Vec<f32>,
-        rows: Range<u32>,
-        picked: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let camera = &scene.cameras[sweep.view as usize];
-        let width = camera.width;
-        let first = (camera.first_texel + sweep.first_row * width) as usize;
-        let band = first..first + (sweep.row_count * width) as usize;
-        let written = first + (rows.start * width) as usize..first + (rows.end * width) as usize;
-        let (entries, guess) = (&entries[band.clone()], &guess[band]);
-        picked[written].par_chunks_mut(width as usize).enumerate().for_each(|(row, depths)| {
-            for (column, depth) in depths.iter_mut().enumerate() {
-                let pixel = (rows.start + row as u32) * width + column as u32;
-                *depth = pick_depth(&scene.object, sweep, means, entries, guess, pixel);
-            }
-        });
-        Ok(())
-    }
-
-    fn march(
-        &self,
-        scene: &PhotoScene<Self>,
-        depths: &Vec<f32>,
-        weights: &Vec<f32>,
-        target: &MarchBlock,
-        first_row: u32,
-        row_count: u32,
-        pixels: &mut Pixels<Self>,
-    ) -> Result<(), Infallible> {
-        let width = target.target.width as usize;
-        let band = first_row as usize * width..(first_row + row_count) as usize * width;
-        let colour_rows = pixels.colours[band.clone()].par_chunks_mut(width);
-        let depth_rows = pixels.depths[band].par_chunks_mut(width);
-        colour_rows.zip(depth_rows).enumerate().for_each(|(row, (colours, pixel_depths))| {
-            for (column, (colour, depth)) in colours.iter_mut().zip(pixel_depths).enumerate() {
-                let at = [column as f32 + 0.5, (first_row as usize + row) as f32 + 0.5];
-                let seen = march(
-                    &scene.object,
-                    &scene.views,
-                    &scene.footprints,
-                    &scene.texels[..],
-                    &depths[..],
-                    weights,
-                    target,
-                    at,
-                );
-                *colour = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
-                *depth = seen.depth;
-            }
-        });
-        Ok(())
-    }
+pub(super) fn hull_entry(
+    view: &u32,
+    pixel_count: u32,
+    object: &[ObjectBlock],
+    views: &[CameraBlock],
+    texels: &[[f32; 4]],
+    entries: &mut [f32],
+) {
+    let camera = &views[*view as usize];
+    let (first, width) = (camera.first_texel as usize, camera.width as usize);
+    for_each_row(&mut entries[first..first + pixel_count as usize], width, 64, |row, entries| {
+        for (column, entry) in entries.iter_mut().enumerate() {
+            let pixel = (row * width + column) as u32;
+            *entry = hull::hull_entry(&object[0], views, texels, *view, pixel);
+        }
+    });
 }
 
-/// The part of a map of all views that belongs to one.
-fn of_view_mut<'a>(scene: &PhotoScene<Cpu>, view: u32, map: &'a mut [f32]) -> &'a mut [f32] {
-    let camera = &scene.cameras[view as usize];
-    let first = camera.first_texel as usize;
-    &mut map[first..first + (camera.width * camera.height) as usize]
+pub(super) fn match_cost(
+    sweep: &SweepBlock,
+    object: &[ObjectBlock],
+    views: &[CameraBlock],
+    texels: &[[f32; 4]],
+    entries: &[f32],
+    pair_weights: &[f32],
+    costs: &mut [f32],
+) {
+    let (object, width) = (&object[0], sweep.width);
+    for_each_pixel(sweep, costs, 512, |pixel, costs| {
+        let swept = SweptPixel::new(sweep, views, texels, entries, sweep.first_row * width + pixel);
+        let (first, end) = swept.planes(object, sweep);
+        costs.fill(OUTSIDE);
+        for (cost, plane) in costs[first as usize..end as usize].iter_mut().zip(first..) {
+            *cost = swept.match_cost(object, sweep, views, texels, entries, pair_weights, plane);
+        }
+    });
 }
 
-/// Runs a kernel for every pixel of a band, rows in parallel; it gets the values of all planes.
-fn for_each_pixel<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn(u32, &mut [T]) + Sync) {
+pub(super) fn sum_row(sweep: &SweepBlock, costs: &[f32], row_sums: &mut [[f32; 2]]) {
+    for_each_plane(sweep, row_sums, |pixel, plane, sums| {
+        *sums = sweep::sum_row(sweep, costs, pixel, plane);
+    });
+}
+
+pub(super) fn mean_column(sweep: &SweepBlock, costs: &[f32], row_sums: &[[f32; 2]], means: &mut [f32]) {
+    for_each_plane(sweep, means, |pixel, plane, mean| {
+        *mean = sweep::mean_column(sweep, costs, row_sums, pixel, plane);
+    });
+}
+
+#[allow(clippy::too_many_arguments)]
+pub(super) fn pick_depth(
+    sweep: &SweepBlock,
+    first_row: u32,
+    row_count: u32,
+    object: &[ObjectBlock],
+    views: &[CameraBlock],
+    means: &[f32],
+    entries: &[f32],
+    guess: &[f32],
+    picked: &mut [f32],
+) {
+    let camera = &views[sweep.view as usize];
+    let width = camera.width;
+    let first = (camera.first_texel + sweep.first_row * width) as usize;
+    let band = first..first + (sweep.row_count * width) as usize;
+    let (entries, guess) = (&entries[band.clone()], &guess[band]);
+    let first = first + (first_row * width) as usize;
+    for_each_row(&mut picked[first..][..(row_count * width) as usize], width as usize, 64, |row, depths| {
+        for (column, depth) in depths.iter_mut().enumerate() {
+            let pixel = (first_row + row as u32) * width + column as u32;
+            *depth = sweep::pick_depth(&object[0], sweep, means, entries, guess, pixel);
+        }
+    });
+}
+
+#[allow(clippy::too_many_arguments)]
+pub(super) fn march(
+    target: &MarchBlock,
+    first_row: u32,
+    row_count: u32,
+    object: &[ObjectBlock],
+    views: &[CameraBlock],
+    footprints: &[f32],
+    texels: &[[f32; 4]],
+    depths: &[f32],
+    weights: &[f32],
+    colours: &mut [[f32; 4]],
+    pixel_depths: &mut [f32],
+) {
+    let width = target.target.width as usize;
+    let band = first_row as usize * width..(first_row + row_count) as usize * width;
+    let (colours, pixel_depths) = (&mut colours[band.clone()], &mut pixel_depths[band]);
+    for_each_row_of_two(colours, pixel_depths, width, 16, |row, colours, pixel_depths| {
+        for (column, (colour, depth)) in colours.iter_mut().zip(pixel_depths).enumerate() {
+            let at = [column as f32 + 0.5, (first_row as usize + row) as f32 + 0.5];
+            let seen = march::march(&object[0], views, footprints, texels, depths, weights, target, at);
+            *colour = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
+            *depth = seen.depth;
+        }
+    });
+}
+
+/// Runs a kernel for every pixel of a band, rows in parallel; it gets the values of all planes. `least` values are enough
+/// work for a part.
+fn for_each_pixel<T: Send>(sweep: &SweepBlock, values: &mut [T], least: usize, kernel: impl Fn(u32, &mut [T]) + Sync) {
     let (plane_count, width) = (sweep.plane_count as usize, sweep.width);
-    values.par_chunks_mut(plane_count * width as usize).enumerate().for_each(|(row, values)| {
+    for_each_row(values, plane_count * width as usize, least, |row, values| {
         for (column, values) in values.chunks_exact_mut(plane_count).enumerate() {
             kernel(row as u32 * width + column as u32, values);
         }
@@ -142,7 +123,7 @@ fn for_each_pixel<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn
 
 /// Runs a kernel for every pixel and plane of a band.
 fn for_each_plane<T: Send>(sweep: &SweepBlock, values: &mut [T], kernel: impl Fn(u32, u32, &mut T) + Sync) {
-    for_each_pixel(sweep, values, |pixel, values| {
+    for_each_pixel(sweep, values, 4096, |pixel, values| {
         for (value, plane) in values.iter_mut().zip(0..) {
             kernel(pixel, plane, value);
         }

@@ -1,36 +1,29 @@
 //! From noise to a picture.
 
-use super::Cpu;
-use crate::kernels::sampler::SamplerKernels;
-use rayon::prelude::*;
-use std::convert::Infallible;
-use viewfuse_core::sampler::{MOST_RESULTS, Mix, NoiseBlock, mixed_element, noisy_element};
+use crate::parallel::for_each;
+use viewfuse_core::sampler::{Mix, NoiseBlock, mixed_element, noisy_element};
 
 /// Elements that a thread takes at least: fewer are done before another one is awake.
 const LEAST_ELEMENTS: usize = 4096;
 
-impl SamplerKernels for Cpu {
-    fn mix_pictures(
-        &self,
-        mix: &Mix,
-        state: &Vec<f32>,
-        results: [&Vec<f32>; MOST_RESULTS],
-        mixed: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let [newest, second, third, fourth] = results.map(Vec::as_slice);
-        mixed.par_iter_mut().with_min_len(LEAST_ELEMENTS).enumerate().for_each(|(element, mixed)| {
-            *mixed = mixed_element(mix, &state[..], newest, second, third, fourth, element);
-        });
-        Ok(())
-    }
+#[allow(clippy::too_many_arguments)]
+pub(super) fn mix_pictures(
+    mix: &Mix,
+    element_count: u32,
+    state: &[f32],
+    newest: &[f32],
+    second: &[f32],
+    third: &[f32],
+    fourth: &[f32],
+    mixed: &mut [f32],
+) {
+    for_each(&mut mixed[..element_count as usize], LEAST_ELEMENTS, |element, mixed| {
+        *mixed = mixed_element(mix, state, newest, second, third, fourth, element);
+    });
+}
 
-    fn add_noise(&self, block: &NoiseBlock, picture: &Vec<f32>, noisy: &mut Vec<f32>) -> Result<(), Infallible> {
-        noisy
-            .par_iter_mut()
-            .zip(picture)
-            .with_min_len(LEAST_ELEMENTS)
-            .enumerate()
-            .for_each(|(element, (noisy, value))| *noisy = noisy_element(block, *value, element as u32));
-        Ok(())
-    }
+pub(super) fn add_noise(block: &NoiseBlock, element_count: u32, picture: &[f32], noisy: &mut [f32]) {
+    for_each(&mut noisy[..element_count as usize], LEAST_ELEMENTS, |element, noisy| {
+        *noisy = noisy_element(block, picture[element], element as u32);
+    });
 }

@@ -1,54 +1,37 @@
 //! How relevant each source is.
 
-use super::Cpu;
-use crate::kernels::weighting::WeightingKernels;
-use rayon::prelude::*;
-use std::convert::Infallible;
-use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding, attend};
+use crate::parallel::for_each_row;
+use viewfuse_core::attention::{self, EMBEDDING, FourierEmbedding, PoseEmbedding};
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock, weigh};
+use viewfuse_core::weighting::{self, MOST_WEIGHED, WeighBlock};
 
-impl WeightingKernels for Cpu {
-    fn weigh(
-        &self,
-        block: &WeighBlock,
-        sources: &Vec<PoseBlock>,
-        targets: &Vec<PoseBlock>,
-        weights: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let mut poses = [Pose::IDENTITY; MOST_WEIGHED];
-        poses.iter_mut().zip(sources).for_each(|(pose, source)| *pose = source.pose());
-        let sources = Sources::from_array(poses, block.source_count);
-        weights.par_chunks_mut(MOST_WEIGHED).zip(targets).for_each(|(row, target)| {
-            row.copy_from_slice(weigh(block.scheme.scheme(), &sources, &target.pose()).values());
-        });
-        Ok(())
-    }
+pub(super) fn weigh(
+    block: &WeighBlock,
+    target_count: u32,
+    sources: &[PoseBlock],
+    targets: &[PoseBlock],
+    weights: &mut [f32],
+) {
+    let mut poses = [Pose::IDENTITY; MOST_WEIGHED];
+    poses.iter_mut().zip(sources).for_each(|(pose, source)| *pose = source.pose());
+    let sources = Sources::from_array(poses, block.source_count);
+    for_each_row(&mut weights[..target_count as usize * MOST_WEIGHED], MOST_WEIGHED, 256, |target, row| {
+        let weights = weighting::weigh(block.scheme.scheme(), &sources, &targets[target].pose());
+        row.copy_from_slice(weights.values());
+    });
+}
 
-    fn embed_pose(
-        &self,
-        embedding: &Vec<f32>,
-        poses: &Vec<PoseBlock>,
-        embedded: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        let embedding = FourierEmbedding::from_flat(embedding);
-        embedded.par_chunks_mut(EMBEDDING).zip(poses).for_each(|(row, pose)| {
-            row.copy_from_slice(&embedding.embed(&pose.pose()));
-        });
-        Ok(())
-    }
+pub(super) fn embed_pose(pose_count: u32, embedding: &[f32], poses: &[PoseBlock], embedded: &mut [f32]) {
+    let embedding = FourierEmbedding::from_flat(embedding);
+    for_each_row(&mut embedded[..pose_count as usize * EMBEDDING], EMBEDDING, 4 * EMBEDDING, |pose, row| {
+        row.copy_from_slice(&embedding.embed(&poses[pose].pose()));
+    });
+}
 
-    fn attend(
-        &self,
-        source_count: u32,
-        queries: &Vec<f32>,
-        keys: &Vec<f32>,
-        weights: &mut Vec<f32>,
-    ) -> Result<(), Infallible> {
-        weights.par_chunks_mut(MOST_WEIGHED).zip(queries.par_chunks(EMBEDDING)).for_each(|(row, query)| {
-            row.copy_from_slice(attend::<MOST_WEIGHED>(query, &keys[..], source_count).values());
-        });
-        Ok(())
-    }
+pub(super) fn attend(source_count: &u32, target_count: u32, queries: &[f32], keys: &[f32], weights: &mut [f32]) {
+    for_each_row(&mut weights[..target_count as usize * MOST_WEIGHED], MOST_WEIGHED, 256, |target, row| {
+        let query = &queries[target * EMBEDDING..][..EMBEDDING];
+        row.copy_from_slice(attention::attend::<MOST_WEIGHED>(query, keys, *source_count).values());
+    });
 }

@@ -10,10 +10,10 @@
 // Indices are as in the formulas; iterators over several arrays at once would hide them.
 #![allow(clippy::needless_range_loop)]
 
-use super::product::{Ending, Panels, Rows, load, store};
-use super::room::with_room;
+use super::linear::{Ending, Panels, Rows, load, store};
+use super::scratch::with_scratch;
+use crate::parallel::for_each_part;
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
 
 /// Outputs of a tile in each direction.
@@ -73,7 +73,6 @@ impl Winograd {
         let rows = tile_rows_at_once((block.out_height as usize).div_ceil(SIDE), tiles_across);
         let (tiles, per_row) = (rows * tiles_across, SIDE * width);
         let zeros = vec![0.0; self.columns];
-        let chunks = outputs.par_chunks_mut(rows * per_row * pitch).enumerate();
         let run = |space: &mut [f32], chunk: usize, outputs: &mut [f32]| {
             let (seen, products) = space.split_at_mut(PLACES * tiles * self.channels);
             let first_row = chunk * rows * SIDE;
@@ -107,7 +106,9 @@ impl Winograd {
             });
         };
         let len = PLACES * tiles * (self.channels + self.columns);
-        chunks.for_each(|(chunk, outputs)| with_room(len, |space| run(space, chunk, outputs)));
+        for_each_part(outputs, rows * per_row * pitch, &|chunk, outputs| {
+            with_scratch(len, |space| run(space, chunk, outputs));
+        });
     }
 }
 

@@ -15,7 +15,7 @@ use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::rays::CastBlock;
-use viewfuse_device::{Device, Layer, Rays};
+use viewfuse_device::{Device, Layer};
 use viewfuse_job::progress::Progress;
 
 /// Rays that the CPU takes at once: their points' activations stay in its caches.
@@ -68,9 +68,9 @@ impl<D: Device> PointNetwork<D> {
         };
         let [first, second, third] = &self.layers;
         let [inside, next] = hidden;
-        device.product(&block(self.features, self.width, 1), fused, first, None, inside)?;
-        device.product(&block(self.width, self.width, 1), inside, second, None, next)?;
-        device.product(&block(self.width, 1 + self.features, 0), next, third, None, raw)
+        device.product(&block(self.features, self.width, 1), fused, &first.weights, &first.bias, None, inside)?;
+        device.product(&block(self.width, self.width, 1), inside, &second.weights, &second.bias, None, next)?;
+        device.product(&block(self.width, 1 + self.features, 0), next, &third.weights, &third.bias, None, raw)
     }
 
     /// Room for what is inside it at so many points.
@@ -185,11 +185,11 @@ impl<'a, D: Device> Tile<'a, D> {
         let Looking { near_far: [near, far], sample_count, jitter, seed, ray_length, inclusive } = *looking;
         let ray_count = pixels.len() as u32;
         let point_count = ray_count * sample_count;
-        let mut rays = Rays { count: ray_count, pixels: device.upload(pixels)?, rays: device.zeros(pixels.len())? };
-        device.cast_rays(cast, &mut rays)?;
+        let (pixels, mut rays) = (device.upload(pixels)?, device.zeros(pixels.len())?);
+        device.cast_rays(cast, ray_count, &pixels, &mut rays)?;
         let coarse = CoarseBlock { seed: [seed as u32, (seed >> 32) as u32], sample_count, jitter };
-        device.coarse_depths(&coarse, &rays, &mut self.depths)?;
-        device.place_points(sample_count, point_count, &self.samples, &rays, &self.depths, &mut self.points)?;
+        device.coarse_depths(&coarse, ray_count, &rays, &pixels, &mut self.depths)?;
+        device.place_points(&sample_count, point_count, &self.samples, &rays, &self.depths, &mut self.points)?;
         let features = network.features;
         for (view, volume) in (0..).zip(&views.volumes) {
             let block = VolumeBlock {

@@ -96,7 +96,8 @@ impl<D: Device> Convolution<D> {
             Addend::Shared(values, first) => (Some(values), 0, first),
         };
         let block = ConvolveBlock { addend_pitch, addend_first, ..block };
-        device.convolve(&block, &image.values, &self.layer, addend, &mut output.values)
+        let Layer { weights, bias } = &self.layer;
+        device.convolve(&block, &image.values, weights, bias, addend, &mut output.values)
     }
 
     /// The same for some rows alone; its windows are single pixels.
@@ -118,7 +119,8 @@ impl<D: Device> Convolution<D> {
             out_first: block.out_first + before * block.out_pitch,
             ..block
         };
-        device.convolve(&block, &image.values, &self.layer, None, &mut output.values)
+        let Layer { weights, bias } = &self.layer;
+        device.convolve(&block, &image.values, weights, bias, None, &mut output.values)
     }
 
     /// The dispatch for an input and an output, without addend.
@@ -212,7 +214,7 @@ impl<D: Device> Transposed<D> {
             size: self.size,
             relu_outputs: 1,
         };
-        device.convolve_transposed(&block, &image.values, &self.layer, &mut output.values)
+        device.convolve_transposed(&block, &image.values, &self.layer.weights, &self.layer.bias, &mut output.values)
     }
 }
 

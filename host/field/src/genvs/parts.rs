@@ -140,7 +140,8 @@ impl<D: Device> Parts<D> {
         let at = Preconditioning::at(level);
         let output = denoiser.run(device, scratch, noisy, features, &at)?;
         let mix = Mix { state: at.skip, results: [at.output, 0.0, 0.0, 0.0] };
-        device.mix_pictures(&mix, noisy, [&output.values; 4], denoised)?;
+        let (count, unused) = (output.size.pixel_count() * output.size.channels, noisy);
+        device.mix_pictures(&mix, count, noisy, &output.values, unused, unused, unused, denoised)?;
         scratch.give(output);
         Ok(())
     }

@@ -105,7 +105,7 @@ impl<D: Device> Volume<D> {
         let Nodes::Whole { image, .. } = &self.nodes else { return Ok(()) };
         let number_count = self.number_count();
         let mut words = device.zeros(word_count(number_count) as usize)?;
-        device.pack_halves(number_count, &image.values, &mut words)?;
+        device.pack_halves(&number_count, &image.values, &mut words)?;
         self.nodes = Nodes::Halves(words);
         Ok(())
     }

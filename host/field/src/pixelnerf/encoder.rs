@@ -73,7 +73,7 @@ fn inject<D: Device>(
     };
     let inject = |layer: &Layer<D>| {
         let mut grid = device.zeros(block.row_count as usize * width)?;
-        device.product(&block, &latents.values, layer, None, &mut grid)?;
+        device.product(&block, &latents.values, &layer.weights, &layer.bias, None, &mut grid)?;
         Ok(grid)
     };
     network.injections.iter().map(inject).collect()
@@ -155,7 +155,8 @@ impl Convolution {
         }
         .packed();
         let mut values = device.zeros(size.len())?;
-        device.convolve(&block, &image.values, layer, addend.map(|image| &image.values), &mut values)?;
+        let addend = addend.map(|image| &image.values);
+        device.convolve(&block, &image.values, &layer.weights, &layer.bias, addend, &mut values)?;
         Ok(Image { size, values })
     }
 }

@@ -127,7 +127,8 @@ impl<D: Device> Network<'_, D> {
         device.embed_points(&embed, view_count, &views.cameras, &workspace.points, &mut workspace.embedded)?;
         let entry =
             ProductBlock { row_count, inner_count: embed.row_len(), column_count: width, ..ProductBlock::default() };
-        device.product(&entry, &workspace.embedded, &layers.entry, None, &mut workspace.flow)?;
+        let Layer { weights, bias } = &layers.entry;
+        device.product(&entry, &workspace.embedded, weights, bias, None, &mut workspace.flow)?;
         if self.grids.is_none() {
             self.gather_latents(workspace, views, point_count)?;
         }
@@ -136,7 +137,7 @@ impl<D: Device> Network<'_, D> {
             self.run_block(workspace, row_count, block)?;
         }
         let Workspace { points, visible, flow, next, .. } = workspace;
-        device.visible_weights(view_count, point_count, &views.cameras, &views.weights, points, visible)?;
+        device.visible_weights(&view_count, point_count, &views.cameras, &views.weights, points, visible)?;
         let fuse =
             FuseBlock { view_count, stride: point_count * width, channel_count: width, weight_stride: view_count };
         device.fuse_views(&fuse, point_count * width, visible, flow, next)?;
@@ -151,7 +152,8 @@ impl<D: Device> Network<'_, D> {
             relu_inputs: 1,
             ..ProductBlock::default()
         };
-        device.product(&exit, &workspace.flow, &layers.exit, None, &mut workspace.raw)
+        let Layer { weights, bias } = &layers.exit;
+        device.product(&exit, &workspace.flow, weights, bias, None, &mut workspace.raw)
     }
 
     /// Looks the latents up in every view.
@@ -195,7 +197,8 @@ impl<D: Device> Network<'_, D> {
                     column_count: width,
                     ..ProductBlock::default()
                 };
-                self.device.product(&product, latents, &self.layers.injections[block], Some(flow), next)?;
+                let Layer { weights, bias } = &self.layers.injections[block];
+                self.device.product(&product, latents, weights, bias, Some(flow), next)?;
             }
         }
         swap(flow, next);
@@ -215,8 +218,8 @@ impl<D: Device> Network<'_, D> {
         let product = ProductBlock { row_count, inner_count: width, column_count: width, ..ProductBlock::default() };
         let into = ProductBlock { relu_inputs: 1, relu_outputs: 1, ..product };
         let Workspace { flow, next, inside, .. } = workspace;
-        self.device.product(&into, flow, first, None, inside)?;
-        self.device.product(&product, inside, second, Some(flow), next)?;
+        self.device.product(&into, flow, &first.weights, &first.bias, None, inside)?;
+        self.device.product(&product, inside, &second.weights, &second.bias, Some(flow), next)?;
         swap(flow, next);
         Ok(())
     }

@@ -84,18 +84,21 @@ impl<D: Device> Renderer<'_, D> {
         let rays = self.rays(pixels)?;
         let coarse = self.first_pass(workspace, &rays, seen, &mut asked[0])?;
         let mut found = self.pixels(pixels.len())?;
-        self.composite(&coarse, &mut found)?;
+        self.composite(&coarse, rays.count, &mut found)?;
         let block = self.fine_block();
         if block.fine_count() == 0 {
             return Ok(found);
         }
         let (ray_count, fine_count) = (pixels.len(), block.fine_count() as usize);
         let mut parts = self.zeros(ray_count * coarse.count as usize)?;
-        device.weigh_samples(coarse.count, rays.count, &coarse.values, &mut parts).map_err(failed)?;
+        device.weigh_samples(&coarse.count, rays.count, &coarse.values, &mut parts).map_err(failed)?;
         let mut chances = self.zeros(ray_count * fine_count)?;
-        device.draw_chances(&block, &rays, &mut chances).map_err(failed)?;
+        device.draw_chances(&block, rays.count, &rays.pixels, &mut chances).map_err(failed)?;
         let mut added = self.zeros(ray_count * fine_count)?;
-        device.fine_depths(&block, &rays, &parts, &found, &chances, &mut added).map_err(failed)?;
+        let Pixels { colours, depths } = &found;
+        device
+            .fine_depths(&block, rays.count, &parts, &rays.rays, colours, depths, &chances, &mut added)
+            .map_err(failed)?;
         let count = coarse.count + block.fine_count();
         let mut fine = self.samples(ray_count, count)?;
         device.merge_depths(&block, rays.count, &coarse.depths, &added, &mut fine.depths).map_err(failed)?;
@@ -111,7 +114,7 @@ impl<D: Device> Renderer<'_, D> {
         });
         let list = self.list(&rays, &fine, wanted.as_ref().map(|block| (block, &parts)))?;
         self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut asked[1])?;
-        self.composite(&fine, &mut found)?;
+        self.composite(&fine, rays.count, &mut found)?;
         Ok(found)
     }
 
@@ -125,7 +128,9 @@ impl<D: Device> Renderer<'_, D> {
     ) -> Outcome<Samples<D>, D> {
         let block = self.coarse_block();
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
-        self.device.coarse_depths(&block, rays, &mut samples.depths).map_err(FieldError::Device)?;
+        self.device
+            .coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)
+            .map_err(FieldError::Device)?;
         let wanted = seen.map(|seen| {
             let block = WantedBlock {
                 sample_count: block.sample_count,
@@ -157,7 +162,9 @@ impl<D: Device> Renderer<'_, D> {
         let all = 0..rays.count * samples.count;
         let Some((block, seen)) = wanted else { return Ok(all.collect()) };
         let mut marks = self.zeros(all.len())?;
-        self.device.wanted_samples(block, rays, &samples.depths, seen, &mut marks).map_err(FieldError::Device)?;
+        self.device
+            .wanted_samples(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut marks)
+            .map_err(FieldError::Device)?;
         let marks = self.device.download(&marks).map_err(FieldError::Device)?;
         Ok(all.filter(|sample| marks[*sample as usize] != 0).collect())
     }
@@ -181,7 +188,7 @@ impl<D: Device> Renderer<'_, D> {
             let count = some.len() as u32;
             let some = device.upload(some).map_err(failed)?;
             device
-                .place_points(samples.count, count, &some, rays, &samples.depths, &mut workspace.points)
+                .place_points(&samples.count, count, &some, &rays.rays, &samples.depths, &mut workspace.points)
                 .map_err(failed)?;
             network.ask(workspace, self.views, count).map_err(failed)?;
             device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values).map_err(failed)?;
@@ -189,17 +196,20 @@ impl<D: Device> Renderer<'_, D> {
         Ok(())
     }
 
-    fn composite(&self, samples: &Samples<D>, pixels: &mut Pixels<D>) -> Outcome<(), D> {
+    fn composite(&self, samples: &Samples<D>, ray_count: u32, pixels: &mut Pixels<D>) -> Outcome<(), D> {
         // A ray that meets nothing ends where looking ends.
         let CastBlock { far, .. } = self.cast;
         let block = CompositeBlock { background: self.background, empty_depth: far, sample_count: samples.count };
-        self.device.composite(&block, &samples.values, &samples.depths, pixels).map_err(FieldError::Device)
+        let Pixels { colours, depths } = pixels;
+        self.device
+            .composite(&block, ray_count, &samples.values, &samples.depths, colours, depths)
+            .map_err(FieldError::Device)
     }
 
     pub(super) fn rays(&self, pixels: &[u32]) -> Outcome<Rays<D>, D> {
         let (count, pixel_buffer) = (pixels.len() as u32, self.device.upload(pixels).map_err(FieldError::Device)?);
         let mut rays = Rays { count, pixels: pixel_buffer, rays: self.zeros(pixels.len())? };
-        self.device.cast_rays(&self.cast, &mut rays).map_err(FieldError::Device)?;
+        self.device.cast_rays(&self.cast, count, &rays.pixels, &mut rays.rays).map_err(FieldError::Device)?;
         Ok(rays)
     }
 

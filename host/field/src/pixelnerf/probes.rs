@@ -27,7 +27,7 @@ impl<D: Device> Renderer<'_, D> {
             let rays = self.rays(some)?;
             let samples = self.first_pass(workspace, &rays, None, asked)?;
             let mut part = self.zeros(some.len() * count as usize)?;
-            self.device.weigh_samples(count, rays.count, &samples.values, &mut part).map_err(failed)?;
+            self.device.weigh_samples(&count, rays.count, &samples.values, &mut part).map_err(failed)?;
             parts.push(part);
             if self.omissions.probe_error > 0.0 {
                 let values = self.device.download(&samples.values).map_err(failed)?;

@@ -102,7 +102,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let list: Vec<u32> = (0..rays.count * sample_count).collect();
         let mut points = device.zeros(list.len())?;
         let point_count = list.len() as u32;
-        device.place_points(sample_count, point_count, &device.upload(&list)?, &rays, &depths, &mut points)?;
+        device.place_points(&sample_count, point_count, &device.upload(&list)?, &rays.rays, &depths, &mut points)?;
         let points: Vec<RayPoint> = device.download(&points)?;
         // The density first, because that is what comes out of a length of 1.
         let unit: Vec<RayPoint> = points.iter().map(|point| RayPoint { length: 1.0, ..*point }).collect();
@@ -112,11 +112,11 @@ impl<'a, D: Device> Reference<'a, D> {
         }
         let samples = device.upload(&samples)?;
         let mut seen = device.zeros(list.len())?;
-        device.weigh_samples(sample_count, rays.count, &samples, &mut seen)?;
+        device.weigh_samples(&sample_count, rays.count, &samples, &mut seen)?;
         let mut pixels: Pixels<D> =
             Pixels { colours: device.zeros(rays.count as usize)?, depths: device.zeros(rays.count as usize)? };
         let block = CompositeBlock { background: [1.0; 3], empty_depth: 0.0, sample_count };
-        device.composite(&block, &samples, &depths, &mut pixels)?;
+        device.composite(&block, rays.count, &samples, &depths, &mut pixels.colours, &mut pixels.depths)?;
         let colours = device.download(&pixels.colours)?;
         let mean_depths = device.download(&pixels.depths)?;
         Ok(SeenRays {
@@ -151,7 +151,8 @@ impl<'a, D: Device> Reference<'a, D> {
         let seen: Vec<[f32; 2]> = coarse_weights.iter().map(|weight| [*weight, 1.0]).collect();
         let (seen, chances) = (device.upload(&seen)?, device.upload(chances)?);
         let mut fine = device.zeros(rays.count as usize * block.fine_count() as usize)?;
-        device.fine_depths(&block, &rays, &seen, &pixels, &chances, &mut fine)?;
+        let Pixels { colours, depths } = &pixels;
+        device.fine_depths(&block, rays.count, &seen, &rays.rays, colours, depths, &chances, &mut fine)?;
         let mut merged = device.zeros(rays.count as usize * (block.coarse_count + block.fine_count()) as usize)?;
         device.merge_depths(&block, rays.count, &device.upload(coarse_depths)?, &fine, &mut merged)?;
         Ok([device.download(&fine)?, device.download(&merged)?])

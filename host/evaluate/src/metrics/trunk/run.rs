@@ -176,7 +176,9 @@ impl<D: Device> Run<'_, D> {
             ..ConvolveBlock::default()
         }
         .packed();
-        self.device.convolve(&block, &image.values, layer, None, &mut out.values).map_err(MetricError::Device)?;
+        self.device
+            .convolve(&block, &image.values, &layer.weights, &layer.bias, None, &mut out.values)
+            .map_err(MetricError::Device)?;
         Ok(out)
     }
 

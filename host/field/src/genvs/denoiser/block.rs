@@ -176,7 +176,7 @@ impl<D: Device> Attention<D> {
             scale: 1.0 / (channels as f32).sqrt(),
         };
         device.multiply_matrices(&block, &triples.values, &triples.values, &mut scores.values)?;
-        device.softmax_rows(pixels, pixels, &scores.values, &mut weights.values)?;
+        device.softmax_rows(&pixels, pixels, &scores.values, &mut weights.values)?;
         let block = MatrixBlock {
             row_count: pixels,
             inner_count: pixels,

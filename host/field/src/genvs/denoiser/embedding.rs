@@ -70,7 +70,8 @@ impl<D: Device> Embedding<D> {
             ..ProductBlock::default()
         };
         let mut shifts = device.zeros(self.shape.column_count)?;
-        device.product(&block, &device.upload(&embedded)?, &self.affine, None, &mut shifts)?;
+        let Layer { weights, bias } = &self.affine;
+        device.product(&block, &device.upload(&embedded)?, weights, bias, None, &mut shifts)?;
         Ok(shifts)
     }
 }

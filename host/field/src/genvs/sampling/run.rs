@@ -191,8 +191,10 @@ where
             None => buffer,
             Some(mix) => {
                 let mut kept = self.buffer()?;
-                let results = [&buffer, state, state, state];
-                self.device.mix_pictures(&mix, state, results, &mut kept).map_err(FieldError::Device)?;
+                let count = self.element_count as u32;
+                self.device
+                    .mix_pictures(&mix, count, state, &buffer, state, state, state, &mut kept)
+                    .map_err(FieldError::Device)?;
                 self.free.push(buffer);
                 kept
             }
@@ -220,8 +222,11 @@ where
         let mut mixed = self.buffer()?;
         // What is not there has coefficient 0.
         let mut all = said.into_iter().chain(&self.results);
-        let results = std::array::from_fn(|_| all.next().unwrap_or(state));
-        self.device.mix_pictures(mix, state, results, &mut mixed).map_err(FieldError::Device)?;
+        let [newest, second, third, fourth] = std::array::from_fn(|_| all.next().unwrap_or(state));
+        let count = self.element_count as u32;
+        self.device
+            .mix_pictures(mix, count, state, newest, second, third, fourth, &mut mixed)
+            .map_err(FieldError::Device)?;
         Ok(mixed)
     }
 
@@ -246,7 +251,7 @@ where
                 &nothing
             }
         };
-        self.device.add_noise(&block, picture, &mut noisy).map_err(FieldError::Device)?;
+        self.device.add_noise(&block, self.element_count as u32, picture, &mut noisy).map_err(FieldError::Device)?;
         Ok(noisy)
     }
 

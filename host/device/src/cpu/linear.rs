@@ -9,9 +9,9 @@
 //!
 //! The crate `pulp` picks the widest instructions of the machine; nothing here is written for one of them.
 
+use crate::parallel::for_each_part;
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use viewfuse_core::network::product::rectified;
 
 /// Products that are summed before outputs are written: most of the layers in one go.
@@ -46,7 +46,7 @@ impl Panels {
         let width = Arch::new().dispatch(PanelWidth);
         let panel_lines = (inner * width).div_ceil(16);
         let mut lines = vec![Line::zeroed(); columns.div_ceil(width) * panel_lines];
-        lines.par_chunks_exact_mut(panel_lines).enumerate().for_each(|(panel, lines)| {
+        for_each_part(&mut lines, panel_lines, &|panel, lines| {
             let first = panel * width;
             let count = width.min(columns - first);
             let rows = cast_slice_mut::<Line, f32>(lines).chunks_exact_mut(width);

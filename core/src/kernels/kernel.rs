@@ -1,0 +1,200 @@
+//! The list of kernels as code, from their rows.
+
+use super::*;
+use crate::network::tile::TILE;
+use crate::pages::MOST_PAGES;
+use bytemuck::{Pod, Zeroable};
+
+/// Invocations of a workgroup, along its only axis.
+pub const WORKGROUP: u32 = 64;
+
+/// Bytes of memory that every device has for a workgroup.
+pub const SHARED_BYTES: usize = 16 << 10;
+
+/// Elements of a tiled kernel with so many outputs: whole tiles, each invocation 8 times 8 of a tile's outputs.
+pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
+    row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
+}
+
+/// The elements of one dispatch: large work is cut into several. Invocation `i` works on element `first + i` if
+/// `i < count`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Piece {
+    /// The first element.
+    pub first: u32,
+    /// How many there are.
+    pub count: u32,
+}
+
+/// What a kernel does with an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// It only reads.
+    Read,
+    /// It writes each of its elements, and reads nothing that it writes.
+    Write,
+}
+
+/// How an array is bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// As one buffer of elements.
+    Whole,
+    /// As one buffer with a struct of [`Array::least_bytes`] bytes.
+    One,
+    /// As [`MOST_PAGES`] buffers of elements.
+    Pages,
+}
+
+/// An array that a kernel binds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Array {
+    /// Its name in the entry point; pages have `_a` to `_d` behind it.
+    pub name: &'static str,
+    /// What is done with it.
+    pub access: Access,
+    /// How it is bound.
+    pub layout: Layout,
+    /// Bytes of an element of the entry point.
+    pub stride: usize,
+    /// Bytes that the kernel reads without looking at the length; 0 where it looks.
+    pub least_bytes: usize,
+}
+
+impl Array {
+    const fn new<E>(name: &'static str, access: Access, layout: Layout) -> Array {
+        Array { name, access, layout, stride: size_of::<E>(), least_bytes: 0 }
+    }
+
+    const fn not_empty(self) -> Array {
+        Array { least_bytes: self.stride, ..self }
+    }
+
+    /// How many bindings it takes.
+    pub const fn binding_count(&self) -> usize {
+        match self.layout {
+            Layout::Whole | Layout::One => 1,
+            Layout::Pages => MOST_PAGES,
+        }
+    }
+}
+
+/// An array of a row.
+macro_rules! array {
+    (read $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Whole) };
+    (filled $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (layer $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (optional $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Pages) };
+    (write $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Whole) };
+    (write $name:ident $host:ty, $entry:ty) => {{
+        const { assert!(size_of::<$entry>() % size_of::<$host>() == 0) };
+        Array::new::<$entry>(stringify!($name), Access::Write, Layout::Whole)
+    }};
+    (write_paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Pages) };
+    (one $name:ident $host:ty) => { array!(one $name $host, $host) };
+    (one $name:ident $host:ty, $entry:ty) => {
+        Array {
+            least_bytes: size_of::<$entry>(),
+            ..Array::new::<$host>(stringify!($name), Access::Read, Layout::One)
+        }
+    };
+}
+
+/// Whether a word is among those of a row.
+macro_rules! has {
+    ($wanted:ident:) => { false };
+    (twin: twin $(, $rest:ident)*) => { true };
+    (tiled: tiled $(, $rest:ident)*) => { true };
+    ($wanted:ident: $other:ident $(, $rest:ident)*) => { has!($wanted: $($rest),*) };
+}
+
+macro_rules! list {
+    ($(
+        $(#[$doc:meta])*
+        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
+        by $($body:ident)::+ $(, $way:ident)* {
+            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
+        }
+    )+) => {
+        /// A kernel.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[repr(u32)]
+        pub enum Kernel {
+            $($(#[$doc])* $Kernel,)+
+        }
+
+        impl Kernel {
+            /// Every kernel, in the order of the data.
+            pub const ALL: [Kernel; [$(stringify!($Kernel)),+].len()] = [$(Kernel::$Kernel),+];
+
+            /// Name of its entry point, and of the method of a device that runs it.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Kernel::$Kernel => stringify!($method),)+
+                }
+            }
+
+            /// What it binds, in the order of the bindings.
+            pub const fn arrays(self) -> &'static [Array] {
+                match self {
+                    $(Kernel::$Kernel => const { &[$(array!($kind $array $host $(, $entry)?)),+] },)+
+                }
+            }
+
+            /// Bytes of its parameters, without the [`Piece`] behind them.
+            pub const fn parameter_bytes(self) -> usize {
+                match self {
+                    $(Kernel::$Kernel => 0 $(+ size_of::<$Block>())?,)+
+                }
+            }
+
+            /// Whether its workgroups compute tiles together: only those have memory of their own, and barriers.
+            pub const fn is_tiled(self) -> bool {
+                match self {
+                    $(Kernel::$Kernel => has!(tiled: $($way),*),)+
+                }
+            }
+
+            /// Whether the CPU runs a faster form of its own. The body is then a definition without a caller in production
+            /// on the CPU.
+            pub const fn has_twin(self) -> bool {
+                match self {
+                    $(Kernel::$Kernel => has!(twin: $($way),*),)+
+                }
+            }
+        }
+
+        // A body that is not there does not compile.
+        $(const _: () = {
+            #[allow(unused_imports)]
+            use crate::$($body)::+;
+        };)+
+    };
+}
+
+crate::for_each_kernel!(list);
+
+impl Kernel {
+    /// Bytes of its push constants.
+    pub const fn push_bytes(self) -> usize {
+        self.parameter_bytes() + size_of::<Piece>()
+    }
+
+    /// Whether it binds pages, and so has the specialisation constant 0.
+    pub fn has_pages(self) -> bool {
+        self.arrays().iter().any(|array| array.layout == Layout::Pages)
+    }
+
+    /// How many bindings it has.
+    pub const fn binding_count(self) -> usize {
+        let arrays = self.arrays();
+        let (mut count, mut index) = (0, 0);
+        while index < arrays.len() {
+            count += arrays[index].binding_count();
+            index += 1;
+        }
+        count
+    }
+}

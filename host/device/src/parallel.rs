@@ -1,0 +1,180 @@
+//! The one driver under all parallel loops: compiled once, for work behind a `dyn Fn`.
+//!
+//! Loops hand out parts of a slice, or indices, under a lock; the threads of the current pool take one after the other
+//! until none is left. What a part holds does not depend on which thread takes it, so results are the same bits for any
+//! number of threads. A part should be 20 µs of work or more: handing it out takes well below 1 µs, waking a thread some.
+//! Work of a single part runs where it is called.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Parts for each thread, where there is enough work: the last ones keep no thread waiting for long.
+const PARTS_PER_THREAD: usize = 16;
+
+/// Runs `worker` on as many threads of the current pool as there are parts, and returns when all have returned.
+fn drive(part_count: usize, worker: &(dyn Fn() + Sync)) {
+    let threads = rayon::current_num_threads().min(part_count);
+    if threads <= 1 {
+        return worker();
+    }
+    rayon::scope(|scope| {
+        for _ in 1..threads {
+            scope.spawn(|_| worker());
+        }
+        worker();
+    });
+}
+
+/// The lock. Nobody works while holding it: it cannot be poisoned.
+fn take<T>(parts: &Mutex<T>) -> MutexGuard<'_, T> {
+    parts.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// `work(index, part)` for the parts of `values`, each of `part_len` values, the last one of fewer.
+pub fn for_each_part<T: Send>(values: &mut [T], part_len: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    let part_len = part_len.max(1);
+    let part_count = values.len().div_ceil(part_len);
+    let parts = Mutex::new(values.chunks_mut(part_len).enumerate());
+    drive(part_count, &|| {
+        loop {
+            let next = take(&parts).next();
+            let Some((index, part)) = next else { return };
+            work(index, part);
+        }
+    });
+}
+
+/// `work(first row, rows)` for some rows of `values` at a time, each of `row_len` values; `least` values are enough work
+/// for a part.
+pub fn for_each_rows<T: Send>(values: &mut [T], row_len: usize, least: usize, work: &(dyn Fn(usize, &mut [T]) + Sync)) {
+    let row_len = row_len.max(1);
+    let rows = rows_at_once(values.len().div_ceil(row_len), row_len, least);
+    for_each_part(values, rows * row_len, &|part, values| work(part * rows, values));
+}
+
+/// `work(row, values)` for every row of `values`, each of `row_len` values; `least` values are enough work for a part.
+pub fn for_each_row<T: Send>(values: &mut [T], row_len: usize, least: usize, work: impl Fn(usize, &mut [T]) + Sync) {
+    let row_len = row_len.max(1);
+    for_each_rows(values, row_len, least, &|first, rows| {
+        for (row, values) in (first..).zip(rows.chunks_mut(row_len)) {
+            work(row, values);
+        }
+    });
+}
+
+/// `work(index, value)` for every value; `least` values are enough work for a part.
+pub fn for_each<T: Send>(values: &mut [T], least: usize, work: impl Fn(usize, &mut T) + Sync) {
+    for_each_rows(values, 1, least, &|first, values| {
+        for (index, value) in (first..).zip(values) {
+            work(index, value);
+        }
+    });
+}
+
+/// `work(row, a's values, b's values)` for the rows of two arrays with equally many, of `row_len` values in both; `least`
+/// values are enough work for a part.
+pub fn for_each_row_of_two<A: Send, B: Send>(
+    a: &mut [A],
+    b: &mut [B],
+    row_len: usize,
+    least: usize,
+    work: impl Fn(usize, &mut [A], &mut [B]) + Sync,
+) {
+    let row_len = row_len.max(1);
+    let row_count = a.len().min(b.len()).div_ceil(row_len);
+    let rows = rows_at_once(row_count, row_len, least);
+    let parts = Mutex::new((0..).step_by(rows).zip(a.chunks_mut(rows * row_len).zip(b.chunks_mut(rows * row_len))));
+    drive(row_count.div_ceil(rows), &|| {
+        loop {
+            let next = take(&parts).next();
+            let Some((first, (a, b))) = next else { return };
+            for (row, (a, b)) in (first..).zip(a.chunks_mut(row_len).zip(b.chunks_mut(row_len))) {
+                work(row, a, b);
+            }
+        }
+    });
+}
+
+/// The results of `work` for `0..count`, in order. Every index is work enough for a part of its own.
+pub fn map<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
+    for_each_part(&mut results, 1, &|index, part| part[0] = Some(work(index)));
+    results.into_iter().flatten().collect()
+}
+
+/// As [`map`], until one fails: the error is the first one's in the order of the indices among those that were tried.
+///
+/// # Errors
+/// The error of `work`.
+pub fn try_map<R: Send, E: Send>(count: usize, work: impl Fn(usize) -> Result<R, E> + Sync) -> Result<Vec<R>, E> {
+    let has_failed = std::sync::atomic::AtomicBool::new(false);
+    let mut results: Vec<Option<Result<R, E>>> = (0..count).map(|_| None).collect();
+    for_each_part(&mut results, 1, &|index, part| {
+        if !has_failed.load(std::sync::atomic::Ordering::Relaxed) {
+            let result = work(index);
+            has_failed.fetch_or(result.is_err(), std::sync::atomic::Ordering::Relaxed);
+            part[0] = Some(result);
+        }
+    });
+    results.into_iter().flatten().collect()
+}
+
+/// How many rows are a part: as few as are enough work, more if there are many.
+fn rows_at_once(row_count: usize, row_len: usize, least: usize) -> usize {
+    let share = row_count.div_ceil(rayon::current_num_threads() * PARTS_PER_THREAD);
+    share.max(least.div_ceil(row_len)).max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every row once, with its own number, whatever the lengths.
+    #[test]
+    fn every_row_is_visited_once() {
+        for (count, row_len, least) in [(0, 3, 1), (1, 1, 1), (7, 3, 1), (1000, 7, 1), (1000, 7, 100), (1000, 1, 5000)]
+        {
+            let mut values = vec![usize::MAX; count];
+            for_each_row(&mut values, row_len, least, |row, values| {
+                values.iter_mut().for_each(|value| *value = row);
+            });
+            let expected: Vec<usize> = (0..count).map(|index| index / row_len).collect();
+            assert_eq!(values, expected);
+        }
+    }
+
+    #[test]
+    fn rows_of_two_arrays_stay_together() {
+        let (mut a, mut b) = (vec![0; 1000], vec![0_u8; 1000]);
+        for_each_row_of_two(&mut a, &mut b, 10, 20, |row, a, b| {
+            a.fill(row);
+            b.fill(row as u8);
+        });
+        assert!(a.iter().zip(&b).enumerate().all(|(index, (a, b))| *a == index / 10 && *b == *a as u8));
+    }
+
+    #[test]
+    fn results_keep_their_order_and_the_first_error_is_kept() {
+        assert_eq!(map(100, |index| index * index), (0..100).map(|index| index * index).collect::<Vec<_>>());
+        assert_eq!(
+            try_map(100, |index| if index < 100 { Ok(index) } else { Err(index) }).map(|all| all.len()),
+            Ok(100)
+        );
+        assert_eq!(try_map(1, |index| if index > 0 { Ok(index) } else { Err(index) }), Err(0));
+    }
+
+    /// The pool that is installed does the work, also one of a single thread.
+    #[test]
+    fn the_installed_pool_does_the_work() {
+        for count in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a pool");
+            let threads = pool.install(|| map(64, |_| rayon::current_num_threads()));
+            assert_eq!(threads, vec![count; 64]);
+        }
+    }
+
+    #[test]
+    fn a_panic_comes_through() {
+        let outcome = std::panic::catch_unwind(|| map(100, |index| assert!(index != 50, "fifty")));
+        assert!(outcome.is_err());
+    }
+}
