@@ -6,7 +6,8 @@ use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, files_belo
 use viewfuse_tests::scenes::Folder;
 use viewfuse_vulkan::kernel::Kernel;
 
-#[test]
+viewfuse_tests::trials![every_kernel_and_a_picture_on_the_cpu, json_says_the_same, what_is_not_there_is_refused,];
+
 fn every_kernel_and_a_picture_on_the_cpu() {
     let folder = Folder::new();
     let printed = done(folder.path(), "check --device cpu --seeds 1");
@@ -21,7 +22,6 @@ fn every_kernel_and_a_picture_on_the_cpu() {
     assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
 }
 
-#[test]
 fn json_says_the_same() {
     let folder = toy();
     let printed = done(folder.path(), "check --seeds 1 --scene toy --device cpu --json");
@@ -50,7 +50,6 @@ fn json_says_the_same() {
     assert!(picture["versus_cpu"].is_null(), "the CPU is not compared with itself: {picture}");
 }
 
-#[test]
 fn what_is_not_there_is_refused() {
     let folder = toy();
     assert_wrong_arguments(BINARY, folder.path(), "check --device gpu", &["gpu", "cpu"]);

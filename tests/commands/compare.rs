@@ -3,13 +3,14 @@
 use super::{BINARY, done};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
 
+viewfuse_tests::trials![one_picture_and_folders, what_cannot_be_compared,];
+
 /// The columns of a metric's row.
 fn row<'a>(printed: &'a str, metric: &str) -> Vec<&'a str> {
     let mut rows = printed.lines().map(|line| line.split_whitespace().collect::<Vec<_>>());
     rows.find(|columns| columns.first() == Some(&metric)).unwrap_or_else(|| panic!("no {metric}:\n{printed}"))
 }
 
-#[test]
 fn one_picture_and_folders() {
     let folder = toy();
     let printed = done(folder.path(), "compare toy/rgb/000000.png toy/rgb/000000.png");
@@ -32,7 +33,6 @@ fn one_picture_and_folders() {
     assert_eq!(plain.lines().count(), published.lines().count());
 }
 
-#[test]
 fn what_cannot_be_compared() {
     let folder = toy();
     folder.write("made/none.txt", "no picture");

@@ -7,6 +7,8 @@ use viewfuse_tests::command::{assert_refused, files_below};
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![a_training_checkpoint, in_half_precision, refusals, learned_attention_becomes_a_header,];
+
 /// A folder with a training checkpoint that PyTorch wrote.
 fn training() -> Folder {
     let folder = Folder::new();
@@ -21,7 +23,6 @@ fn words(folder: &Path, arguments: &str) -> String {
     done(folder, arguments).split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-#[test]
 fn a_training_checkpoint() {
     let folder = training();
     let printed = words(folder.path(), "convert training.pth new/out.safetensors");
@@ -38,7 +39,6 @@ fn a_training_checkpoint() {
     assert_eq!(written.tensor("1.bias").expect("a tensor"), [3.0, 4.0]);
 }
 
-#[test]
 fn in_half_precision() {
     let folder = training();
     let printed = words(folder.path(), "convert training.pth out.safetensors --half");
@@ -46,7 +46,6 @@ fn in_half_precision() {
     assert!(printed.contains("rounding 0.00e0 of the value at most"), "all values are exact: {printed}");
 }
 
-#[test]
 fn refusals() {
     let folder = training();
     let before = files_below(folder.path());
@@ -59,7 +58,6 @@ fn refusals() {
     assert_eq!(files_below(folder.path()), before, "nothing is left behind");
 }
 
-#[test]
 fn learned_attention_becomes_a_header() {
     let folder = Folder::new();
     let models = repository().join("host/models");

@@ -9,6 +9,14 @@ use viewfuse_tests::scenes::Folder;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Missing};
 
+viewfuse_tests::trials![
+    devices_lists_what_is_there,
+    devices_as_json,
+    devices_that_are_not_there_are_refused,
+    the_device_is_in_the_record,
+    check_has_every_kernel_on_every_device,
+];
+
 /// Every Vulkan device, or why there is none.
 fn adapters() -> (Vec<Adapter>, Option<String>) {
     match vulkan_devices() {
@@ -17,7 +25,6 @@ fn adapters() -> (Vec<Adapter>, Option<String>) {
     }
 }
 
-#[test]
 fn devices_lists_what_is_there() {
     let folder = Folder::new();
     let (adapters, problem) = adapters();
@@ -37,7 +44,6 @@ fn devices_lists_what_is_there() {
     assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
 }
 
-#[test]
 fn devices_as_json() {
     let (adapters, problem) = adapters();
     let report: Value = serde_json::from_str(&done(Folder::new().path(), "devices --json")).expect("JSON");
@@ -53,7 +59,6 @@ fn devices_as_json() {
     }
 }
 
-#[test]
 fn devices_that_are_not_there_are_refused() {
     let scene = toy();
     let render = |device: &str| format!("render toy --targets 20 --size 16x16 -o out --device {device}");
@@ -76,7 +81,6 @@ fn devices_that_are_not_there_are_refused() {
     }
 }
 
-#[test]
 fn the_device_is_in_the_record() {
     let scene = toy();
     let (adapters, _) = adapters();
@@ -96,7 +100,6 @@ fn the_device_is_in_the_record() {
     }
 }
 
-#[test]
 fn check_has_every_kernel_on_every_device() {
     let report: Value = serde_json::from_str(&done(Folder::new().path(), "check --seeds 1 --json")).expect("JSON");
     let devices = report["devices"].as_array().expect("a list");

@@ -8,6 +8,27 @@ use viewfuse_core::attention::POSE_FEATURES;
 use viewfuse_tests::command::{self, change_poses, f32_bytes, safetensors, toy};
 use viewfuse_tests::scenes::{Folder, huge_png, words};
 
+viewfuse_tests::trials![
+    no_scene,
+    poses_missing_or_extra,
+    poses_that_are_none,
+    photographs_that_are_none,
+    nothing_but_background,
+    silhouettes_with_nothing_in_common,
+    sources_too_few,
+    views_that_do_not_fit,
+    schemes_that_are_none,
+    attention_parameters_that_are_none,
+    sizes_that_do_not_fit,
+    wrong_arguments_of_networks,
+    arguments_of_another_network,
+    wrong_arguments_of_genvs,
+    wrong_arguments,
+    outputs_that_cannot_be_written,
+    references_that_are_none,
+    an_evaluation_of_nothing,
+];
+
 const RENDER: &str = "render toy --targets 20 --size 32x32 -o out";
 
 /// A sample scene with something broken is refused by every command that reads it.
@@ -39,13 +60,11 @@ fn with_pose(change: impl Fn(&mut [f64; 16])) -> Folder {
     folder
 }
 
-#[test]
 fn no_scene() {
     assert_refused("render nowhere --orbit 3 -o out", &["nowhere: no such file or folder"]);
     assert_refused("inspect toy/rgb -o map.png", &["toy/rgb: no scene here"]);
 }
 
-#[test]
 fn poses_missing_or_extra() {
     let folder = toy();
     folder.remove("toy/pose/000003.txt");
@@ -55,7 +74,6 @@ fn poses_missing_or_extra() {
     assert_scene_refused(&folder, &["toy/pose/000003.txt: this pose has no photograph", "toy/rgb/000003.png"]);
 }
 
-#[test]
 fn poses_that_are_none() {
     let folder = with_pose(|matrix| matrix[3] = f64::NAN);
     assert_scene_refused(&folder, &["toy/pose/000003.txt:1: \"NaN\" is not a finite number"]);
@@ -75,7 +93,6 @@ fn poses_that_are_none() {
     assert_scene_refused(&folder, &["toy/pose/000003.txt: found 15 numbers instead of 16"]);
 }
 
-#[test]
 fn photographs_that_are_none() {
     let folder = toy();
     let whole = fs::read(folder.path().join("toy/rgb/000003.png")).expect("a photograph");
@@ -87,20 +104,17 @@ fn photographs_that_are_none() {
     assert_scene_refused(&folder, &["toy/rgb/000003.png: the image is 128 x 96", "is for 128 x 128"]);
 }
 
-#[test]
 fn nothing_but_background() {
     let folder = toy();
     folder.image("toy/rgb/000003.png", 128, 128);
     assert_scene_refused(&folder, &["toy/rgb/000003.png: shows no object before the background", "--background"]);
 }
 
-#[test]
 fn silhouettes_with_nothing_in_common() {
     let folder = with_pose(|matrix| matrix[3] += 1.0e4);
     assert_scene_refused(&folder, &["toy: the silhouettes of the sources have no common object", "viewfuse inspect"]);
 }
 
-#[test]
 fn sources_too_few() {
     let render = |sources: &str| format!("{RENDER} --sources {sources}");
     assert_refused(&render("3"), &["toy: too few source views: 1, at least 2 are needed"]);
@@ -111,7 +125,6 @@ fn sources_too_few() {
     assert_refused("weights toy --target 20 --sources ,", &["toy: too few source views: 0, at least 1"]);
 }
 
-#[test]
 fn views_that_do_not_fit() {
     let render = |sources: &str| format!("{RENDER} --sources {sources}");
     assert_refused(&render("3,20"), &["toy: view '000020' is a target and a source at once", "--sources"]);
@@ -125,7 +138,6 @@ fn views_that_do_not_fit() {
     assert_refused("render toy -o out", &["toy: no targets", "--targets", "--orbit"]);
 }
 
-#[test]
 fn schemes_that_are_none() {
     let render = |scheme: &str| format!("{RENDER} --weights {scheme}");
     assert_refused(&render("nearest"), &["unknown weighting scheme 'nearest'", "there are: mean, l1,"]);
@@ -141,7 +153,6 @@ fn schemes_that_are_none() {
     assert_refused("evaluate toy --weights foo -o scores.csv", &["unknown weighting scheme 'foo'"]);
 }
 
-#[test]
 fn attention_parameters_that_are_none() {
     const N: usize = POSE_FEATURES;
     let folder = toy();
@@ -171,7 +182,6 @@ fn attention_parameters_that_are_none() {
     refused("nan.safetensors", &["nan.safetensors: tensor 'query_layer.weight' is not finite at flat index 5"]);
 }
 
-#[test]
 fn sizes_that_do_not_fit() {
     assert_refused("render toy --targets 20 --size 64x48 -o out", &["--size 64x48", "128x128", "64x64"]);
     assert_refused("evaluate toy --targets 20 --size 64x48", &["--size 64x48", "64x64"]);
@@ -180,7 +190,6 @@ fn sizes_that_do_not_fit() {
     }
 }
 
-#[test]
 fn wrong_arguments_of_networks() {
     for samples in ["64,16", "64,16,16,x", "64,16,16,", "0,1,1", "1025,1,1"] {
         assert_wrong(&format!("render toy --model body:16 --samples {samples} -o out"), &["--samples", "64,16,16"]);
@@ -196,7 +205,6 @@ fn wrong_arguments_of_networks() {
     assert_wrong("render toy --model body:17 -o out", &["body:17", "multiple of 8"]);
 }
 
-#[test]
 fn arguments_of_another_network() {
     let wrong =
         |arguments: &str, parts: &[&str]| assert_wrong(&format!("render toy --targets 20 {arguments} -o out"), parts);
@@ -228,7 +236,6 @@ fn arguments_of_another_network() {
     assert_wrong("evaluate toy --targets 20 --model genvs:small --probe-step 8", &["--probe-step cannot"]);
 }
 
-#[test]
 fn wrong_arguments_of_genvs() {
     let wrong = |arguments: &str, parts: &[&str]| {
         assert_wrong(&format!("render toy --model genvs:small {arguments} -o out"), parts)
@@ -260,7 +267,6 @@ fn wrong_arguments_of_genvs() {
     }
 }
 
-#[test]
 fn wrong_arguments() {
     assert_wrong("", &[]);
     assert_wrong("paint toy", &["paint"]);
@@ -275,7 +281,6 @@ fn wrong_arguments() {
     assert_wrong("verify", &["required"]);
 }
 
-#[test]
 fn outputs_that_cannot_be_written() {
     let folder = toy();
     folder.write("out", "a file in the way");
@@ -287,7 +292,6 @@ fn outputs_that_cannot_be_written() {
     refused("inspect toy -o out/map.png", &["out/map.png: cannot be written: out is not a folder"]);
 }
 
-#[test]
 fn references_that_are_none() {
     let folder = toy();
     let refused = |file: &str, parts: &[&str]| {
@@ -316,7 +320,6 @@ fn references_that_are_none() {
     refused("metrics.safetensors", &["metrics.safetensors: tensor 'pred'", "U8 [pair, row, column, 3]"]);
 }
 
-#[test]
 fn an_evaluation_of_nothing() {
     assert_refused("evaluate toy --targets ,", &["toy", "no targets"]);
     // Every scene is opened before the first is computed.

@@ -11,6 +11,18 @@ use viewfuse_tests::command::{
     Outcome, assert_refused, assert_wrong_arguments, command, f32_bytes, names_in, safetensors, toy,
 };
 
+viewfuse_tests::trials![
+    a_picture_of_any_size_a_sheet_and_a_record_without_depth,
+    unless_told_otherwise_the_size_is_the_networks,
+    options_reach_the_run,
+    exact_leaves_nothing_out,
+    frames_start_from_the_ones_before,
+    the_seed_decides,
+    files_of_either_network,
+    evaluates_schemes,
+    sweeps_samplers_and_what_is_left_out,
+];
+
 const RENDER: &str = "render toy --targets 20 --views 2 --size 16x16 --device cpu -o out";
 
 /// What a run with these options says of itself.
@@ -32,7 +44,6 @@ fn left_out(record: &Value, what: &str) -> (u64, bool, u64) {
     (count("left_out"), line["switch"] == true, count("of"))
 }
 
-#[test]
 fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
     let scene = toy();
     let folder = scene.path();
@@ -59,7 +70,6 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
     assert!(left_out(&record, "encoded views").1 && left_out(&record, "volume rows").1);
 }
 
-#[test]
 fn unless_told_otherwise_the_size_is_the_networks() {
     let scene = toy();
     done(scene.path(), "render toy --targets 20 --views 2 --model genvs:small --steps 1 --device cpu -o out");
@@ -67,7 +77,6 @@ fn unless_told_otherwise_the_size_is_the_networks() {
     assert_eq!((picture.width(), picture.height()), (64, 64));
 }
 
-#[test]
 fn options_reach_the_run() {
     let scene = toy();
     let denoising =
@@ -83,7 +92,6 @@ fn options_reach_the_run() {
     assert_eq!(denoising("--steps 3 --compute calls")["settled"], Value::Null);
 }
 
-#[test]
 fn exact_leaves_nothing_out() {
     let scene = toy();
     let exact = record(scene.path(), "--model genvs:small --exact --weights distance:power=3");
@@ -104,7 +112,6 @@ fn exact_leaves_nothing_out() {
     assert!(left_out(&rows, "encoded views").1 && left_out(&rows, "denoiser calls").1);
 }
 
-#[test]
 fn frames_start_from_the_ones_before() {
     let scene = toy();
     let orbit = |options: &str| {
@@ -124,7 +131,6 @@ fn frames_start_from_the_ones_before() {
     assert!(first == same_first && last != other_last);
 }
 
-#[test]
 fn the_seed_decides() {
     let scene = toy();
     let render = |options: &str| picture(scene.path(), &format!("--model genvs:small --steps 3 {options}"));
@@ -135,7 +141,6 @@ fn the_seed_decides() {
 }
 
 /// Which network a file holds is said by its tensors, not by its name.
-#[test]
 fn files_of_either_network() {
     let scene = toy();
     let folder = scene.path();
@@ -162,7 +167,6 @@ fn files_of_either_network() {
     assert_refused(BINARY, folder, "render toy --targets 20 --model other.safetensors -o new", &parts);
 }
 
-#[test]
 fn evaluates_schemes() {
     let scene = toy();
     let schemes = "--weights mean --weights distance:power=3";
@@ -174,7 +178,6 @@ fn evaluates_schemes() {
     assert_eq!(scores.lines().count(), 4, "{scores}");
 }
 
-#[test]
 fn sweeps_samplers_and_what_is_left_out() {
     let scene = toy();
     let folder = scene.path();

@@ -5,6 +5,16 @@ use serde_json::Value;
 use viewfuse_tests::command::{change_poses, names_in, run, toy};
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![
+    a_good_scene,
+    draws_the_cameras,
+    flipped_axes,
+    cameras_without_a_common_point,
+    a_scene_in_other_units,
+    two_views_from_one_place,
+    a_background_of_many_colours,
+];
+
 fn inspection(folder: &Folder) -> Value {
     serde_json::from_str(&done(folder.path(), "inspect toy --json")).expect("JSON")
 }
@@ -21,7 +31,6 @@ fn assert_warns(folder: &Folder, text: &str, others: usize) {
     assert!(printed.lines().any(|line| line.starts_with("warning    ") && line.contains(text)), "{printed}");
 }
 
-#[test]
 fn a_good_scene() {
     let scene = toy();
     let inspection = inspection(&scene);
@@ -37,7 +46,6 @@ fn a_good_scene() {
     assert!(done(scene.path(), "inspect toy").contains("warnings   none"));
 }
 
-#[test]
 fn draws_the_cameras() {
     let scene = toy();
     let printed = done(scene.path(), "inspect toy -o maps/cameras.png");
@@ -50,14 +58,12 @@ fn draws_the_cameras() {
     assert!(serde_json::from_str::<Value>(&json).is_ok(), "{json}");
 }
 
-#[test]
 fn flipped_axes() {
     let scene = toy();
     change_poses(&scene, |_, matrix| [1, 2, 5, 6, 9, 10].iter().for_each(|&at| matrix[at] = -matrix[at]));
     assert_warns(&scene, "24 of 24 cameras look away from the point", 1);
 }
 
-#[test]
 fn cameras_without_a_common_point() {
     let scene = toy();
     change_poses(&scene, |view, matrix| {
@@ -68,21 +74,18 @@ fn cameras_without_a_common_point() {
     assert_warns(&scene, "the cameras do not look at a common point", 1);
 }
 
-#[test]
 fn a_scene_in_other_units() {
     let scene = toy();
     change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e6));
     assert_warns(&scene, "the cameras are 1.300e6 units from what they look at", 0);
 }
 
-#[test]
 fn two_views_from_one_place() {
     let scene = toy();
     std::fs::copy(scene.path().join("toy/pose/000003.txt"), scene.path().join("toy/pose/000007.txt")).expect("a copy");
     assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
 }
 
-#[test]
 fn a_background_of_many_colours() {
     let scene = toy();
     for name in names_in(&scene.file("toy/rgb")) {

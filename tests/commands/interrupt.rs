@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 use viewfuse_tests::command::{command, names_in, toy};
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![ctrl_c_leaves_whole_files_and_no_record,];
+
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Waits until `ready` holds; the command must still be running then.
@@ -54,7 +56,6 @@ fn assert_stops_cleanly(folder: &Folder, signal: &str) {
     }
 }
 
-#[test]
 fn ctrl_c_leaves_whole_files_and_no_record() {
     let folder = toy();
     assert_stops_cleanly(&folder, "-INT");

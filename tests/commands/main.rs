@@ -13,17 +13,49 @@ mod pareto;
 mod protocols;
 mod readme;
 mod render;
+mod report;
 mod scenes;
 mod tables;
 mod train;
 mod trained;
 mod verify;
 
+use libtest_mimic::{Arguments, run};
 use serde_json::Value;
 use std::path::Path;
+use std::process::ExitCode;
 use viewfuse_tests::command;
 
+viewfuse_tests::trials![help_fits_and_gives_examples,];
+
 const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let trials = [
+        trials(),
+        check::trials(),
+        compare::trials(),
+        convert::trials(),
+        devices::trials(),
+        errors::trials(),
+        genvs::trials(),
+        inspect::trials(),
+        interrupt::trials(),
+        memory::trials(),
+        pareto::trials(),
+        protocols::trials(),
+        readme::trials(),
+        render::trials(),
+        report::trials(),
+        scenes::trials(),
+        tables::trials(),
+        train::trials(),
+        trained::trials(),
+        verify::trials(),
+    ];
+    run(&arguments, trials.into_iter().flatten().collect()).exit_code()
+}
 
 /// Runs the command in a folder; it must succeed and say nothing on standard error.
 #[track_caller]
@@ -48,7 +80,6 @@ fn assert_near(value: f64, expected: f64, tolerance: f64) {
     assert!((value - expected).abs() <= tolerance, "{value} is not {expected} to within {tolerance}");
 }
 
-#[test]
 fn help_fits_and_gives_examples() {
     let here = Path::new(".");
     let version = done(here, "--version");

@@ -1,6 +1,7 @@
 //! What a render takes of memory.
 
 use super::BINARY;
+use libtest_mimic::Trial;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -8,6 +9,16 @@ use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 use viewfuse_tests::command::{command, toy};
+use viewfuse_tests::trials::{needing, trial};
+
+pub(crate) fn trials() -> Vec<Trial> {
+    let missing = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
+    let tests: [(&str, fn()); 2] = [
+        ("commands::memory::more_samples_take_no_more", more_samples_take_no_more),
+        ("commands::memory::a_larger_picture_takes_no_more", a_larger_picture_takes_no_more),
+    ];
+    tests.map(|(name, test)| needing(missing.clone(), false, trial(name, test))).into()
+}
 
 /// Largest resident set in KiB of a command that must succeed, as the system counts it; looked at until it ends.
 fn most_memory(folder: &Path, arguments: &str) -> u64 {
@@ -27,8 +38,6 @@ fn most_memory(folder: &Path, arguments: &str) -> u64 {
 }
 
 /// Of the rays of a GeNVS so many are worked on at once as take little memory; what it takes is known before.
-#[test]
-#[cfg_attr(not(target_os = "linux"), ignore = "the system does not say what a process takes")]
 fn more_samples_take_no_more() {
     let scene = toy();
     let render = |samples: u32| {
@@ -50,8 +59,6 @@ fn more_samples_take_no_more() {
     );
 }
 
-#[test]
-#[cfg_attr(not(target_os = "linux"), ignore = "the system does not say what a process takes")]
 fn a_larger_picture_takes_no_more() {
     let scene = toy();
     let render = |side: u32| {

@@ -8,6 +8,14 @@ use std::path::Path;
 use viewfuse::evaluate::pareto::front::best_for_their_time;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in, toy};
 
+viewfuse_tests::trials![
+    sweeps_what_a_network_leaves_out,
+    sweeps_the_field_without_a_network,
+    targets_without_photographs_have_no_loss,
+    bad_input_is_refused,
+    ctrl_c_leaves_what_was_there,
+];
+
 const NETWORK: &str =
     "pareto toy --targets 20 --views 3 --size 24x24 --model body:16 --samples 16,8,8 --repeat 2 --device cpu";
 
@@ -63,7 +71,6 @@ fn check_plot(folder: &Path) -> String {
     plot
 }
 
-#[test]
 fn sweeps_what_a_network_leaves_out() {
     let scene = toy();
     let folder = scene.path();
@@ -135,7 +142,6 @@ fn sweeps_what_a_network_leaves_out() {
     }
 }
 
-#[test]
 fn sweeps_the_field_without_a_network() {
     let scene = toy();
     let folder = scene.path();
@@ -151,7 +157,6 @@ fn sweeps_the_field_without_a_network() {
     check_plot(folder);
 }
 
-#[test]
 fn targets_without_photographs_have_no_loss() {
     let scene = toy();
     let folder = scene.path();
@@ -165,7 +170,6 @@ fn targets_without_photographs_have_no_loss() {
     assert_eq!(record(folder)["devices"][0]["fastest_without_loss"], Value::Null);
 }
 
-#[test]
 fn bad_input_is_refused() {
     let scene = toy();
     let folder = scene.path();
@@ -186,7 +190,6 @@ fn bad_input_is_refused() {
 
 /// Ctrl-C while it measures: nothing appears, and what was there stays.
 #[cfg(unix)]
-#[test]
 fn ctrl_c_leaves_what_was_there() {
     use std::process::{Command, Stdio};
     use std::time::Duration;

@@ -3,3 +3,7 @@
 mod choice;
 mod folders;
 mod summaries;
+
+pub(crate) fn trials() -> Vec<libtest_mimic::Trial> {
+    [choice::trials(), folders::trials(), summaries::trials()].into_iter().flatten().collect()
+}

@@ -6,6 +6,16 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use viewfuse_tests::places::repository;
 
+viewfuse_tests::trials![
+    every_command_runs,
+    the_test_command_is_the_one_that_ci_runs,
+    the_readme_is_short,
+    links_lead_somewhere,
+    tables_are_what_the_program_prints,
+    every_package_can_stand_alone,
+    core_depends_on_mathematics_only,
+];
+
 fn read(path: &Path) -> String {
     std::fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
@@ -97,7 +107,6 @@ fn run(arguments: &[String]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-#[test]
 fn every_command_runs() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("out");
@@ -132,7 +141,6 @@ fn every_command_runs() {
     }
 }
 
-#[test]
 fn the_test_command_is_the_one_that_ci_runs() {
     let test = "tests/run";
     assert!(readme().lines().any(|line| line == test), "{test} is not in the README");
@@ -147,7 +155,6 @@ fn the_test_command_is_the_one_that_ci_runs() {
     }
 }
 
-#[test]
 fn the_readme_is_short() {
     let size = readme().len();
     assert!(size <= 10_000, "{size} bytes");
@@ -160,7 +167,6 @@ fn headings(text: &str) -> Vec<String> {
     text.lines().filter(|line| line.starts_with('#')).map(|line| heading(line).chars().filter(kept).collect()).collect()
 }
 
-#[test]
 fn links_lead_somewhere() {
     const OURS: [&str; 2] =
         ["https://github.com/viewfuse/viewfuse/tree/main/", "https://github.com/viewfuse/viewfuse/blob/main/"];
@@ -199,7 +205,6 @@ fn numbers(line: &str) -> Vec<f64> {
     numbers
 }
 
-#[test]
 fn tables_are_what_the_program_prints() {
     // Numbers of pictures are the same everywhere but for roundings; those of `check` are times and the worst of many.
     for (file, difference) in [("host/evaluate/tables/toy.txt", 0.05), ("host/check/tables/cpu.txt", f64::INFINITY)] {
@@ -233,7 +238,6 @@ fn cargo(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-#[test]
 fn every_package_can_stand_alone() {
     let metadata: Value =
         serde_json::from_str(&cargo(&["metadata", "--no-deps", "--format-version", "1"])).expect("JSON");
@@ -270,7 +274,6 @@ fn every_package_can_stand_alone() {
     assert!(count >= 15, "{count}");
 }
 
-#[test]
 fn core_depends_on_mathematics_only() {
     let tree = |extra: &[&str]| {
         let arguments = ["tree", "-p", "viewfuse-core", "-e", "normal,no-proc-macro", "--prefix", "none"];

@@ -7,6 +7,16 @@ use std::fs;
 use std::path::Path;
 use viewfuse_tests::command::{names_in, toy};
 
+viewfuse_tests::trials![
+    writes_a_picture_a_depth_map_a_sheet_and_a_record,
+    leaves_out_what_counts_little,
+    orbits,
+    the_same_run_makes_the_same_pictures,
+    chooses_sources,
+    a_second_run_replaces_the_first,
+    weights_change_the_picture,
+];
+
 fn record(folder: &Path, output: &str) -> Value {
     let text = fs::read_to_string(folder.join(output).join("run.json")).expect("a run record");
     serde_json::from_str(&text).expect("JSON")
@@ -25,7 +35,6 @@ fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
         .collect()
 }
 
-#[test]
 fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let scene = toy();
     let folder = scene.path();
@@ -72,7 +81,6 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     assert!(depths.iter().all(|z| *z == 0.0 || (0.7..1.9).contains(z)));
 }
 
-#[test]
 fn leaves_out_what_counts_little() {
     let scene = toy();
     done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 -o out");
@@ -92,7 +100,6 @@ fn leaves_out_what_counts_little() {
     }
 }
 
-#[test]
 fn orbits() {
     let scene = toy();
     done(scene.path(), "render toy --orbit 3 --size 32x32 -o out");
@@ -114,7 +121,6 @@ fn orbits() {
     }
 }
 
-#[test]
 fn the_same_run_makes_the_same_pictures() {
     let scene = toy();
     let folder = scene.path();
@@ -129,7 +135,6 @@ fn the_same_run_makes_the_same_pictures() {
     assert!(first[0].1 != first[3].1, "two targets look the same");
 }
 
-#[test]
 fn chooses_sources() {
     let scene = toy();
     let sources = |choice: &str| {
@@ -147,7 +152,6 @@ fn chooses_sources() {
     assert_eq!(sources("--sources 3..6 --views 2").len(), 2);
 }
 
-#[test]
 fn a_second_run_replaces_the_first() {
     let scene = toy();
     let folder = scene.path();
@@ -158,7 +162,6 @@ fn a_second_run_replaces_the_first() {
     assert_eq!(record(folder, "out")["weighting"], "mean");
 }
 
-#[test]
 fn weights_change_the_picture() {
     let scene = toy();
     let folder = scene.path();

@@ -6,9 +6,14 @@ use viewfuse::scene::Scene;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in};
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![
+    scenes_appear_in_their_folders_and_are_read_again,
+    wrong_arguments_are_told,
+    ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on,
+];
+
 const FEW: &str = "scenes make chairs out --train 2 --val 1 --test 1 --views 2 --test-views 3 --size 64";
 
-#[test]
 fn scenes_appear_in_their_folders_and_are_read_again() {
     let folder = Folder::new();
     assert_eq!(done(folder.path(), FEW), "out: 4 new scenes, 0 were there\n");
@@ -24,7 +29,6 @@ fn scenes_appear_in_their_folders_and_are_read_again() {
     assert_eq!(done(folder.path(), toys), "out: 1 new scenes, 0 were there\n");
 }
 
-#[test]
 fn wrong_arguments_are_told() {
     let folder = Folder::new();
     let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
@@ -35,7 +39,6 @@ fn wrong_arguments_are_told() {
 }
 
 #[cfg(unix)]
-#[test]
 fn ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on() {
     use std::process::{Command, Stdio};
     use std::time::{Duration, Instant};

@@ -6,7 +6,14 @@ use std::fs;
 use viewfuse::weighting::SCHEME_NAMES;
 use viewfuse_tests::command::{names_in, toy};
 
-#[test]
+viewfuse_tests::trials![
+    weights_as_a_table,
+    weights_as_json,
+    evaluates_schemes_against_the_nearest_copy,
+    evaluates_the_views_that_are_no_sources,
+    a_reader_that_goes_away_is_no_failure,
+];
+
 fn weights_as_a_table() {
     let scene = toy();
     let table = done(scene.path(), "weights toy --target 20 --sources 0..9");
@@ -31,7 +38,6 @@ fn weights_as_a_table() {
     assert_eq!(names_in(scene.path()), ["toy"]);
 }
 
-#[test]
 fn weights_as_json() {
     let scene = toy();
     let weights = |arguments: &str| -> Value {
@@ -53,7 +59,6 @@ fn weights_as_json() {
     assert!(numbers(&columns["error:alpha=0.25,angle=full"]) != [0.25; 4]);
 }
 
-#[test]
 fn evaluates_schemes_against_the_nearest_copy() {
     let scene = toy();
     let run = "evaluate toy ./toy --targets 20,21 --size 64x64 --weights mean --weights error:alpha=1 -o scores.csv";
@@ -88,7 +93,6 @@ fn evaluates_schemes_against_the_nearest_copy() {
     }
 }
 
-#[test]
 fn evaluates_the_views_that_are_no_sources() {
     let scene = toy();
     let table = done(scene.path(), "evaluate toy --sources all/2 --size 32x32 --weights error:alpha=1");
@@ -98,7 +102,6 @@ fn evaluates_the_views_that_are_no_sources() {
 
 /// `viewfuse ... | head` closes the pipe early: no panic, and the files are written all the same.
 #[cfg(unix)]
-#[test]
 fn a_reader_that_goes_away_is_no_failure() {
     use std::io::Read;
     use std::process::Stdio;

@@ -11,6 +11,14 @@ use std::time::{Duration, Instant};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in};
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![
+    a_killed_run_goes_on_and_ends_in_the_same_numbers,
+    ctrl_c_writes_the_state_first,
+    genvs_goes_on_too,
+    data_are_told_by_what_is_in_them,
+    wrong_input_is_told,
+];
+
 /// Small enough for a second a run.
 const PIXELNERF: &str = "train pixelnerf learn/toys --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
     --validate-every 10 --write-every 0";
@@ -41,7 +49,6 @@ fn kill(folder: &Path, arguments: &str, state: &str) {
     child.wait().expect("an end");
 }
 
-#[test]
 fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     let folder = scenes();
     let path = folder.path();
@@ -87,7 +94,6 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     }
 }
 
-#[test]
 fn ctrl_c_writes_the_state_first() {
     let folder = scenes();
     let path = folder.path();
@@ -107,7 +113,6 @@ fn ctrl_c_writes_the_state_first() {
     assert!(record["steps"].as_u64() >= Some(5) && path.join("run/state.safetensors").exists(), "{record}");
 }
 
-#[test]
 fn genvs_goes_on_too() {
     let folder = scenes();
     let path = folder.path();
@@ -126,7 +131,6 @@ fn genvs_goes_on_too() {
     assert_wrong_arguments(BINARY, path, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
 }
 
-#[test]
 fn data_are_told_by_what_is_in_them() {
     let folder = scenes();
     let path = folder.path();
@@ -149,7 +153,6 @@ fn data_are_told_by_what_is_in_them() {
     assert_refused(BINARY, path, &format!("{moved} -o more"), &["more/state.safetensors", "checkpoint was"]);
 }
 
-#[test]
 fn wrong_input_is_told() {
     let folder = scenes();
     let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);

@@ -6,6 +6,11 @@ use std::collections::BTreeMap;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![
+    networks_beat_the_nearest_copy_with_every_weighting,
+    most_samples_are_left_out_and_the_picture_stays,
+];
+
 /// PSNR by scheme of some targets of the car, from three sources.
 fn scores(network: &str, weightings: &[&str]) -> BTreeMap<String, f64> {
     let folder = Folder::new();
@@ -31,7 +36,6 @@ fn scores(network: &str, weightings: &[&str]) -> BTreeMap<String, f64> {
     sums.into_iter().map(|(scheme, all)| (scheme, all.iter().sum::<f64>() / all.len() as f64)).collect()
 }
 
-#[test]
 fn networks_beat_the_nearest_copy_with_every_weighting() {
     // The denoiser called twice: nearly the mean of what it would draw, which is what PSNR asks for.
     for (model, options, least) in [("pixelnerf_cars", "", 6.0), ("genvs_cars", "--steps 2", 3.0)] {
@@ -50,7 +54,6 @@ fn networks_beat_the_nearest_copy_with_every_weighting() {
     }
 }
 
-#[test]
 fn most_samples_are_left_out_and_the_picture_stays() {
     let folder = Folder::new();
     let render = |name: &str, options: &str| -> Value {

@@ -5,6 +5,15 @@ use serde_json::{Value, json};
 use viewfuse_tests::command::{run, safetensors};
 use viewfuse_tests::scenes::Folder;
 
+viewfuse_tests::trials![
+    right_weights_pass,
+    wrong_weights_do_not,
+    a_weight_that_is_no_number_does_not_pass,
+    metrics_right_and_wrong,
+    scores_of_the_official_codes,
+    scores_that_are_not_the_official_codes,
+];
+
 /// Scores and distances by the official codes; see `tests/data/metrics.md`.
 const REFERENCE: &[u8] = include_bytes!("../data/metrics/reference.safetensors");
 
@@ -40,7 +49,6 @@ fn assert_exceeded(folder: &Folder, file: &str, quantity: &str) {
     assert!(exceeded.len() == 1 && exceeded[0].trim().starts_with(quantity), "{}", outcome.stdout);
 }
 
-#[test]
 fn right_weights_pass() {
     let folder = Folder::new();
     folder.write("weighting.json", weighting().to_string());
@@ -50,7 +58,6 @@ fn right_weights_pass() {
     assert!(!printed.contains("EXCEEDED"), "{printed}");
 }
 
-#[test]
 fn wrong_weights_do_not() {
     let folder = Folder::new();
     for method in ["distance", "distance_cubed", "error_weighing_alpha=1", "error_weighing_alpha=0.5"] {
@@ -63,7 +70,6 @@ fn wrong_weights_do_not() {
 }
 
 /// JSON has no NaN: the official code's is `null`, which is no number to agree with.
-#[test]
 fn a_weight_that_is_no_number_does_not_pass() {
     let folder = Folder::new();
     for bad in [json!(null), json!("NaN")] {
@@ -85,7 +91,6 @@ fn metrics(psnr: [f64; 3]) -> Vec<u8> {
     safetensors(&[("pred", "U8", shape, prediction), ("truth", "U8", shape, truth), ("psnr", "F64", &[3], psnr)])
 }
 
-#[test]
 fn metrics_right_and_wrong() {
     let folder = Folder::new();
     let right = [10.0 * (255.0_f64 * 255.0 / 100.0).log10(), f64::INFINITY, 0.0];
@@ -106,7 +111,6 @@ fn metrics_right_and_wrong() {
 }
 
 /// Networks by formula with the heads that are published, and sets of points.
-#[test]
 fn scores_of_the_official_codes() {
     let folder = Folder::new();
     folder.write("metrics.safetensors", REFERENCE);
@@ -116,7 +120,6 @@ fn scores_of_the_official_codes() {
 }
 
 /// Every number of the file counts: a head's, a point's, a score.
-#[test]
 fn scores_that_are_not_the_official_codes() {
     let folder = Folder::new();
     for (tensor, change, quantity) in [

@@ -27,6 +27,9 @@ use std::env;
 use std::process::ExitCode;
 use std::sync::Arc;
 use viewfuse_tests::devices::vulkan_devices;
+use viewfuse_tests::trials::{is_required, needing};
+
+const REQUIRED: &str = "VIEWFUSE_REQUIRE_VULKAN";
 
 const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 
@@ -66,30 +69,18 @@ fn main() -> ExitCode {
             let (work, candidate) = (test.work, candidate.clone());
             let name = format!("{}::{}", candidate.adapter.name, test.name);
             let missing = candidate.problem().or_else(|| test.missing.clone());
-            trials.push(needing(missing, Trial::test(name, move || work(&candidate))));
+            trials.push(needing(missing, is_required(REQUIRED), Trial::test(name, move || work(&candidate))));
         }
     }
     if let Some(problem) = problem {
         let gone = tests.iter().map(|test| {
             let problem_here = problem.clone();
             let trial = Trial::test(format!("vulkan::{}", test.name), move || Err(problem_here.into()));
-            needing(Some(problem.clone()), trial)
+            needing(Some(problem.clone()), is_required(REQUIRED), trial)
         });
         trials.extend(gone);
     }
     libtest_mimic::run(&arguments, trials).exit_code()
-}
-
-/// A trial that is ignored, with the reason before its name, where something is missing; unless nothing may be missing.
-fn needing(missing: Option<String>, trial: Trial) -> Trial {
-    match missing {
-        Some(missing) if !is_required() => trial.with_kind(missing).with_ignored_flag(true),
-        _ => trial,
-    }
-}
-
-fn is_required() -> bool {
-    env::var("VIEWFUSE_REQUIRE_VULKAN").is_ok_and(|value| value == "1")
 }
 
 fn enough_drivers(drivers: &BTreeSet<String>) -> Result<(), Failed> {

@@ -16,6 +16,7 @@ use viewfuse_tests::emulator::image::Image;
 use viewfuse_tests::emulator::list::{Difference, Line, compare, gathered, parsed};
 use viewfuse_tests::emulator::trace::{Call, calls};
 use viewfuse_tests::places::repository;
+use viewfuse_tests::trials::{is_required, needing};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_FIRMWARE";
 
@@ -67,13 +68,10 @@ type OnDevice = Box<dyn FnOnce(&Firmware) -> Result<(), Failed> + Send>;
 pub(crate) fn trials() -> Vec<Trial> {
     let emulator = Emulator::find(&repository(), Path::new(env!("CARGO_TARGET_TMPDIR")));
     let missing = emulator.as_ref().err().cloned();
-    let ignored = missing.is_some() && !std::env::var(REQUIRED).is_ok_and(|value| value == "1");
     let firmware = Arc::new(Firmware { emulator, built: Mutex::default() });
     let on_device = |name: String, test: OnDevice| {
         let firmware = Arc::clone(&firmware);
-        let trial = Trial::test(name, move || test(&firmware)).with_ignored_flag(ignored);
-        // The kind is printed in front of the name: why a test is ignored.
-        if ignored { trial.with_kind(missing.clone().unwrap_or_default()) } else { trial }
+        needing(missing.clone(), is_required(REQUIRED), Trial::test(name, move || test(&firmware)))
     };
     let mut trials = vec![
         Trial::test("the_lists_are_worth_comparing", the_lists_are_worth_comparing),

@@ -19,6 +19,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::job::progress::Silent;
 use viewfuse_tests::devices::vulkan_devices;
+use viewfuse_tests::trials::{is_required, needing};
 use viewfuse_vulkan::GpuOptions;
 use viewfuse_vulkan::kernel::{Access, Kernel};
 
@@ -54,7 +55,10 @@ fn main() -> ExitCode {
         }
         Err(error) => trials.extend(trials_of(&Candidate {
             name: "vulkan".to_owned(),
-            open: || Err::<Vulkan, _>("there is no device".to_owned()),
+            open: {
+                let problem = error.to_string();
+                move || Err::<Vulkan, _>(problem.clone())
+            },
             missing: Some(error.to_string()),
             dispatch_count: vulkan_dispatches,
         })),
@@ -77,15 +81,13 @@ fn trials_of<D: Device + 'static, F>(candidate: &Candidate<D, F>) -> Vec<Trial>
 where
     F: Fn() -> Result<D, String> + Clone + Send + 'static,
 {
-    let is_required = std::env::var("VIEWFUSE_REQUIRE_VULKAN").is_ok_and(|value| value == "1");
     let dispatch_count = candidate.dispatch_count;
     let trial = |kernel: Kernel| {
         let name = format!("{}::{}", candidate.name, kernel.name());
         let open = candidate.open.clone();
-        match candidate.missing.clone() {
-            None => Trial::test(name, move || parity(&open()?, kernel, dispatch_count)),
-            Some(missing) => Trial::test(name, move || Err(missing.into())).with_ignored_flag(!is_required),
-        }
+        let missing = candidate.missing.clone();
+        let trial = Trial::test(name, move || parity(&open()?, kernel, dispatch_count));
+        needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), trial)
     };
     Kernel::ALL.into_iter().map(trial).collect()
 }

@@ -12,6 +12,19 @@ pub fn trial(path: &str, test: fn()) -> Trial {
     })
 }
 
+/// Whether an environment variable such as `VIEWFUSE_REQUIRE_VULKAN` is 1: what is missing then is a failure.
+pub fn is_required(variable: &str) -> bool {
+    std::env::var(variable).is_ok_and(|value| value == "1")
+}
+
+/// A trial that is ignored, with the reason before its name, where something is missing that is not required.
+pub fn needing(missing: Option<String>, is_required: bool, trial: Trial) -> Trial {
+    match missing {
+        Some(missing) if !is_required => trial.with_kind(missing).with_ignored_flag(true),
+        _ => trial,
+    }
+}
+
 /// Makes `trials()` of functions in this module. A test that is not listed is dead code, which is a warning.
 #[macro_export]
 macro_rules! trials {

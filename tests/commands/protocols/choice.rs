@@ -7,6 +7,16 @@ use viewfuse::scene::Scene;
 use viewfuse::scene::rig::Rig;
 use viewfuse_tests::command::toy;
 
+viewfuse_tests::trials![
+    protocols_as_text,
+    random_hangs_on_seed_name_and_trial_alone,
+    random_prefers_no_view,
+    more_sources_hold_the_fewer,
+    close_has_exactly_one_near_source,
+    fixed_takes_the_views_of_its_lists,
+    a_field_may_need_more_sources,
+];
+
 const DRAWS: Draws = Draws { seed: 7, trial_count: 5, target_count: 4 };
 
 fn protocol(text: &str) -> Protocol {
@@ -29,7 +39,6 @@ fn assert_sound(job: &Job) {
     assert!(job.sources.is_sorted(), "{job:?}");
 }
 
-#[test]
 fn protocols_as_text() {
     for (text, whole) in [
         ("random", "random:sources=3"),
@@ -61,7 +70,6 @@ fn protocols_as_text() {
     }
 }
 
-#[test]
 fn random_hangs_on_seed_name_and_trial_alone() {
     let (one, two) = (toy(), toy());
     let elsewhere = scene(&two.path().join("toy"));
@@ -92,7 +100,6 @@ fn random_hangs_on_seed_name_and_trial_alone() {
 }
 
 /// Over many trials every view is a source about as often as any other.
-#[test]
 fn random_prefers_no_view() {
     let folder = toy();
     let scenes = [scene(&folder.path().join("toy"))];
@@ -103,7 +110,6 @@ fn random_prefers_no_view() {
     assert!(counts.iter().all(|count| (400..600).contains(count)), "{counts:?}");
 }
 
-#[test]
 fn more_sources_hold_the_fewer() {
     let folder = toy();
     let scenes = [scene(&folder.path().join("toy"))];
@@ -124,7 +130,6 @@ fn more_sources_hold_the_fewer() {
     }
 }
 
-#[test]
 fn close_has_exactly_one_near_source() {
     let folder = toy();
     let scenes = [scene(&folder.path().join("toy"))];
@@ -166,7 +171,6 @@ fn close_has_exactly_one_near_source() {
     assert!(error.to_string().contains("24 of 24 views are no targets"), "{error}");
 }
 
-#[test]
 fn fixed_takes_the_views_of_its_lists() {
     let folder = toy();
     let scenes = [scene(&folder.path().join("toy"))];
@@ -184,7 +188,6 @@ fn fixed_takes_the_views_of_its_lists() {
     }
 }
 
-#[test]
 fn a_field_may_need_more_sources() {
     let folder = toy();
     let scenes = [scene(&folder.path().join("toy"))];

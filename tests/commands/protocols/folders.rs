@@ -12,6 +12,17 @@ use viewfuse_tests::command::{
     Outcome, assert_refused, assert_wrong_arguments, command, done, f32_bytes, names_in, run, safetensors, toy,
 };
 
+viewfuse_tests::trials![
+    shards_together_are_the_whole,
+    a_killed_run_ends_in_the_same_numbers,
+    other_settings_are_refused,
+    parameters_of_the_same_name_are_told_apart,
+    data_sets_and_published_metrics,
+    one_writer_a_shard,
+    pictures_show_sources_predictions_and_truth,
+    arguments_that_do_not_fit,
+];
+
 const RUN: &str = "evaluate toy --protocol random --trials 6 --targets-per-trial 2 --size 24x24 --device cpu \
      --weights mean --weights error:alpha=1 --weights l1";
 
@@ -46,7 +57,6 @@ fn printed(text: &str) -> Vec<String> {
     text.lines().filter(is_row).map(without_time).collect()
 }
 
-#[test]
 fn shards_together_are_the_whole() {
     let scene = toy();
     let folder = scene.path();
@@ -85,7 +95,6 @@ fn shards_together_are_the_whole() {
 }
 
 #[cfg(unix)]
-#[test]
 fn a_killed_run_ends_in_the_same_numbers() {
     let scene = toy();
     let folder = scene.path();
@@ -124,7 +133,6 @@ fn a_killed_run_ends_in_the_same_numbers() {
     assert_eq!(a.iter().filter(shown).collect::<Vec<_>>(), b.iter().collect::<Vec<_>>());
 }
 
-#[test]
 fn other_settings_are_refused() {
     let scene = toy();
     let folder = scene.path();
@@ -163,7 +171,6 @@ fn other_settings_are_refused() {
     refused(&first, &["out/run.json: is not of an evaluation"]);
 }
 
-#[test]
 fn parameters_of_the_same_name_are_told_apart() {
     const N: usize = POSE_FEATURES;
     let scene = toy();
@@ -184,7 +191,6 @@ fn parameters_of_the_same_name_are_told_apart() {
     assert_refused(BINARY, folder, &run, &["out/run.json", "other settings (own.safetensors: "]);
 }
 
-#[test]
 fn data_sets_and_published_metrics() {
     let scene = toy();
     let folder = scene.path();
@@ -212,7 +218,6 @@ fn data_sets_and_published_metrics() {
     assert_refused(BINARY, folder, &format!("{run} --lpips alex=net.safetensors -o lpips"), &["net.safetensors"]);
 }
 
-#[test]
 fn one_writer_a_shard() {
     let scene = toy();
     let folder = scene.path();
@@ -226,7 +231,6 @@ fn one_writer_a_shard() {
     done(BINARY, folder, &format!("{first} -o out"));
 }
 
-#[test]
 fn pictures_show_sources_predictions_and_truth() {
     let scene = toy();
     let folder = scene.path();
@@ -267,7 +271,6 @@ fn pictures_show_sources_predictions_and_truth() {
     }
 }
 
-#[test]
 fn arguments_that_do_not_fit() {
     let scene = toy();
     let folder = scene.path();

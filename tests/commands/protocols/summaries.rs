@@ -5,6 +5,12 @@ use viewfuse::evaluate::run_folder::Finished;
 use viewfuse::evaluate::summary::{Table, tables};
 use viewfuse::evaluate::{NEAREST_COPY, PSNR, SSIM, Score};
 
+viewfuse_tests::trials![
+    scenes_count_the_same_and_differences_are_paired,
+    a_table_for_each_number_of_sources,
+    equal_pictures_are_best,
+];
+
 /// A job of a scene: PSNR and SSIM of the copy, the mean and another scheme.
 fn job(number: usize, scene: usize, source_count: usize, values: [[f64; 2]; 3]) -> Finished {
     let score = |(scheme, [psnr, ssim]): (&str, [f64; 2])| Score {
@@ -24,7 +30,6 @@ fn value(table: &Table, row: usize, column: usize) -> f64 {
     table.rows[row].cells[column].as_ref().expect("a cell").value.mean
 }
 
-#[test]
 fn scenes_count_the_same_and_differences_are_paired() {
     // The first scene has two jobs, the others one: its mean comes first.
     let jobs = [
@@ -57,7 +62,6 @@ fn scenes_count_the_same_and_differences_are_paired() {
     assert_eq!((table.rows[0].seconds, table.rows[1].seconds), (None, Some(1.5)));
 }
 
-#[test]
 fn a_table_for_each_number_of_sources() {
     let jobs = [job(0, 0, 8, [[10.0, 0.5]; 3]), job(1, 0, 2, [[9.0, 0.5]; 3]), job(2, 1, 8, [[11.0, 0.5]; 3])];
     let all = tables(&jobs, true);
@@ -67,7 +71,6 @@ fn a_table_for_each_number_of_sources() {
     assert_eq!(tables(&jobs, false)[0].source_counts, [2, 8]);
 }
 
-#[test]
 fn equal_pictures_are_best() {
     let jobs = [job(0, 0, 3, [[10.0, 0.5], [f64::INFINITY, 1.0], [30.0, 0.9]])];
     let cell = tables(&jobs, false)[0].rows[1].cells[0].clone().expect("a cell");

@@ -6,51 +6,41 @@
 
 mod browser;
 
+use super::BINARY;
 use browser::Browser;
-use libtest_mimic::{Arguments, Failed, Trial};
+use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use std::process::ExitCode;
 use std::sync::Arc;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, names_in, toy};
 use viewfuse_tests::scenes::Folder;
+use viewfuse_tests::trials::{is_required, needing, trial};
 
-const BINARY: &str = env!("CARGO_BIN_EXE_viewfuse");
 const SMALL: &str =
     "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
 
 /// A test that needs the browser.
 type InBrowser = fn(&Browser);
 
-fn main() -> ExitCode {
-    let arguments = Arguments::from_args();
+pub(crate) fn trials() -> Vec<Trial> {
     let mut trials = vec![
-        Trial::test("the_page_holds_everything", || checked(the_page_holds_everything)),
-        Trial::test("evaluations_under_way_are_shown", || checked(evaluations_under_way_are_shown)),
-        Trial::test("what_is_no_record_is_refused", || checked(what_is_no_record_is_refused)),
+        trial("commands::report::the_page_holds_everything", the_page_holds_everything),
+        trial("commands::report::evaluations_under_way_are_shown", evaluations_under_way_are_shown),
+        trial("commands::report::what_is_no_record_is_refused", what_is_no_record_is_refused),
     ];
     let browser = Browser::find().map(Arc::new);
     let tests: [(&str, InBrowser); 3] = [
-        ("browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
-        ("browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
-        ("browser::light_and_dark", light_and_dark),
+        ("report::browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
+        ("report::browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
+        ("report::browser::light_and_dark", light_and_dark),
     ];
-    let is_required = std::env::var("VIEWFUSE_REQUIRE_BROWSER").is_ok_and(|value| value == "1");
-    for (name, test) in tests {
-        trials.push(match browser.clone() {
-            Ok(browser) => Trial::test(name, move || checked(|| test(&browser))),
-            Err(missing) if is_required => Trial::test(name, move || Err(Failed::from(missing))),
-            Err(missing) => Trial::test(name, || Ok(())).with_kind(missing).with_ignored_flag(true),
-        });
-    }
-    libtest_mimic::run(&arguments, trials).exit_code()
-}
-
-/// A test that panics where something is wrong.
-fn checked(test: impl FnOnce()) -> Result<(), Failed> {
-    test();
-    Ok(())
+    trials.extend(tests.map(|(name, test)| {
+        let found = browser.clone();
+        let trial = Trial::test(name, move || Ok(test(&*found?)));
+        needing(browser.as_ref().err().cloned(), is_required("VIEWFUSE_REQUIRE_BROWSER"), trial)
+    }));
+    trials
 }
 
 /// The sample scene twice, three evaluations of it, a sweep and a training.
