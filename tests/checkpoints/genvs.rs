@@ -6,7 +6,7 @@ use viewfuse::field::genvs::{
 };
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
-use viewfuse::nn::formula;
+use viewfuse::nn::initialisation;
 
 /// The tensors of a made network, without values as long as nobody changes them.
 struct Tensors {
@@ -51,7 +51,7 @@ impl Tensors {
         let tensors = self.shapes.into_iter().map(|(name, shape)| TensorShape { name, shape });
         let values = self.values;
         Checkpoint::computed("it", tensors, self.metadata, move |tensor| {
-            values.get(&tensor.name).cloned().unwrap_or_else(|| formula::tensor(&tensor.name, &tensor.shape))
+            values.get(&tensor.name).cloned().unwrap_or_else(|| initialisation::tensor(&tensor.name, &tensor.shape))
         })
     }
 
@@ -176,7 +176,7 @@ fn made_of_the_formula_with_two_gains() {
         ("denoiser.model.enc.64x64_conv.weight", 1.0),
         ("denoiser.model.enc.64x64_block0.norm0.weight", 1.0),
     ] {
-        let plain = formula::tensor(name, &checkpoint.shapes()[name]);
+        let plain = initialisation::tensor(name, &checkpoint.shapes()[name]);
         let gained: Vec<f32> = plain.iter().map(|value| gain * value).collect();
         assert_eq!(checkpoint.tensor(name).expect(name), gained, "{name}");
     }

@@ -13,7 +13,7 @@ use viewfuse::evaluate::metrics::lpips::{Lpips, LpipsTrunk};
 use viewfuse::evaluate::metrics::trunk::{Convolution, Pooling, Step, tensors, vgg16};
 use viewfuse::evaluate::metrics::{Metrics, Scored};
 use viewfuse::nn::checkpoint::Checkpoint;
-use viewfuse::nn::formula;
+use viewfuse::nn::initialisation;
 use viewfuse_vulkan::GpuOptions;
 
 pub(crate) const TESTS: &[Test] = &[Test::new("metrics_are_the_cpus", metrics_are_the_cpus)];
@@ -28,7 +28,7 @@ fn picture(shift: u32) -> RgbImage {
 
 fn made(steps: &[Step<Convolution>]) -> Checkpoint {
     Checkpoint::computed("formula", tensors(steps, 3).0, BTreeMap::new(), |tensor| {
-        formula::tensor(&tensor.name, &tensor.shape)
+        initialisation::tensor(&tensor.name, &tensor.shape)
     })
 }
 
@@ -40,7 +40,7 @@ fn scores<D: Device>(device: &D) -> Result<Vec<Scored>, Failed> {
     let metrics = Metrics {
         convention: Convention::Plain,
         lpips: vec![lpips(LpipsTrunk::Alex)?, lpips(LpipsTrunk::Squeeze)?],
-        dists: Some(Dists::new(device, &made(&vgg16(Pooling::RootMeanSquare)), &published_dists()?)?),
+        dists: Some(Dists::new(device, &made(&vgg16(Pooling::L2)), &published_dists()?)?),
         inception: None,
     };
     Ok(metrics.compare(device, &picture(0), &picture(2))?)

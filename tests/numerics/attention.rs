@@ -4,7 +4,7 @@ use serde_json::Value;
 use viewfuse::check::compare::Comparator;
 use viewfuse::check::oracle::{Matrix, WidePose};
 use viewfuse::check::poses::{Random, pose_of};
-use viewfuse::nn::formula;
+use viewfuse::nn::initialisation;
 use viewfuse_core::attention::{
     EMBEDDING, FlatEmbedding, FourierEmbedding, LearnedCrossAttention, Linear, POSE_FEATURES, PoseEmbedding,
     PoseSelfAttention, cross_attention, learned_cross_attention, pose_self_attention, published_cross_attention,
@@ -18,8 +18,8 @@ const SELF: &str = "relative_pose_self_attention";
 
 /// A layer from rows `first..first + O` of the named tensors.
 fn layer<const I: usize, const O: usize>(weight: (&str, usize), bias: Option<&str>, first: usize) -> Linear<I, O> {
-    let flat = formula::tensor(weight.0, &[weight.1, I]);
-    let bias = bias.map(|name| formula::tensor(name, &[weight.1]));
+    let flat = initialisation::tensor(weight.0, &[weight.1, I]);
+    let bias = bias.map(|name| initialisation::tensor(name, &[weight.1]));
     Linear {
         weight: std::array::from_fn(|row| std::array::from_fn(|column| flat[(first + row) * I + column])),
         bias: std::array::from_fn(|row| bias.as_ref().map_or(0.0, |bias| bias[first + row])),

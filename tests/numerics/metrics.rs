@@ -17,7 +17,7 @@ use viewfuse::evaluate::metrics::lpips::{Lpips, LpipsTrunk};
 use viewfuse::evaluate::metrics::trunk::{Convolution, InceptionKind, Pooling, Step, inception, tensors, vgg16};
 use viewfuse::evaluate::metrics::{MetricError, Metrics, Scored};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
-use viewfuse::nn::formula;
+use viewfuse::nn::initialisation;
 
 /// What networks in `f32` may differ by, of the score.
 const TOLERANCE: f64 = 1.0e-4;
@@ -47,7 +47,7 @@ fn checkpoint(
     change: impl Fn(&TensorShape, &mut Vec<f32>) + Send + Sync + 'static,
 ) -> Checkpoint {
     Checkpoint::computed("made", shapes, BTreeMap::new(), move |tensor| {
-        let mut values = formula::tensor(&format!("{prefix}{}", tensor.name), &tensor.shape);
+        let mut values = initialisation::tensor(&format!("{prefix}{}", tensor.name), &tensor.shape);
         change(tensor, &mut values);
         values
     })
@@ -63,7 +63,7 @@ fn lpips(kind: LpipsTrunk) -> Lpips<Cpu> {
 }
 
 fn dists() -> Dists<Cpu> {
-    let vgg = trunk(&vgg16(Pooling::RootMeanSquare), "vgg16.");
+    let vgg = trunk(&vgg16(Pooling::L2), "vgg16.");
     Dists::new(&Cpu, &vgg, &published_dists().expect("weights")).expect("the network")
 }
 

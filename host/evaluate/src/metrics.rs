@@ -33,11 +33,11 @@ use dists::Dists;
 use features::{Features, Inception};
 use image::RgbImage;
 use lpips::Lpips;
-use trunk::Map;
 use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_device::Device;
 use viewfuse_field::finite::NotFinite;
 use viewfuse_nn::checkpoint::CheckpointError;
+use viewfuse_nn::image::HostImage;
 
 /// Why pictures could not be scored.
 #[derive(Debug, thiserror::Error)]
@@ -165,8 +165,8 @@ fn same_size<E: std::error::Error>(prediction: &RgbImage, truth: &RgbImage) -> R
 }
 
 /// A picture as a network takes it: each channel's 8-bit level by its function.
-fn seen(picture: &RgbImage, value: impl Fn(usize, f32) -> f32) -> Map {
+fn seen(picture: &RgbImage, value: impl Fn(usize, f32) -> f32) -> HostImage {
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let values = picture.as_raw().iter().enumerate().map(|(at, level)| value(at % 3, f32::from(*level))).collect();
-    Map { height, width, channels: 3, values }
+    HostImage { height, width, channels: 3, values }
 }

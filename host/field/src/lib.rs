@@ -11,7 +11,6 @@ pub mod learned;
 pub mod photo;
 pub mod pixelnerf;
 pub mod render;
-pub mod resnet;
 
 use finite::NotFinite;
 use viewfuse_core::camera::Camera;
@@ -19,6 +18,7 @@ use viewfuse_device::Device;
 use viewfuse_job::progress::Interrupted;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::CheckpointError;
+use viewfuse_nn::loader::LoadError;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -56,6 +56,15 @@ pub enum FieldError<E: std::error::Error> {
     /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
+}
+
+impl<E: std::error::Error> From<LoadError<E>> for FieldError<E> {
+    fn from(error: LoadError<E>) -> FieldError<E> {
+        match error {
+            LoadError::Checkpoint(error) => FieldError::Checkpoint(error),
+            LoadError::Device(error) => FieldError::Device(error),
+        }
+    }
 }
 
 /// A rendered target, values not yet rounded. Row-major, one entry a pixel.

@@ -20,17 +20,18 @@ pub use options::{LEAST_OPACITY, LEAST_SHARE, Omissions, PixelNerfOptions, Sampl
 
 use super::learned::{default_near_far, over_white};
 use super::{Field, FieldError, LeftOut, Rendered};
-use encoder::{Image, Size, ViewLatents, encode};
+use encoder::{ViewLatents, encode};
 use network::{Network, Views, Workspace};
-use parameters::{HostLayer, Parameters};
+use parameters::{DeviceParameters, HostParameters};
 use pass::{Asked, Renderer, rays_at_once};
 use std::cell::OnceCell;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
-use viewfuse_device::{Device, Layer, Pixels};
+use viewfuse_device::{Device, Pixels};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
+use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -39,7 +40,7 @@ pub const SOURCE_SIDE: u32 = 128;
 /// A PixelNeRF with its parameters, ready for any device.
 pub struct PixelNerf {
     architecture: Architecture,
-    parameters: Arc<Parameters<HostLayer>>,
+    parameters: Arc<HostParameters>,
     options: PixelNerfOptions,
     counts: Mutex<Counts>,
 }
@@ -56,7 +57,7 @@ struct Counts {
 
 /// Photographs and parameters on a device.
 pub struct Prepared<D: Device> {
-    parameters: Parameters<Layer<D>>,
+    parameters: DeviceParameters<D>,
     images: Vec<Image<D>>,
     cameras: Vec<CameraBlock>,
     /// `[view]`: encoded when a target first uses the view.
@@ -72,7 +73,7 @@ impl PixelNerf {
     /// [`CheckpointError`] if it is not of this family, or cannot be read.
     pub fn new(checkpoint: &Checkpoint, options: PixelNerfOptions) -> Result<PixelNerf, CheckpointError> {
         let architecture = Architecture::of(checkpoint)?;
-        let parameters = Arc::new(Parameters::read(checkpoint, &architecture)?);
+        let parameters = Arc::new(HostParameters::read(checkpoint, &architecture)?);
         let options = options.checked();
         Ok(PixelNerf { architecture, parameters, options, counts: Mutex::default() })
     }
@@ -330,7 +331,7 @@ impl PixelNerf {
 fn upload_image<D: Device>(device: &D, image: &SourceImage) -> Result<Image<D>, D::Error> {
     let values: Vec<f32> = image.texels.iter().flat_map(|texel| over_white(*texel)).collect();
     let (width, height) = (image.camera.pinhole.width(), image.camera.pinhole.height());
-    Ok(Image { size: Size { height, width, channels: 3 }, values: device.upload(&values)? })
+    Image::upload(device, Size { height, width, channels: 3 }, &values)
 }
 
 /// Depths along the rays become depths along the principal axis; rays that meet nothing get 0.

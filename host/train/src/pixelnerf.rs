@@ -17,8 +17,8 @@ use std::sync::Arc;
 use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_field::pixelnerf::architecture::Architecture;
-use viewfuse_field::resnet::needs_downsample;
 use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_nn::resnet::has_shortcut;
 
 /// What the field adds to variances.
 const VARIANCE_FLOOR: f64 = 1.0e-5;
@@ -140,7 +140,7 @@ impl PixelNerf {
                 let inside = inside.relu()?;
                 let (conv2, bn2) = (format!("{name}.conv2"), format!("{name}.bn2"));
                 let inside = self.normalised(&inside, &conv2, &bn2, Window::same(3), false)?;
-                let beside = match block == 0 && needs_downsample(level, channels, sizes.channels) {
+                let beside = match block == 0 && has_shortcut(level, channels, sizes.channels) {
                     true => {
                         let window = Window { size: 1, stride, padding: 0, dilation: 1 };
                         let (name, norm) = (format!("{name}.downsample.0"), format!("{name}.downsample.1"));

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, HIDDEN, POSE_FEATURES};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_device::Device;
-use viewfuse_nn::formula;
+use viewfuse_nn::initialisation;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// What is embedded, and by which parameters.
@@ -23,8 +23,8 @@ pub struct Inputs {
 fn embedding() -> Vec<f32> {
     let layers = [("0", HIDDEN, POSE_FEATURES), ("2", HIDDEN, HIDDEN), ("4", EMBEDDING, HIDDEN)];
     let layer = |(name, outputs, inputs): (&str, usize, usize)| {
-        let weights = formula::tensor(&format!("paper.{name}.weight"), &[outputs, inputs]);
-        [weights, formula::tensor(&format!("paper.{name}.bias"), &[outputs])].concat()
+        let weights = initialisation::tensor(&format!("paper.{name}.weight"), &[outputs, inputs]);
+        [weights, initialisation::tensor(&format!("paper.{name}.bias"), &[outputs])].concat()
     };
     layers.map(layer).concat()
 }

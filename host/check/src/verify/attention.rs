@@ -8,7 +8,7 @@ use std::path::Path;
 use viewfuse_core::attention::{EMBEDDING, PoseEmbedding, published_cross_attention};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
-use viewfuse_nn::formula;
+use viewfuse_nn::initialisation;
 use viewfuse_weighting::attention::AttentionModel;
 use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 
@@ -85,7 +85,7 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
 
 /// Parameters by formula, their names behind a prefix.
 fn prefixed(prefix: &'static str) -> impl FnMut(&str, &[usize]) -> Result<Vec<f32>, Infallible> {
-    move |name, shape| Ok(formula::tensor(&format!("{prefix}{name}"), shape))
+    move |name, shape| Ok(initialisation::tensor(&format!("{prefix}{name}"), shape))
 }
 
 /// Names of the variants in the file, with their parameters; the published cross attention has none.

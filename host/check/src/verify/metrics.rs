@@ -18,7 +18,7 @@ use viewfuse_evaluate::metrics::lpips::{Lpips, LpipsTrunk};
 use viewfuse_evaluate::metrics::similarity::ssim_gaussian;
 use viewfuse_evaluate::metrics::trunk::{Convolution, Pooling, Step, tensors, vgg16};
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
-use viewfuse_nn::formula;
+use viewfuse_nn::initialisation;
 
 /// Both sides compute in `f64`; the order of summation differs.
 const TOLERANCE: f64 = 1.0e-9;
@@ -148,7 +148,7 @@ impl<'a> Pairs<'a> {
         }
         if self.file.tensors.tensor("dists").is_ok() {
             let (weights, names) = self.prefixed("dists_");
-            let trunk = by_formula(&vgg16(Pooling::RootMeanSquare), "vgg16.");
+            let trunk = by_formula(&vgg16(Pooling::L2), "vgg16.");
             let dists = Dists::new(device, &trunk, &weights).map_err(|error| self.failed("dists", &error))?;
             let score: &Score<'_> = &|p, t| dists.distance(device, p, t).map_err(|error| self.failed("dists", &error));
             let quantity = Quantity::new("DISTS", Measure::Absolute, DISTS_STEPS);
@@ -205,6 +205,6 @@ type Score<'a> = dyn Fn(&RgbImage, &RgbImage) -> Result<f64, VerifyError> + 'a;
 
 /// A trunk's parameters by formula from their names behind a prefix.
 fn by_formula(steps: &[Step<Convolution>], prefix: &'static str) -> Checkpoint {
-    let values = move |tensor: &TensorShape| formula::tensor(&format!("{prefix}{}", tensor.name), &tensor.shape);
+    let values = move |tensor: &TensorShape| initialisation::tensor(&format!("{prefix}{}", tensor.name), &tensor.shape);
     Checkpoint::computed("formula", tensors(steps, 3).0, BTreeMap::new(), values)
 }

@@ -1,6 +1,6 @@
 //! DISTS: how far two pictures are apart in structure and texture.
 //!
-//! At the picture itself and at each tap of VGG16 (whose halvings are blurred roots of squares), every channel is compared
+//! At the picture itself and at each tap of VGG16 (with L2 pools in place of max pools), every channel is compared
 //! by its means, `(2 m n + c) / (m^2 + n^2 + c)`, and by its covariance, `(2 cov + c) / (var + var + c)`, `c = 1e-6`. What
 //! these lack of 1, weighted by the published `alpha` and `beta` divided by their sum, is the distance (Ding, Ma, Wang,
 //! Simoncelli: "Image quality assessment: unifying structure and texture similarity", TPAMI 2022; dingkeyan93/DISTS). The
@@ -9,11 +9,12 @@
 //! Pictures are compared at their own size; the published script first reduces pictures whose shorter side is above 256
 //! to that, which is left to the caller.
 
-use super::trunk::{Map, Pooling, Trunk, vgg16};
+use super::trunk::{Pooling, Trunk, vgg16};
 use super::{MetricError, same_size, seen};
 use image::RgbImage;
 use viewfuse_device::Device;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
+use viewfuse_nn::image::HostImage;
 
 /// ImageNet's means and deviations, of levels in `[0, 1]`.
 const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
@@ -48,7 +49,7 @@ impl<D: Device> Dists<D> {
         let (mut alpha, mut beta) = (read("alpha")?, read("beta")?);
         let sum: f64 = alpha.iter().chain(&beta).sum();
         alpha.iter_mut().chain(&mut beta).for_each(|weight| *weight /= sum);
-        let steps = vgg16(Pooling::RootMeanSquare);
+        let steps = vgg16(Pooling::L2);
         let trunk = Trunk::load(device, trunk, &steps, |name| name.starts_with("classifier."))?;
         Ok(Dists { trunk, alpha, beta })
     }
@@ -59,7 +60,7 @@ impl<D: Device> Dists<D> {
     /// [`MetricError`] if the sizes differ, or if the device fails.
     pub fn distance(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<f64, MetricError<D::Error>> {
         same_size(prediction, truth)?;
-        let maps = |picture| -> Result<Vec<Map>, MetricError<D::Error>> {
+        let maps = |picture| -> Result<Vec<HostImage>, MetricError<D::Error>> {
             let plain = seen(picture, |_, level| level / 255.0);
             let scaled = |channel: usize, level: f32| (level / 255.0 - MEAN[channel]) / DEVIATION[channel];
             let mut maps = vec![plain];
@@ -74,10 +75,10 @@ impl<D: Device> Dists<D> {
 }
 
 /// What each channel's similarity of means and of structure lacks of 1.
-fn channels_lacking(prediction: &Map, truth: &Map) -> Vec<[f64; 2]> {
+fn channels_lacking(prediction: &HostImage, truth: &HostImage) -> Vec<[f64; 2]> {
     let count = (truth.height * truth.width) as f64;
     let lacking = |channel: usize| {
-        let mean = |map: &Map| map.channel(channel).sum::<f64>() / count;
+        let mean = |map: &HostImage| map.channel(channel).sum::<f64>() / count;
         let (m, n) = (mean(prediction), mean(truth));
         let (mut variances, mut covariance) = (0.0, 0.0);
         for (p, t) in prediction.channel(channel).zip(truth.channel(channel)) {

@@ -5,11 +5,12 @@
 //! the 2048 channels at the end are averaged over pixels. Which of the two Inceptions a file holds, its last layer tells
 //! ([`InceptionKind`]); with torchvision's, `transform_input` is left out, as pytorch-fid does.
 
-use super::trunk::{InceptionKind, Map, Trunk, inception};
+use super::trunk::{InceptionKind, Trunk, inception};
 use super::{MetricError, seen};
 use image::RgbImage;
 use viewfuse_device::Device;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes};
+use viewfuse_nn::image::HostImage;
 
 /// Side of the pictures that Inception sees.
 const SIDE: usize = 299;
@@ -143,7 +144,7 @@ impl<D: Device> Inception<D> {
         for picture in pictures {
             let resized = resized(&seen(picture, |_, level| level / 255.0), SIDE);
             let stretched = resized.values.iter().map(|value| 2.0 * value - 1.0).collect();
-            for map in self.trunk.taps(device, &Map { values: stretched, ..resized })? {
+            for map in self.trunk.taps(device, &HostImage { values: stretched, ..resized })? {
                 let count = (map.height * map.width) as f64;
                 values.extend((0..map.channels).map(|channel| map.channel(channel).sum::<f64>() / count));
             }
@@ -167,7 +168,7 @@ fn kind_of(checkpoint: &Checkpoint) -> Result<InceptionKind, CheckpointError> {
 
 /// A square image, bilinear between the four nearest pixels, the outer edges of both laid over one another (PyTorch's
 /// `interpolate` without `align_corners`).
-fn resized(image: &Map, side: usize) -> Map {
+fn resized(image: &HostImage, side: usize) -> HostImage {
     let along = |length: usize| -> Vec<(usize, usize, f32)> {
         let scale = length as f64 / side as f64;
         let place = |index: usize| {
@@ -189,7 +190,7 @@ fn resized(image: &Map, side: usize) -> Map {
             }));
         }
     }
-    Map { height: side, width: side, channels: image.channels, values }
+    HostImage { height: side, width: side, channels: image.channels, values }
 }
 
 #[cfg(test)]
@@ -198,7 +199,7 @@ mod tests {
 
     #[test]
     fn resizing_keeps_outer_edges() {
-        let image = Map { height: 1, width: 2, channels: 1, values: vec![0.0, 1.0] };
+        let image = HostImage { height: 1, width: 2, channels: 1, values: vec![0.0, 1.0] };
         // Four pixels over two: centres at -1/4, 1/4, 3/4 and 5/4 of the distance between the two.
         let wide = resized(&image, 4);
         assert_eq!(wide.values[..4], [0.0, 0.25, 0.75, 1.0]);

@@ -5,13 +5,14 @@
 //! (Zhang, Isola, Efros, Shechtman, Wang: "The unreasonable effectiveness of deep features as a perceptual metric", CVPR
 //! 2018; richzhang/PerceptualSimilarity), not its spatial variant. The trunk computes in `f32`, the rest is `f64`.
 
-use super::trunk::{Convolution, Map, Pooling, Step, Trunk, alexnet, squeezenet, vgg16};
+use super::trunk::{Convolution, Pooling, Step, Trunk, alexnet, squeezenet, vgg16};
 use super::{MetricError, same_size, seen};
 use image::RgbImage;
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 use viewfuse_device::Device;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
+use viewfuse_nn::image::HostImage;
 
 /// What pictures, levels in `[-1, 1]`, are shifted by and divided by.
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
@@ -47,7 +48,7 @@ impl LpipsTrunk {
     pub fn steps(self) -> Vec<Step<Convolution>> {
         match self {
             LpipsTrunk::Alex => alexnet(),
-            LpipsTrunk::Vgg => vgg16(Pooling::Largest),
+            LpipsTrunk::Vgg => vgg16(Pooling::Max),
             LpipsTrunk::Squeeze => squeezenet(),
         }
     }
@@ -139,7 +140,7 @@ impl<D: Device> Lpips<D> {
 }
 
 /// The share of one tap.
-fn tap_distance(prediction: &Map, truth: &Map, head: &[f32]) -> f64 {
+fn tap_distance(prediction: &HostImage, truth: &HostImage, head: &[f32]) -> f64 {
     let length = |pixel: &[f32]| pixel.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt() + FLOOR;
     let distance = |(prediction, truth): (&[f32], &[f32])| -> f64 {
         let (prediction_length, truth_length) = (length(prediction), length(truth));

@@ -1,18 +1,16 @@
 //! Trunks: the published image networks that metrics look at pictures through, as trees of steps.
 //!
-//! A trunk is data ([`Step`]): which layers follow one another, which stand beside one another, and where the metric taps
-//! it. The same tree says which tensors a `state_dict` must have, is read from a checkpoint, and runs on any device
+//! A trunk is data ([`Step`]): which layers follow one another, which are concatenated, and where the metric taps it. The same tree says which tensors a `state_dict` must have, is read from a checkpoint, and runs on any device
 //! ([`Trunk`]).
 
 mod architectures;
-mod layer;
-mod pool;
 mod run;
 
 pub use architectures::{InceptionKind, Pooling, alexnet, inception, squeezenet, vgg16};
-pub use run::{Map, Trunk};
+pub use run::Trunk;
 
 use viewfuse_nn::checkpoint::TensorShape;
+use viewfuse_nn::pool::MaxPool;
 
 /// A convolution with bias; its output is rectified, as all of these networks do.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,7 +18,7 @@ pub struct Convolution {
     /// Its name in a `state_dict`.
     pub name: String,
     /// Whether it is torchvision's `BasicConv2d`: `conv.weight` and a batch norm `bn` in place of `weight` and `bias`.
-    pub is_normalised: bool,
+    pub has_batch_norm: bool,
     /// Output channels.
     pub channels: usize,
     /// Rows and columns of the window.
@@ -36,7 +34,7 @@ impl Convolution {
     pub fn square(name: impl Into<String>, channels: usize, side: usize, stride: usize, padding: usize) -> Convolution {
         Convolution {
             name: name.into(),
-            is_normalised: false,
+            has_batch_norm: false,
             channels,
             window: [side; 2],
             stride,
@@ -49,7 +47,7 @@ impl Convolution {
         let [rows, columns] = self.window;
         let kernel = vec![self.channels, in_channels, rows, columns];
         let tensor = |leaf: &str, shape| TensorShape { name: format!("{}.{leaf}", self.name), shape };
-        if !self.is_normalised {
+        if !self.has_batch_norm {
             return vec![tensor("weight", kernel), tensor("bias", vec![self.channels])];
         }
         let norms = ["bn.weight", "bn.bias", "bn.running_mean", "bn.running_var"];
@@ -58,36 +56,23 @@ impl Convolution {
     }
 }
 
-/// The largest of square windows; what lies outside of the image does not count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct LargestOf {
-    /// Side of the window.
-    pub side: u32,
-    /// Pixels from one window to the next.
-    pub stride: u32,
-    /// How far windows reach over the border.
-    pub padding: u32,
-    /// Whether a last window may hang over the bottom and right border (PyTorch's `ceil_mode`).
-    pub hangs_over: bool,
-}
-
 /// A step of a trunk. `C` is a convolution, or one with its parameters on a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Step<C> {
     /// A convolution.
     Convolve(C),
-    /// The largest of every window.
-    Largest(LargestOf),
+    /// A max pool.
+    MaxPool(MaxPool),
     /// The mean of every window of 3x3 around a pixel.
-    Mean {
+    AveragePool {
         /// Whether zeros outside of the image count (PyTorch's `count_include_pad`).
-        counts_border: bool,
+        count_include_pad: bool,
     },
-    /// DISTS' pooling: the square root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second
+    /// DISTS' L2 pool: the square root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second
     /// pixel.
-    RootMeanSquare,
-    /// Steps that see the same image, their outputs put side by side by channels.
-    Beside(Vec<Vec<Step<C>>>),
+    L2Pool,
+    /// Steps that see the same image, their outputs concatenated by channels.
+    Concatenate(Vec<Vec<Step<C>>>),
     /// The metric wants the image that is here.
     Tap,
 }
@@ -101,13 +86,13 @@ pub fn tensors(steps: &[Step<Convolution>], in_channels: usize) -> (Vec<TensorSh
                 all.extend(convolution.tensors(channels));
                 channels = convolution.channels;
             }
-            Step::Beside(branches) => {
+            Step::Concatenate(branches) => {
                 let branches = branches.iter().map(|branch| tensors(branch, channels));
                 let (shapes, counts): (Vec<_>, Vec<_>) = branches.unzip();
                 all.extend(shapes.into_iter().flatten());
                 channels = counts.iter().sum();
             }
-            Step::Largest(_) | Step::Mean { .. } | Step::RootMeanSquare | Step::Tap => {}
+            Step::MaxPool(_) | Step::AveragePool { .. } | Step::L2Pool | Step::Tap => {}
         }
     }
     (all, channels)

@@ -11,9 +11,9 @@
 mod denoiser;
 mod encoder;
 
-pub use crate::resnet::Level;
 pub use denoiser::{Block, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Resampling, group_count};
 pub use encoder::{ASPP_RATES, Encoder};
+pub use viewfuse_nn::resnet::Level;
 
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
 

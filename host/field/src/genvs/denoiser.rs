@@ -8,19 +8,33 @@
 mod block;
 mod embedding;
 
-use super::architecture::COLOUR_CHANNELS;
-use super::image::{Image, Scratch, Size};
-use super::layers::{Addend, Convolution, Loader, Norm, Way};
+use super::architecture::{COLOUR_CHANNELS, group_count};
 use crate::FieldError;
 use block::{Block, Resample};
-use embedding::{Embedding, Parts};
+use embedding::{Embedding, ShiftLayers};
 use std::f32::consts::FRAC_1_SQRT_2;
 use viewfuse_core::genvs::DenoiserInputBlock;
 use viewfuse_core::schedule::Preconditioning;
-use viewfuse_device::Device;
+use viewfuse_device::{Device, Memory};
+use viewfuse_nn::convolution::{Convolution, ConvolutionOptions, Residual};
+use viewfuse_nn::image::{Image, Size};
+use viewfuse_nn::loader::Loader;
+use viewfuse_nn::norm::GroupNorm;
+use viewfuse_nn::scratch::Scratch;
 
 /// Channels of a picture.
 const PICTURE_CHANNELS: u32 = COLOUR_CHANNELS as u32;
+/// What group norms add to variances (`networks.py`).
+const GROUP_NORM_EPSILON: f32 = 1.0e-6;
+
+const PLAIN: ConvolutionOptions = ConvolutionOptions::PLAIN;
+
+type Outcome<T, D> = Result<T, FieldError<<D as Memory>::Error>>;
+
+/// A group norm with as many groups as published.
+fn group_norm<D: Device>(loader: &Loader<'_, D>, name: &str) -> Outcome<GroupNorm<D>, D> {
+    Ok(loader.group_norm(name, group_count, GROUP_NORM_EPSILON)?)
+}
 
 /// A level of the encoder.
 struct Level<D: Device> {
@@ -29,53 +43,51 @@ struct Level<D: Device> {
     blocks: Vec<Block<D>>,
 }
 
-/// The way from a level to the next.
+/// From a level to the next.
 struct Down<D: Device> {
     block: Block<D>,
     /// The network's input, or what it became a level before, halved and brought to the level's channels.
-    residual: Convolution<D>,
+    aux_residual: Convolution<D>,
 }
 
-/// A level of the decoder: blocks that join nothing, then those that join what skipped.
-struct Rise<D: Device> {
-    alone: Vec<Block<D>>,
-    joining: Vec<Block<D>>,
+/// A level of the decoder: blocks without skip connection, then those that read one.
+struct DecoderLevel<D: Device> {
+    plain: Vec<Block<D>>,
+    skipped: Vec<Block<D>>,
 }
 
 /// The denoiser's layers on a device.
 pub(super) struct Denoiser<D: Device> {
     embedding: Embedding<D>,
-    entry: Convolution<D>,
+    first: Convolution<D>,
     levels: Vec<Level<D>>,
-    rises: Vec<Rise<D>>,
-    exit_norm: Norm<D>,
-    exit: Convolution<D>,
+    decoder_levels: Vec<DecoderLevel<D>>,
+    aux_norm: GroupNorm<D>,
+    aux_conv: Convolution<D>,
 }
 
 /// Reads blocks, and gathers what the noise level shifts in each.
 struct Blocks<'a, 'b, D: Device> {
     loader: &'a Loader<'b, D>,
-    shifts: Parts,
+    shifts: ShiftLayers,
 }
 
 impl<D: Device> Blocks<'_, '_, D> {
     fn load(&mut self, level: &str, what: &str, resample: Resample, side: u32) -> Outcome<Block<D>, D> {
         let name = format!("{level}_{what}");
-        let first_shift = self.shifts.push(self.loader, &name)?;
+        let first_shift = self.shifts.push(&self.loader.tensors, &name)?;
         Block::load(self.loader, &name, resample, side, first_shift)
     }
 
     /// `block0`, `block1` and so on, as many as there are.
     fn load_all(&mut self, level: &str, side: u32) -> Outcome<Vec<Block<D>>, D> {
         let mut blocks = Vec::new();
-        while self.loader.has(&format!("{level}_block{}.norm0.weight", blocks.len())) {
+        while self.loader.tensors.has(&format!("{level}_block{}.norm0.weight", blocks.len())) {
             blocks.push(self.load(level, &format!("block{}", blocks.len()), Resample::None, side)?);
         }
         Ok(blocks)
     }
 }
-
-type Outcome<T, D> = Result<T, FieldError<<D as viewfuse_device::Memory>::Error>>;
 
 impl<D: Device> Denoiser<D> {
     /// Reads it, for pictures of at least `side` rows and columns. `resolutions` are its levels' in the names of the
@@ -84,38 +96,39 @@ impl<D: Device> Denoiser<D> {
     /// # Errors
     /// If the checkpoint cannot be read, or the device has no room.
     pub(super) fn load(loader: &Loader<'_, D>, side: u32, resolutions: &[u32]) -> Outcome<Denoiser<D>, D> {
-        let mut blocks = Blocks { loader, shifts: Parts::default() };
-        let (mut levels, mut rises) = (Vec::new(), Vec::new());
+        let mut blocks = Blocks { loader, shifts: ShiftLayers::default() };
+        let (mut levels, mut decoder_levels) = (Vec::new(), Vec::new());
         for (depth, resolution) in resolutions.iter().enumerate() {
             let (side, name) = (side >> depth, format!("enc.{resolution}x{resolution}"));
             let down = match depth {
                 0 => None,
                 _ => Some(Down {
                     block: blocks.load(&name, "down", Resample::Halve, side)?,
-                    residual: loader
-                        .changed_convolution(&format!("{name}_aux_residual"), 0, |window| window.then_halved())?,
+                    aux_residual: loader.changed_convolution(&format!("{name}_aux_residual"), 0, |weights| {
+                        weights.followed_by_average_pool()
+                    })?,
                 }),
             };
             levels.push(Level { down, blocks: blocks.load_all(&name, side)? });
         }
         for (depth, resolution) in resolutions.iter().enumerate().rev() {
             let (side, name) = (side >> depth, format!("dec.{resolution}x{resolution}"));
-            let alone = if rises.is_empty() {
+            let plain = if decoder_levels.is_empty() {
                 vec![blocks.load(&name, "in0", Resample::None, side)?, blocks.load(&name, "in1", Resample::None, side)?]
             } else {
                 vec![blocks.load(&name, "up", Resample::Double, side)?]
             };
-            rises.push(Rise { alone, joining: blocks.load_all(&name, side)? });
+            decoder_levels.push(DecoderLevel { plain, skipped: blocks.load_all(&name, side)? });
         }
         let largest = resolutions[0];
         let (first, last) = (format!("enc.{largest}x{largest}"), format!("dec.{largest}x{largest}"));
         Ok(Denoiser {
             embedding: Embedding::load(loader, blocks.shifts)?,
-            entry: loader.convolution(&format!("{first}_conv"), side)?,
+            first: loader.convolution(&format!("{first}_conv"), side)?,
             levels,
-            rises,
-            exit_norm: loader.norm(&format!("{last}_aux_norm"))?,
-            exit: loader.convolution(&format!("{last}_aux_conv"), side)?,
+            decoder_levels,
+            aux_norm: group_norm(loader, &format!("{last}_aux_norm"))?,
+            aux_conv: loader.convolution(&format!("{last}_aux_conv"), side)?,
         })
     }
 
@@ -126,13 +139,12 @@ impl<D: Device> Denoiser<D> {
     /// If the device is lost or has no room.
     pub(super) fn run(
         &self,
-        device: &D,
         scratch: &mut Scratch<'_, D>,
         noisy: &D::Buffer<f32>,
         condition: &Image<D>,
         at: &Preconditioning,
     ) -> Result<Image<D>, D::Error> {
-        let size = condition.size;
+        let (device, size) = (scratch.device(), condition.size);
         let block = DenoiserInputBlock {
             picture_channels: PICTURE_CHANNELS,
             condition_channels: size.channels,
@@ -141,27 +153,27 @@ impl<D: Device> Denoiser<D> {
         let mut inputs = scratch.image(size.with_channels(PICTURE_CHANNELS + size.channels))?;
         device.denoiser_input(&block, size.pixel_count(), noisy, &condition.values, &mut inputs.values)?;
         let shifts = self.embedding.shifts(device, at.noise)?;
-        let skips = self.encode(device, scratch, inputs, &shifts)?;
-        let x = self.decode(device, scratch, skips, &shifts)?;
-        let normalised = self.exit_norm.run(scratch, device, &x, true)?;
-        let output = self.exit.run(scratch, device, Way::PLAIN, &normalised, Addend::None)?;
-        scratch.give(x);
-        scratch.give(normalised);
+        let skips = self.encode(scratch, inputs, &shifts)?;
+        let x = self.decode(scratch, skips, &shifts)?;
+        let normalised = self.aux_norm.run(scratch, &x, true)?;
+        let output = self.aux_conv.run(scratch, PLAIN, &normalised, Residual::None)?;
+        scratch.recycle(x);
+        scratch.recycle(normalised);
         Ok(output)
     }
 
     /// All that skips to the decoder, in the order in which it is made.
     fn encode(
         &self,
-        device: &D,
         scratch: &mut Scratch<'_, D>,
         inputs: Image<D>,
         shifts: &D::Buffer<f32>,
     ) -> Result<Vec<Image<D>>, D::Error> {
+        let device = scratch.device();
         let mut in_front = self.channels_in_front().into_iter();
         let mut place = |scratch: &mut Scratch<'_, D>, size: Size| {
             let front = in_front.next().unwrap_or(0);
-            scratch.beside(size, front + size.channels, front)
+            scratch.channel_slice(size, front + size.channels, front)
         };
         let mut skips: Vec<Image<D>> = Vec::new();
         // Where the first image of the level before is, once there is one.
@@ -170,18 +182,18 @@ impl<D: Device> Denoiser<D> {
             let first = match (&level.down, skips.last()) {
                 (Some(down), Some(x)) => {
                     let mut halved = scratch.image(down.block.out_size(x.size))?;
-                    down.block.run(device, scratch, shifts, x, &mut halved)?;
+                    down.block.run(scratch, shifts, x, &mut halved)?;
                     let mut first = place(scratch, halved.size)?;
-                    let way = Way { stride: 2, padding: Some(1), scale: FRAC_1_SQRT_2, ..Way::PLAIN };
-                    let given = residual.map_or(&inputs, |index| &skips[index]);
-                    down.residual.run_into(device, way, given, Addend::Image(&halved), &mut first)?;
-                    scratch.give(halved);
+                    let options = ConvolutionOptions { stride: 2, padding: Some(1), scale: FRAC_1_SQRT_2, ..PLAIN };
+                    let input = residual.map_or(&inputs, |index| &skips[index]);
+                    down.aux_residual.run_into(device, options, input, Residual::Image(&halved), &mut first)?;
+                    scratch.recycle(halved);
                     residual = Some(skips.len());
                     first
                 }
                 _ => {
-                    let mut first = place(scratch, inputs.size.with_channels(self.entry.channels))?;
-                    self.entry.run_into(device, Way::PLAIN, &inputs, Addend::None, &mut first)?;
+                    let mut first = place(scratch, inputs.size.with_channels(self.first.channels))?;
+                    self.first.run_into(device, PLAIN, &inputs, Residual::None, &mut first)?;
                     first
                 }
             };
@@ -189,11 +201,11 @@ impl<D: Device> Denoiser<D> {
             for block in &level.blocks {
                 let x = &skips[skips.len() - 1];
                 let mut next = place(scratch, block.out_size(x.size))?;
-                block.run(device, scratch, shifts, x, &mut next)?;
+                block.run(scratch, shifts, x, &mut next)?;
                 skips.push(next);
             }
         }
-        scratch.give(inputs);
+        scratch.recycle(inputs);
         Ok(skips)
     }
 
@@ -201,43 +213,42 @@ impl<D: Device> Denoiser<D> {
     fn channels_in_front(&self) -> Vec<u32> {
         let mut made = Vec::new();
         for level in &self.levels {
-            made.push(level.down.as_ref().map_or(self.entry.channels, |down| down.block.channels));
+            made.push(level.down.as_ref().map_or(self.first.channels, |down| down.block.channels));
             made.extend(level.blocks.iter().map(|block| block.channels));
         }
-        // The last one made is joined first.
-        let joining = self.rises.iter().flat_map(|rise| &rise.joining).map(|block| block.in_channels);
-        let mut in_front: Vec<u32> = made.iter().rev().zip(joining).map(|(own, all)| all - own).collect();
+        // The last one made is read first.
+        let skipped = self.decoder_levels.iter().flat_map(|level| &level.skipped).map(|block| block.in_channels);
+        let mut in_front: Vec<u32> = made.iter().rev().zip(skipped).map(|(own, all)| all - own).collect();
         in_front.reverse();
         in_front
     }
 
     fn decode(
         &self,
-        device: &D,
         scratch: &mut Scratch<'_, D>,
         mut skips: Vec<Image<D>>,
         shifts: &D::Buffer<f32>,
     ) -> Result<Image<D>, D::Error> {
         let mut x: Option<Image<D>> = None;
-        for rise in &self.rises {
-            let count = rise.alone.len() + rise.joining.len();
-            for (index, block) in rise.alone.iter().chain(&rise.joining).enumerate() {
-                let joins_next = index + 1 >= rise.alone.len() && index + 1 < count;
-                // Where the next block joins what skipped, the output goes in front of that.
-                let skip = if joins_next { skips.pop() } else { None };
-                // The first block reads the last image that skips, and joins nothing.
+        for level in &self.decoder_levels {
+            let count = level.plain.len() + level.skipped.len();
+            for (index, block) in level.plain.iter().chain(&level.skipped).enumerate() {
+                let next_is_skipped = index + 1 >= level.plain.len() && index + 1 < count;
+                // Where the next block has a skip connection, the output goes in front of what comes through it.
+                let skip = if next_is_skipped { skips.pop() } else { None };
+                // The first block reads the last image that skips, and nothing beside it.
                 let input = x.as_ref().unwrap_or_else(|| &skips[skips.len() - 1]);
                 let size = block.out_size(input.size);
                 let mut output = match skip {
-                    Some(skip) => skip.seen_as(0, size.channels),
+                    Some(skip) => skip.channel_slice(0, size.channels),
                     None => scratch.image(size)?,
                 };
-                block.run(device, scratch, shifts, input, &mut output)?;
+                block.run(scratch, shifts, input, &mut output)?;
                 if let Some(x) = x.take() {
-                    scratch.give(x);
+                    scratch.recycle(x);
                 }
                 let channels = output.pitch;
-                x = Some(output.seen_as(0, channels));
+                x = Some(output.channel_slice(0, channels));
             }
         }
         Ok(x.unwrap_or_else(|| unreachable!("a decoder has blocks")))

@@ -3,8 +3,6 @@
 //!
 //! Source: `pixel_nerf_net.py`, with the mean over views replaced by weights.
 
-use super::image::{Image, Scratch, Size, enlarge};
-use super::layers::Loader;
 use super::looking::Looking;
 use super::volume::Volume;
 use crate::FieldError;
@@ -13,10 +11,14 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
-use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::rays::CastBlock;
-use viewfuse_device::{Device, Layer};
+use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_nn::image::{Image, Size};
+use viewfuse_nn::linear::{Linear, LinearOptions};
+use viewfuse_nn::loader::Loader;
+use viewfuse_nn::resample::upsample;
+use viewfuse_nn::scratch::Scratch;
 
 /// Rays that the CPU takes at once: their points' activations stay in its caches.
 const LEAST_RAYS: usize = 64;
@@ -37,7 +39,7 @@ pub(super) struct Views<'a, D: Device> {
 
 /// The network that is asked about points, on a device.
 pub(super) struct PointNetwork<D: Device> {
-    layers: [Layer<D>; 3],
+    layers: [Linear<D>; 3],
     /// Features of a point.
     pub(super) features: u32,
     width: u32,
@@ -59,18 +61,12 @@ impl<D: Device> PointNetwork<D> {
         hidden: &mut [D::Buffer<f32>; 2],
         raw: &mut D::Buffer<f32>,
     ) -> Result<(), D::Error> {
-        let block = |inner_count: u32, column_count: u32, relu_outputs: u32| ProductBlock {
-            row_count: point_count,
-            inner_count,
-            column_count,
-            relu_outputs,
-            ..ProductBlock::default()
-        };
+        let rectified = LinearOptions { relu_inputs: false, relu_outputs: true };
         let [first, second, third] = &self.layers;
         let [inside, next] = hidden;
-        device.product(&block(self.features, self.width, 1), fused, &first.weights, &first.bias, None, inside)?;
-        device.product(&block(self.width, self.width, 1), inside, &second.weights, &second.bias, None, next)?;
-        device.product(&block(self.width, 1 + self.features, 0), next, &third.weights, &third.bias, None, raw)
+        first.run(device, point_count, rectified, fused, None, inside)?;
+        second.run(device, point_count, rectified, inside, None, next)?;
+        third.run(device, point_count, LinearOptions::PLAIN, next, None, raw)
     }
 
     /// Room for what is inside it at so many points.
@@ -105,10 +101,10 @@ pub(super) fn render<D: Device>(
         features.extend(tile.render(pixels, &cast).map_err(failed)?);
     }
     check_finite(&features, "rendering the target's features", "feature image")?;
-    let half_image = scratch.uploaded(half, &features).map_err(failed)?;
+    let half_image = Image::upload(scratch.device(), half, &features).map_err(failed)?;
     let mut image = scratch.image(half.doubled()).map_err(failed)?;
-    enlarge(device, &half_image, 0, &mut image).map_err(failed)?;
-    scratch.give(half_image);
+    upsample(device, &half_image, 0, &mut image).map_err(failed)?;
+    scratch.recycle(half_image);
     Ok(image)
 }
 

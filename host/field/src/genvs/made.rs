@@ -3,13 +3,13 @@
 use super::architecture::{Architecture, IMAGE_SIDE};
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::Checkpoint;
-use viewfuse_nn::formula;
+use viewfuse_nn::initialisation;
 
 /// By what tensors of the networks by formula are multiplied, so that volumes and densities vary.
 const GAINS: [(&str, f32); 2] =
     [("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0), ("pixel_nerf_net.mlp.layers.2.weight", 4.0)];
 
-/// Every tensor by [`formula`], computed when it is read. With [`Architecture::published`] it is the network of the
+/// Every tensor by [`initialisation`], computed when it is read. With [`Architecture::published`] it is the network of the
 /// reference values.
 pub fn by_formula(architecture: &Architecture) -> Checkpoint {
     let metadata = match architecture.denoiser {
@@ -17,7 +17,7 @@ pub fn by_formula(architecture: &Architecture) -> Checkpoint {
         None => BTreeMap::from([(IMAGE_SIDE.to_owned(), architecture.image_side.to_string())]),
     };
     Checkpoint::computed("genvs", architecture.tensors(), metadata, |tensor| {
-        let mut values = formula::tensor(&tensor.name, &tensor.shape);
+        let mut values = initialisation::tensor(&tensor.name, &tensor.shape);
         if let Some((_, gain)) = GAINS.iter().find(|(name, _)| *name == tensor.name) {
             values.iter_mut().for_each(|value| *value *= gain);
         }

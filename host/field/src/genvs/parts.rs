@@ -6,8 +6,6 @@ use super::architecture::{Architecture, COLOUR_CHANNELS};
 use super::denoiser::Denoiser;
 use super::encoder::Encoder;
 use super::feature_image::{PointNetwork, Views, render};
-use super::image::{Image, Scratch, Size};
-use super::layers::Loader;
 use super::looking::Looking;
 use super::sampling::{Plan, Sampled, Start, sample};
 use super::volume::Volume;
@@ -15,12 +13,15 @@ use crate::FieldError;
 use crate::finite::{check_finite, download_finite};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::network::normalise::MeanBlock;
 use viewfuse_core::sampler::Mix;
 use viewfuse_core::schedule::Preconditioning;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_nn::image::{Image, Size};
+use viewfuse_nn::loader::Loader;
+use viewfuse_nn::pool::global_average_pool;
+use viewfuse_nn::scratch::Scratch;
 
 /// The parts of a network.
 pub(super) struct Parts<D: Device> {
@@ -41,7 +42,7 @@ impl<D: Device> Parts<D> {
         architecture: &Architecture,
         side: u32,
     ) -> Outcome<Parts<D>, D> {
-        let loader = |prefix| Loader { device, checkpoint, prefix };
+        let loader = |prefix| Loader::new(device, checkpoint, prefix);
         let features = architecture.encoder.feature_count;
         let denoiser = architecture.denoiser.as_ref().map(|denoiser| {
             let sides: Vec<u32> =
@@ -49,7 +50,7 @@ impl<D: Device> Parts<D> {
             Denoiser::load(&loader("denoiser.model."), side, &sides)
         });
         Ok(Parts {
-            encoder: Encoder::load(&loader("pixel_nerf_net.encoder."), side, features)?,
+            encoder: Encoder::load(&loader("pixel_nerf_net.encoder."), &architecture.encoder, side)?,
             points: PointNetwork::load(&loader("pixel_nerf_net."), features as u32, architecture.mlp_width as u32)?,
             denoiser: denoiser.transpose()?,
         })
@@ -70,11 +71,8 @@ impl<D: Device> Parts<D> {
         }
         let Some(image) = volume.image() else { return Ok(new_rows) };
         // A mean is no number where one of its summands is none: a small download tells whether to look at all of them.
-        let Size { channels, .. } = image.size;
-        let block = MeanBlock { pixel_count: image.size.pixel_count(), channels };
-        let mut means = device.zeros(channels as usize).map_err(failed)?;
-        device.channel_means(&block, &image.values, &mut means).map_err(failed)?;
-        let means = device.download(&means).map_err(failed)?;
+        let means = global_average_pool(&mut Scratch::new(device), image).map_err(failed)?;
+        let means = device.download(&means.values).map_err(failed)?;
         if means.iter().any(|mean| !mean.is_finite()) {
             download_finite(device, &image.values, &encoding(view), "volume [row][column][depth][feature]")?;
         }
@@ -138,11 +136,11 @@ impl<D: Device> Parts<D> {
     ) -> Result<(), D::Error> {
         let Some(denoiser) = &self.denoiser else { return Ok(()) };
         let at = Preconditioning::at(level);
-        let output = denoiser.run(device, scratch, noisy, features, &at)?;
+        let output = denoiser.run(scratch, noisy, features, &at)?;
         let mix = Mix { state: at.skip, results: [at.output, 0.0, 0.0, 0.0] };
         let (count, unused) = (output.size.pixel_count() * output.size.channels, noisy);
         device.mix_pictures(&mix, count, noisy, &output.values, unused, unused, unused, denoised)?;
-        scratch.give(output);
+        scratch.recycle(output);
         Ok(())
     }
 }

@@ -1,7 +1,6 @@
 //! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
 
 use super::feature_image::Views;
-use super::image::{Image, Scratch, Size};
 use super::looking::Looking;
 use super::sampling::{Plan, Start};
 use super::{Architecture, Genvs, Outcome, Prepared};
@@ -10,6 +9,8 @@ use std::cell::Ref;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Silent;
+use viewfuse_nn::image::{Image, Size};
+use viewfuse_nn::scratch::Scratch;
 use viewfuse_scene::photographs::SourceImages;
 
 /// Sources on a device, with the network.
@@ -166,6 +167,10 @@ impl<'a, D: Device> Reference<'a, D> {
         features: &[f32],
         [height, width]: [u32; 2],
     ) -> Result<Image<D>, D::Error> {
-        scratch.uploaded(Size { height, width, channels: (features.len() as u32) / (height * width) }, features)
+        Image::upload(
+            scratch.device(),
+            Size { height, width, channels: (features.len() as u32) / (height * width) },
+            features,
+        )
     }
 }

@@ -2,7 +2,6 @@
 //! 16 bits.
 
 use super::encoder::Encoder;
-use super::image::{Image, Scratch, Size};
 use super::looking::Looking;
 use std::ops::Range;
 use viewfuse_core::Vec3;
@@ -11,6 +10,8 @@ use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::half::{fetch_half, word_count};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
+use viewfuse_nn::image::{Image, Size};
+use viewfuse_nn::scratch::Scratch;
 
 /// What is known of a view.
 pub(super) struct Volume<D: Device> {
@@ -41,10 +42,10 @@ impl<D: Device> Volume<D> {
     pub(super) fn encode(device: &D, encoder: &Encoder<D>, values: &[f32], size: Size) -> Result<Volume<D>, D::Error> {
         // Its own: what an encoding needs in between is not kept beside the volumes.
         let mut scratch = Scratch::new(device);
-        let deep = encoder.encode(device, &mut scratch, values, size)?;
+        let deep = encoder.encode(&mut scratch, values, size)?;
         let size = encoder.volume_size(size);
         // Rows that no target looks at are never written.
-        let image = Scratch::new(device).image(size)?;
+        let image = Image::zeros(device, size)?;
         Ok(Volume { size, nodes: Nodes::Whole { deep, image }, filled: 0..0 })
     }
 

@@ -4,11 +4,11 @@
 //! trunk is torchvision's ResNet of basic blocks). Sizes are read off the tensors: trunk width and depth, how many trunk
 //! levels there are latents of, the width and depth of the two point networks, how many blocks latents are injected into.
 
-pub use crate::resnet::Level;
+pub use viewfuse_nn::resnet::Level;
 
-use crate::resnet;
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
+use viewfuse_nn::resnet;
 
 /// Most octaves: sines of more are noise in `f32`.
 const MOST_OCTAVES: usize = 20;

@@ -3,17 +3,17 @@
 use super::architecture::Architecture;
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
-use viewfuse_nn::formula;
+use viewfuse_nn::initialisation;
 
 /// Outputs of the networks by formula are multiplied by this, so that densities vary.
 const OUTPUT_GAIN: f32 = 6.0;
 
-/// Every tensor by [`formula`]; space is full of mist. With [`Architecture::published`] it is the network of the reference
+/// Every tensor by [`initialisation`]; space is full of mist. With [`Architecture::published`] it is the network of the reference
 /// values.
 pub fn by_formula(architecture: &Architecture) -> Checkpoint {
     made("formula", architecture, |tensor| {
         let gain = if tensor.name.ends_with("lin_out.weight") { OUTPUT_GAIN } else { 1.0 };
-        let mut values = formula::tensor(&tensor.name, &tensor.shape);
+        let mut values = initialisation::tensor(&tensor.name, &tensor.shape);
         values.iter_mut().for_each(|value| *value *= gain);
         values
     })
@@ -71,7 +71,7 @@ const DENSITY_OFFSET: f32 = 2.0;
 const DENSITY_NOISE: f32 = 0.02;
 
 fn by_formula_values(tensor: &TensorShape) -> Vec<f32> {
-    formula::tensor(&tensor.name, &tensor.shape)
+    initialisation::tensor(&tensor.name, &tensor.shape)
 }
 
 fn made(

@@ -6,10 +6,10 @@ use super::parameters::PointNetwork;
 use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::rays::RayPoint;
-use viewfuse_device::{Device, Layer};
+use viewfuse_device::Device;
+use viewfuse_nn::linear::{Linear, LinearOptions};
 
 /// Floats that a buffer of activations holds on the CPU: 4 MiB, which a few cores' caches hold together. Quarter and four
 /// times as many took the same time.
@@ -33,7 +33,7 @@ pub(super) struct Workspace<D: Device> {
     pub(super) point_count: u32,
     pub(super) points: D::Buffer<RayPoint>,
     embedded: D::Buffer<f32>,
-    /// `[view][point][channel]`; empty where the grids hold injections.
+    /// `[view][point][channel]`; empty where the grids hold what `lin_z` makes of them.
     latents: D::Buffer<f32>,
     /// `[view][point][width]`, later `[point][width]`: what flows through the blocks, what comes behind it, and what is
     /// inside a block.
@@ -102,7 +102,7 @@ pub(super) fn workspace_bytes<D: Device>(
 pub(super) struct Network<'a, D: Device> {
     pub(super) device: &'a D,
     pub(super) architecture: &'a Architecture,
-    pub(super) layers: &'a PointNetwork<Layer<D>>,
+    pub(super) layers: &'a PointNetwork<Linear<D>>,
     /// Which list of a view's grids is this network's; `None` where the grid holds latents.
     pub(super) grids: Option<usize>,
 }
@@ -125,15 +125,13 @@ impl<D: Device> Network<'_, D> {
             frequency: architecture.frequency,
         };
         device.embed_points(&embed, view_count, &views.cameras, &workspace.points, &mut workspace.embedded)?;
-        let entry =
-            ProductBlock { row_count, inner_count: embed.row_len(), column_count: width, ..ProductBlock::default() };
-        let Layer { weights, bias } = &layers.entry;
-        device.product(&entry, &workspace.embedded, weights, bias, None, &mut workspace.flow)?;
+        let Workspace { embedded, flow, .. } = workspace;
+        layers.lin_in.run(device, row_count, LinearOptions::PLAIN, embedded, None, flow)?;
         if self.grids.is_none() {
             self.gather_latents(workspace, views, point_count)?;
         }
         for block in 0..architecture.injected_count {
-            self.inject(workspace, views, point_count, block)?;
+            self.add_latents(workspace, views, point_count, block)?;
             self.run_block(workspace, row_count, block)?;
         }
         let Workspace { points, visible, flow, next, .. } = workspace;
@@ -145,15 +143,8 @@ impl<D: Device> Network<'_, D> {
         for block in architecture.injected_count..architecture.block_count {
             self.run_block(workspace, point_count, block)?;
         }
-        let exit = ProductBlock {
-            row_count: point_count,
-            inner_count: width,
-            column_count: 4,
-            relu_inputs: 1,
-            ..ProductBlock::default()
-        };
-        let Layer { weights, bias } = &layers.exit;
-        device.product(&exit, &workspace.flow, weights, bias, None, &mut workspace.raw)
+        let options = LinearOptions { relu_inputs: true, relu_outputs: false };
+        layers.lin_out.run(device, point_count, options, &workspace.flow, None, &mut workspace.raw)
     }
 
     /// Looks the latents up in every view.
@@ -172,8 +163,8 @@ impl<D: Device> Network<'_, D> {
         Ok(())
     }
 
-    /// Adds a block's injection of latents: from the grids that hold it already, or as a product.
-    fn inject(
+    /// Adds what a block's `lin_z` makes of the latents: from the grids that hold it already, or at the points.
+    fn add_latents(
         &self,
         workspace: &mut Workspace<D>,
         views: &Views<'_, D>,
@@ -191,14 +182,9 @@ impl<D: Device> Network<'_, D> {
                 }
             }
             None => {
-                let product = ProductBlock {
-                    row_count: views.latents.len() as u32 * point_count,
-                    inner_count: self.architecture.latent_channels() as u32,
-                    column_count: width,
-                    ..ProductBlock::default()
-                };
-                let Layer { weights, bias } = &self.layers.injections[block];
-                self.device.product(&product, latents, weights, bias, Some(flow), next)?;
+                let row_count = views.latents.len() as u32 * point_count;
+                let lin_z = &self.layers.lin_z[block];
+                lin_z.run(self.device, row_count, LinearOptions::PLAIN, latents, Some(flow), next)?;
             }
         }
         swap(flow, next);
@@ -211,15 +197,13 @@ impl<D: Device> Network<'_, D> {
         GatherBlock { view, point_count, channel_count, height, width, has_addend: 0, pixel_centre }
     }
 
-    /// A residual block: `flow + second(relu(first(relu(flow))))`.
+    /// A residual block: `flow + fc_1(relu(fc_0(relu(flow))))`.
     fn run_block(&self, workspace: &mut Workspace<D>, row_count: u32, block: usize) -> Result<(), D::Error> {
-        let width = self.architecture.width as u32;
-        let [first, second] = &self.layers.blocks[block];
-        let product = ProductBlock { row_count, inner_count: width, column_count: width, ..ProductBlock::default() };
-        let into = ProductBlock { relu_inputs: 1, relu_outputs: 1, ..product };
+        let [fc_0, fc_1] = &self.layers.blocks[block];
+        let rectified = LinearOptions { relu_inputs: true, relu_outputs: true };
         let Workspace { flow, next, inside, .. } = workspace;
-        self.device.product(&into, flow, &first.weights, &first.bias, None, inside)?;
-        self.device.product(&product, inside, &second.weights, &second.bias, Some(flow), next)?;
+        fc_0.run(self.device, row_count, rectified, flow, None, inside)?;
+        fc_1.run(self.device, row_count, LinearOptions::PLAIN, inside, Some(flow), next)?;
         swap(flow, next);
         Ok(())
     }

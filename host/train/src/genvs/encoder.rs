@@ -6,7 +6,7 @@ use super::super::operations::Window;
 use super::layers::{Layers, convolved};
 use candle_core::{Result, Tensor};
 use viewfuse_field::genvs::{ASPP_RATES, Encoder};
-use viewfuse_field::resnet::needs_downsample;
+use viewfuse_nn::resnet::has_shortcut;
 
 /// Volumes `[image][row][column][depth and feature]` of pictures `[image][row][column][3]` in `[-1, 1]`.
 pub(super) fn volumes(layers: Layers<'_>, sizes: &Encoder, pictures: &Tensor) -> Result<Tensor> {
@@ -44,7 +44,7 @@ fn trunk(layers: Layers<'_>, sizes: &Encoder, stem: &Tensor) -> Result<[Tensor; 
             let window = Window { padding: dilation, dilation, ..Window::same(3) };
             let inside = layers.plain(&format!("{name}.conv1"), &image, Window { stride, ..window }, true)?;
             let inside = layers.plain(&format!("{name}.conv2"), &inside, window, false)?;
-            let beside = match block == 0 && needs_downsample(level, channels, sizes.channels) {
+            let beside = match block == 0 && has_shortcut(level, channels, sizes.channels) {
                 true => {
                     let window = Window { stride, ..Window::same(1) };
                     layers.plain(&format!("{name}.downsample.0"), &image, window, false)?

@@ -4,7 +4,8 @@
 //! (richzhang/PerceptualSimilarity, `pretrained_networks.py`), of DISTS (dingkeyan93/DISTS, `DISTS_pt.py`) and of
 //! pytorch-fid (mseitzer/pytorch-fid, `inception.py`).
 
-use super::{Convolution, LargestOf, Step};
+use super::{Convolution, Step};
+use viewfuse_nn::pool::MaxPool;
 
 type Steps = Vec<Step<Convolution>>;
 
@@ -12,23 +13,23 @@ type Steps = Vec<Step<Convolution>>;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pooling {
     /// As torchvision does, and LPIPS.
-    Largest,
+    Max,
     /// As DISTS does.
-    RootMeanSquare,
+    L2,
 }
 
 /// Which Inception v3 it is: the files have the same names, and the networks pool differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InceptionKind {
-    /// The one that FID is defined with, `pt_inception-2015-12-05` of pytorch-fid: averages do not count the border, the
-    /// last block takes the largest instead of the average, and it knows 1008 classes.
+    /// The one that FID is defined with, `pt_inception-2015-12-05` of pytorch-fid: average pools do not count the border,
+    /// the last block has a max pool instead, and it knows 1008 classes.
     Fid,
-    /// Torchvision's, of 1000 classes: averages count zeros outside of the image. Distances are not those of tables.
+    /// Torchvision's, of 1000 classes: average pools count zeros outside of the image. Distances are not those of tables.
     Torchvision,
 }
 
-const HALVE_3: LargestOf = LargestOf { side: 3, stride: 2, padding: 0, hangs_over: false };
-const HALVE_2: LargestOf = LargestOf { side: 2, stride: 2, padding: 0, hangs_over: false };
+const POOL_3: MaxPool = MaxPool { size: 3, stride: 2, padding: 0, ceil_mode: false };
+const POOL_2: MaxPool = MaxPool { size: 2, stride: 2, padding: 0, ceil_mode: false };
 
 fn convolve(name: impl Into<String>, channels: usize, side: usize, stride: usize, padding: usize) -> Step<Convolution> {
     Step::Convolve(Convolution::square(name, channels, side, stride, padding))
@@ -39,10 +40,10 @@ pub fn alexnet() -> Steps {
     vec![
         convolve("features.0", 64, 11, 4, 2),
         Step::Tap,
-        Step::Largest(HALVE_3),
+        Step::MaxPool(POOL_3),
         convolve("features.3", 192, 5, 1, 2),
         Step::Tap,
-        Step::Largest(HALVE_3),
+        Step::MaxPool(POOL_3),
         convolve("features.6", 384, 3, 1, 1),
         Step::Tap,
         convolve("features.8", 256, 3, 1, 1),
@@ -60,8 +61,8 @@ pub fn vgg16(pooling: Pooling) -> Steps {
     for (channels, places) in STAGES {
         if !steps.is_empty() {
             steps.push(match pooling {
-                Pooling::Largest => Step::Largest(HALVE_2),
-                Pooling::RootMeanSquare => Step::RootMeanSquare,
+                Pooling::Max => Step::MaxPool(POOL_2),
+                Pooling::L2 => Step::L2Pool,
             });
         }
         steps.extend(places.iter().map(|place| convolve(format!("features.{place}"), channels, 3, 1, 1)));
@@ -72,12 +73,12 @@ pub fn vgg16(pooling: Pooling) -> Steps {
 
 /// SqueezeNet 1.1, tapped seven times: 64, 128, 256, 384, 384, 512 and 512 channels.
 pub fn squeezenet() -> Steps {
-    let halve = || Step::Largest(LargestOf { hangs_over: true, ..HALVE_3 });
+    let halve = || Step::MaxPool(MaxPool { ceil_mode: true, ..POOL_3 });
     let fire = |place: usize, narrow: usize, wide: usize| {
         let name = |leaf: &str| format!("features.{place}.{leaf}");
         let expand = [convolve(name("expand1x1"), wide, 1, 1, 0), convolve(name("expand3x3"), wide, 3, 1, 1)]
             .map(|step| vec![step]);
-        [convolve(name("squeeze"), narrow, 1, 1, 0), Step::Beside(expand.into())]
+        [convolve(name("squeeze"), narrow, 1, 1, 0), Step::Concatenate(expand.into())]
     };
     let mut steps = vec![convolve("features.0", 64, 3, 2, 0), Step::Tap, halve()];
     steps.extend(fire(3, 16, 64).into_iter().chain(fire(4, 16, 64)));
@@ -100,30 +101,30 @@ pub fn inception(kind: InceptionKind) -> Steps {
         stem("Conv2d_1a_3x3", 32, 3, 2, 0),
         stem("Conv2d_2a_3x3", 32, 3, 1, 0),
         stem("Conv2d_2b_3x3", 64, 3, 1, 1),
-        Step::Largest(HALVE_3),
+        Step::MaxPool(POOL_3),
         stem("Conv2d_3b_1x1", 80, 1, 1, 0),
         stem("Conv2d_4a_3x3", 192, 3, 1, 0),
-        Step::Largest(HALVE_3),
+        Step::MaxPool(POOL_3),
     ];
-    let mean = || Step::Mean { counts_border: kind == InceptionKind::Torchvision };
+    let average_pool = || Step::AveragePool { count_include_pad: kind == InceptionKind::Torchvision };
     steps.extend([("Mixed_5b", 32), ("Mixed_5c", 64), ("Mixed_5d", 64)].map(|(name, pooled)| {
         let block = Block(name);
-        Step::Beside(vec![
+        Step::Concatenate(vec![
             vec![block.one("branch1x1", 64)],
             vec![block.one("branch5x5_1", 48), block.same("branch5x5_2", 64, [5, 5])],
             block.double(96, 1),
-            vec![mean(), block.one("branch_pool", pooled)],
+            vec![average_pool(), block.one("branch_pool", pooled)],
         ])
     }));
     let block = Block("Mixed_6a");
-    steps.push(Step::Beside(vec![
+    steps.push(Step::Concatenate(vec![
         vec![block.halve("branch3x3", 384)],
         block.double(96, 2),
-        vec![Step::Largest(HALVE_3)],
+        vec![Step::MaxPool(POOL_3)],
     ]));
     steps.extend([("Mixed_6b", 128), ("Mixed_6c", 160), ("Mixed_6d", 160), ("Mixed_6e", 192)].map(|(name, narrow)| {
         let block = Block(name);
-        Step::Beside(vec![
+        Step::Concatenate(vec![
             vec![block.one("branch1x1", 192)],
             vec![
                 block.one("branch7x7_1", narrow),
@@ -137,11 +138,11 @@ pub fn inception(kind: InceptionKind) -> Steps {
                 block.same("branch7x7dbl_4", narrow, [7, 1]),
                 block.same("branch7x7dbl_5", 192, [1, 7]),
             ],
-            vec![mean(), block.one("branch_pool", 192)],
+            vec![average_pool(), block.one("branch_pool", 192)],
         ])
     }));
     let block = Block("Mixed_7a");
-    steps.push(Step::Beside(vec![
+    steps.push(Step::Concatenate(vec![
         vec![block.one("branch3x3_1", 192), block.halve("branch3x3_2", 320)],
         vec![
             block.one("branch7x7x3_1", 192),
@@ -149,16 +150,16 @@ pub fn inception(kind: InceptionKind) -> Steps {
             block.same("branch7x7x3_3", 192, [7, 1]),
             block.halve("branch7x7x3_4", 192),
         ],
-        vec![Step::Largest(HALVE_3)],
+        vec![Step::MaxPool(POOL_3)],
     ]));
-    let largest = Step::Largest(LargestOf { side: 3, stride: 1, padding: 1, hangs_over: false });
-    let last = if kind == InceptionKind::Fid { largest } else { mean() };
-    steps.extend([("Mixed_7b", mean()), ("Mixed_7c", last)].map(|(name, pool)| {
+    let max_pool = Step::MaxPool(MaxPool { size: 3, stride: 1, padding: 1, ceil_mode: false });
+    let last = if kind == InceptionKind::Fid { max_pool } else { average_pool() };
+    steps.extend([("Mixed_7b", average_pool()), ("Mixed_7c", last)].map(|(name, pool)| {
         let block = Block(name);
         let split = |first: &str, second: &str| {
-            Step::Beside(vec![vec![block.same(first, 384, [1, 3])], vec![block.same(second, 384, [3, 1])]])
+            Step::Concatenate(vec![vec![block.same(first, 384, [1, 3])], vec![block.same(second, 384, [3, 1])]])
         };
-        Step::Beside(vec![
+        Step::Concatenate(vec![
             vec![block.one("branch1x1", 320)],
             vec![block.one("branch3x3_1", 384), split("branch3x3_2a", "branch3x3_2b")],
             vec![
@@ -175,7 +176,7 @@ pub fn inception(kind: InceptionKind) -> Steps {
 
 /// Torchvision's `BasicConv2d`.
 fn basic(name: String, channels: usize, window: [usize; 2], stride: usize, padding: [usize; 2]) -> Step<Convolution> {
-    Step::Convolve(Convolution { name, is_normalised: true, channels, window, stride, padding })
+    Step::Convolve(Convolution { name, has_batch_norm: true, channels, window, stride, padding })
 }
 
 /// A block of Inception, by its name.

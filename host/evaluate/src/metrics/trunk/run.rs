@@ -1,62 +1,33 @@
 //! A trunk on a device.
 
-use super::layer::{Loaded, load};
-use super::{Convolution, LargestOf, Step, pool, tensors};
+use super::{Convolution, Step, tensors};
 use crate::metrics::MetricError;
 use std::rc::Rc;
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
-use viewfuse_device::Device;
+use viewfuse_device::{Device, Memory};
 use viewfuse_field::finite::check_finite;
-use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
+use viewfuse_nn::convolution::{Convolution as Layer, ConvolutionOptions, Residual};
+use viewfuse_nn::image::{HostImage, Image};
+use viewfuse_nn::loader::Tensors;
+use viewfuse_nn::pool::{average_pool, l2_pool};
+use viewfuse_nn::resample::concatenate;
+use viewfuse_nn::scratch::Scratch;
+use viewfuse_nn::weights::ConvolutionWeights;
 
-/// An image of any number of channels on the host.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Map {
-    /// Rows.
-    pub height: usize,
-    /// Columns.
-    pub width: usize,
-    /// Numbers of a pixel.
-    pub channels: usize,
-    /// `[row][column][channel]`.
-    pub values: Vec<f32>,
-}
+/// What Inception's batch norms add to variances.
+const BATCH_NORM_EPSILON: f64 = 1.0e-3;
 
-impl Map {
-    /// The channels of a pixel.
-    ///
-    /// # Panics
-    /// Outside of the image.
-    pub fn pixel(&self, row: usize, column: usize) -> &[f32] {
-        &self.values[(row * self.width + column) * self.channels..][..self.channels]
-    }
-
-    /// The channels of every pixel.
-    pub fn pixels(&self) -> impl Iterator<Item = &[f32]> {
-        self.values.chunks_exact(self.channels.max(1))
-    }
-
-    /// A channel of every pixel.
-    ///
-    /// # Panics
-    /// If there is no such channel.
-    pub fn channel(&self, channel: usize) -> impl Iterator<Item = f64> + '_ {
-        self.values[channel..].iter().step_by(self.channels).map(|value| f64::from(*value))
-    }
-}
+type Outcome<D, T> = Result<T, MetricError<<D as Memory>::Error>>;
 
 /// A trunk with its parameters on a device.
 pub struct Trunk<D: Device> {
-    steps: Vec<Step<Loaded<D>>>,
+    steps: Vec<Step<LoadedConvolution<D>>>,
 }
 
-/// An image `[row][column][channel]` in a device's memory.
-struct Image<D: Device> {
-    height: u32,
-    width: u32,
-    channels: u32,
-    values: D::Buffer<f32>,
+/// A convolution with its parameters on a device, and how it is run.
+struct LoadedConvolution<D: Device> {
+    layer: Layer<D>,
+    options: ConvolutionOptions,
 }
 
 impl<D: Device> Trunk<D> {
@@ -81,47 +52,101 @@ impl<D: Device> Trunk<D> {
     /// # Errors
     /// [`MetricError::Small`] if a window is larger than what it is to slide over; [`MetricError::NotFinite`];
     /// [`MetricError::Device`].
-    pub fn taps(&self, device: &D, input: &Map) -> Result<Vec<Map>, MetricError<D::Error>> {
-        let mut run = Run { device, input, taps: Vec::new() };
-        let image = Rc::new(run.upload(input)?);
-        run.steps(&self.steps, image)?;
+    pub fn taps(&self, device: &D, input: &HostImage) -> Result<Vec<HostImage>, MetricError<D::Error>> {
+        let mut run = Run { scratch: Scratch::new(device), input, taps: Vec::new() };
+        let image = input.upload(device).map_err(MetricError::Device)?;
+        run.steps(&self.steps, Rc::new(image))?;
         Ok(run.taps)
     }
 }
 
-/// One picture on its way.
-struct Run<'a, D: Device> {
-    device: &'a D,
-    input: &'a Map,
-    taps: Vec<Map>,
+/// Takes steps to a device.
+fn load<D: Device>(
+    device: &D,
+    checkpoint: &Checkpoint,
+    steps: &[Step<Convolution>],
+) -> Outcome<D, Vec<Step<LoadedConvolution<D>>>> {
+    let step = |step: &Step<Convolution>| {
+        Ok(match step {
+            Step::Convolve(convolution) => Step::Convolve(LoadedConvolution::load(device, checkpoint, convolution)?),
+            Step::MaxPool(pool) => Step::MaxPool(*pool),
+            Step::AveragePool { count_include_pad } => Step::AveragePool { count_include_pad: *count_include_pad },
+            Step::L2Pool => Step::L2Pool,
+            Step::Concatenate(branches) => {
+                let branches = branches.iter().map(|branch| load(device, checkpoint, branch));
+                Step::Concatenate(branches.collect::<Result<_, _>>()?)
+            }
+            Step::Tap => Step::Tap,
+        })
+    };
+    steps.iter().map(step).collect()
 }
 
-type Outcome<D, T> = Result<T, MetricError<<D as viewfuse_device::Memory>::Error>>;
+impl<D: Device> LoadedConvolution<D> {
+    fn load(
+        device: &D,
+        checkpoint: &Checkpoint,
+        convolution: &Convolution,
+    ) -> Result<LoadedConvolution<D>, MetricError<D::Error>> {
+        let weights = weights(checkpoint, convolution)?;
+        // Windows of one row or one column have become squares, which begin so much further out.
+        let [above, left] = convolution.window.map(|length| (weights.size - length) / 2);
+        let padding = convolution.padding[0] + above;
+        debug_assert_eq!(padding, convolution.padding[1] + left, "{}", convolution.name);
+        let (stride, padding) = (convolution.stride as u32, Some(padding as u32));
+        let options = ConvolutionOptions { stride, padding, ..ConvolutionOptions::RELU };
+        // Scores are to be exact: no device may take another way for large images.
+        let layer = weights.load(device, 0).map_err(MetricError::Device)?;
+        Ok(LoadedConvolution { layer, options })
+    }
+}
+
+fn weights(checkpoint: &Checkpoint, convolution: &Convolution) -> Result<ConvolutionWeights, CheckpointError> {
+    let name = &convolution.name;
+    let tensors = Tensors { checkpoint, prefix: "" };
+    if !convolution.has_batch_norm {
+        return tensors.convolution(name);
+    }
+    tensors.convolution_with_norm(&format!("{name}.conv"), &format!("{name}.bn"), BATCH_NORM_EPSILON)
+}
+
+/// One picture on its way.
+struct Run<'a, D: Device> {
+    /// No image is handed back to it: those at the taps are downloaded with their whole buffers, and a buffer that is used
+    /// again may be twice as long as its image.
+    scratch: Scratch<'a, D>,
+    input: &'a HostImage,
+    taps: Vec<HostImage>,
+}
 
 impl<D: Device> Run<'_, D> {
-    fn steps(&mut self, steps: &[Step<Loaded<D>>], mut image: Rc<Image<D>>) -> Outcome<D, Rc<Image<D>>> {
+    fn steps(&mut self, steps: &[Step<LoadedConvolution<D>>], mut image: Rc<Image<D>>) -> Outcome<D, Rc<Image<D>>> {
         for step in steps {
             image = match step {
-                Step::Convolve(convolution) => Rc::new(self.convolve(convolution, &image)?),
-                Step::Largest(window) => Rc::new(self.largest(window, &image)?),
-                Step::Mean { counts_border } => {
-                    let map = self.download(&image)?;
-                    Rc::new(self.upload(&pool::mean(&map, *counts_border))?)
+                Step::Convolve(LoadedConvolution { layer, options }) => {
+                    layer.out_size(*options, image.size).ok_or_else(|| self.small())?;
+                    let output = layer.run(&mut self.scratch, *options, &image, Residual::None);
+                    Rc::new(output.map_err(MetricError::Device)?)
                 }
-                Step::RootMeanSquare => {
-                    let map = self.download(&image)?;
-                    Rc::new(self.upload(&pool::root_mean_square(&map))?)
+                Step::MaxPool(pool) => {
+                    pool.out_size(image.size).ok_or_else(|| self.small())?;
+                    Rc::new(pool.run(&mut self.scratch, &image).map_err(MetricError::Device)?)
                 }
-                Step::Beside(branches) => {
-                    let outputs: Vec<_> =
-                        branches.iter().map(|branch| self.steps(branch, image.clone())).collect::<Result<_, _>>()?;
-                    Rc::new(self.beside(&outputs)?)
+                Step::AveragePool { count_include_pad } => {
+                    self.on_host(&image, |image| average_pool(image, *count_include_pad))?
+                }
+                Step::L2Pool => self.on_host(&image, l2_pool)?,
+                Step::Concatenate(branches) => {
+                    let outputs = branches.iter().map(|branch| self.steps(branch, image.clone()));
+                    let outputs: Vec<Rc<Image<D>>> = outputs.collect::<Result<_, _>>()?;
+                    let outputs: Vec<&Image<D>> = outputs.iter().map(AsRef::as_ref).collect();
+                    Rc::new(concatenate(&mut self.scratch, &outputs).map_err(MetricError::Device)?)
                 }
                 Step::Tap => {
-                    let map = self.download(&image)?;
+                    let tapped = self.download(&image)?;
                     let tap = format!("tap {}", self.taps.len());
-                    check_finite(&map.values, "looking at a picture through a metric's network", &tap)?;
-                    self.taps.push(map);
+                    check_finite(&tapped.values, "looking at a picture through a metric's network", &tap)?;
+                    self.taps.push(tapped);
                     image
                 }
             };
@@ -129,93 +154,16 @@ impl<D: Device> Run<'_, D> {
         Ok(image)
     }
 
-    fn upload(&self, map: &Map) -> Outcome<D, Image<D>> {
-        let values = self.device.upload(&map.values).map_err(MetricError::Device)?;
-        Ok(Image { height: map.height as u32, width: map.width as u32, channels: map.channels as u32, values })
+    fn on_host(&self, image: &Image<D>, step: impl FnOnce(&HostImage) -> HostImage) -> Outcome<D, Rc<Image<D>>> {
+        let output = step(&self.download(image)?);
+        Ok(Rc::new(output.upload(self.scratch.device()).map_err(MetricError::Device)?))
     }
 
-    fn download(&self, image: &Image<D>) -> Outcome<D, Map> {
-        let [height, width, channels] = [image.height, image.width, image.channels].map(|length| length as usize);
-        let mut values = self.device.download(&image.values).map_err(MetricError::Device)?;
-        values.truncate(height * width * channels);
-        Ok(Map { height, width, channels, values })
+    fn download(&self, image: &Image<D>) -> Outcome<D, HostImage> {
+        image.download(self.scratch.device()).map_err(MetricError::Device)
     }
 
-    fn zeros(&self, [height, width]: [u32; 2], channels: u32) -> Outcome<D, Image<D>> {
-        let count = height as usize * width as usize * channels as usize;
-        Ok(Image { height, width, channels, values: self.device.zeros(count).map_err(MetricError::Device)? })
-    }
-
-    /// How many windows lie on each side of an image.
-    fn windows(&self, image: &Image<D>, window: &LargestOf) -> Outcome<D, [u32; 2]> {
-        let count = |length: u32| {
-            let free = (length + 2 * window.padding).checked_sub(window.side)?;
-            Some(1 + if window.hangs_over { free.div_ceil(window.stride) } else { free / window.stride })
-        };
-        match (count(image.height), count(image.width)) {
-            (Some(height), Some(width)) => Ok([height, width]),
-            _ => Err(MetricError::Small { width: self.input.width, height: self.input.height }),
-        }
-    }
-
-    fn convolve(&self, convolution: &Loaded<D>, image: &Image<D>) -> Outcome<D, Image<D>> {
-        let Loaded { layer, channels, side, stride, padding } = convolution;
-        let window = LargestOf { side: *side, stride: *stride, padding: *padding, hangs_over: false };
-        let mut out = self.zeros(self.windows(image, &window)?, *channels)?;
-        let block = ConvolveBlock {
-            in_height: image.height,
-            in_width: image.width,
-            in_channels: image.channels,
-            out_height: out.height,
-            out_width: out.width,
-            out_channels: out.channels,
-            size: *side,
-            stride: *stride,
-            padding: *padding,
-            relu_outputs: 1,
-            ..ConvolveBlock::default()
-        }
-        .packed();
-        self.device
-            .convolve(&block, &image.values, &layer.weights, &layer.bias, None, &mut out.values)
-            .map_err(MetricError::Device)?;
-        Ok(out)
-    }
-
-    fn largest(&self, window: &LargestOf, image: &Image<D>) -> Outcome<D, Image<D>> {
-        let mut out = self.zeros(self.windows(image, window)?, image.channels)?;
-        let block = PoolBlock {
-            in_height: image.height,
-            in_width: image.width,
-            out_height: out.height,
-            out_width: out.width,
-            channels: image.channels,
-            size: window.side,
-            stride: window.stride,
-            padding: window.padding,
-        };
-        self.device.max_pool(&block, &image.values, &mut out.values).map_err(MetricError::Device)?;
-        Ok(out)
-    }
-
-    /// Images of one size side by side by channels: enlarging to the own size is copying.
-    fn beside(&self, images: &[Rc<Image<D>>]) -> Outcome<D, Image<D>> {
-        let size = images.first().map_or([0, 0], |image| [image.height, image.width]);
-        let mut out = self.zeros(size, images.iter().map(|image| image.channels).sum())?;
-        let mut first_channel = 0;
-        for image in images {
-            let block = UpsampleBlock {
-                in_height: image.height,
-                in_width: image.width,
-                in_channels: image.channels,
-                out_height: out.height,
-                out_width: out.width,
-                out_channels: out.channels,
-                first_channel,
-            };
-            self.device.upsample(&block, &image.values, &mut out.values).map_err(MetricError::Device)?;
-            first_channel += image.channels;
-        }
-        Ok(out)
+    fn small(&self) -> MetricError<D::Error> {
+        MetricError::Small { width: self.input.width, height: self.input.height }
     }
 }

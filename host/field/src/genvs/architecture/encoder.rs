@@ -1,8 +1,8 @@
 //! From an image to a volume of features: DeepLabV3+ on a ResNet trunk, with learned upsampling.
 
 use super::{COLOUR_CHANNELS, with_bias};
-use crate::resnet::{self, Level, batch_norm};
 use viewfuse_nn::checkpoint::{CheckpointError, Sizes, TensorShape};
+use viewfuse_nn::resnet::{self, Level, batch_norm_tensors};
 
 /// Dilations of the three dilated branches of the ASPP module (atrous spatial pyramid pooling).
 pub const ASPP_RATES: [usize; 3] = [12, 24, 36];
@@ -105,21 +105,21 @@ impl Encoder {
         let branch = |branch: usize| format!("{decoder}.aspp.0.convs.{branch}");
         let pooled = 1 + ASPP_RATES.len();
         pointwise(&mut tensors, &format!("{}.0", branch(0)), inner, last);
-        batch_norm(&mut tensors, &format!("{}.1", branch(0)), inner);
+        batch_norm_tensors(&mut tensors, &format!("{}.1", branch(0)), inner);
         for dilated in 1..pooled {
             separable(&mut tensors, &format!("{}.0", branch(dilated)), inner, last);
-            batch_norm(&mut tensors, &format!("{}.1", branch(dilated)), inner);
+            batch_norm_tensors(&mut tensors, &format!("{}.1", branch(dilated)), inner);
         }
         pointwise(&mut tensors, &format!("{}.1", branch(pooled)), inner, last);
-        batch_norm(&mut tensors, &format!("{}.2", branch(pooled)), inner);
+        batch_norm_tensors(&mut tensors, &format!("{}.2", branch(pooled)), inner);
         pointwise(&mut tensors, &format!("{decoder}.aspp.0.project.0"), inner, (pooled + 1) * inner);
-        batch_norm(&mut tensors, &format!("{decoder}.aspp.0.project.1"), inner);
+        batch_norm_tensors(&mut tensors, &format!("{decoder}.aspp.0.project.1"), inner);
         separable(&mut tensors, &format!("{decoder}.aspp.1"), inner, inner);
-        batch_norm(&mut tensors, &format!("{decoder}.aspp.2"), inner);
+        batch_norm_tensors(&mut tensors, &format!("{decoder}.aspp.2"), inner);
         pointwise(&mut tensors, &format!("{decoder}.block1.0"), high, first);
-        batch_norm(&mut tensors, &format!("{decoder}.block1.1"), high);
+        batch_norm_tensors(&mut tensors, &format!("{decoder}.block1.1"), high);
         separable(&mut tensors, &format!("{decoder}.block2.0"), inner, inner + high);
-        batch_norm(&mut tensors, &format!("{decoder}.block2.1"), inner);
+        batch_norm_tensors(&mut tensors, &format!("{decoder}.block2.1"), inner);
         // Convolutions by what they see, and transposed ones between that double the side.
         let up = format!("{decoder}.modified_up");
         stage(&mut tensors, &format!("{up}.stage1"), inner, third + last + inner);

@@ -1,12 +1,16 @@
 //! A residual block of the U-Net, and self-attention behind it.
 
-use super::super::image::{Image, Scratch, Size};
-use super::super::layers::{Addend, Convolution, Depthwise, Loader, Norm, Way};
-use super::Outcome;
+use super::{Outcome, PLAIN, group_norm};
 use crate::FieldError;
 use std::f32::consts::FRAC_1_SQRT_2;
-use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_device::Device;
+use viewfuse_nn::attention::self_attention;
+use viewfuse_nn::convolution::{Convolution, ConvolutionOptions, DepthwiseConvolution, Residual};
+use viewfuse_nn::image::{Image, Size};
+use viewfuse_nn::loader::Loader;
+use viewfuse_nn::norm::GroupNorm;
+use viewfuse_nn::scratch::Scratch;
+use viewfuse_nn::weights::ConvolutionWeights;
 
 /// What a block does to its image's size. The published filter is `[1, 1]`: the mean of 2x2 pixels, or each of them
 /// repeated.
@@ -23,15 +27,15 @@ pub(super) enum Resample {
 /// A block's layers.
 pub(super) struct Block<D: Device> {
     resample: Resample,
-    halving: Option<Depthwise<D>>,
-    first_norm: Norm<D>,
-    first: Convolution<D>,
+    halving: Option<DepthwiseConvolution<D>>,
+    norm0: GroupNorm<D>,
+    conv0: Convolution<D>,
     /// Where the block's shifts by noise level start.
     first_shift: u32,
-    second_norm: Norm<D>,
-    second: Convolution<D>,
-    /// Where sizes or channels change.
-    beside: Option<Convolution<D>>,
+    norm1: GroupNorm<D>,
+    conv1: Convolution<D>,
+    /// The shortcut's convolution (`skip`), where sizes or channels change.
+    shortcut: Option<Convolution<D>>,
     attention: Option<Attention<D>>,
     /// Of its input.
     pub(super) in_channels: u32,
@@ -41,10 +45,10 @@ pub(super) struct Block<D: Device> {
 
 /// Self-attention with one head.
 struct Attention<D: Device> {
-    norm: Norm<D>,
+    norm2: GroupNorm<D>,
     /// To queries, keys and values, one behind the other.
-    entry: Convolution<D>,
-    exit: Convolution<D>,
+    qkv: Convolution<D>,
+    proj: Convolution<D>,
 }
 
 impl<D: Device> Block<D> {
@@ -57,36 +61,36 @@ impl<D: Device> Block<D> {
         first_shift: u32,
     ) -> Outcome<Block<D>, D> {
         let layer = |layer: &str| format!("{name}.{layer}");
-        let first = loader.convolution(&layer("conv0"), side)?;
-        let has = |name: &str| loader.has(&layer(&format!("{name}.weight")));
-        // What is beside a block that halves sees the mean of 2x2 pixels: a window of 2x2.
-        let beside = |window: super::super::layers::Window| match resample {
-            Resample::Halve => window.then_halved(),
-            _ => window,
+        let conv0 = loader.convolution(&layer("conv0"), side)?;
+        let has = |name: &str| loader.tensors.has(&layer(&format!("{name}.weight")));
+        let shortcut = |weights: ConvolutionWeights| match resample {
+            Resample::Halve => weights.followed_by_average_pool(),
+            _ => weights,
         };
         let attention = || {
             Ok::<_, FieldError<D::Error>>(Attention {
-                norm: loader.norm(&layer("norm2"))?,
+                norm2: group_norm(loader, &layer("norm2"))?,
                 // Published: the three of a channel lie together.
-                entry: loader.changed_convolution(&layer("qkv"), 0, |window| {
-                    let channels = window.columns / 3;
-                    window.reordered(|column| column % channels * 3 + column / channels)
+                qkv: loader.changed_convolution(&layer("qkv"), 0, |weights| {
+                    let channels = weights.out_channels / 3;
+                    weights.with_outputs_reordered(|column| column % channels * 3 + column / channels)
                 })?,
-                exit: loader.convolution(&layer("proj"), 0)?,
+                proj: loader.convolution(&layer("proj"), 0)?,
             })
         };
-        let halving = (resample == Resample::Halve).then(|| Depthwise::halving(loader.device)).transpose();
+        let halving = (resample == Resample::Halve).then(|| DepthwiseConvolution::average_pool(loader.device));
+        let norm0 = group_norm(loader, &layer("norm0"))?;
         Ok(Block {
             resample,
-            halving: halving.map_err(FieldError::Device)?,
-            in_channels: loader.tensor(&layer("norm0.weight"))?.len() as u32,
-            channels: first.channels,
-            first_norm: loader.norm(&layer("norm0"))?,
-            first,
+            halving: halving.transpose().map_err(FieldError::Device)?,
+            in_channels: norm0.channels,
+            channels: conv0.channels,
+            norm0,
+            conv0,
             first_shift,
-            second_norm: loader.norm(&layer("norm1"))?,
-            second: loader.convolution(&layer("conv1"), side)?,
-            beside: has("skip").then(|| loader.changed_convolution(&layer("skip"), 0, beside)).transpose()?,
+            norm1: group_norm(loader, &layer("norm1"))?,
+            conv1: loader.convolution(&layer("conv1"), side)?,
+            shortcut: has("skip").then(|| loader.changed_convolution(&layer("skip"), 0, shortcut)).transpose()?,
             attention: has("qkv").then(attention).transpose()?,
         })
     }
@@ -104,96 +108,59 @@ impl<D: Device> Block<D> {
     /// Runs it into an image of the right size; `shifts` are those of all blocks.
     pub(super) fn run(
         &self,
-        device: &D,
         scratch: &mut Scratch<'_, D>,
         shifts: &D::Buffer<f32>,
         image: &Image<D>,
         output: &mut Image<D>,
     ) -> Result<(), D::Error> {
-        let mut normalised = self.first_norm.run(scratch, device, image, true)?;
+        let mut normalised = self.norm0.run(scratch, image, true)?;
         if let Some(halving) = &self.halving {
-            let way = Way { stride: 2, padding: Some(0), ..Way::PLAIN };
-            let halved = halving.run(scratch, device, way, &normalised)?;
-            scratch.give(std::mem::replace(&mut normalised, halved));
+            let options = ConvolutionOptions { stride: 2, padding: Some(0), ..PLAIN };
+            let halved = halving.run(scratch, options, &normalised)?;
+            scratch.recycle(std::mem::replace(&mut normalised, halved));
         }
-        let enlarge = if self.resample == Resample::Double { 2 } else { 1 };
-        let way = Way { enlarge, ..Way::PLAIN };
-        let shift = Addend::Shared(shifts, self.first_shift);
-        let inside = self.first.run(scratch, device, way, &normalised, shift)?;
-        scratch.give(normalised);
-        let normalised = self.second_norm.run(scratch, device, &inside, true)?;
-        scratch.give(inside);
+        let upsampling = if self.resample == Resample::Double { 2 } else { 1 };
+        let options = ConvolutionOptions { upsampling, ..PLAIN };
+        let shift = Residual::Channels(shifts, self.first_shift);
+        let inside = self.conv0.run(scratch, options, &normalised, shift)?;
+        scratch.recycle(normalised);
+        let normalised = self.norm1.run(scratch, &inside, true)?;
+        scratch.recycle(inside);
         let stride = if self.resample == Resample::Halve { 2 } else { 1 };
-        let beside_way = Way { stride, padding: Some(0), ..way };
-        let beside = self
-            .beside
-            .as_ref()
-            .map(|layer| layer.run(scratch, device, beside_way, image, Addend::None))
-            .transpose()?;
-        let addend = Addend::Image(beside.as_ref().unwrap_or(image));
+        let shortcut_options = ConvolutionOptions { stride, padding: Some(0), ..options };
+        let shortcut = match &self.shortcut {
+            Some(layer) => Some(layer.run(scratch, shortcut_options, image, Residual::None)?),
+            None => None,
+        };
+        let residual = Residual::Image(shortcut.as_ref().unwrap_or(image));
         // The sum of two independent images is brought back to the variance of one.
-        let way = Way { scale: FRAC_1_SQRT_2, ..Way::PLAIN };
+        let options = ConvolutionOptions { scale: FRAC_1_SQRT_2, ..PLAIN };
         match &self.attention {
-            None => self.second.run_into(device, way, &normalised, addend, output)?,
+            None => self.conv1.run_into(scratch.device(), options, &normalised, residual, output)?,
             Some(attention) => {
-                let sum = self.second.run(scratch, device, way, &normalised, addend)?;
-                attention.run_into(device, scratch, &sum, output)?;
-                scratch.give(sum);
+                let sum = self.conv1.run(scratch, options, &normalised, residual)?;
+                attention.run_into(scratch, &sum, output)?;
+                scratch.recycle(sum);
             }
         }
-        scratch.give(normalised);
-        if let Some(beside) = beside {
-            scratch.give(beside);
+        scratch.recycle(normalised);
+        if let Some(shortcut) = shortcut {
+            scratch.recycle(shortcut);
         }
         Ok(())
     }
 }
 
 impl<D: Device> Attention<D> {
-    /// The image and what its pixels make of one another.
-    fn run_into(
-        &self,
-        device: &D,
-        scratch: &mut Scratch<'_, D>,
-        image: &Image<D>,
-        output: &mut Image<D>,
-    ) -> Result<(), D::Error> {
-        let (pixels, channels) = (image.size.pixel_count(), image.size.channels);
-        let normalised = self.norm.run(scratch, device, image, false)?;
-        let triples = self.entry.run(scratch, device, Way::PLAIN, &normalised, Addend::None)?;
-        let table = Size { height: pixels, width: 1, channels: pixels };
-        let (mut scores, mut weights) = (scratch.image(table)?, scratch.image(table)?);
-        let block = MatrixBlock {
-            row_count: pixels,
-            inner_count: channels,
-            column_count: pixels,
-            left_pitch: 3 * channels,
-            left_first: 0,
-            // The keys, transposed.
-            right_row_pitch: 1,
-            right_column_pitch: 3 * channels,
-            right_first: channels,
-            scale: 1.0 / (channels as f32).sqrt(),
-        };
-        device.multiply_matrices(&block, &triples.values, &triples.values, &mut scores.values)?;
-        device.softmax_rows(&pixels, pixels, &scores.values, &mut weights.values)?;
-        let block = MatrixBlock {
-            row_count: pixels,
-            inner_count: pixels,
-            column_count: channels,
-            left_pitch: pixels,
-            left_first: 0,
-            right_row_pitch: 3 * channels,
-            right_column_pitch: 1,
-            right_first: 2 * channels,
-            scale: 1.0,
-        };
-        let mut attended = scratch.image(image.size)?;
-        device.multiply_matrices(&block, &weights.values, &triples.values, &mut attended.values)?;
-        let way = Way { scale: FRAC_1_SQRT_2, ..Way::PLAIN };
-        self.exit.run_into(device, way, &attended, Addend::Image(image), output)?;
-        for image in [normalised, triples, scores, weights, attended] {
-            scratch.give(image);
+    /// The image plus what attention makes of it.
+    fn run_into(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>, output: &mut Image<D>) -> Result<(), D::Error> {
+        let normalised = self.norm2.run(scratch, image, false)?;
+        let qkv = self.qkv.run(scratch, PLAIN, &normalised, Residual::None)?;
+        let attended = self_attention(scratch, &qkv)?;
+        let options = ConvolutionOptions { scale: FRAC_1_SQRT_2, ..PLAIN };
+        self.proj.run_into(scratch.device(), options, &attended, Residual::Image(image), output)?;
+        for image in [normalised, qkv, attended] {
+            scratch.recycle(image);
         }
         Ok(())
     }

@@ -1,0 +1,66 @@
+//! Self-attention of an image's pixels.
+
+use super::image::{Image, Size};
+use super::scratch::Scratch;
+use viewfuse_core::network::attend::MatrixBlock;
+use viewfuse_device::Device;
+
+/// Scaled dot-product attention with one head: of `qkv[pixel][query, key, value][channel]`, an image that fills its buffer,
+/// each pixel's mean of all values, weighted by the softmax of `query . key / sqrt(channels)`.
+///
+/// # Errors
+/// If the device is lost or has no memory left.
+pub fn self_attention<D: Device>(scratch: &mut Scratch<'_, D>, qkv: &Image<D>) -> Result<Image<D>, D::Error> {
+    let device = scratch.device();
+    let (pixels, channels) = (qkv.size.pixel_count(), qkv.size.channels / 3);
+    let table = Size { height: pixels, width: 1, channels: pixels };
+    let (mut scores, mut weights) = (scratch.image(table)?, scratch.image(table)?);
+    let block = MatrixBlock {
+        row_count: pixels,
+        inner_count: channels,
+        column_count: pixels,
+        left_pitch: 3 * channels,
+        left_first: 0,
+        // The keys, transposed.
+        right_row_pitch: 1,
+        right_column_pitch: 3 * channels,
+        right_first: channels,
+        scale: 1.0 / (channels as f32).sqrt(),
+    };
+    device.multiply_matrices(&block, &qkv.values, &qkv.values, &mut scores.values)?;
+    device.softmax_rows(&pixels, pixels, &scores.values, &mut weights.values)?;
+    let block = MatrixBlock {
+        row_count: pixels,
+        inner_count: pixels,
+        column_count: channels,
+        left_pitch: pixels,
+        left_first: 0,
+        right_row_pitch: 3 * channels,
+        right_column_pitch: 1,
+        right_first: 2 * channels,
+        scale: 1.0,
+    };
+    let mut attended = scratch.image(qkv.size.with_channels(channels))?;
+    device.multiply_matrices(&block, &weights.values, &qkv.values, &mut attended.values)?;
+    scratch.recycle(scores);
+    scratch.recycle(weights);
+    Ok(attended)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_device::cpu::Cpu;
+
+    #[test]
+    fn equal_keys_give_means_and_a_strong_one_its_value() {
+        let mut scratch = Scratch::new(&Cpu);
+        let size = Size { height: 2, width: 1, channels: 3 };
+        let Ok(qkv) = Image::upload(&Cpu, size, &[1.0, 0.0, 2.0, 5.0, 0.0, 4.0]);
+        let Ok(means) = self_attention(&mut scratch, &qkv);
+        assert_eq!((means.size.channels, &means.values[..2]), (1, &[3.0, 3.0][..]));
+        let Ok(qkv) = Image::upload(&Cpu, size, &[0.0, -50.0, 2.0, 1.0, 50.0, 4.0]);
+        let Ok(attended) = self_attention(&mut scratch, &qkv);
+        assert_eq!(attended.values[..2], [3.0, 4.0]);
+    }
+}

@@ -1,0 +1,312 @@
+//! Convolutions: of all channels, of each channel by itself, and transposed.
+
+use super::image::{Image, Size};
+use super::scratch::Scratch;
+use super::window::Windows;
+use std::ops::Range;
+use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::depthwise::DepthwiseBlock;
+use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_device::{Device, Layer};
+
+/// A convolution with bias on a device.
+pub struct Convolution<D: Device> {
+    pub(crate) layer: Layer<D>,
+    /// Rows and columns of the window.
+    pub size: u32,
+    /// Channels of the output.
+    pub channels: u32,
+}
+
+/// How a convolution is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ConvolutionOptions {
+    /// Pixels from one window to the next.
+    pub stride: u32,
+    /// Pixels from one place of the window to the next.
+    pub dilation: u32,
+    /// Rows and columns of zeros around the image; `None`: as many as keep its size at stride 1.
+    pub padding: Option<u32>,
+    /// How many times each input pixel is repeated in both directions first (nearest-neighbour upsampling).
+    pub upsampling: u32,
+    /// Factor of the result, the residual included.
+    pub scale: f32,
+    /// Whether negative outputs become 0.
+    pub relu: bool,
+}
+
+impl ConvolutionOptions {
+    /// Image to image of the same size.
+    pub const PLAIN: ConvolutionOptions =
+        ConvolutionOptions { stride: 1, dilation: 1, padding: None, upsampling: 1, scale: 1.0, relu: false };
+    /// The same, rectified.
+    pub const RELU: ConvolutionOptions = ConvolutionOptions { relu: true, ..ConvolutionOptions::PLAIN };
+
+    /// Rows and columns of zeros around the image for a window of this size.
+    fn padding(&self, window: u32) -> u32 {
+        self.padding.unwrap_or((window - 1) * self.dilation / 2)
+    }
+
+    fn windows(&self, window: u32) -> Windows {
+        let (reach, padding) = ((window - 1) * self.dilation + 1, self.padding(window));
+        Windows { reach, stride: self.stride, padding, ceil_mode: false }
+    }
+
+    /// Size of the output for an input, one row or column where not even one window fits.
+    fn out_size(&self, size: Size, window: u32, channels: u32) -> Size {
+        let count = |side: u32| self.windows(window).count_at_least_one(side * self.upsampling);
+        Size { height: count(size.height), width: count(size.width), channels }
+    }
+}
+
+/// What is added to a convolution's result, before it is scaled and rectified.
+pub enum Residual<'a, D: Device> {
+    /// Nothing.
+    None,
+    /// An image of its output's size.
+    Image(&'a Image<D>),
+    /// The same numbers at every pixel: `[channel]` from a place of a buffer on.
+    Channels(&'a D::Buffer<f32>, u32),
+}
+
+impl<D: Device> Convolution<D> {
+    /// Size of the output for an image of this size; `None` if the image with its padding is smaller than the window.
+    pub fn out_size(&self, options: ConvolutionOptions, size: Size) -> Option<Size> {
+        let windows = options.windows(self.size);
+        let count = |side: u32| windows.count(side * options.upsampling);
+        Some(Size { height: count(size.height)?, width: count(size.width)?, channels: self.channels })
+    }
+
+    /// Runs it into a new image. Of an image smaller than the window, the output has one row or column.
+    ///
+    /// # Errors
+    /// If the device is lost or has no memory left.
+    pub fn run(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        options: ConvolutionOptions,
+        image: &Image<D>,
+        residual: Residual<'_, D>,
+    ) -> Result<Image<D>, D::Error> {
+        let mut output = scratch.image(options.out_size(image.size, self.size, self.channels))?;
+        self.run_into(scratch.device(), options, image, residual, &mut output)?;
+        Ok(output)
+    }
+
+    /// Runs it into an image of the right size.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn run_into(
+        &self,
+        device: &D,
+        options: ConvolutionOptions,
+        image: &Image<D>,
+        residual: Residual<'_, D>,
+        output: &mut Image<D>,
+    ) -> Result<(), D::Error> {
+        let block = self.block(options, image, output);
+        debug_assert_eq!([block.out_height, block.out_width], [output.size.height, output.size.width]);
+        let (residual, addend_pitch, addend_first) = match residual {
+            Residual::None => (None, 0, 0),
+            Residual::Image(image) => (Some(&image.values), image.pitch, image.first),
+            Residual::Channels(values, first) => (Some(values), 0, first),
+        };
+        let block = ConvolveBlock { addend_pitch, addend_first, ..block };
+        self.dispatch(device, &block, image, residual, output)
+    }
+
+    /// The same for some rows alone; its windows are single pixels.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn run_rows(
+        &self,
+        device: &D,
+        options: ConvolutionOptions,
+        image: &Image<D>,
+        rows: Range<u32>,
+        output: &mut Image<D>,
+    ) -> Result<(), D::Error> {
+        let block = self.block(options, image, output);
+        debug_assert_eq!([block.size, block.stride], [1, 1]);
+        let (height, before) = (rows.len() as u32, rows.start * block.in_width);
+        let block = ConvolveBlock {
+            in_height: height,
+            in_first: block.in_first + before * block.in_pitch,
+            out_height: height,
+            out_first: block.out_first + before * block.out_pitch,
+            ..block
+        };
+        self.dispatch(device, &block, image, None, output)
+    }
+
+    /// The parameters for an input and an output, without residual.
+    fn block(&self, options: ConvolutionOptions, image: &Image<D>, output: &Image<D>) -> ConvolveBlock {
+        let size = options.out_size(image.size, self.size, self.channels);
+        ConvolveBlock {
+            in_height: image.size.height,
+            in_width: image.size.width,
+            in_channels: image.size.channels,
+            in_pitch: image.pitch,
+            in_first: image.first,
+            enlarge: options.upsampling,
+            out_height: size.height,
+            out_width: size.width,
+            out_channels: size.channels,
+            out_pitch: output.pitch,
+            out_first: output.first,
+            size: self.size,
+            stride: options.stride,
+            dilation: options.dilation,
+            padding: options.padding(self.size),
+            scale: options.scale,
+            relu_outputs: u32::from(options.relu),
+            ..ConvolveBlock::default()
+        }
+    }
+
+    fn dispatch(
+        &self,
+        device: &D,
+        block: &ConvolveBlock,
+        image: &Image<D>,
+        residual: Option<&D::Buffer<f32>>,
+        output: &mut Image<D>,
+    ) -> Result<(), D::Error> {
+        let Layer { weights, bias } = &self.layer;
+        device.convolve(block, &image.values, weights, bias, residual, &mut output.values)
+    }
+}
+
+/// A depthwise convolution (of every channel by itself) without bias, on a device.
+pub struct DepthwiseConvolution<D: Device> {
+    pub(crate) weights: D::Buffer<f32>,
+    pub(crate) size: u32,
+    /// Whether all channels have the same window.
+    pub(crate) is_shared: bool,
+}
+
+impl<D: Device> DepthwiseConvolution<D> {
+    /// An average pool of 2x2 pixels, if it is run with stride 2 and no padding.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    pub fn average_pool(device: &D) -> Result<DepthwiseConvolution<D>, D::Error> {
+        Ok(DepthwiseConvolution { weights: device.upload(&[0.25; 4])?, size: 2, is_shared: true })
+    }
+
+    /// Runs it into a new image. Scale, upsampling and rectification are not for it.
+    ///
+    /// # Errors
+    /// If the device is lost or has no memory left.
+    pub fn run(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        options: ConvolutionOptions,
+        image: &Image<D>,
+    ) -> Result<Image<D>, D::Error> {
+        debug_assert_eq!((options.scale, options.upsampling, options.relu), (1.0, 1, false));
+        let size = options.out_size(image.size, self.size, image.size.channels);
+        let mut output = scratch.image(size)?;
+        let block = DepthwiseBlock {
+            in_height: image.size.height,
+            in_width: image.size.width,
+            in_pitch: image.pitch,
+            in_first: image.first,
+            out_height: size.height,
+            out_width: size.width,
+            channels: size.channels,
+            size: self.size,
+            stride: options.stride,
+            dilation: options.dilation,
+            padding: options.padding(self.size),
+            is_shared: u32::from(self.is_shared),
+        };
+        scratch.device().convolve_depthwise(&block, &image.values, &self.weights, &mut output.values)?;
+        Ok(output)
+    }
+}
+
+/// A transposed convolution with bias whose stride is its window's size, on a device.
+pub struct TransposedConvolution<D: Device> {
+    pub(crate) layer: Layer<D>,
+    pub(crate) size: u32,
+    /// Channels of the output.
+    pub channels: u32,
+}
+
+impl<D: Device> TransposedConvolution<D> {
+    /// Runs it, rectified, into an image of the right size: the input's rows and columns times the window's size.
+    ///
+    /// # Errors
+    /// If the device is lost.
+    pub fn run_into(&self, device: &D, image: &Image<D>, output: &mut Image<D>) -> Result<(), D::Error> {
+        let block = TransposedBlock {
+            in_height: image.size.height,
+            in_width: image.size.width,
+            in_channels: image.size.channels,
+            in_pitch: image.pitch,
+            in_first: image.first,
+            out_channels: self.channels,
+            out_pitch: output.pitch,
+            out_first: output.first,
+            size: self.size,
+            relu_outputs: 1,
+        };
+        let Layer { weights, bias } = &self.layer;
+        device.convolve_transposed(&block, &image.values, weights, bias, &mut output.values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::weights::ConvolutionWeights;
+    use viewfuse_device::cpu::Cpu;
+
+    const SIZE: Size = Size { height: 3, width: 3, channels: 1 };
+
+    fn sum_of_window() -> Convolution<Cpu> {
+        let Ok(layer) = ConvolutionWeights::new([1, 1, 3, 3], &[1.0; 9], vec![-20.0]).load(&Cpu, 0);
+        layer
+    }
+
+    #[test]
+    fn residuals_scale_and_rectification_come_in_this_order() {
+        let mut scratch = Scratch::new(&Cpu);
+        let Ok(image) = Image::upload(&Cpu, SIZE, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
+        let options = ConvolutionOptions { scale: 0.5, ..ConvolutionOptions::RELU };
+        let layer = sum_of_window();
+        let Ok(plain) = layer.run(&mut scratch, options, &image, Residual::None);
+        assert_eq!(plain.values, [0.0, 0.5, 0.0, 3.5, 12.5, 6.5, 2.0, 9.5, 4.0]);
+        let Ok(with_image) = layer.run(&mut scratch, options, &image, Residual::Image(&image));
+        assert_eq!(with_image.values, [0.0, 1.5, 0.0, 5.5, 15.0, 9.5, 5.5, 13.5, 8.5]);
+        let Ok(with_channel) = layer.run(&mut scratch, options, &image, Residual::Channels(&vec![9.0, 10.0], 1));
+        assert_eq!(with_channel.values, [1.0, 5.5, 3.0, 8.5, 17.5, 11.5, 7.0, 14.5, 9.0]);
+    }
+
+    #[test]
+    fn sizes_follow_the_options() {
+        let layer = sum_of_window();
+        let size = |options| layer.out_size(options, SIZE).map(|size| [size.height, size.width]);
+        let plain = ConvolutionOptions::PLAIN;
+        assert_eq!(size(plain), Some([3, 3]));
+        assert_eq!(size(ConvolutionOptions { stride: 2, ..plain }), Some([2, 2]));
+        assert_eq!(size(ConvolutionOptions { dilation: 5, ..plain }), Some([3, 3]));
+        assert_eq!(size(ConvolutionOptions { padding: Some(0), ..plain }), Some([1, 1]));
+        assert_eq!(size(ConvolutionOptions { padding: Some(0), dilation: 2, ..plain }), None);
+        assert_eq!(size(ConvolutionOptions { padding: Some(0), upsampling: 2, ..plain }), Some([4, 4]));
+    }
+
+    #[test]
+    fn an_average_pool_is_a_depthwise_convolution() {
+        let mut scratch = Scratch::new(&Cpu);
+        let size = Size { height: 2, width: 2, channels: 2 };
+        let Ok(image) = Image::upload(&Cpu, size, &[1.0, 10.0, 2.0, 20.0, 3.0, 30.0, 6.0, 60.0]);
+        let Ok(pool) = DepthwiseConvolution::average_pool(&Cpu);
+        let options = ConvolutionOptions { stride: 2, padding: Some(0), ..ConvolutionOptions::PLAIN };
+        let Ok(output) = pool.run(&mut scratch, options, &image);
+        assert_eq!((output.size, output.values), (size.halved(), vec![3.0, 30.0]));
+    }
+}

@@ -1,0 +1,178 @@
+//! Pools: max pool and global average pool as kernels; the 3x3 average pool and DISTS' L2 pool on the host, in `f64`, because
+//! no kernel computes them: their images are downloaded and uploaded again.
+
+use super::image::{HostImage, Image, Size};
+use super::scratch::Scratch;
+use super::window::Windows;
+use rayon::prelude::*;
+use viewfuse_core::network::normalise::MeanBlock;
+use viewfuse_core::network::resample::PoolBlock;
+use viewfuse_device::Device;
+
+/// The largest number of square windows, channel by channel; what lies outside of the image does not count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MaxPool {
+    /// Rows and columns of the window.
+    pub size: u32,
+    /// Pixels from one window to the next.
+    pub stride: u32,
+    /// How far windows reach over the border.
+    pub padding: u32,
+    /// Whether a last window may reach over the bottom and right padding (PyTorch's `ceil_mode`).
+    pub ceil_mode: bool,
+}
+
+impl MaxPool {
+    fn windows(&self) -> Windows {
+        let MaxPool { size, stride, padding, ceil_mode } = *self;
+        Windows { reach: size, stride, padding, ceil_mode }
+    }
+
+    /// Size of the output for an image of this size; `None` if the image is smaller than the window.
+    pub fn out_size(&self, size: Size) -> Option<Size> {
+        let windows = self.windows();
+        Some(Size { height: windows.count(size.height)?, width: windows.count(size.width)?, ..size })
+    }
+
+    /// Pools an image that fills its buffer. Of an image smaller than the window, the output has one row or column.
+    ///
+    /// # Errors
+    /// If the device is lost or has no memory left.
+    pub fn run<D: Device>(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, D::Error> {
+        let count = |side: u32| self.windows().count_at_least_one(side);
+        let size = Size { height: count(image.size.height), width: count(image.size.width), ..image.size };
+        let block = PoolBlock {
+            in_height: image.size.height,
+            in_width: image.size.width,
+            out_height: size.height,
+            out_width: size.width,
+            channels: size.channels,
+            size: self.size,
+            stride: self.stride,
+            padding: self.padding,
+        };
+        let mut output = scratch.image(size)?;
+        scratch.device().max_pool(&block, &image.values, &mut output.values)?;
+        Ok(output)
+    }
+}
+
+/// The mean of every channel of an image that fills its buffer, as an image of one pixel.
+///
+/// # Errors
+/// If the device is lost or has no memory left.
+pub fn global_average_pool<D: Device>(scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, D::Error> {
+    let Size { channels, .. } = image.size;
+    let mut mean = scratch.image(Size { height: 1, width: 1, channels })?;
+    let block = MeanBlock { pixel_count: image.size.pixel_count(), channels };
+    scratch.device().channel_means(&block, &image.values, &mut mean.values)?;
+    Ok(mean)
+}
+
+/// The mean of the 3x3 pixels around each pixel. Pixels outside of the image count as zeros, or, without
+/// `count_include_pad`, not at all.
+pub fn average_pool(image: &HostImage, count_include_pad: bool) -> HostImage {
+    pooled(image, [image.height, image.width], 1, |window, channel| {
+        let (mut sum, mut count) = (0.0, 0);
+        for (_, pixel) in window {
+            sum += f64::from(pixel[channel]);
+            count += 1;
+        }
+        sum / if count_include_pad { 9.0 } else { f64::from(count) }
+    })
+}
+
+/// What DISTS adds before it takes the root.
+const L2_POOL_EPSILON: f64 = 1.0e-12;
+
+/// DISTS' L2 pool: the root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second pixel; outside
+/// of the image there are zeros.
+pub fn l2_pool(image: &HostImage) -> HostImage {
+    let size = [image.height.div_ceil(2), image.width.div_ceil(2)];
+    pooled(image, size, 2, |window, channel| {
+        let sum: f64 = window
+            .map(|([row, column], pixel)| {
+                // 1, 2, 1 in both directions.
+                let share = (2 - row.abs_diff(1)) * (2 - column.abs_diff(1));
+                share as f64 / 16.0 * f64::from(pixel[channel]).powi(2)
+            })
+            .sum();
+        (sum + L2_POOL_EPSILON).sqrt()
+    })
+}
+
+/// A place of a window of 3x3 and the channels of the pixel there.
+type WindowPixel<'a> = ([usize; 2], &'a [f32]);
+
+/// An image of `size` of what `value` makes of the windows of 3x3 around every `stride`-th pixel.
+fn pooled(
+    image: &HostImage,
+    size: [usize; 2],
+    stride: usize,
+    value: impl Fn(&mut dyn Iterator<Item = WindowPixel<'_>>, usize) -> f64 + Sync,
+) -> HostImage {
+    let [height, width] = size;
+    let channels = image.channels;
+    let mut values = vec![0.0; height * width * channels];
+    values.par_chunks_mut(channels).enumerate().for_each(|(pixel, outputs)| {
+        let (top, left) = (pixel / width * stride, pixel % width * stride);
+        let window: Vec<WindowPixel<'_>> = (0..9)
+            .map(|place| [place / 3, place % 3])
+            .filter_map(|[row, column]| {
+                // Outside of the image the difference is none.
+                let (y, x) = ((top + row).checked_sub(1)?, (left + column).checked_sub(1)?);
+                (y < image.height && x < image.width).then(|| ([row, column], image.pixel(y, x)))
+            })
+            .collect();
+        for (channel, output) in outputs.iter_mut().enumerate() {
+            *output = value(&mut window.iter().copied(), channel) as f32;
+        }
+    });
+    HostImage { height, width, channels, values }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_device::cpu::Cpu;
+
+    /// 2 rows of 3 pixels, 2 channels: 1 to 6, and 10 times that.
+    fn image() -> HostImage {
+        let values = (1..=6_u8).flat_map(|value| [f32::from(value), f32::from(value) * 10.0]).collect();
+        HostImage { height: 2, width: 3, channels: 2, values }
+    }
+
+    #[test]
+    fn means_with_and_without_padding() {
+        let (zeros, none) = (average_pool(&image(), true), average_pool(&image(), false));
+        // The corner sees 1, 2, 4 and 5; the pixel beside it all six.
+        assert_eq!(zeros.pixel(0, 0), [12.0 / 9.0, 120.0 / 9.0]);
+        assert_eq!(none.pixel(0, 0), [3.0, 30.0]);
+        assert_eq!(zeros.pixel(1, 1), [21.0 / 9.0, 210.0 / 9.0]);
+        assert_eq!(none.pixel(1, 1), [3.5, 35.0]);
+    }
+
+    #[test]
+    fn roots_of_blurred_squares() {
+        let pooled = l2_pool(&image());
+        assert_eq!([pooled.height, pooled.width, pooled.channels], [1, 2, 2]);
+        let left = ((4.0 + 2.0 * 4.0 + 2.0 * 16.0 + 25.0) / 16.0_f32).sqrt();
+        let right = ((4.0 * 9.0 + 2.0 * 4.0 + 2.0 * 36.0 + 25.0) / 16.0_f32).sqrt();
+        for (value, expected) in pooled.values.iter().zip([left, 10.0 * left, right, 10.0 * right]) {
+            assert!((value - expected).abs() <= 1.0e-6 * expected, "{value} is not {expected}");
+        }
+    }
+
+    #[test]
+    fn largest_numbers_and_means_on_a_device() {
+        let mut scratch = Scratch::new(&Cpu);
+        let Ok(image) = image().upload(&Cpu);
+        let pool = MaxPool { size: 2, stride: 2, padding: 0, ceil_mode: true };
+        assert_eq!(pool.out_size(image.size), Some(Size { height: 1, width: 2, channels: 2 }));
+        let Ok(Ok(pooled)) = pool.run(&mut scratch, &image).map(|image| image.download(&Cpu));
+        assert_eq!(pooled.values, [5.0, 50.0, 6.0, 60.0]);
+        assert_eq!(MaxPool { size: 3, ..pool }.out_size(image.size), None);
+        let Ok(Ok(mean)) = global_average_pool(&mut scratch, &image).map(|image| image.download(&Cpu));
+        assert_eq!((mean.width, mean.values), (1, vec![3.5, 35.0]));
+    }
+}

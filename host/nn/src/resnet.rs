@@ -1,0 +1,247 @@
+//! The trunk that both published networks have: torchvision's ResNet of basic blocks, its sizes, its tensors, and its run.
+//!
+//! Source: He, Zhang, Ren, Sun: "Deep residual learning for image recognition", CVPR 2016; torchvision's `resnet.py`.
+
+use super::checkpoint::TensorShape;
+use super::convolution::{Convolution, ConvolutionOptions, Residual};
+use super::image::Image;
+use super::pool::MaxPool;
+use super::scratch::Scratch;
+use viewfuse_device::Device;
+
+/// What its batch norms add to variances.
+pub const BATCH_NORM_EPSILON: f64 = 1.0e-5;
+
+/// The first convolution.
+const STEM: ConvolutionOptions = ConvolutionOptions { stride: 2, ..ConvolutionOptions::RELU };
+/// What follows it.
+const POOL: MaxPool = MaxPool { size: 3, stride: 2, padding: 1, ceil_mode: false };
+/// Pixels of the input from one pixel of the first level to the next.
+const FIRST_STRIDE: u32 = 4;
+
+/// A level of the trunk: basic blocks of two 3x3 convolutions.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Level {
+    /// Its channels.
+    pub channels: usize,
+    /// Its blocks.
+    pub block_count: usize,
+}
+
+/// A convolution of the trunk, as a `state_dict` has it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ResNetLayer {
+    /// Its name.
+    pub name: String,
+    /// The name of the batch norm behind it.
+    pub norm: String,
+    /// The level that it belongs to, from 1; 0 for the stem.
+    pub level: usize,
+    /// Shape of its weights: `[output channel][input channel][row][column]`.
+    pub shape: [usize; 4],
+}
+
+/// A basic block: two convolutions, what came in added before the last rectification.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BasicBlock<L> {
+    /// The first convolution, which may have a stride.
+    pub conv1: L,
+    /// The second convolution.
+    pub conv2: L,
+    /// What came in goes through it where sizes or channels change (torchvision's `downsample`).
+    pub shortcut: Option<L>,
+}
+
+/// The trunk. `L` is a convolution: its name and shape ([`ResNetLayer`]), its parameters on the host, or on a device.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ResNet<L> {
+    /// The first convolution, 7x7 with stride 2.
+    pub stem: L,
+    /// `[level][block]`.
+    pub levels: Vec<Vec<BasicBlock<L>>>,
+}
+
+/// Whether the first block of level `level` (counted from 1) has a shortcut convolution: where the level halves the image
+/// or, in a trunk that stops halving, is meant to, and where it changes the channels.
+pub fn has_shortcut(level: usize, in_channels: usize, out_channels: usize) -> bool {
+    level > 1 || in_channels != out_channels
+}
+
+impl ResNet<ResNetLayer> {
+    /// The trunk of these sizes.
+    pub fn new(stem_channels: usize, levels: &[Level]) -> ResNet<ResNetLayer> {
+        let stem =
+            ResNetLayer { name: "conv1".to_owned(), norm: "bn1".to_owned(), level: 0, shape: [stem_channels, 3, 7, 7] };
+        let mut channels = stem_channels;
+        let mut block = |level: usize, block: usize, own: usize| {
+            let layer = |name: &str, norm: &str, shape: [usize; 4]| ResNetLayer {
+                name: format!("layer{level}.{block}.{name}"),
+                norm: format!("layer{level}.{block}.{norm}"),
+                level,
+                shape,
+            };
+            let own_block = BasicBlock {
+                conv1: layer("conv1", "bn1", [own, channels, 3, 3]),
+                conv2: layer("conv2", "bn2", [own, own, 3, 3]),
+                shortcut: (block == 0 && has_shortcut(level, channels, own))
+                    .then(|| layer("downsample.0", "downsample.1", [own, channels, 1, 1])),
+            };
+            channels = own;
+            own_block
+        };
+        let levels = (1..).zip(levels);
+        let levels =
+            levels.map(|(level, sizes)| (0..sizes.block_count).map(|at| block(level, at, sizes.channels)).collect());
+        ResNet { stem, levels: levels.collect() }
+    }
+}
+
+impl<L> ResNet<L> {
+    /// The same trunk of other layers, in the order of the data.
+    ///
+    /// # Errors
+    /// The first that a layer makes.
+    pub fn try_map<M, E>(&self, mut layer: impl FnMut(&L) -> Result<M, E>) -> Result<ResNet<M>, E> {
+        let stem = layer(&self.stem)?;
+        let mut block = |block: &BasicBlock<L>| {
+            Ok(BasicBlock {
+                conv1: layer(&block.conv1)?,
+                conv2: layer(&block.conv2)?,
+                shortcut: block.shortcut.as_ref().map(&mut layer).transpose()?,
+            })
+        };
+        let mut level = |blocks: &Vec<BasicBlock<L>>| blocks.iter().map(&mut block).collect();
+        Ok(ResNet { stem, levels: self.levels.iter().map(&mut level).collect::<Result<_, _>>()? })
+    }
+}
+
+/// Every tensor of a trunk, in the order of the data; the names begin with `prefix` and a dot.
+pub fn tensors(prefix: &str, stem_channels: usize, levels: &[Level]) -> Vec<TensorShape> {
+    let mut tensors = Vec::new();
+    let network = ResNet::new(stem_channels, levels);
+    let blocks = network.levels.iter().flatten();
+    let layers = blocks.flat_map(|block| [Some(&block.conv1), Some(&block.conv2), block.shortcut.as_ref()]).flatten();
+    for ResNetLayer { name, norm, shape, .. } in std::iter::once(&network.stem).chain(layers) {
+        tensors.push(TensorShape { name: format!("{prefix}.{name}.weight"), shape: shape.to_vec() });
+        batch_norm_tensors(&mut tensors, &format!("{prefix}.{norm}"), shape[0]);
+    }
+    tensors
+}
+
+/// Adds the tensors of a batch norm.
+pub fn batch_norm_tensors(tensors: &mut Vec<TensorShape>, name: &str, channels: usize) {
+    for leaf in ["weight", "bias", "running_mean", "running_var"] {
+        tensors.push(TensorShape { name: format!("{name}.{leaf}"), shape: vec![channels] });
+    }
+}
+
+impl<D: Device> ResNet<Convolution<D>> {
+    /// What the stem makes of an image of three channels, then what each level does, as images of their own. Each level halves
+    /// rows and columns until one of its pixels stands for `output_stride` of the image; from there on, windows are dilated
+    /// instead.
+    ///
+    /// # Errors
+    /// If the device is lost or has no memory left.
+    pub fn run(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        image: &Image<D>,
+        output_stride: u32,
+    ) -> Result<Vec<Image<D>>, D::Error> {
+        let stem = self.stem.run(scratch, STEM, image, Residual::None)?;
+        let mut x = Some(POOL.run(scratch, &stem)?);
+        let mut images = vec![stem];
+        let mut level_stride = FIRST_STRIDE;
+        for (level, blocks) in self.levels.iter().enumerate() {
+            let dilation = (level_stride / output_stride).max(1);
+            let first_stride = if level > 0 && dilation == 1 { 2 } else { 1 };
+            for (index, block) in blocks.iter().enumerate() {
+                let stride = if index == 0 { first_stride } else { 1 };
+                let options = ConvolutionOptions { stride, dilation, ..ConvolutionOptions::RELU };
+                // The first block of a level reads the level before, which is kept.
+                let input = x.as_ref().unwrap_or_else(|| &images[images.len() - 1]);
+                let output = block.run(scratch, options, input)?;
+                if let Some(inner) = x.replace(output) {
+                    scratch.recycle(inner);
+                }
+            }
+            images.extend(x.take());
+            level_stride = level_stride.saturating_mul(2);
+        }
+        Ok(images)
+    }
+}
+
+impl<D: Device> BasicBlock<Convolution<D>> {
+    /// Runs it; the stride is the first convolution's and the shortcut's.
+    fn run(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        options: ConvolutionOptions,
+        image: &Image<D>,
+    ) -> Result<Image<D>, D::Error> {
+        let inside = self.conv1.run(scratch, options, image, Residual::None)?;
+        let shortcut_options = ConvolutionOptions { stride: options.stride, ..ConvolutionOptions::PLAIN };
+        let shortcut = match &self.shortcut {
+            Some(layer) => Some(layer.run(scratch, shortcut_options, image, Residual::None)?),
+            None => None,
+        };
+        let residual = Residual::Image(shortcut.as_ref().unwrap_or(image));
+        let output = self.conv2.run(scratch, ConvolutionOptions { stride: 1, ..options }, &inside, residual)?;
+        scratch.recycle(inside);
+        if let Some(shortcut) = shortcut {
+            scratch.recycle(shortcut);
+        }
+        Ok(output)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Size;
+    use crate::initialisation;
+    use crate::weights::ConvolutionWeights;
+    use std::convert::Infallible;
+    use viewfuse_device::cpu::Cpu;
+
+    fn levels(channels: [usize; 3]) -> Vec<Level> {
+        channels.map(|channels| Level { channels, block_count: 2 }).to_vec()
+    }
+
+    #[test]
+    fn tensors_are_in_the_order_of_the_data() {
+        let tensors = tensors("trunk", 4, &levels([4, 8, 8]));
+        let names: Vec<&str> = tensors.iter().map(|tensor| tensor.name.as_str()).collect();
+        assert_eq!(names[..2], ["trunk.conv1.weight", "trunk.bn1.weight"]);
+        let shortcuts: Vec<&&str> = names.iter().filter(|name| name.contains("downsample.0")).collect();
+        // A level that halves has one even if its channels stay.
+        assert_eq!(shortcuts, [&"trunk.layer2.0.downsample.0.weight", &"trunk.layer3.0.downsample.0.weight"]);
+        assert_eq!(tensors.len(), 5 * (1 + 3 * 4 + 2));
+        assert_eq!(tensors[0].shape, [4, 3, 7, 7]);
+    }
+
+    #[test]
+    fn levels_halve_or_dilate() -> Result<(), Infallible> {
+        let weights = |layer: &ResNetLayer| {
+            let values = initialisation::tensor(&layer.name, &layer.shape);
+            ConvolutionWeights::new(layer.shape, &values, vec![0.0; layer.shape[0]]).load(&Cpu, 0)
+        };
+        let network = ResNet::new(4, &levels([4, 8, 8])).try_map(weights)?;
+        let size = Size { height: 32, width: 48, channels: 3 };
+        let image = Image::upload(&Cpu, size, &initialisation::tensor("image", &[32, 48, 3]))?;
+        let mut scratch = Scratch::new(&Cpu);
+        let sizes = |images: &[Image<Cpu>]| -> Vec<[u32; 3]> {
+            images.iter().map(|image| [image.size.height, image.size.width, image.size.channels]).collect()
+        };
+        let halved = network.run(&mut scratch, &image, u32::MAX)?;
+        assert_eq!(sizes(&halved), [[16, 24, 4], [8, 12, 4], [4, 6, 8], [2, 3, 8]]);
+        let dilated = network.run(&mut scratch, &image, 8)?;
+        assert_eq!(sizes(&dilated), [[16, 24, 4], [8, 12, 4], [4, 6, 8], [4, 6, 8]]);
+        // The same up to where they part, and nothing of what was kept was written over.
+        for (one, other) in halved.iter().zip(&dilated).take(3) {
+            assert_eq!(one.download(&Cpu)?, other.download(&Cpu)?);
+        }
+        Ok(())
+    }
+}

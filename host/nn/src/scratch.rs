@@ -1,0 +1,73 @@
+//! Scratch buffers: memory for the images between layers, used again and again.
+
+use super::image::{Image, Size};
+use viewfuse_device::Device;
+
+/// A device and the buffers on it that are free. Every kernel writes all of its output: what a buffer held before is never
+/// read. Dropping it frees them.
+pub struct Scratch<'a, D: Device> {
+    device: &'a D,
+    free: Vec<(usize, D::Buffer<f32>)>,
+}
+
+impl<'a, D: Device> Scratch<'a, D> {
+    /// Without any buffers.
+    pub fn new(device: &'a D) -> Scratch<'a, D> {
+        Scratch { device, free: Vec::new() }
+    }
+
+    /// The device.
+    pub fn device(&self) -> &'a D {
+        self.device
+    }
+
+    /// An image with a buffer of its own, its values undefined.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    pub fn image(&mut self, size: Size) -> Result<Image<D>, D::Error> {
+        self.channel_slice(size, size.channels, 0)
+    }
+
+    /// An image that is the channels from `first` on of a new one with `pitch` channels, all of its values undefined.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    pub fn channel_slice(&mut self, size: Size, pitch: u32, first: u32) -> Result<Image<D>, D::Error> {
+        let len = size.pixel_count() as usize * pitch as usize;
+        // A buffer that is much too large is kept for those that need it.
+        let fits = |capacity: usize| (len..=2 * len).contains(&capacity);
+        let best = self.free.iter().enumerate().filter(|(_, (capacity, _))| fits(*capacity));
+        let (capacity, values) = match best.min_by_key(|(_, (capacity, _))| *capacity).map(|(index, _)| index) {
+            Some(index) => self.free.swap_remove(index),
+            None => (len, self.device.zeros(len)?),
+        };
+        Ok(Image { values, size, pitch, first, capacity })
+    }
+
+    /// Takes an image's buffer back for others.
+    pub fn recycle(&mut self, image: Image<D>) {
+        self.free.push((image.capacity, image.values));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_device::cpu::Cpu;
+
+    #[test]
+    fn buffers_are_used_again_if_they_are_not_much_too_large() {
+        let mut scratch = Scratch::new(&Cpu);
+        let size = Size { height: 2, width: 3, channels: 4 };
+        let Ok(image) = scratch.image(size);
+        assert_eq!((image.values.len(), image.pitch, image.first), (24, 4, 0));
+        scratch.recycle(image);
+        let Ok(small) = scratch.image(size.with_channels(1));
+        assert_eq!(small.values.len(), 6, "24 numbers are too many for 6");
+        let Ok(half) = scratch.channel_slice(size.with_channels(1), 2, 1);
+        assert_eq!((half.values.len(), half.pitch, half.first), (24, 2, 1));
+        let Ok(another) = scratch.image(size);
+        assert_eq!(another.values.len(), 24, "the first is in use");
+    }
+}

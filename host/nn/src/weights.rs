@@ -1,0 +1,242 @@
+//! Parameters of layers on the host, in the order in which kernels take them, and batch norms folded into them.
+
+use super::convolution::Convolution;
+use super::linear::Linear;
+use viewfuse_device::{Device, Layer, LayerShape};
+
+/// Rows and columns from which on a device may convolve images in its way for large ones.
+const LARGE_IMAGE: u32 = 32;
+
+/// A convolution's weights and bias. Windows are square: those of other shapes lie in the middle of a square of zeros.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ConvolutionWeights {
+    /// Rows and columns of the window.
+    pub size: usize,
+    /// Channels of the input.
+    pub in_channels: usize,
+    /// Channels of the output.
+    pub out_channels: usize,
+    /// `[row][column][input channel][output channel]`.
+    pub values: Vec<f32>,
+    /// `[output channel]`.
+    pub bias: Vec<f32>,
+}
+
+impl ConvolutionWeights {
+    /// From PyTorch's order: `weights[output channel][input channel][row][column]`, the shape in the same order.
+    pub fn new(shape: [usize; 4], weights: &[f32], bias: Vec<f32>) -> ConvolutionWeights {
+        let [out_channels, in_channels, rows, columns] = shape;
+        let size = rows.max(columns);
+        let [above, left] = [rows, columns].map(|length| (size - length) / 2);
+        let place_len = in_channels * out_channels;
+        let mut values = vec![0.0; size * size * place_len];
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let place = (row + above) * size + column + left;
+            let place = &mut values[place * place_len..][..place_len];
+            for (in_channel, outputs) in place.chunks_exact_mut(out_channels.max(1)).enumerate() {
+                for (out_channel, value) in outputs.iter_mut().enumerate() {
+                    *value = weights[((out_channel * in_channels + in_channel) * rows + row) * columns + column];
+                }
+            }
+        }
+        ConvolutionWeights { size, in_channels, out_channels, values, bias }
+    }
+
+    /// The same convolution followed by an average pool of 2x2 outputs with stride 2, as one convolution with a window
+    /// larger by 1, which is to be run with stride 2. Exact up to rounding, and less than half the work.
+    pub fn followed_by_average_pool(self) -> ConvolutionWeights {
+        let ConvolutionWeights { size, in_channels, out_channels, values, bias } = self;
+        let place_len = in_channels * out_channels;
+        let mut larger = vec![0.0; (size + 1) * (size + 1) * place_len];
+        for (place, weights) in values.chunks_exact(place_len).enumerate() {
+            for corner in 0..4 {
+                let (row, column) = (place / size + corner / 2, place % size + corner % 2);
+                let sums = &mut larger[(row * (size + 1) + column) * place_len..][..place_len];
+                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += 0.25 * weight);
+            }
+        }
+        ConvolutionWeights { size: size + 1, in_channels, out_channels, values: larger, bias }
+    }
+
+    /// The same with its output channels in another order: `old(new)` is where a channel was.
+    pub fn with_outputs_reordered(self, old: impl Fn(usize) -> usize) -> ConvolutionWeights {
+        let ConvolutionWeights { size, in_channels, out_channels, values, bias } = self;
+        let order: Vec<usize> = (0..out_channels).map(old).collect();
+        let sorted = |row: &[f32]| order.iter().map(|old| row[*old]).collect::<Vec<f32>>();
+        let values = values.chunks_exact(out_channels).flat_map(sorted).collect();
+        ConvolutionWeights { size, in_channels, out_channels, values, bias: sorted(&bias) }
+    }
+
+    /// Takes them to a device. It is run with stride 1 and without dilation on images of at least `least_side` rows and
+    /// columns, or `least_side` is 0: a device may convolve large images in a way of its own, which rounds otherwise.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    pub fn load<D: Device>(&self, device: &D, least_side: u32) -> Result<Convolution<D>, D::Error> {
+        let shape = LayerShape {
+            inner_count: self.size * self.size * self.in_channels,
+            column_count: self.out_channels,
+            has_wide_images: self.size == 3 && least_side >= LARGE_IMAGE,
+        };
+        let layer = Layer::new(device, &shape, &self.values, &self.bias)?;
+        Ok(Convolution { layer, size: self.size as u32, channels: self.out_channels as u32 })
+    }
+}
+
+/// A linear layer's weights and bias.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinearWeights {
+    /// `[input][output]`.
+    pub values: Vec<f32>,
+    /// `[output]`, at least one.
+    pub bias: Vec<f32>,
+}
+
+impl LinearWeights {
+    /// From PyTorch's order: `weights[output][input]`.
+    pub fn new(weights: &[f32], bias: Vec<f32>) -> LinearWeights {
+        LinearWeights { values: transposed(weights, bias.len()), bias }
+    }
+
+    /// How many numbers go in.
+    pub fn in_count(&self) -> usize {
+        self.values.len() / self.bias.len()
+    }
+
+    /// Layers that read the same inputs as one, their outputs one behind the other. `in_count` numbers go into each.
+    pub fn concatenated(layers: &[LinearWeights], in_count: usize) -> LinearWeights {
+        let row = |input: usize| {
+            layers.iter().flat_map(move |LinearWeights { values, bias }| {
+                values[input * bias.len()..(input + 1) * bias.len()].iter().copied()
+            })
+        };
+        LinearWeights {
+            values: (0..in_count).flat_map(row).collect(),
+            bias: layers.iter().flat_map(|layer| layer.bias.iter().copied()).collect(),
+        }
+    }
+
+    /// Its outputs, computed on the host: the bias, then the products added input by input.
+    pub fn run(&self, inputs: &[f32]) -> Vec<f32> {
+        let mut sums = self.bias.clone();
+        for (input, weights) in inputs.iter().zip(self.values.chunks_exact(self.bias.len())) {
+            sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += input * weight);
+        }
+        sums
+    }
+
+    /// Takes them to a device.
+    ///
+    /// # Errors
+    /// If the device has no memory left.
+    pub fn load<D: Device>(&self, device: &D) -> Result<Linear<D>, D::Error> {
+        let (in_count, out_count) = (self.in_count(), self.bias.len());
+        let shape = LayerShape { inner_count: in_count, column_count: out_count, has_wide_images: false };
+        let layer = Layer::new(device, &shape, &self.values, &self.bias)?;
+        Ok(Linear { layer, in_count: in_count as u32, out_count: out_count as u32 })
+    }
+}
+
+/// A batch norm with the statistics of training: a factor and a shift for each channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BatchNorm {
+    /// `[channel]`: what outputs are multiplied by.
+    factors: Vec<f64>,
+    mean: Vec<f32>,
+    shift: Vec<f32>,
+}
+
+impl BatchNorm {
+    /// From PyTorch's `weight`, `bias`, `running_mean` and `running_var`; `epsilon` is added to variances. Negative variances
+    /// count as 0.
+    pub fn new(weight: &[f32], bias: Vec<f32>, mean: Vec<f32>, variance: &[f32], epsilon: f64) -> BatchNorm {
+        let factor =
+            |(weight, variance): (&f32, &f32)| f64::from(*weight) / (f64::from(*variance).max(0.0) + epsilon).sqrt();
+        BatchNorm { factors: weight.iter().zip(variance).map(factor).collect(), mean, shift: bias }
+    }
+
+    /// Folds it into the convolution before it, in `f64`: multiplies `weights[output channel][...]` and returns the bias, from
+    /// the convolution's own.
+    pub fn fold(&self, weights: &mut [f32], bias: &[f32]) -> Vec<f32> {
+        let per_channel = (weights.len() / self.factors.len().max(1)).max(1);
+        for (weights, factor) in weights.chunks_exact_mut(per_channel).zip(&self.factors) {
+            weights.iter_mut().for_each(|weight| *weight = (f64::from(*weight) * factor) as f32);
+        }
+        let channels = self.factors.iter().zip(&self.mean).zip(&self.shift).zip(bias);
+        let folded = |(((factor, mean), shift), bias): (((&f64, &f32), &f32), &f32)| {
+            (f64::from(*shift) - (f64::from(*mean) - f64::from(*bias)) * factor) as f32
+        };
+        channels.map(folded).collect()
+    }
+}
+
+/// `values[row][column]` of so many rows, as `[column][row]`.
+pub(crate) fn transposed(values: &[f32], row_count: usize) -> Vec<f32> {
+    let columns = values.len() / row_count;
+    (0..values.len()).map(|index| values[index % row_count * columns + index / row_count]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_come_in_the_order_of_kernels() {
+        // 2 outputs, 3 inputs, 2 rows, 1 column: digits in the order of the axes.
+        let place = |out: usize, channel: usize, row: usize| (out * 100 + channel * 10 + row) as f32;
+        let given: Vec<f32> = (0..12).map(|at| place(at / 6, at / 2 % 3, at % 2)).collect();
+        let weights = ConvolutionWeights::new([2, 3, 2, 1], &given, vec![0.0; 2]);
+        assert_eq!((weights.size, weights.in_channels, weights.out_channels), (2, 3, 2));
+        for (at, value) in weights.values.iter().enumerate() {
+            let (out, channel, column, row) = (at % 2, at / 2 % 3, at / 6 % 2, at / 12);
+            assert_eq!(*value, if column == 0 { place(out, channel, row) } else { 0.0 });
+        }
+        let linear = LinearWeights::new(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], vec![10.0, 20.0]);
+        assert_eq!((linear.in_count(), &linear.values[..]), (3, &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0][..]));
+        assert_eq!(linear.run(&[1.0, 0.0, -1.0]), [8.0, 18.0]);
+        let both = LinearWeights::concatenated(&[linear.clone(), linear], 3);
+        assert_eq!(both.run(&[1.0, 0.0, -1.0]), [8.0, 18.0, 8.0, 18.0]);
+    }
+
+    #[test]
+    fn one_row_lies_in_the_middle_of_a_square() {
+        let weights = ConvolutionWeights::new([1, 1, 1, 3], &[1.0, 2.0, 3.0], vec![0.0]);
+        assert_eq!(weights.values, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn a_pool_behind_it_is_a_larger_window() {
+        let weights = ConvolutionWeights::new([2, 1, 1, 1], &[4.0, 8.0], vec![1.0, 2.0]).followed_by_average_pool();
+        assert_eq!((weights.size, weights.bias), (2, vec![1.0, 2.0]));
+        assert_eq!(weights.values, [1.0, 2.0, 1.0, 2.0, 1.0, 2.0, 1.0, 2.0]);
+    }
+
+    #[test]
+    fn outputs_change_places_with_their_bias() {
+        let weights = ConvolutionWeights::new([3, 1, 1, 1], &[1.0, 2.0, 3.0], vec![10.0, 20.0, 30.0]);
+        let turned = weights.with_outputs_reordered(|new| (new + 1) % 3);
+        assert_eq!((turned.values, turned.bias), (vec![2.0, 3.0, 1.0], vec![20.0, 30.0, 10.0]));
+    }
+
+    #[test]
+    fn a_folded_norm_does_what_the_norm_does() {
+        let (mean, variance, epsilon) = ([0.5, -2.0], [4.0, 0.25], 1.0e-5);
+        let (scale, shift) = ([2.0, -3.0], [0.125, 1.0]);
+        let norm = BatchNorm::new(&scale, shift.to_vec(), mean.to_vec(), &variance, epsilon);
+        let (weights, bias) = ([0.75_f32, -1.5], [0.25_f32, 0.5]);
+        let mut folded = weights;
+        let folded_bias = norm.fold(&mut folded, &bias);
+        for channel in 0..2 {
+            let output = f64::from(weights[channel]) * 3.0 + f64::from(bias[channel]);
+            let deviation = (f64::from(variance[channel]) + epsilon).sqrt();
+            let expected =
+                (output - f64::from(mean[channel])) / deviation * f64::from(scale[channel]) + f64::from(shift[channel]);
+            let found = f64::from(folded[channel]) * 3.0 + f64::from(folded_bias[channel]);
+            assert!((found - expected).abs() < 1.0e-6 * expected.abs(), "{found} is not {expected}");
+        }
+        // Without a spread, or with a broken one, only the epsilon divides.
+        let norm = BatchNorm::new(&[1.0], vec![0.0], vec![0.0], &[-1.0], 0.25);
+        let mut weights = [1.0];
+        assert_eq!((norm.fold(&mut weights, &[0.0]), weights), (vec![0.0], [2.0]));
+    }
+}
