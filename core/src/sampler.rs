@@ -22,7 +22,11 @@
 //! itself. Nothing that cancels is subtracted: the coefficients are good to a few units of `f32`, so the state may be
 //! `f32` too.
 //!
+//! A sampler is one row of the list below and the functions that the row names:
+//!
 //! ```text
+//! mix             the linear combination, and noise
+//! heun            euler, heun                      results are denoised pictures, steps are straight
 //! exponential     dpm++2m, dpm++3m, unipc          results are denoised pictures
 //! directions      ipndm, ipndm-v                   results are directions
 //! interpolation   integrals of interpolating polynomials
@@ -34,196 +38,216 @@ pub mod churn;
 pub mod control;
 mod directions;
 mod exponential;
+mod heun;
 mod interpolation;
+mod mix;
 
-use crate::pages::Fetch;
-use crate::random::normal;
-use crate::schedule::HeunStep;
-use bytemuck::{Pod, Zeroable};
+pub use mix::{MOST_RESULTS, Mix, NoiseBlock, mixed_element, noisy_element};
 
-/// How many results a step combines at most.
-pub const MOST_RESULTS: usize = 4;
+use core::fmt;
+use core::str::FromStr;
 
-/// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. What has
-/// coefficient 0 is not read. Also the block of the kernel `mix_pictures`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Mix {
-    /// Of the state.
-    pub state: f32,
-    /// Of the results.
-    pub results: [f32; MOST_RESULTS],
+/// When a step is corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Corrected {
+    /// Never.
+    Never,
+    /// By a call at the level reached, made for that: twice the calls. The state that the step reached is corrected.
+    ByAnotherCall,
+    /// By the call at the level reached that the next step needs anyway. What is corrected is the step: from the state in
+    /// which it began.
+    ByTheNextCall,
 }
 
-impl Mix {
-    /// The state as it is.
-    pub const STAY: Mix = Mix { state: 1.0, results: [0.0; MOST_RESULTS] };
-    /// The newest result as it is.
-    pub const NEWEST: Mix = Mix { state: 0.0, results: [1.0, 0.0, 0.0, 0.0] };
+/// Makes [`Sampler`] and what is known of each from one row a sampler:
+///
+/// - `name`: what a person calls it,
+/// - `order`: the power of the step with which its error shrinks on the published levels,
+/// - `results`: how many results a step combines, once there are so many,
+/// - `keeps`: what is kept of a call at a level; [`denoised`] or a function from the level to a mix,
+/// - `step`: the step from the newest of the levels, by so many results, to a level,
+/// - `corrected`, `correction`: when a step is corrected, and the mix of that from the levels, their count and the level
+///   reached; [`none`] where it never is.
+macro_rules! samplers {
+    ($($(#[$attribute:meta])+ $sampler:ident {
+        name: $name:literal,
+        order: $order:literal,
+        results: $results:literal,
+        keeps: $keeps:path,
+        step: $step:path,
+        corrected: $corrected:path,
+        correction: $correction:path,
+    })+) => {
+        /// A sampler; see the module.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        pub enum Sampler {
+            $($(#[$attribute])+ $sampler,)+
+        }
 
-    /// The combination of numbers; what has coefficient 0 counts nothing, whatever it is.
-    #[inline]
-    pub fn of(&self, state: f32, results: &[f32; MOST_RESULTS]) -> f32 {
-        let [a, b, c, d] = results;
-        mixed_element(self, &[state], &[*a], &[*b], &[*c], &[*d], 0)
-    }
+        impl Sampler {
+            /// All of them.
+            pub const ALL: [Sampler; [$($name),+].len()] = [$(Sampler::$sampler),+];
 
-    /// The difference between what a corrector and a predictor make of the same state: the corrector's newest result is
-    /// one that the predictor does not have.
-    pub fn correction_beyond(&self, predictor: &Mix) -> Mix {
-        let ([new, a, b, c], [p, q, r, _]) = (self.results, predictor.results);
-        Mix { state: self.state - predictor.state, results: [new, a - p, b - q, c - r] }
-    }
+            /// What a person calls it.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Sampler::$sampler => $name,)+
+                }
+            }
+
+            /// The power of the step with which its error shrinks on the published levels.
+            pub const fn order(self) -> u32 {
+                match self {
+                    $(Sampler::$sampler => $order,)+
+                }
+            }
+
+            /// How many results a step combines, once there are so many.
+            pub const fn result_count(self) -> u32 {
+                match self {
+                    $(Sampler::$sampler => $results,)+
+                }
+            }
+
+            /// When a step is corrected, by [`Sampler::correction`].
+            pub const fn corrected(self) -> Corrected {
+                match self {
+                    $(Sampler::$sampler => $corrected,)+
+                }
+            }
+
+            /// What is kept of a call at level `sigma`, from the state and the denoised picture (as the newest result);
+            /// `None` where that is the denoised picture itself.
+            pub fn kept(self, sigma: f32) -> Option<Mix> {
+                match self {
+                    $(Sampler::$sampler => $keeps(sigma),)+
+                }
+            }
+
+            fn step_by(self, levels: &[f32; MOST_RESULTS], count: u32, next: f32) -> Mix {
+                match self {
+                    $(Sampler::$sampler => $step(levels, count, next),)+
+                }
+            }
+
+            fn correction_by(self, levels: &[f32; MOST_RESULTS], count: u32, reached: f32) -> Mix {
+                match self {
+                    $(Sampler::$sampler => $correction(levels, count, reached),)+
+                }
+            }
+        }
+    };
 }
 
-/// Kernel `mix_pictures`: an element of the combination. The sum runs from the state over the newest to the oldest
-/// result; arrays with coefficient 0 are not read, and may be anything.
-#[inline]
-pub fn mixed_element<A: Fetch<f32> + ?Sized>(
-    mix: &Mix,
-    state: &A,
-    newest: &A,
-    second: &A,
-    third: &A,
-    fourth: &A,
-    element: usize,
-) -> f32 {
-    let mut sum = 0.0;
-    if mix.state != 0.0 {
-        sum = mix.state * state.fetch(element);
-    }
-    if mix.results[0] != 0.0 {
-        sum += mix.results[0] * newest.fetch(element);
-    }
-    if mix.results[1] != 0.0 {
-        sum += mix.results[1] * second.fetch(element);
-    }
-    if mix.results[2] != 0.0 {
-        sum += mix.results[2] * third.fetch(element);
-    }
-    if mix.results[3] != 0.0 {
-        sum += mix.results[3] * fourth.fetch(element);
-    }
-    sum
-}
-
-/// A dispatch of `add_noise`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct NoiseBlock {
-    /// Low and high word of the run's seed.
-    pub seed: [u32; 2],
-    /// Which noise of the run: 0 at its start, then one for each level at which some is added.
-    pub stream: u32,
-    /// Standard deviation of the noise.
-    pub scale: f32,
-}
-
-/// Kernel `add_noise`: a picture's value with noise, `value + scale * normal(seed, element, stream)`. The same number for
-/// the same seed on every device, up to the rounding of [`normal`].
-#[inline]
-pub fn noisy_element(block: &NoiseBlock, value: f32, element: u32) -> f32 {
-    value + block.scale * normal(block.seed, element, block.stream)
-}
-
-/// A sampler; see the module.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Sampler {
+samplers! {
     /// `euler`: order 1.
-    Euler,
+    Euler {
+        name: "euler",
+        order: 1,
+        results: 1,
+        keeps: denoised,
+        step: heun::euler_step,
+        corrected: Corrected::Never,
+        correction: none,
+    }
     /// `heun`: order 2, two calls a step.
-    Heun,
+    Heun {
+        name: "heun",
+        order: 2,
+        results: 1,
+        keeps: denoised,
+        step: heun::euler_step,
+        corrected: Corrected::ByAnotherCall,
+        correction: heun::correction,
+    }
     /// `dpm++2m`: DPM-Solver++ with two results.
-    DpmPlus2,
+    DpmPlus2 {
+        name: "dpm++2m",
+        order: 2,
+        results: 2,
+        keeps: denoised,
+        step: exponential::second_order,
+        corrected: Corrected::Never,
+        correction: none,
+    }
     /// `dpm++3m`: DPM-Solver++ with three results.
-    DpmPlus3,
+    DpmPlus3 {
+        name: "dpm++3m",
+        order: 3,
+        results: 3,
+        keeps: denoised,
+        step: exponential::predictor,
+        corrected: Corrected::Never,
+        correction: none,
+    }
     /// `unipc`: three results, corrected by a fourth.
-    UniPc,
+    UniPc {
+        name: "unipc",
+        order: 4,
+        results: 3,
+        keeps: denoised,
+        step: exponential::predictor,
+        corrected: Corrected::ByTheNextCall,
+        correction: exponential::corrector,
+    }
     /// `ipndm`: four directions, coefficients of even steps.
     #[default]
-    Ipndm,
+    Ipndm {
+        name: "ipndm",
+        order: 2,
+        results: 4,
+        keeps: directions::direction,
+        step: directions::even_steps,
+        corrected: Corrected::Never,
+        correction: none,
+    }
     /// `ipndm-v`: four directions, coefficients of the steps that are taken.
-    IpndmUneven,
+    IpndmUneven {
+        name: "ipndm-v",
+        order: 4,
+        results: 4,
+        keeps: directions::direction,
+        step: directions::uneven_steps,
+        corrected: Corrected::Never,
+        correction: none,
+    }
+}
+
+/// The denoised picture itself is kept.
+fn denoised(_: f32) -> Option<Mix> {
+    None
+}
+
+/// No correction.
+fn none(_: &[f32; MOST_RESULTS], _: u32, _: f32) -> Mix {
+    Mix::STAY
 }
 
 impl Sampler {
-    /// All of them.
-    pub const ALL: [Sampler; 7] = [
-        Sampler::Euler,
-        Sampler::Heun,
-        Sampler::DpmPlus2,
-        Sampler::DpmPlus3,
-        Sampler::UniPc,
-        Sampler::Ipndm,
-        Sampler::IpndmUneven,
-    ];
-
-    /// What a person calls it.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Sampler::Euler => "euler",
-            Sampler::Heun => "heun",
-            Sampler::DpmPlus2 => "dpm++2m",
-            Sampler::DpmPlus3 => "dpm++3m",
-            Sampler::UniPc => "unipc",
-            Sampler::Ipndm => "ipndm",
-            Sampler::IpndmUneven => "ipndm-v",
-        }
-    }
-
-    /// The power of the step with which its error shrinks on the published levels.
-    pub const fn order(self) -> u32 {
-        match self {
-            Sampler::Euler => 1,
-            Sampler::Heun | Sampler::DpmPlus2 | Sampler::Ipndm => 2,
-            Sampler::DpmPlus3 => 3,
-            Sampler::UniPc | Sampler::IpndmUneven => 4,
-        }
-    }
-
-    /// How many results a step combines, once there are so many.
-    pub const fn result_count(self) -> u32 {
-        match self {
-            Sampler::Euler | Sampler::Heun => 1,
-            Sampler::DpmPlus2 => 2,
-            Sampler::DpmPlus3 | Sampler::UniPc => 3,
-            Sampler::Ipndm | Sampler::IpndmUneven => 4,
-        }
-    }
-
     /// Whether it forgets the results before the newest: only then may noise be added on the way.
     pub const fn is_single_step(self) -> bool {
         self.result_count() == 1
     }
 
-    /// Whether a step is corrected once the denoiser was called at the level reached, by [`Sampler::correction`].
+    /// Whether a step is ever corrected.
     pub const fn is_corrected(self) -> bool {
-        matches!(self, Sampler::Heun | Sampler::UniPc)
+        !matches!(self.corrected(), Corrected::Never)
     }
 
-    /// How many calls of the denoiser a run over so many levels above 0 makes: one a level; for `heun` another one a
-    /// step, of which the last, to 0, needs none.
+    /// How many calls of the denoiser a run over so many levels above 0 makes: one a level; where steps are corrected by
+    /// another call another one a step, of which the last, to 0, needs none.
     pub const fn call_count(self, level_count: u32) -> u32 {
-        match self {
-            Sampler::Heun => (2 * level_count).saturating_sub(1),
-            _ => level_count,
+        match self.corrected() {
+            Corrected::ByAnotherCall => (2 * level_count).saturating_sub(1),
+            Corrected::Never | Corrected::ByTheNextCall => level_count,
         }
     }
 
     /// The most levels that a run with at most so many calls can have.
     pub const fn level_count(self, call_count: u32) -> u32 {
-        match self {
-            Sampler::Heun => call_count.div_ceil(2),
-            _ => call_count,
-        }
-    }
-
-    /// What is kept of a call at level `sigma`, from the state and the denoised picture (as the newest result); `None`
-    /// where that is the denoised picture itself.
-    pub fn kept(self, sigma: f32) -> Option<Mix> {
-        match self {
-            Sampler::Ipndm | Sampler::IpndmUneven => Some(directions::direction(sigma)),
-            _ => None,
+        match self.corrected() {
+            Corrected::ByAnotherCall => call_count.div_ceil(2),
+            Corrected::Never | Corrected::ByTheNextCall => call_count,
         }
     }
 
@@ -234,33 +258,49 @@ impl Sampler {
             return Mix::STAY;
         }
         let known = if self.result_count() < history.count { self.result_count() } else { history.count };
-        match self {
-            Sampler::Euler | Sampler::Heun => {
-                let remaining = HeunStep::between(history.levels[0], next).remaining;
-                Mix { state: remaining, results: [1.0 - remaining, 0.0, 0.0, 0.0] }
-            }
-            Sampler::DpmPlus2 => exponential::second_order(&history.levels, known, next),
-            Sampler::DpmPlus3 | Sampler::UniPc => exponential::predictor(&history.levels, known, next),
-            Sampler::Ipndm => directions::even_steps(&history.levels, known, next),
-            Sampler::IpndmUneven => directions::uneven_steps(&history.levels, known, next),
-        }
+        self.step_by(&history.levels, known, next)
     }
 
     /// The correction of a step that reached level `reached`, from what was kept of the calls at the levels of the history
-    /// and, as the newest result, of the one at the level reached: for `unipc` of the state in which the step began, for
-    /// `heun` of the state that it reached. Where nothing is corrected, the state.
+    /// and, as the newest result, of the one at the level reached; of which state, [`Corrected`] says. Where nothing is
+    /// corrected, the state.
     pub fn correction(self, history: &History, reached: f32) -> Mix {
         if history.count == 0 || !(reached < history.levels[0] && reached > 0.0) {
             return Mix::STAY;
         }
-        match self {
-            Sampler::Heun => {
-                let correction = HeunStep::between(history.levels[0], reached).correction;
-                Mix { state: 1.0, results: [correction, -correction, 0.0, 0.0] }
-            }
-            Sampler::UniPc => exponential::corrector(&history.levels, history.count.min(3), reached),
-            _ => Mix::STAY,
+        self.correction_by(&history.levels, history.count, reached)
+    }
+}
+
+impl fmt::Display for Sampler {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// No sampler has this name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct UnknownSampler;
+
+impl fmt::Display for UnknownSampler {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("unknown sampler; there are: ")?;
+        for (index, sampler) in Sampler::ALL.iter().enumerate() {
+            f.write_str(if index == 0 { "" } else { ", " })?;
+            f.write_str(sampler.name())?;
         }
+        Ok(())
+    }
+}
+
+impl core::error::Error for UnknownSampler {}
+
+impl FromStr for Sampler {
+    type Err = UnknownSampler;
+
+    /// The sampler that a person calls by this name.
+    fn from_str(name: &str) -> Result<Sampler, UnknownSampler> {
+        Sampler::ALL.into_iter().find(|sampler| sampler.name() == name).ok_or(UnknownSampler)
     }
 }
 

@@ -13,6 +13,7 @@ use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
 use tempfile::TempDir;
 use viewfuse::weighting::attention::{AttentionModel, c_header};
+use viewfuse_core::weighting::{ROWS, Row};
 use viewfuse_tests::places::repository;
 
 viewfuse_tests::trials![
@@ -33,12 +34,29 @@ fn face() -> PathBuf {
     repository().join("core/capi")
 }
 
-/// The header as the sources of the C face make it.
+/// The enum of the formulas as text, from the schemes' rows: cbindgen expands no macros.
+fn formulas() -> String {
+    let mut rows = ROWS.to_vec();
+    rows.sort_by_key(|row| row.formula as u32);
+    let variant = |row: &Row| {
+        let doc: String = row.doc.lines().map(|line| format!("    ///{line}\n")).collect();
+        format!("{doc}    {} = {},\n", row.variant, row.formula as u32)
+    };
+    let doc = "The formulas of camera weighting. Weights are proportional to `1 / (e + 1e-6)`, except for the Gaussian.";
+    let variants: String = rows.iter().map(variant).collect();
+    format!("/// {doc}\n#[repr(u32)]\npub enum Formula {{\n{variants}}}\n")
+}
+
+/// The header as the sources of the C face and the schemes' rows make it.
 fn generated_header() -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let formula_source = folder.path().join("formulas.rs");
+    std::fs::write(&formula_source, formulas()).expect("a file");
     let config = cbindgen::Config::from_file(face().join("cbindgen.toml")).expect("cbindgen's settings");
-    let builder = ["status", "weigh", "fuse", "ray", "schedule"]
+    let [status, weigh, fuse, ray, schedule] =
+        ["status", "weigh", "fuse", "ray", "schedule"].map(|module| face().join(format!("src/{module}.rs")));
+    let builder = [status, formula_source, weigh, fuse, ray, schedule]
         .into_iter()
-        .map(|module| face().join(format!("src/{module}.rs")))
         .fold(cbindgen::Builder::new().with_config(config), cbindgen::Builder::with_src);
     let mut header = Vec::new();
     builder.generate().expect("a header").write(&mut header);

@@ -2,6 +2,7 @@
 
 use core::ffi::{CStr, c_char};
 use viewfuse_core::pose::PoseError;
+use viewfuse_core::weighting::SchemeError;
 
 /// What came of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +42,15 @@ impl From<PoseError> for Status {
             PoseError::LastRow => Status::PoseLastRow,
             PoseError::NotRigid { .. } => Status::PoseNotRigid,
             PoseError::Mirrored => Status::PoseMirrored,
+        }
+    }
+}
+
+impl From<SchemeError> for Status {
+    fn from(error: SchemeError) -> Status {
+        match error {
+            SchemeError::Formula(_) | SchemeError::Choice(_) => Status::Formula,
+            SchemeError::Parameter(_) => Status::Parameter,
         }
     }
 }

@@ -9,27 +9,6 @@ use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{self, AngleKind};
 use viewfuse_core::weights::Weights;
 
-/// The formulas of camera weighting. Weights are proportional to `1 / (e + 1e-6)`, except for the Gaussian.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u32)]
-pub enum Formula {
-    /// Every source counts the same. Choice and parameter are not used.
-    Mean = 0,
-    /// `exp(-parameter d^2)` with `d` the distance of the centres; the parameter is finite and at least 0.
-    Gaussian = 1,
-    /// `e = d^choice`; the choice is 1, 2 or 3, the parameter is not used.
-    Distance = 2,
-    /// `e = parameter angle / pi + (1 - parameter) d / max d`; the parameter lies in 0 to 1, the choice is a
-    /// viewfuse_angle. With the parameter 1 and the angle between principal axes the best of the formulas.
-    Error = 3,
-    /// `e` is the sum of the absolute differences of the two matrices. Choice and parameter are not used.
-    L1 = 4,
-    /// `e` is the Frobenius norm of the difference of the two matrices. Choice and parameter are not used.
-    Frobenius = 5,
-    /// `e` is the Frobenius norm of the relative pose. Choice and parameter are not used.
-    RelativeFrobenius = 6,
-}
-
 /// Which angle between two cameras counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -39,6 +18,11 @@ pub enum Angle {
     /// Of the full relative rotation: roll counts.
     FullRotation = 1,
 }
+
+const _: () = assert!(
+    Angle::PrincipalAxis as u32 == AngleKind::PrincipalAxis as u32
+        && Angle::FullRotation as u32 == AngleKind::FullRotation as u32
+);
 
 /// A weighting scheme.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,31 +37,9 @@ pub struct Scheme {
 }
 
 impl Scheme {
+    /// The header's viewfuse_formula is made from the schemes' rows, so its numbers are those of core.
     fn checked(self) -> Result<weighting::Scheme, Status> {
-        const MEAN: u32 = Formula::Mean as u32;
-        const GAUSSIAN: u32 = Formula::Gaussian as u32;
-        const DISTANCE: u32 = Formula::Distance as u32;
-        const ERROR: u32 = Formula::Error as u32;
-        const L1: u32 = Formula::L1 as u32;
-        const FROBENIUS: u32 = Formula::Frobenius as u32;
-        const RELATIVE_FROBENIUS: u32 = Formula::RelativeFrobenius as u32;
-        match self.formula {
-            MEAN => Ok(weighting::Scheme::MEAN),
-            GAUSSIAN => weighting::Scheme::gaussian(self.parameter).map_err(|_| Status::Parameter),
-            DISTANCE => weighting::Scheme::distance(self.choice).map_err(|_| Status::Formula),
-            ERROR => {
-                let angle = match self.choice {
-                    c if c == Angle::PrincipalAxis as u32 => AngleKind::PrincipalAxis,
-                    c if c == Angle::FullRotation as u32 => AngleKind::FullRotation,
-                    _ => return Err(Status::Formula),
-                };
-                weighting::Scheme::error(self.parameter, angle).map_err(|_| Status::Parameter)
-            }
-            L1 => Ok(weighting::Scheme::L1),
-            FROBENIUS => Ok(weighting::Scheme::FROBENIUS),
-            RELATIVE_FROBENIUS => Ok(weighting::Scheme::RELATIVE_FROBENIUS),
-            _ => Err(Status::Formula),
-        }
+        Ok(weighting::Scheme::numbered(self.formula, self.choice, self.parameter)?)
     }
 }
 

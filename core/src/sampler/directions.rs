@@ -9,9 +9,9 @@ use super::interpolation::{EVEN_MOMENTS, Row, weights};
 use crate::math::min;
 
 /// The direction at level `sigma` from the state and the denoised picture. Levels below 1e-38 count as that.
-pub(super) fn direction(sigma: f32) -> Mix {
+pub(super) fn direction(sigma: f32) -> Option<Mix> {
     let factor = min(1.0 / sigma, 1.0e38);
-    Mix { state: factor, results: [-factor, 0.0, 0.0, 0.0] }
+    Some(Mix { state: factor, results: [-factor, 0.0, 0.0, 0.0] })
 }
 
 /// The step by `count` directions as if all steps were as long as this. To level 0 the first-order one, which is the

@@ -41,8 +41,9 @@ pub(super) fn predictor(levels: &Row, count: u32, next: f32) -> Mix {
     Mix { state: remaining, results: weights(&places(levels, count, levels[0], h), count, &moments) }
 }
 
-/// UniPC's corrector: the polynomial through the result at the level reached and `count` results before it.
+/// UniPC's corrector: the polynomial through the result at the level reached and `count`, at most 3, results before it.
 pub(super) fn corrector(levels: &Row, count: u32, reached: f32) -> Mix {
+    let count = count.min(3);
     let (remaining, h, moments) = prepared(levels[0], reached);
     let [_, a, b, _] = places(levels, count, levels[0], h);
     Mix { state: remaining, results: weights(&[1.0, 0.0, a, b], count + 1, &moments) }

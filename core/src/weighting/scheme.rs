@@ -1,0 +1,284 @@
+//! A scheme: what its row says, its checks, its text, and its form for kernels.
+
+use super::{AngleKind, Formula, ROWS};
+use crate::math::clamp;
+use bytemuck::{Pod, Zeroable};
+use core::fmt;
+
+/// What there is to know of a scheme beside its formula.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// The formula, whose number kernels and the C face know it by.
+    pub formula: Formula,
+    /// The formula's name in [`Formula`].
+    pub variant: &'static str,
+    /// What a person calls the scheme.
+    pub name: &'static str,
+    /// Its number, if it takes one.
+    pub parameter: Option<Parameter>,
+    /// Its choice among a few, if it has one.
+    pub choice: Option<Choice>,
+    /// How it appears in tables over all schemes: texts as a person types them.
+    pub tables: &'static [&'static str],
+    /// The formula's documentation, a line each, as it stands in the C header.
+    pub doc: &'static str,
+}
+
+/// A number that a scheme takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// What a person calls it.
+    pub key: &'static str,
+    /// The least that it can be.
+    pub least: f32,
+    /// The most that it can be.
+    pub most: f32,
+    /// What it is if it is not given.
+    pub default: f32,
+    /// Its range in words: `key must be ...`.
+    pub wanted: &'static str,
+}
+
+/// What a scheme lets choose among a few; the first is the default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Choice {
+    /// What a person calls it.
+    pub key: &'static str,
+    /// Number of the first option; the others count from there.
+    pub first: u32,
+    /// What a person calls the options.
+    pub options: &'static [&'static str],
+}
+
+/// Numbers of a row without its texts, for kernels: of what a scheme does not use all are 0.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    least: f32,
+    most: f32,
+    default: f32,
+    first: u32,
+    last: u32,
+}
+
+impl Limits {
+    pub(super) const fn of(parameter: Option<Parameter>, choice: Option<Choice>) -> Limits {
+        let (least, most, default) = match parameter {
+            Some(Parameter { least, most, default, .. }) => (least, most, default),
+            None => (0.0, 0.0, 0.0),
+        };
+        let (first, last) = match choice {
+            Some(Choice { first, options, .. }) => (first, first + options.len() as u32 - 1),
+            None => (0, 0),
+        };
+        Limits { least, most, default, first, last }
+    }
+}
+
+impl Formula {
+    /// The formula's row.
+    pub fn row(self) -> &'static Row {
+        let mut rows = ROWS.iter();
+        rows.find(|row| row.formula == self).unwrap_or(&ROWS[0])
+    }
+}
+
+/// Why something is no scheme.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SchemeError {
+    /// No formula has this number.
+    Formula(u32),
+    /// The parameter is out of its range.
+    Parameter(Formula),
+    /// The choice is none of the options.
+    Choice(Formula),
+}
+
+impl fmt::Display for SchemeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            SchemeError::Formula(number) => write!(f, "no formula has the number {number}"),
+            SchemeError::Parameter(formula) => match formula.row().parameter {
+                Some(Parameter { key, wanted, .. }) => write!(f, "{key} must be {wanted}"),
+                None => f.write_str("the parameter is out of its range"),
+            },
+            SchemeError::Choice(formula) => match formula.row().choice {
+                Some(choice) => write!(f, "{} must be {choice}", choice.key),
+                None => f.write_str("the choice is out of its range"),
+            },
+        }
+    }
+}
+
+impl core::error::Error for SchemeError {}
+
+impl fmt::Display for Choice {
+    /// The options: `1, 2 or 3`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, option) in self.options.iter().enumerate() {
+            let before = match index {
+                0 => "",
+                _ if index + 1 == self.options.len() => " or ",
+                _ => ", ",
+            };
+            write!(f, "{before}{option}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A weighting scheme given by a formula: the formula, its choice and its parameter, which are in their ranges. What a
+/// formula does not use is 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scheme {
+    pub(super) formula: Formula,
+    pub(super) choice: u32,
+    pub(super) parameter: f32,
+}
+
+impl Scheme {
+    /// Every source counts the same: what PixelNeRF and GeNVS do.
+    pub const MEAN: Scheme = Scheme::of(Formula::Mean);
+    /// `e = sum |T - S|` over the entries of the two 4x4 poses.
+    pub const L1: Scheme = Scheme::of(Formula::L1);
+    /// `e = |T - S|_F`, the Frobenius norm of the difference of the two 4x4 poses.
+    pub const FROBENIUS: Scheme = Scheme::of(Formula::Frobenius);
+    /// `e = |S T^-1|_F`, the Frobenius norm of the relative pose (in world axes, as published). Uniform on a ring of
+    /// cameras that look at its centre.
+    pub const RELATIVE_FROBENIUS: Scheme = Scheme::of(Formula::RelativeFrobenius);
+    /// Error weighting with `alpha = 1` and the angle between principal axes: the best of the paper's formulas.
+    pub const ERROR: Scheme = Scheme::of(Formula::Error);
+
+    /// The formula with its default parameter and choice.
+    pub const fn of(formula: Formula) -> Scheme {
+        let Limits { default, first, .. } = formula.limits();
+        Scheme { formula, choice: first, parameter: default }
+    }
+
+    /// The formula with this choice and parameter; what it does not use may be anything.
+    ///
+    /// # Errors
+    /// [`SchemeError::Choice`] or [`SchemeError::Parameter`] if it is out of the range that the formula's row gives.
+    #[inline]
+    pub const fn new(formula: Formula, choice: u32, parameter: f32) -> Result<Scheme, SchemeError> {
+        let Limits { least, most, first, last, .. } = formula.limits();
+        let choice = if last == 0 { 0 } else { choice };
+        let parameter = if most == 0.0 { 0.0 } else { parameter };
+        if choice < first || choice > last {
+            return Err(SchemeError::Choice(formula));
+        }
+        if parameter >= least && parameter <= most {
+            Ok(Scheme { formula, choice, parameter })
+        } else {
+            Err(SchemeError::Parameter(formula))
+        }
+    }
+
+    /// As [`Scheme::new`], by the formula's number.
+    ///
+    /// # Errors
+    /// Those of [`Scheme::new`], and [`SchemeError::Formula`] if no formula has the number.
+    pub fn numbered(formula: u32, choice: u32, parameter: f32) -> Result<Scheme, SchemeError> {
+        let found = Formula::numbered_or_mean(formula);
+        if found as u32 == formula { Scheme::new(found, choice, parameter) } else { Err(SchemeError::Formula(formula)) }
+    }
+
+    /// Weights proportional to `exp(-beta d^2)` with `d` the distance of the centres in world units.
+    ///
+    /// # Errors
+    /// [`SchemeError::Parameter`] unless `beta` is finite and at least 0.
+    #[inline]
+    pub fn gaussian(beta: f32) -> Result<Scheme, SchemeError> {
+        Scheme::new(Formula::Gaussian, 0, beta)
+    }
+
+    /// `e = alpha * angle / pi + (1 - alpha) * d / max d`.
+    ///
+    /// # Errors
+    /// [`SchemeError::Parameter`] unless `alpha` lies in `[0, 1]`.
+    #[inline]
+    pub fn error(alpha: f32, angle: AngleKind) -> Result<Scheme, SchemeError> {
+        Scheme::new(Formula::Error, angle as u32, alpha)
+    }
+
+    /// `e = d^power` with `d` the distance of the centres in world units and `power` 1, 2 or 3.
+    ///
+    /// # Errors
+    /// [`SchemeError::Choice`] for any other power.
+    #[inline]
+    pub fn distance(power: u32) -> Result<Scheme, SchemeError> {
+        Scheme::new(Formula::Distance, power, 0.0)
+    }
+
+    /// Its formula.
+    pub fn formula(&self) -> Formula {
+        self.formula
+    }
+
+    /// Its choice; 0 if it has none.
+    pub fn choice(&self) -> u32 {
+        self.choice
+    }
+
+    /// Its parameter; 0 if it has none.
+    pub fn parameter(&self) -> f32 {
+        self.parameter
+    }
+
+    /// The scheme as plain data for kernels.
+    pub fn block(&self) -> SchemeBlock {
+        let Scheme { formula, choice, parameter } = *self;
+        SchemeBlock { formula: formula as u32, choice, parameter, padding: 0 }
+    }
+}
+
+impl fmt::Display for Scheme {
+    /// As a person types it: `gaussian:beta=1`. A choice behind a parameter is left out where it is the default.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Row { name, parameter, choice, .. } = self.formula.row();
+        f.write_str(name)?;
+        if let Some(Parameter { key, .. }) = parameter {
+            write!(f, ":{key}={}", self.parameter)?;
+        }
+        if let Some(Choice { key, first, options }) = choice
+            && (parameter.is_none() || self.choice != *first)
+        {
+            let option = options.get((self.choice - first) as usize).unwrap_or(&"");
+            write!(f, "{}{key}={option}", if parameter.is_some() { ',' } else { ':' })?;
+        }
+        Ok(())
+    }
+}
+
+/// A scheme as plain data: what a kernel reads from a buffer. Made from a [`Scheme`] by [`Scheme::block`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SchemeBlock {
+    /// Number of the formula; unknown ones are the mean.
+    pub formula: u32,
+    /// The choice.
+    pub choice: u32,
+    /// The parameter.
+    pub parameter: f32,
+    /// Zero.
+    pub padding: u32,
+}
+
+const _: () = assert!(size_of::<SchemeBlock>() == 16);
+
+impl SchemeBlock {
+    /// The scheme that the block was made from. What no scheme has is brought into its range.
+    #[inline]
+    pub fn scheme(&self) -> Scheme {
+        let formula = Formula::numbered_or_mean(self.formula);
+        let Limits { least, most, first, last, .. } = formula.limits();
+        // Not `clamp`, which would bring its assertion into the kernel.
+        let choice = if self.choice < first {
+            first
+        } else if self.choice > last {
+            last
+        } else {
+            self.choice
+        };
+        Scheme { formula, choice, parameter: clamp(self.parameter, least, most) }
+    }
+}
