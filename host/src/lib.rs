@@ -1,4 +1,4 @@
-//! viewfuse: from a handful of posed photographs, the picture from a camera that was never there.
+#![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "check")]
@@ -19,8 +19,3 @@ pub use viewfuse_synthetic as synthetic;
 pub use viewfuse_train as train;
 pub use viewfuse_vulkan as vulkan;
 pub use viewfuse_weighting as weighting;
-
-/// The examples of the README, compiled and run.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
