@@ -67,8 +67,8 @@ fn commands() -> Vec<String> {
 const NOT_RUN: [(&str, &str); 9] = [
     ("#", "a comment"),
     ("tests/run", "it runs this test"),
-    ("cargo build --profile firmware -p viewfuse-capi", "the test `capi` runs it"),
-    ("cc ", "the test `capi` compiles the program"),
+    ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
+    ("cc ", "`embedded/capi.rs` compiles the program"),
     ("cargo install", "it would change the machine"),
     ("viewfuse ", "on files of a person, or hours of training"),
     ("seq ", "GNU parallel may not be there; the tests of protocols run shards"),
@@ -194,7 +194,9 @@ fn links_lead_somewhere() {
 
 /// A table's words without its numbers: what must be the same on every machine.
 fn structure(table: &str) -> Vec<Vec<String>> {
-    let is_word = |word: &&str| *word != "*" && !word.trim_matches(['(', '+', '%']).parse::<f64>().is_ok();
+    let is_rule = |word: &str| word.chars().all(|c| ['─', '═'].contains(&c));
+    let is_number = |word: &str| word.trim_matches(['(', '+', '%']).parse::<f64>().is_ok();
+    let is_word = |word: &&str| *word != "*" && !is_rule(word) && !is_number(word);
     table.lines().map(|line| line.split_whitespace().filter(is_word).map(str::to_owned).collect()).collect()
 }
 
