@@ -8,7 +8,7 @@ use std::time::Instant;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, made};
+use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, test_networks};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_tests::lorry::photographs;
 
@@ -19,7 +19,8 @@ const LEVELS: [u32; 2] = [2, 8];
 fn main() {
     // Cargo hands over arguments of its own as well.
     let rounds = std::env::args().find_map(|argument| argument.parse().ok()).unwrap_or(5);
-    let field = Genvs::new(made::by_formula(&Architecture::published()), GenvsOptions::default()).expect("a network");
+    let field = Genvs::new(test_networks::deterministic(&Architecture::published()), GenvsOptions::default())
+        .expect("a network");
     let photographs = photographs(SOURCES, SIDE);
     let pixels = (SIDE * SIDE) as usize;
     let features: Vec<f32> = (0..pixels * 16).map(|index| (index * 7919 % 1000) as f32 / 1000.0 - 0.5).collect();

@@ -17,7 +17,7 @@ struct Tensors {
 
 impl Tensors {
     fn of(architecture: &Architecture) -> Tensors {
-        let made = made::by_formula(architecture);
+        let made = test_networks::deterministic(architecture);
         Tensors { shapes: made.shapes().clone(), values: BTreeMap::new(), metadata: made.metadata().clone() }
     }
 
@@ -159,7 +159,7 @@ fn sizes_come_from_the_checkpoint() {
             ..small
         },
     ] {
-        let checkpoint = made::by_formula(&architecture);
+        let checkpoint = test_networks::deterministic(&architecture);
         assert_eq!(Architecture::of(&checkpoint).expect("a member of the family"), architecture);
         let count: usize = checkpoint.shapes().values().map(|shape| shape.iter().product::<usize>()).sum();
         assert_eq!(architecture.parameter_count(), count);
@@ -168,7 +168,7 @@ fn sizes_come_from_the_checkpoint() {
 
 #[test]
 fn made_of_the_formula_with_two_gains() {
-    let checkpoint = made::by_formula(&Architecture::small());
+    let checkpoint = test_networks::deterministic(&Architecture::small());
     for (name, gain) in [
         ("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0),
         ("pixel_nerf_net.mlp.layers.2.weight", 4.0),

@@ -144,16 +144,16 @@ fn the_seed_decides() {
 fn files_of_either_network() {
     let scene = toy();
     let folder = scene.path();
-    let computed = genvs::made::by_formula(&genvs::Architecture::small());
+    let computed = genvs::test_networks::deterministic(&genvs::Architecture::small());
     computed.write_safetensors(&folder.join("one.safetensors"), Precision::Kept, &Silent).expect("a file");
-    let computed = pixelnerf::made::by_formula(&pixelnerf::Architecture::small(8));
+    let computed = pixelnerf::test_networks::deterministic(&pixelnerf::Architecture::small(8));
     computed.write_safetensors(&folder.join("two.safetensors"), Precision::Kept, &Silent).expect("a file");
     let genvs = picture(folder, "--steps 2 --model one.safetensors");
     assert!(genvs == picture(folder, "--steps 2 --model genvs:small"), "a file is not what was written");
     let pixelnerf = record(folder, "--samples 8,4,4 --model two.safetensors");
     assert_eq!((&pixelnerf["field"], &pixelnerf["denoising"]), (&"pixelnerf".into(), &Value::Null));
     let without = genvs::Architecture { denoiser: None, ..genvs::Architecture::small() };
-    genvs::made::by_formula(&without)
+    genvs::test_networks::deterministic(&without)
         .write_safetensors(&folder.join("three.safetensors"), Precision::Kept, &Silent)
         .expect("a file");
     let plain = record(folder, "--model three.safetensors");

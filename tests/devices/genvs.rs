@@ -7,7 +7,7 @@ use viewfuse::check::verify::verify;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
+use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse::field::{Field, FieldError};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
@@ -54,7 +54,7 @@ fn picture<D: Device>(
     let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 3 };
     let plan = Plan { steps, ..Plan::published(0) };
     let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
-    let field = Genvs::new(made::by_formula(&architecture), options)?;
+    let field = Genvs::new(test_networks::deterministic(&architecture), options)?;
     let quiet = Silent;
     let prepared = field.prepare(device, &photographs(3, 30), &quiet)?;
     field.encode(device, &prepared, &[], &quiet)?;

@@ -5,7 +5,7 @@ use libtest_mimic::Failed;
 use viewfuse::check::verify::verify;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, made};
+use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
@@ -40,7 +40,7 @@ fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>,
     let job = selection.resolve(&scene, 1).expect("views of it");
     let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
     let sampling = Sampling { coarse_count: 32, importance_count: 8, depth_count: 8, ..Sampling::default() };
-    let body = made::body(&Architecture::small(16));
+    let body = test_networks::body(&Architecture::small(16));
     let field = PixelNerf::new(&body, PixelNerfOptions { sampling, omissions }).expect("a made network");
     let mut colours = Vec::new();
     let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {

@@ -10,7 +10,7 @@ mod values;
 use std::convert::Infallible;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
+use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse::field::{Field, FieldError, Rendered};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
@@ -32,12 +32,12 @@ fn leaving_out(omissions: Omissions) -> GenvsOptions {
 }
 
 fn made(options: GenvsOptions) -> Genvs {
-    Genvs::new(made::by_formula(&Architecture::small()), options).expect("a made network")
+    Genvs::new(test_networks::deterministic(&Architecture::small()), options).expect("a made network")
 }
 
 fn without_denoiser(options: GenvsOptions) -> Genvs {
     let architecture = Architecture { denoiser: None, ..Architecture::small() };
-    Genvs::new(made::by_formula(&architecture), options).expect("a made network")
+    Genvs::new(test_networks::deterministic(&architecture), options).expect("a made network")
 }
 
 /// The lorry from some sides, on white.

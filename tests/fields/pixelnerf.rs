@@ -5,7 +5,7 @@ mod omissions;
 mod sizes;
 
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, made};
+use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::field::{Field, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::SourceImages;
@@ -19,12 +19,12 @@ const WIDTH: usize = 16;
 
 /// A body in empty space.
 fn body(options: PixelNerfOptions) -> PixelNerf {
-    PixelNerf::new(&made::body(&Architecture::small(WIDTH)), options).expect("a made network")
+    PixelNerf::new(&test_networks::body(&Architecture::small(WIDTH)), options).expect("a made network")
 }
 
 /// Space full of mist.
 fn mist(options: PixelNerfOptions) -> PixelNerf {
-    PixelNerf::new(&made::by_formula(&Architecture::small(WIDTH)), options).expect("a made network")
+    PixelNerf::new(&test_networks::deterministic(&Architecture::small(WIDTH)), options).expect("a made network")
 }
 
 fn leaving_out(omissions: Omissions) -> PixelNerfOptions {

@@ -4,7 +4,7 @@ use half::f16;
 use viewfuse::check::poses::Random;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
-use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, made};
+use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse::field::{Field, LeftOut, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
@@ -87,7 +87,7 @@ const VIEWS: u32 = 3;
 fn field(half_volumes: bool) -> Genvs {
     let omissions = Omissions { half_volumes, ..Omissions::default() };
     let options = GenvsOptions { omissions, ..GenvsOptions::default() };
-    Genvs::new(made::by_formula(&Architecture::small()), options).expect("a made network")
+    Genvs::new(test_networks::deterministic(&Architecture::small()), options).expect("a made network")
 }
 
 fn orbit() -> Orbit {

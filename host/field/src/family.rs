@@ -57,9 +57,9 @@ mod tests {
 
     #[test]
     fn told_by_names() {
-        let pixelnerf = pixelnerf::made::by_formula(&pixelnerf::Architecture::small(8));
+        let pixelnerf = pixelnerf::test_networks::deterministic(&pixelnerf::Architecture::small(8));
         assert_eq!(Family::of(&pixelnerf).ok(), Some(Family::PixelNerf));
-        let genvs = genvs::made::by_formula(&genvs::Architecture::small());
+        let genvs = genvs::test_networks::deterministic(&genvs::Architecture::small());
         assert_eq!(Family::of(&genvs).ok(), Some(Family::Genvs));
     }
 

@@ -9,12 +9,12 @@ mod denoiser;
 mod encoder;
 mod feature_image;
 mod looking;
-pub mod made;
 mod memory;
 mod options;
 mod parts;
 pub mod reference;
 pub mod sampling;
+pub mod test_networks;
 mod volume;
 
 pub use architecture::MLP;

@@ -6,7 +6,6 @@
 
 pub mod architecture;
 mod encoder;
-pub mod made;
 mod memory;
 mod network;
 mod options;
@@ -14,6 +13,7 @@ mod parameters;
 mod pass;
 mod probes;
 pub mod reference;
+pub mod test_networks;
 
 pub use architecture::{Architecture, Level, Pass};
 pub use options::{LEAST_OPACITY, LEAST_SHARE, Omissions, PixelNerfOptions, Sampling};

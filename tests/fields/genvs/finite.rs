@@ -4,7 +4,7 @@ use super::{exact, sources, target, try_picture};
 use std::collections::BTreeMap;
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;
-use viewfuse::field::genvs::{Architecture, Genvs, made};
+use viewfuse::field::genvs::{Architecture, Genvs, test_networks};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::weights::Weights;
@@ -14,7 +14,7 @@ const LARGE: f32 = 1.9e38;
 
 /// The small network with all weights of a module, or of a layer, multiplied.
 fn multiplied(module: &str, factor: f32) -> Genvs {
-    let made = made::by_formula(&Architecture::small());
+    let made = test_networks::deterministic(&Architecture::small());
     let belongs = move |name: &str, module: &str| {
         name.strip_prefix(module).is_some_and(|rest| rest.starts_with('.') && rest.ends_with(".weight"))
     };

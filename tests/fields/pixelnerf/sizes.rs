@@ -2,11 +2,11 @@
 
 use super::{assert_sound, exact, picture, sources, target};
 use std::collections::BTreeMap;
-use viewfuse::field::pixelnerf::{Architecture, Level, PixelNerf, made};
+use viewfuse::field::pixelnerf::{Architecture, Level, PixelNerf, test_networks};
 use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 
 fn with_changes(change: impl FnOnce(&mut Vec<(TensorShape, Vec<f32>)>)) -> Checkpoint {
-    let made = made::by_formula(&Architecture::small(16));
+    let made = test_networks::deterministic(&Architecture::small(16));
     let mut tensors: Vec<(TensorShape, Vec<f32>)> = made
         .shapes()
         .iter()
@@ -37,7 +37,7 @@ fn sizes_come_from_the_checkpoint() {
         Architecture { width: 40, block_count: 2, injected_count: 2, ..small.clone() },
         Architecture { block_count: 1, injected_count: 1, frequency_count: 1, has_fine: false, ..small },
     ] {
-        let checkpoint = made::by_formula(&architecture);
+        let checkpoint = test_networks::deterministic(&architecture);
         let field = PixelNerf::new(&checkpoint, exact()).expect("a member of the family");
         assert_eq!(*field.architecture(), architecture);
         if architecture.width < 512 {

@@ -13,7 +13,7 @@ use viewfuse_core::sources::Sources;
 use viewfuse_device::Device;
 use viewfuse_field::genvs::reference::Reference;
 use viewfuse_field::genvs::sampling::{Plan, Steps};
-use viewfuse_field::genvs::{Architecture, COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, made};
+use viewfuse_field::genvs::{Architecture, COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 
@@ -44,7 +44,8 @@ pub(super) fn verify<D: Device>(
     };
     let failed = |message: String| file.wrong("genvs", message);
     let options = GenvsOptions { omissions: Omissions::NONE, plan: Plan::published(0), ..GenvsOptions::default() };
-    let field = Genvs::new(made::by_formula(&architecture), options).map_err(|error| failed(error.to_string()))?;
+    let field =
+        Genvs::new(test_networks::deterministic(&architecture), options).map_err(|error| failed(error.to_string()))?;
     let sources = file.sources("focal_normalized", |height| height as f32 / 2.0)?;
     let side = architecture.image_side;
     if sources.images.iter().any(|image| image.texels.len() != side * side) {

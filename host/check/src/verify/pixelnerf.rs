@@ -9,7 +9,7 @@ use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{RayPoint, TargetRay};
 use viewfuse_device::Device;
 use viewfuse_field::pixelnerf::reference::{Reference, SeenRays};
-use viewfuse_field::pixelnerf::{Architecture, Omissions, Pass, PixelNerf, PixelNerfOptions, made};
+use viewfuse_field::pixelnerf::{Architecture, Omissions, Pass, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse_scene::photographs::SourceImages;
 
 /// Weights of the views by the names of the file.
@@ -35,7 +35,7 @@ pub(super) fn verify<D: Device>(
         Some(Ok(width @ 1..=4096)) => Architecture::small(width),
         Some(_) => return Err(file.wrong("metadata", "'width' is no whole number from 1 to 4096")),
     };
-    let checkpoint = made::by_formula(&architecture);
+    let checkpoint = test_networks::deterministic(&architecture);
     let failed =
         |message: String| VerifyError::Content { path: path.to_path_buf(), place: "pixelnerf".to_owned(), message };
     let options = |omissions| PixelNerfOptions { omissions, ..PixelNerfOptions::default() };

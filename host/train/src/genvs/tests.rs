@@ -15,7 +15,9 @@ use viewfuse_core::rays::cast_ray;
 use viewfuse_core::schedule::Preconditioning;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::genvs::reference::Reference;
-use viewfuse_field::genvs::{Architecture, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, made, ray_length};
+use viewfuse_field::genvs::{
+    Architecture, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, ray_length, test_networks,
+};
 use viewfuse_field::learned::default_near_far;
 use viewfuse_nn::checkpoint::TensorShape;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
@@ -52,7 +54,7 @@ fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -
 
 #[test]
 fn the_graph_is_the_renderers() {
-    let made = made::by_formula(&Architecture::small());
+    let made = test_networks::deterministic(&Architecture::small());
     let network = Genvs::frozen(&made, 64, DType::F64).expect("a network");
     let field = Field::new(made, GenvsOptions::default()).expect("a network");
     let (sources, target) = (photographs(3, 64), target(64, 2.0));
@@ -153,7 +155,7 @@ fn looking_has_its_slopes() {
 
 #[test]
 fn the_loss_has_its_slopes() {
-    let made = made::by_formula(&Architecture::narrow(32, 4));
+    let made = test_networks::deterministic(&Architecture::narrow(32, 4));
     let network = Genvs { is_frozen: false, ..Genvs::frozen(&made, 32, DType::F64).expect("a network") };
     let views = views(&photographs(2, 32), &[target(32, 2.0), target(32, 0.5)], 2);
     let samples = CoarseBlock { seed: [1, 2], sample_count: 4, jitter: 1.0 };

@@ -69,10 +69,10 @@ impl Model {
         };
         Ok(match self {
             Model::File(path) => Checkpoint::open(path)?,
-            Model::Formula(width) => pixelnerf::made::by_formula(&sizes(width)),
-            Model::Body(width) => pixelnerf::made::body(&sizes(width)),
-            Model::Genvs { small: true } => genvs::made::by_formula(&genvs::Architecture::small()),
-            Model::Genvs { small: false } => genvs::made::by_formula(&genvs::Architecture::published()),
+            Model::Formula(width) => pixelnerf::test_networks::deterministic(&sizes(width)),
+            Model::Body(width) => pixelnerf::test_networks::body(&sizes(width)),
+            Model::Genvs { small: true } => genvs::test_networks::deterministic(&genvs::Architecture::small()),
+            Model::Genvs { small: false } => genvs::test_networks::deterministic(&genvs::Architecture::published()),
         })
     }
 }

@@ -1,17 +1,17 @@
-//! Checkpoints that are computed, not trained: for checking against other implementations, and for measuring.
+//! Test networks: checkpoints that are computed, not trained, for checking against other implementations, and for measuring.
 
 use super::architecture::Architecture;
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse_nn::initialisation;
 
-/// Outputs of the networks by formula are multiplied by this, so that densities vary.
+/// Outputs of test networks are multiplied by this, so that densities vary.
 const OUTPUT_GAIN: f32 = 6.0;
 
 /// Every tensor by [`initialisation`]; space is full of mist. With [`Architecture::published`] it is the network of the reference
 /// values.
-pub fn by_formula(architecture: &Architecture) -> Checkpoint {
-    made("formula", architecture, |tensor| {
+pub fn deterministic(architecture: &Architecture) -> Checkpoint {
+    computed("formula", architecture, |tensor| {
         let gain = if tensor.name.ends_with("lin_out.weight") { OUTPUT_GAIN } else { 1.0 };
         let mut values = initialisation::tensor(&tensor.name, &tensor.shape);
         values.iter_mut().for_each(|value| *value *= gain);
@@ -22,15 +22,15 @@ pub fn by_formula(architecture: &Architecture) -> Checkpoint {
 /// A solid ball-like body around the world's origin, of a radius near 0.3, coloured by what the views show and empty
 /// outside: a network for measuring what can be left out, as long as there is no trained one.
 ///
-/// It is [`by_formula`] with one channel of the flow set aside: it enters as the sum of the cosines of the lowest
+/// It is [`deterministic`] with one channel of the flow set aside: it enters as the sum of the cosines of the lowest
 /// frequency, which falls with the distance from the origin whatever the view's axes, passes all blocks unchanged, and
 /// decides the density.
 pub fn body(architecture: &Architecture) -> Checkpoint {
     let frequency_axes = 6..9;
     let frequency = architecture.frequency;
-    made("body", architecture, move |tensor| {
+    computed("body", architecture, move |tensor| {
         let TensorShape { name, shape } = tensor;
-        let mut values = by_formula_values(tensor);
+        let mut values = initial_values(tensor);
         let leaf = name.split_once('.').map_or("", |(_, leaf)| leaf);
         let columns = shape.get(1).copied().unwrap_or(1);
         if !name.starts_with("mlp_") {
@@ -67,14 +67,14 @@ const SURFACE_COORDINATE: f32 = 0.18;
 const DENSITY_SLOPE: f32 = 2000.0;
 /// Density below zero just outside of the surface.
 const DENSITY_OFFSET: f32 = 2.0;
-/// What is left of the formula's own density.
+/// What is left of the initialisation's own density.
 const DENSITY_NOISE: f32 = 0.02;
 
-fn by_formula_values(tensor: &TensorShape) -> Vec<f32> {
+fn initial_values(tensor: &TensorShape) -> Vec<f32> {
     initialisation::tensor(&tensor.name, &tensor.shape)
 }
 
-fn made(
+fn computed(
     label: &str,
     architecture: &Architecture,
     values: impl Fn(&TensorShape) -> Vec<f32> + Send + Sync + 'static,

@@ -1,17 +1,17 @@
-//! Checkpoints that are computed, not trained: for checking against other implementations, and for measuring.
+//! Test networks: checkpoints that are computed, not trained, for checking against other implementations, and for measuring.
 
 use super::architecture::{Architecture, IMAGE_SIDE};
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::initialisation;
 
-/// By what tensors of the networks by formula are multiplied, so that volumes and densities vary.
+/// By what tensors of test networks are multiplied, so that volumes and densities vary.
 const GAINS: [(&str, f32); 2] =
     [("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0), ("pixel_nerf_net.mlp.layers.2.weight", 4.0)];
 
 /// Every tensor by [`initialisation`], computed when it is read. With [`Architecture::published`] it is the network of the
 /// reference values.
-pub fn by_formula(architecture: &Architecture) -> Checkpoint {
+pub fn deterministic(architecture: &Architecture) -> Checkpoint {
     let metadata = match architecture.denoiser {
         Some(_) => BTreeMap::new(),
         None => BTreeMap::from([(IMAGE_SIDE.to_owned(), architecture.image_side.to_string())]),
