@@ -140,17 +140,17 @@ fn views_that_do_not_fit() {
 
 fn schemes_that_are_none() {
     let render = |scheme: &str| format!("{RENDER} --weights {scheme}");
-    assert_refused(&render("nearest"), &["unknown weighting scheme 'nearest'", "there are: mean, l1,"]);
-    assert_refused(&render("gaussian:beta=-1"), &["'gaussian': beta must be finite and at least 0, not '-1'"]);
-    assert_refused(&render("gaussian:beta=inf"), &["beta must be finite", "'inf'"]);
-    assert_refused(&render("gaussian:beta=NaN"), &["beta must be finite", "'NaN'"]);
-    assert_refused(&render("gaussian:beta=much"), &["beta must be a number, not 'much'"]);
-    assert_refused(&render("error:alpha=1.5"), &["'error': alpha must be between 0 and 1, not '1.5'"]);
-    assert_refused(&render("error:angle=wide"), &["'error': angle must be axis or full, not 'wide'"]);
-    assert_refused(&render("distance:power=4"), &["'distance': power must be 1, 2 or 3, not '4'"]);
-    assert_refused(&render("gaussian:sigma=1"), &["'gaussian' has no parameter 'sigma'"]);
-    assert_refused("weights toy --target 20 --weights mean --weights foo", &["unknown weighting scheme 'foo'"]);
-    assert_refused("evaluate toy --weights foo -o scores.csv", &["unknown weighting scheme 'foo'"]);
+    assert_wrong(&render("nearest"), &["unknown weighting scheme 'nearest'", "there are: mean, l1,"]);
+    assert_wrong(&render("gaussian:beta=-1"), &["'gaussian': beta must be finite and at least 0, not '-1'"]);
+    assert_wrong(&render("gaussian:beta=inf"), &["beta must be finite", "'inf'"]);
+    assert_wrong(&render("gaussian:beta=NaN"), &["beta must be finite", "'NaN'"]);
+    assert_wrong(&render("gaussian:beta=much"), &["beta must be a number, not 'much'"]);
+    assert_wrong(&render("error:alpha=1.5"), &["'error': alpha must be between 0 and 1, not '1.5'"]);
+    assert_wrong(&render("error:angle=wide"), &["'error': angle must be axis or full, not 'wide'"]);
+    assert_wrong(&render("distance:power=4"), &["'distance': power must be 1, 2 or 3, not '4'"]);
+    assert_wrong(&render("gaussian:sigma=1"), &["'gaussian' has no parameter 'sigma'"]);
+    assert_wrong("weights toy --target 20 --weights mean --weights foo", &["unknown weighting scheme 'foo'"]);
+    assert_wrong("evaluate toy --weights foo -o scores.csv", &["unknown weighting scheme 'foo'"]);
 }
 
 fn attention_parameters_that_are_none() {
@@ -158,7 +158,7 @@ fn attention_parameters_that_are_none() {
     let folder = toy();
     let render = |file: &str| format!("{RENDER} --weights attention:{file}");
     let refused = |file: &str, parts: &[&str]| command::assert_refused(BINARY, folder.path(), &render(file), parts);
-    refused("", &["'attention' needs a file of parameters", "attention:FILE"]);
+    assert_wrong(&render(""), &["'attention' needs a file of parameters", "attention:FILE"]);
     refused("none.safetensors", &["none.safetensors: cannot be read: No such file"]);
     refused("toy", &["toy: cannot be read"]);
     folder.write("text.safetensors", "These are not the tensors you are looking for.");
@@ -240,7 +240,7 @@ fn wrong_arguments_of_genvs() {
     let wrong = |arguments: &str, parts: &[&str]| {
         assert_wrong(&format!("render toy --model genvs:small {arguments} -o out"), parts)
     };
-    wrong("--sampler plms", &["unknown sampler 'plms'; there are: euler, heun, dpm++2m, dpm++3m, unipc, ipndm"]);
+    wrong("--sampler plms", &["'plms'", "unknown sampler; there are: euler, heun, dpm++2m, dpm++3m, unipc, ipndm"]);
     wrong("--steps 0", &["--steps", "1..=1000"]);
     for tolerance in ["0", "1.5", "nan", "small"] {
         wrong(&format!("--tolerance {tolerance}"), &["--tolerance", "above 0, at most 1"]);

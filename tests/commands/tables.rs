@@ -3,7 +3,7 @@
 use super::{assert_near, done, numbers, texts};
 use serde_json::Value;
 use std::fs;
-use viewfuse::weighting::SCHEME_NAMES;
+use viewfuse::weighting::scheme_names;
 use viewfuse_tests::command::{names_in, toy};
 
 viewfuse_tests::trials![
@@ -25,9 +25,9 @@ fn weights_as_a_table() {
         .collect();
     assert_eq!(rows.len(), 10, "{table}");
     for (view, row) in rows.iter().enumerate() {
-        assert_eq!((row[0], row.len()), (format!("{view:06}").as_str(), 3 + SCHEME_NAMES.len()), "{table}");
+        assert_eq!((row[0], row.len()), (format!("{view:06}").as_str(), 3 + scheme_names().len()), "{table}");
     }
-    for column in 3..3 + SCHEME_NAMES.len() {
+    for column in 3..3 + scheme_names().len() {
         // Four decimals each.
         assert_near(rows.iter().map(|row| row[column].parse::<f64>().expect("a weight")).sum(), 1.0, 10.0 * 0.5e-4);
     }
@@ -46,8 +46,8 @@ fn weights_as_json() {
     let all = weights("--target 20");
     assert_eq!((&all["target"], texts(&all["sources"]).len()), (&"000020".into(), 23));
     let columns = all["weights"].as_object().expect("schemes");
-    assert_eq!(columns.len(), SCHEME_NAMES.len());
-    for name in SCHEME_NAMES {
+    assert_eq!(columns.len(), scheme_names().len());
+    for name in scheme_names() {
         let values = numbers(&columns[name]);
         assert!(values.len() == 23 && values.iter().all(|weight| *weight >= 0.0), "{name}");
         assert_near(values.iter().sum(), 1.0, 1.0e-5);

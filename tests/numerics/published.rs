@@ -5,34 +5,34 @@
 use serde_json::Value;
 use std::path::PathBuf;
 use viewfuse::check::compare::Comparator;
-use viewfuse::check::oracle::Formula;
 use viewfuse_core::metrics::{mean_squared_error, psnr, ssim};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{AngleKind, weigh};
+use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
 use viewfuse_tests::places::data;
 
 /// The scheme that a published name means.
-fn formula(name: &str) -> Formula {
+fn scheme(name: &str) -> Scheme {
     let number = |text: &str| text.parse::<f32>().unwrap_or_else(|_| panic!("{name}: no number"));
-    match name {
-        "baseline_mean" => Formula::Mean,
-        "distance" => Formula::Distance(1),
-        "distance_squared" => Formula::Distance(2),
-        "distance_cubed" => Formula::Distance(3),
-        "l1_weighing" => Formula::L1,
-        "f_norm_weighting" => Formula::Frobenius,
-        "rel_cam_poses_l2" | "rel_cam_poses_f_norm" => Formula::RelativeFrobenius,
+    let built = match name {
+        "baseline_mean" => Ok(Scheme::MEAN),
+        "distance" => Scheme::distance(1),
+        "distance_squared" => Scheme::distance(2),
+        "distance_cubed" => Scheme::distance(3),
+        "l1_weighing" => Ok(Scheme::L1),
+        "f_norm_weighting" => Ok(Scheme::FROBENIUS),
+        "rel_cam_poses_l2" | "rel_cam_poses_f_norm" => Ok(Scheme::RELATIVE_FROBENIUS),
         _ => {
             if let Some(alpha) = name.strip_prefix("error_weighing_alpha=") {
-                Formula::Error(number(alpha), AngleKind::FullRotation)
+                Scheme::error(number(alpha), AngleKind::FullRotation)
             } else if let Some(beta) = name.strip_prefix("distance_gaussian_b=") {
-                Formula::Gaussian(number(beta))
+                Scheme::gaussian(number(beta))
             } else {
                 panic!("unknown method {name}")
             }
         }
-    }
+    };
+    built.unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
 fn reference() -> Value {
@@ -57,10 +57,10 @@ fn pose(value: &Value) -> Pose {
     Pose::from_opengl(&matrix).expect("a pose")
 }
 
-fn ours(case: &Value, formula: Formula) -> Vec<f32> {
+fn ours(case: &Value, scheme: Scheme) -> Vec<f32> {
     let poses: Vec<Pose> = array(&case["src"]).iter().map(pose).collect();
     let sources = Sources::<32>::new(&poses).expect("up to 32 sources");
-    let weights = weigh(formula.scheme(), &sources, &pose(&case["tgt"]));
+    let weights = weigh(scheme, &sources, &pose(&case["tgt"]));
     weights.values()[..poses.len()].to_vec()
 }
 
@@ -72,14 +72,14 @@ fn every_published_scheme_agrees() {
     let first = cases[0]["official"].as_object().expect("methods by name");
     assert_eq!(first.len(), 15);
     for name in first.keys() {
-        let formula = formula(name);
+        let scheme = scheme(name);
         let mut worst = 0.0_f64;
         for case in cases {
-            let actual = ours(case, formula);
+            let actual = ours(case, scheme);
             let published = &case["official"][name];
             let wide = numbers(&published["f64"]);
             // The relative pose was never published in f64.
-            assert!(wide.is_some() || formula == Formula::RelativeFrobenius, "{name}");
+            assert!(wide.is_some() || scheme == Scheme::RELATIVE_FROBENIUS, "{name}");
             let expected = wide.or_else(|| numbers(&published["f32"])).expect("numbers");
             // The poses are rounded to f32: a Gaussian's logit of 40 loses 40 * 4 * 2^-24 to that alone.
             let tolerance = Comparator { absolute: 0.0, relative: 1.0e-5 };
@@ -97,7 +97,7 @@ fn extreme_poses_give_weights_where_the_published_code_gives_nan() {
     let (mut repaired, mut pairs) = (0, 0);
     for case in array(&reference["extreme"]) {
         for (name, published) in case["official"].as_object().expect("methods by name") {
-            let actual = ours(case, formula(name));
+            let actual = ours(case, scheme(name));
             let sum: f64 = actual.iter().map(|w| f64::from(*w)).sum();
             assert!(actual.iter().all(|w| w.is_finite() && *w >= 0.0), "{name} on {}: {actual:?}", case["name"]);
             assert!((sum - 1.0).abs() <= actual.len() as f64 / 16_777_216.0, "{name} on {}: {actual:?}", case["name"]);

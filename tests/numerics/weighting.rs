@@ -1,38 +1,38 @@
 //! Every formula weighting against `f64` on the same poses, with the derived bound, and what must not change it.
 
 use viewfuse::check::compare::relative_units;
-use viewfuse::check::oracle::{Arithmetic, FORMULAS, Formula, Matrix, WidePose, minus, norm, normalised};
+use viewfuse::check::oracle::{Arithmetic, Matrix, WidePose, evaluate, minus, norm, normalised, schemes};
 use viewfuse::check::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{AngleKind, Scheme, SchemeError, weigh};
+use viewfuse_core::weighting::{AngleKind, Formula, Scheme, SchemeError, weigh};
 
 /// Weights below this may be cut off: `exp` knows no subnormals.
 const NEGLIGIBLE: f64 = 4.0e-38;
 const COUNTS: [usize; 7] = [1, 2, 3, 5, 8, 16, 32];
 
-fn weights(formula: Formula, sources: &[Pose], target: &Pose) -> Vec<f32> {
+fn weights(scheme: Scheme, sources: &[Pose], target: &Pose) -> Vec<f32> {
     let sources = Sources::<32>::new(sources).expect("between 1 and 32 sources");
-    let weights = weigh(formula.scheme(), &sources, target);
+    let weights = weigh(scheme, &sources, target);
     weights.values()[..weights.count() as usize].to_vec()
 }
 
 /// Largest error in units of `2^-24`, after asserting the simplex and the bound of each weight.
 #[track_caller]
-fn check(formula: Formula, sources: &[Pose], target: &Pose) -> f64 {
-    let actual = weights(formula, sources, target);
-    let (expected, bounds) = formula.evaluate(sources, target, Arithmetic::EXACT);
+fn check(scheme: Scheme, sources: &[Pose], target: &Pose) -> f64 {
+    let actual = weights(scheme, sources, target);
+    let (expected, bounds) = evaluate(scheme, sources, target, Arithmetic::EXACT);
     let sum: f64 = actual.iter().map(|w| f64::from(*w)).sum();
-    assert!((sum - 1.0).abs() <= sources.len() as f64 / 16_777_216.0, "{formula:?}: sum {sum}");
+    assert!((sum - 1.0).abs() <= sources.len() as f64 / 16_777_216.0, "{scheme}: sum {sum}");
     let mut worst = 0.0_f64;
     for view in 0..sources.len() {
         let (a, e, bound) = (actual[view], expected[view], bounds[view]);
-        assert!(a.is_finite() && a >= 0.0, "{formula:?}[{view}] = {a}");
+        assert!(a.is_finite() && a >= 0.0, "{scheme}[{view}] = {a}");
         if (f64::from(a) - e).abs() <= NEGLIGIBLE {
             continue;
         }
         let units = relative_units(a, e);
-        assert!(units <= bound, "{formula:?}[{view}] = {a:e}, not {e:e}: {units:.1} units, bound {bound:.1}");
+        assert!(units <= bound, "{scheme}[{view}] = {a:e}, not {e:e}: {units:.1} units, bound {bound:.1}");
         worst = worst.max(units);
     }
     worst
@@ -41,9 +41,9 @@ fn check(formula: Formula, sources: &[Pose], target: &Pose) -> f64 {
 /// Checks every formula on many scenes and prints the worst error of each.
 #[track_caller]
 fn check_all(what: &str, scenes: &[(Vec<Pose>, Pose)]) {
-    for formula in FORMULAS {
-        let worst = scenes.iter().map(|(sources, target)| check(formula, sources, target)).fold(0.0, f64::max);
-        println!("{what}: {formula:?}: {worst:.1} units of 2^-24");
+    for scheme in schemes() {
+        let worst = scenes.iter().map(|(sources, target)| check(scheme, sources, target)).fold(0.0, f64::max);
+        println!("{what}: {scheme}: {worst:.1} units of 2^-24");
     }
 }
 
@@ -89,7 +89,7 @@ fn rings_with_and_without_roll() {
     }
     check_all("rings", &scenes);
     let uniform =
-        weights(Formula::RelativeFrobenius, &ring(8, 1.3, 0.4, 0.0), &looking_at_origin([1.0, 0.5, 0.5], 0.0));
+        weights(Scheme::RELATIVE_FROBENIUS, &ring(8, 1.3, 0.4, 0.0), &looking_at_origin([1.0, 0.5, 0.5], 0.0));
     assert!(uniform.iter().all(|w| (w - 0.125).abs() < 1.0e-6), "uniform on a look-at ring: {uniform:?}");
 }
 
@@ -116,11 +116,11 @@ fn cameras_that_nearly_coincide() {
 fn coinciding_cameras_share_the_weight() {
     let pose = looking_at_origin([1.0, 0.2, 0.3], 0.5);
     let other = looking_at_origin([-1.0, 0.4, 0.3], 0.0);
-    for formula in FORMULAS {
-        assert_eq!(weights(formula, &[pose; 3], &pose), vec![1.0 / 3.0; 3], "{formula:?}");
-        check(formula, &[pose, other, pose], &pose);
-        check(formula, &[pose, other], &other);
-        assert_eq!(weights(formula, &[other], &pose), [1.0], "{formula:?}");
+    for scheme in schemes() {
+        assert_eq!(weights(scheme, &[pose; 3], &pose), vec![1.0 / 3.0; 3], "{scheme}");
+        check(scheme, &[pose, other, pose], &pose);
+        check(scheme, &[pose, other], &other);
+        assert_eq!(weights(scheme, &[other], &pose), [1.0], "{scheme}");
     }
 }
 
@@ -176,9 +176,9 @@ fn a_rigid_motion_of_the_world_changes_nothing() {
         let motion = (random.rotation(), random.vector());
         let moved: Vec<Pose> = sources.iter().map(|pose| moved(pose, &motion, 1.0)).collect();
         let moved_target = self::moved(&target, &motion, 1.0);
-        for formula in FORMULAS {
-            let (before, after) = (weights(formula, &sources, &target), weights(formula, &moved, &moved_target));
-            let bounds = formula.evaluate(&sources, &target, Arithmetic::EXACT).1;
+        for scheme in schemes() {
+            let (before, after) = (weights(scheme, &sources, &target), weights(scheme, &moved, &moved_target));
+            let bounds = evaluate(scheme, &sources, &target, Arithmetic::EXACT).1;
             // Rounding the moved poses moves centres by 2e-7 and axes by 1e-7 or so; all distances here exceed 0.01.
             let nearest = sources.iter().map(|s| f64::from(s.distance(&target))).fold(1.0, f64::min);
             let steepness = 3.0 * 6.0e-7 / nearest.max(1.0e-2) + 40.0e-7;
@@ -186,10 +186,10 @@ fn a_rigid_motion_of_the_world_changes_nothing() {
                 let difference = f64::from((before[view] - after[view]).abs());
                 let same =
                     difference <= f64::from(before[view]) * (2.0 * bounds[view] / 16_777_216.0 + 4.0 * steepness);
-                match formula {
+                match scheme.formula() {
                     Formula::L1 | Formula::RelativeFrobenius => changed_by_rotation += i32::from(!same),
-                    Formula::Gaussian(_) => assert!(difference <= 2.0e-4, "{formula:?} {before:?} {after:?}"),
-                    _ => assert!(same, "{formula:?} {before:?} {after:?}"),
+                    Formula::Gaussian => assert!(difference <= 2.0e-4, "{scheme} {before:?} {after:?}"),
+                    _ => assert!(same, "{scheme} {before:?} {after:?}"),
                 }
             }
         }
@@ -208,8 +208,8 @@ fn error_weighting_ignores_the_unit_of_length() {
             let scaled: Vec<Pose> = sources.iter().map(|pose| moved(pose, &still, factor)).collect();
             let scaled_target = moved(&target, &still, factor);
             for alpha in [0.0, 0.5, 1.0] {
-                let formula = Formula::Error(alpha, AngleKind::PrincipalAxis);
-                let (a, b) = (weights(formula, &sources, &target), weights(formula, &scaled, &scaled_target));
+                let scheme = Scheme::error(alpha, AngleKind::PrincipalAxis).expect("a scheme");
+                let (a, b) = (weights(scheme, &sources, &target), weights(scheme, &scaled, &scaled_target));
                 // Powers of two are exact until the norm starts to scale its components.
                 let same = a.iter().zip(&b).all(|(a, b)| (a - b).abs() <= 30.0 * a / 16_777_216.0);
                 assert!(same && (factor > 1.0e15 || a == b), "{factor}: {a:?} {b:?}");
@@ -221,13 +221,13 @@ fn error_weighting_ignores_the_unit_of_length() {
 #[test]
 fn parameters_out_of_range_are_refused() {
     for alpha in [-0.1, 1.1, f32::NAN, f32::INFINITY] {
-        assert_eq!(Scheme::error(alpha, AngleKind::FullRotation), Err(SchemeError::Alpha));
+        assert_eq!(Scheme::error(alpha, AngleKind::FullRotation), Err(SchemeError::Parameter(Formula::Error)));
     }
     for beta in [-1.0, f32::NAN, f32::INFINITY] {
-        assert_eq!(Scheme::gaussian(beta), Err(SchemeError::Beta));
+        assert_eq!(Scheme::gaussian(beta), Err(SchemeError::Parameter(Formula::Gaussian)));
     }
     for power in [0, 4] {
-        assert_eq!(Scheme::distance(power), Err(SchemeError::Power));
+        assert_eq!(Scheme::distance(power), Err(SchemeError::Choice(Formula::Distance)));
     }
 }
 
@@ -240,14 +240,11 @@ fn permuting_the_sources_permutes_the_weights() {
         let target = random.pose(1.5);
         let shift = random.below(count);
         let rotated: Vec<Pose> = (0..count).map(|view| sources[(view + shift) % count]).collect();
-        for formula in FORMULAS.into_iter().filter(|f| *f != Formula::Mean) {
-            let (a, b) = (weights(formula, &sources, &target), weights(formula, &rotated, &target));
+        for scheme in schemes().into_iter().filter(|scheme| *scheme != Scheme::MEAN) {
+            let (a, b) = (weights(scheme, &sources, &target), weights(scheme, &rotated, &target));
             // Only the order of the sum differs: S - 1 additions and the division, twice.
             let bound = 2.0 * count as f32 / 16_777_216.0;
-            assert!(
-                (0..count).all(|view| (a[(view + shift) % count] - b[view]).abs() <= bound * b[view]),
-                "{formula:?}"
-            );
+            assert!((0..count).all(|view| (a[(view + shift) % count] - b[view]).abs() <= bound * b[view]), "{scheme}");
         }
     }
 }

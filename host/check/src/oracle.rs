@@ -9,7 +9,7 @@
 //! many of them are on the way to a weight is counted for each formula.
 
 use viewfuse_core::pose::Pose;
-use viewfuse_core::weighting::{AngleKind, ERROR_OFFSET, Scheme};
+use viewfuse_core::weighting::{AngleKind, ERROR_OFFSET, Formula, Scheme};
 
 /// What divisions and square roots cost beyond a correct rounding, in units of `2^-24`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,124 +119,95 @@ impl WidePose {
     }
 }
 
-/// A scheme with its parameters in the open.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Formula {
-    /// Equal weights.
-    Mean,
-    /// Sum of absolute differences.
-    L1,
-    /// Frobenius norm of the difference.
-    Frobenius,
-    /// Frobenius norm of the relative pose.
-    RelativeFrobenius,
-    /// Gaussian of the distance with this beta.
-    Gaussian(f32),
-    /// Error weighting with this alpha.
-    Error(f32, AngleKind),
-    /// A power of the distance.
-    Distance(u32),
-}
-
-/// Every scheme, with a spread of parameters.
-pub const FORMULAS: [Formula; 17] = [
-    Formula::Mean,
-    Formula::L1,
-    Formula::Frobenius,
-    Formula::RelativeFrobenius,
-    Formula::Gaussian(0.0),
-    Formula::Gaussian(0.3),
-    Formula::Gaussian(1.0),
-    Formula::Gaussian(3.0),
-    Formula::Error(0.0, AngleKind::PrincipalAxis),
-    Formula::Error(0.3, AngleKind::PrincipalAxis),
-    Formula::Error(1.0, AngleKind::PrincipalAxis),
-    Formula::Error(0.0, AngleKind::FullRotation),
-    Formula::Error(0.5, AngleKind::FullRotation),
-    Formula::Error(1.0, AngleKind::FullRotation),
-    Formula::Distance(1),
-    Formula::Distance(2),
-    Formula::Distance(3),
+/// Every formula with a spread of parameters: choice and parameter of each.
+const SPREAD: [(Formula, u32, f32); 17] = [
+    (Formula::Mean, 0, 0.0),
+    (Formula::L1, 0, 0.0),
+    (Formula::Frobenius, 0, 0.0),
+    (Formula::RelativeFrobenius, 0, 0.0),
+    (Formula::Gaussian, 0, 0.0),
+    (Formula::Gaussian, 0, 0.3),
+    (Formula::Gaussian, 0, 1.0),
+    (Formula::Gaussian, 0, 3.0),
+    (Formula::Error, AngleKind::PrincipalAxis as u32, 0.0),
+    (Formula::Error, AngleKind::PrincipalAxis as u32, 0.3),
+    (Formula::Error, AngleKind::PrincipalAxis as u32, 1.0),
+    (Formula::Error, AngleKind::FullRotation as u32, 0.0),
+    (Formula::Error, AngleKind::FullRotation as u32, 0.5),
+    (Formula::Error, AngleKind::FullRotation as u32, 1.0),
+    (Formula::Distance, 1, 0.0),
+    (Formula::Distance, 2, 0.0),
+    (Formula::Distance, 3, 0.0),
 ];
 
-impl Formula {
-    /// The scheme of the product.
-    ///
-    /// # Panics
-    /// If a parameter is refused.
-    pub fn scheme(self) -> Scheme {
-        let scheme = match self {
-            Formula::Mean => Ok(Scheme::MEAN),
-            Formula::L1 => Ok(Scheme::L1),
-            Formula::Frobenius => Ok(Scheme::FROBENIUS),
-            Formula::RelativeFrobenius => Ok(Scheme::RELATIVE_FROBENIUS),
-            Formula::Gaussian(beta) => Scheme::gaussian(beta),
-            Formula::Error(alpha, angle) => Scheme::error(alpha, angle),
-            Formula::Distance(power) => Scheme::distance(power),
-        };
-        scheme.unwrap_or_else(|error| panic!("{self:?}: {error:?}"))
-    }
+/// Every scheme, with a spread of parameters: what is checked and tested.
+///
+/// # Panics
+/// If a parameter of the list is refused.
+pub fn schemes() -> Vec<Scheme> {
+    let scheme = |(formula, choice, parameter)| {
+        Scheme::new(formula, choice, parameter).unwrap_or_else(|error| panic!("{formula:?}: {error}"))
+    };
+    SPREAD.into_iter().map(scheme).collect()
+}
 
-    /// The weights in `f64` and the bound on each one's relative error, in units of `2^-24`.
-    pub fn evaluate(self, sources: &[Pose], target: &Pose, arithmetic: Arithmetic) -> (Vec<f64>, Vec<f64>) {
-        let Arithmetic { division, square_root } = arithmetic;
-        let target = WidePose::new(target);
-        let sources: Vec<WidePose> = sources.iter().map(WidePose::new).collect();
-        let distances: Vec<f64> = sources.iter().map(|s| s.distance(&target)).collect();
-        let largest = distances.iter().copied().fold(0.0, f64::max);
-        if let Formula::Gaussian(beta) = self {
-            return gaussian(&distances, f64::from(beta), arithmetic);
-        }
-        // Roundings of a distance: 1 a component, squares, two additions, halved by the root, the root; with the
-        // scaling of very small or large components one division a component and one product more.
-        let unscaled = |d: f64| d == 0.0 || (1.0e-14..1.0e14).contains(&d);
-        let is_scaled = !distances.iter().all(|d| unscaled(*d));
-        let scaling = if is_scaled { division } else { 0.0 };
-        let distance_units = (if is_scaled { 5.5 } else { 3.5 }) + square_root + scaling;
-        // A norm of two norms: the inner roots are in `distance_units` or as many, the outer one comes on top.
-        let norm_units = square_root + scaling;
-        let (errors, units): (Vec<f64>, Vec<f64>) = sources
-            .iter()
-            .zip(&distances)
-            .map(|(source, &distance)| match self {
-                Formula::Mean | Formula::Gaussian(_) => (1.0, 0.0),
-                Formula::L1 => (l1(source, &target), 12.0),
-                Formula::Frobenius => (
-                    source.rotation_difference_squared(&target).sqrt().hypot(distance),
-                    distance_units + 4.0 + norm_units,
-                ),
-                Formula::RelativeFrobenius => {
-                    let (error, units) = relative_frobenius(source, &target);
-                    (error, units + 2.0 * norm_units)
-                }
-                Formula::Distance(power) => {
-                    (distance.powi(power as i32), f64::from(power) * (distance_units + 2.0 + division))
-                }
-                Formula::Error(alpha, kind) => {
-                    let angle = match kind {
-                        AngleKind::PrincipalAxis => source.axis_angle(&target),
-                        AngleKind::FullRotation => source.rotation_angle(&target),
-                    };
-                    let alpha = f64::from(alpha);
-                    let translation = if largest > 0.0 { distance / largest } else { 0.0 };
-                    // Angle 16.5, division by pi 1.5, factor 1, two additions; the distance term has less. With
-                    // costly roots and divisions it has more: two distances and their quotient; an angle has a root and
-                    // up to two divisions.
-                    let costly = 2.0 * (square_root + scaling) + 2.0 * division;
-                    (alpha * angle / std::f64::consts::PI + (1.0 - alpha) * translation, 21.0 + costly)
-                }
-            })
-            .unzip();
-        let offset = if self == Formula::Mean { 0.0 } else { f64::from(ERROR_OFFSET) };
-        let scores: Vec<f64> = errors.iter().map(|e| 1.0 / (e + offset)).collect();
-        let sum: f64 = scores.iter().sum();
-        let weights: Vec<f64> = scores.iter().map(|s| s / sum).collect();
-        let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| w * (u + 1.0)).sum();
-        // The quotients of the smallest and each error, in the numerator and in the sum, and the sum's reciprocal.
-        let quotients = 3.0 * division;
-        let bounds = units.iter().map(|u| u + 1.0 + mean_units + sources.len() as f64 + 3.0 + quotients).collect();
-        (weights, bounds)
+/// The weights in `f64` and the bound on each one's relative error, in units of `2^-24`.
+pub fn evaluate(scheme: Scheme, sources: &[Pose], target: &Pose, arithmetic: Arithmetic) -> (Vec<f64>, Vec<f64>) {
+    let Arithmetic { division, square_root } = arithmetic;
+    let target = WidePose::new(target);
+    let sources: Vec<WidePose> = sources.iter().map(WidePose::new).collect();
+    let distances: Vec<f64> = sources.iter().map(|s| s.distance(&target)).collect();
+    let largest = distances.iter().copied().fold(0.0, f64::max);
+    if scheme.formula() == Formula::Gaussian {
+        return gaussian(&distances, f64::from(scheme.parameter()), arithmetic);
     }
+    // Roundings of a distance: 1 a component, squares, two additions, halved by the root, the root; with the
+    // scaling of very small or large components one division a component and one product more.
+    let unscaled = |d: f64| d == 0.0 || (1.0e-14..1.0e14).contains(&d);
+    let is_scaled = !distances.iter().all(|d| unscaled(*d));
+    let scaling = if is_scaled { division } else { 0.0 };
+    let distance_units = (if is_scaled { 5.5 } else { 3.5 }) + square_root + scaling;
+    // A norm of two norms: the inner roots are in `distance_units` or as many, the outer one comes on top.
+    let norm_units = square_root + scaling;
+    let (errors, units): (Vec<f64>, Vec<f64>) = sources
+        .iter()
+        .zip(&distances)
+        .map(|(source, &distance)| match scheme.formula() {
+            Formula::Mean | Formula::Gaussian => (1.0, 0.0),
+            Formula::L1 => (l1(source, &target), 12.0),
+            Formula::Frobenius => {
+                (source.rotation_difference_squared(&target).sqrt().hypot(distance), distance_units + 4.0 + norm_units)
+            }
+            Formula::RelativeFrobenius => {
+                let (error, units) = relative_frobenius(source, &target);
+                (error, units + 2.0 * norm_units)
+            }
+            Formula::Distance => {
+                let power = scheme.choice();
+                (distance.powi(power as i32), f64::from(power) * (distance_units + 2.0 + division))
+            }
+            Formula::Error => {
+                let is_of_axes = scheme.choice() == AngleKind::PrincipalAxis as u32;
+                let angle = if is_of_axes { source.axis_angle(&target) } else { source.rotation_angle(&target) };
+                let alpha = f64::from(scheme.parameter());
+                let translation = if largest > 0.0 { distance / largest } else { 0.0 };
+                // Angle 16.5, division by pi 1.5, factor 1, two additions; the distance term has less. With
+                // costly roots and divisions it has more: two distances and their quotient; an angle has a root and
+                // up to two divisions.
+                let costly = 2.0 * (square_root + scaling) + 2.0 * division;
+                (alpha * angle / std::f64::consts::PI + (1.0 - alpha) * translation, 21.0 + costly)
+            }
+        })
+        .unzip();
+    let offset = if scheme == Scheme::MEAN { 0.0 } else { f64::from(ERROR_OFFSET) };
+    let scores: Vec<f64> = errors.iter().map(|e| 1.0 / (e + offset)).collect();
+    let sum: f64 = scores.iter().sum();
+    let weights: Vec<f64> = scores.iter().map(|s| s / sum).collect();
+    let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| w * (u + 1.0)).sum();
+    // The quotients of the smallest and each error, in the numerator and in the sum, and the sum's reciprocal.
+    let quotients = 3.0 * division;
+    let bounds = units.iter().map(|u| u + 1.0 + mean_units + sources.len() as f64 + 3.0 + quotients).collect();
+    (weights, bounds)
 }
 
 fn l1(source: &WidePose, target: &WidePose) -> f64 {
@@ -287,4 +258,17 @@ fn gaussian(distances: &[f64], beta: f64, arithmetic: Arithmetic) -> (Vec<f64>, 
     let mean_units: f64 = weights.iter().zip(&units).map(|(w, u)| if *w > 0.0 { w * u } else { 0.0 }).sum();
     let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 3.0 + 3.0 * division).collect();
     (weights, bounds)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::schemes;
+    use viewfuse_core::weighting::ROWS;
+
+    #[test]
+    fn every_formula_is_checked() {
+        for row in ROWS {
+            assert!(schemes().iter().any(|scheme| scheme.formula() == row.formula), "{} is in no check", row.name);
+        }
+    }
 }

@@ -140,7 +140,7 @@ fn rendered<D: Device>(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<(RgbImage, Duration), AnyError> {
-    let weighting: Weighting = "error:alpha=1".parse()?;
+    let weighting = Weighting::default_scheme();
     let mut picture = None;
     let start = Instant::now();
     let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {

@@ -24,6 +24,7 @@ mod terminal;
 #[cfg(feature = "train")]
 mod train;
 mod verify;
+mod weighting;
 mod weights;
 
 #[cfg(not(feature = "pareto"))]
@@ -44,10 +45,7 @@ use std::process::ExitCode;
     name = "viewfuse",
     version,
     about = "From a handful of posed photographs, the picture from a camera that was never there.",
-    long_about = "Few-shot novel view synthesis. Every source view is weighted by how relevant its camera is to the \
-        target (\"Pay Attention to Where You Looked\"), and the weighted views are fused into a picture.\n\n\
-        A scene is an SRN folder (rgb/, pose/, intrinsics.txt), a folder with transforms.json (Blender, instant-ngp, \
-        nerfstudio), or a Middlebury folder with *_par.txt.",
+    long_about = long_about(),
     after_help = "Exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted.",
     max_term_width = 110
 )]
@@ -87,6 +85,15 @@ enum Command {
 }
 
 pub(crate) use hints::hint;
+
+fn long_about() -> String {
+    format!(
+        "Few-shot novel view synthesis. Every source view is weighted by how relevant its camera is to the target \
+         (\"Pay Attention to Where You Looked\"), and the weighted views are fused into a picture.\n\n\
+         A scene is one of: {}.",
+        viewfuse_scene::looked_for(&viewfuse_scene::READERS)
+    )
+}
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {

@@ -11,7 +11,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_output::canvas::{BLUE, Canvas, GREY, INK, LINE_HEIGHT, RED};
 use viewfuse_scene::photographs::{Album, BackgroundChoice};
 use viewfuse_scene::rig::Rig;
-use viewfuse_scene::{Layout, Scene, View};
+use viewfuse_scene::{Scene, View};
 use viewfuse_weighting::sources::MOST_SOURCES;
 
 /// Longest side at which photographs are looked at: enough to find the object.
@@ -82,11 +82,7 @@ pub fn inspect(
     let photograph_count = scene.views.iter().filter(|view| view.image.is_some()).count();
     Ok(Inspection {
         path: scene.path.display().to_string(),
-        layout: match scene.layout {
-            Layout::Srn => "srn",
-            Layout::Transforms => "transforms",
-            Layout::Middlebury => "middlebury",
-        },
+        layout: scene.layout,
         photograph_count,
         target_count: scene.views.len() - photograph_count,
         size: [pinhole.width(), pinhole.height()],

@@ -4,6 +4,7 @@
 //!
 //! ```text
 //! scene         a folder of posed photographs, in any layout: Scene, View, Photograph
+//!               reader: what a layout's reader is, and READERS, all of them
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up, orbits
 //! few_shot      which views are sources, which cameras are targets: FewShot
@@ -17,7 +18,9 @@ pub mod photographs;
 pub mod rig;
 mod scene;
 
-pub use scene::{IntrinsicsFault, LARGEST_SIDE, Layout, Photograph, Place, Scene, SceneError, View};
+pub use scene::{
+    IntrinsicsFault, LARGEST_SIDE, Photograph, Place, READERS, Scene, SceneError, View, looked_for, reader,
+};
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

@@ -1,7 +1,7 @@
 //! Scenes: posed photographs on disk.
 //!
-//! [`Scene::open`] recognises the layout of a folder, reads every pose and every image *header* and checks them all:
-//! counts, finite and rigid poses, sizes. The pixels of a view are read when they are first needed
+//! [`Scene::open`] asks each reader of a layout whether a folder is its own, reads every pose and every image *header* and
+//! checks them all: counts, finite and rigid poses, sizes. The pixels of a view are read when they are first needed
 //! ([`Scene::photograph`]), so that a command that needs only poses touches no image.
 
 use std::collections::{HashMap, HashSet};
@@ -17,25 +17,24 @@ mod files;
 mod images;
 mod json;
 mod middlebury;
+pub mod reader;
 mod srn;
 mod transforms;
 
 pub use error::SceneError;
 pub use fault::{IntrinsicsFault, Place};
+use reader::Reader;
+
+/// The readers of all layouts, in the order in which they are asked: a path is taken for the first that fits.
+pub const READERS: [&dyn Reader; 3] = [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn];
+
+/// What readers look for, for help texts and messages.
+pub fn looked_for(readers: &[&dyn Reader]) -> String {
+    readers.iter().map(|reader| reader.form()).collect::<Vec<_>>().join("; ")
+}
 
 /// Most pixels that an image may have on a side: a larger header is refused before anything is allocated.
 pub const LARGEST_SIDE: u32 = 16_384;
-
-/// How a scene is laid out on disk.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
-    /// ShapeNet scenes of Scene Representation Networks: `rgb/`, `pose/`, `intrinsics.txt`, and `target_pose/`.
-    Srn,
-    /// NeRF's `transforms.json` (Blender, instant-ngp, nerfstudio).
-    Transforms,
-    /// Middlebury multi-view stereo: `*_par.txt` beside the images.
-    Middlebury,
-}
 
 /// One camera of a scene, with the photograph it took if there is one.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,38 +62,44 @@ pub struct Photograph {
 pub struct Scene {
     /// The folder or file it was opened from.
     pub path: PathBuf,
-    /// How it is laid out.
-    pub layout: Layout,
+    /// How it is laid out: the name of the reader that fitted.
+    pub layout: &'static str,
     /// Views with photographs first (at least one), then target poses without. In the order of the list where the
     /// layout has one, otherwise in natural order of the names (`2` before `10`).
     pub views: Vec<View>,
 }
 
 impl Scene {
-    /// Opens a scene: recognises its layout, reads every pose and every image header, and checks them.
+    /// Opens a scene by the first of [`READERS`] that fits, and checks it.
     ///
-    /// A folder is taken for the first of these that fits: `transforms.json` or, without one,
-    /// `transforms_train.json`; one `*_par.txt`; `rgb/` or `pose/` (SRN). A file must be a `.json` or a `*_par.txt`.
+    /// # Errors
+    /// As [`Scene::open_with`].
+    pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
+        Scene::open_with(path, &READERS)
+    }
+
+    /// Opens a scene by the first of these readers that fits: reads every pose and every image header, and checks them.
+    /// A crate outside puts its own readers before or behind [`READERS`].
     ///
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
-    pub fn open(path: impl AsRef<Path>) -> Result<Scene, SceneError> {
+    pub fn open_with(path: impl AsRef<Path>, readers: &[&dyn Reader]) -> Result<Scene, SceneError> {
         let path = path.as_ref();
-        let (layout, file) = recognise(path)?;
-        let mut views = match layout {
-            Layout::Srn => srn::read(&file),
-            Layout::Transforms => transforms::read(&file),
-            Layout::Middlebury => middlebury::read(&file),
-        }?;
-        distinguish(&mut views);
-        let mut names = HashSet::new();
-        for view in &views {
-            if !names.insert(view.name.as_str()) {
-                let path = view.image.clone().unwrap_or(file);
-                return Err(SceneError::DuplicateName { path, name: view.name.clone() });
+        fs::metadata(path).map_err(|cause| files::unreadable(path, cause))?;
+        for reader in readers {
+            let Some(found) = reader.recognise(path)? else { continue };
+            let mut views = check::views(&found, reader.form(), reader.read(&found)?)?;
+            distinguish(&mut views);
+            let mut names = HashSet::new();
+            for view in &views {
+                if !names.insert(view.name.as_str()) {
+                    let path = view.image.clone().unwrap_or(found);
+                    return Err(SceneError::DuplicateName { path, name: view.name.clone() });
+                }
             }
+            return Ok(Scene { path: path.to_path_buf(), layout: reader.name(), views });
         }
-        Ok(Scene { path: path.to_path_buf(), layout, views })
+        Err(SceneError::UnknownLayout { path: path.to_path_buf(), looked_for: looked_for(readers) })
     }
 
     /// What people call it: the name of its folder, however the path was written.
@@ -168,37 +173,6 @@ fn distinguish(views: &mut [View]) {
             view.name = format!("{}_{}", folder.to_string_lossy(), view.name);
         }
     }
-}
-
-/// The layout of what is at a path, and the folder or file that its reader takes.
-fn recognise(path: &Path) -> Result<(Layout, PathBuf), SceneError> {
-    let is_list = |path: &Path| path.to_string_lossy().ends_with(middlebury::SUFFIX);
-    let unknown = || SceneError::UnknownLayout { path: path.to_path_buf() };
-    if !fs::metadata(path).map_err(|cause| files::unreadable(path, cause))?.is_dir() {
-        return if files::has_extension(path, &["json"]) {
-            Ok((Layout::Transforms, path.to_path_buf()))
-        } else if is_list(path) {
-            Ok((Layout::Middlebury, path.to_path_buf()))
-        } else {
-            Err(unknown())
-        };
-    }
-    if let Some(file) = transforms::FILE_NAMES.iter().map(|name| path.join(name)).find(|file| file.is_file()) {
-        return Ok((Layout::Transforms, file));
-    }
-    match files::list(path, is_list)?.as_slice() {
-        [] => {}
-        [list] => return Ok((Layout::Middlebury, list.clone())),
-        [first, second, ..] => {
-            let name = |list: &Path| list.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            return Err(SceneError::Ambiguous { path: path.to_path_buf(), first: name(first), second: name(second) });
-        }
-    }
-    // One of the two folders is enough, so that a scene with the other one missing is told which.
-    if path.join("rgb").is_dir() || path.join("pose").is_dir() {
-        return Ok((Layout::Srn, path.to_path_buf()));
-    }
-    Err(unknown())
 }
 
 /// The digits that a name ends in, without leading zeros (empty for zero itself); `None` if it ends in no digit.

@@ -84,7 +84,7 @@ fn pictures_of_hardly_any_pixels() {
 #[test]
 fn every_weighting_scheme() {
     let sources = ball_views(24);
-    for scheme in viewfuse::weighting::SCHEME_NAMES {
+    for scheme in viewfuse::weighting::scheme_names() {
         let picture = Run { scheme, ..Run::default() }.picture(&sources, &target(24)).expect("a picture");
         assert_sound(&picture);
         assert_shows_an_object(&picture);

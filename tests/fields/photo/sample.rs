@@ -24,7 +24,7 @@ fn sample_folder() -> PathBuf {
 }
 
 fn scheme(name: &str) -> Weighting {
-    name.parse().expect("a scheme")
+    Weighting::open(name).expect("a scheme")
 }
 
 fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {

@@ -40,7 +40,7 @@ impl Run {
         target: &Camera,
     ) -> Result<Rendered, FieldError<std::convert::Infallible>> {
         let (field, quiet) = (self.field, Silent);
-        let weighting: Weighting = self.scheme.parse().expect("a scheme");
+        let weighting = Weighting::open(self.scheme).expect("a scheme");
         let prepared = field.prepare(&Cpu, sources, &quiet)?;
         let relevance = relevance(sources, &weighting);
         let latents = field.encode(&Cpu, &prepared, &relevance, &quiet)?;

@@ -3,11 +3,11 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::oracle::{Arithmetic, FORMULAS, Formula};
+use crate::oracle::{Arithmetic, evaluate, schemes};
 use crate::poses::{Random, looking_at_origin, random, ring};
 use rayon::prelude::*;
 use viewfuse_core::pose::{Pose, PoseBlock};
-use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock};
+use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock};
 use viewfuse_device::Device;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -17,7 +17,7 @@ const NEGLIGIBLE: f64 = 4.0e-38;
 /// A dispatch.
 #[derive(Clone, Debug)]
 pub struct Job {
-    formula: Formula,
+    scheme: Scheme,
     block: WeighBlock,
     sources: Vec<PoseBlock>,
     targets: Vec<PoseBlock>,
@@ -70,19 +70,20 @@ impl Case for Weigh {
     fn inputs(seed: u64, size: u32) -> Vec<Job> {
         let random = &mut random(0, seed, size);
         // So that neighbouring seeds give every scheme every number of sources.
-        let first = seed as usize * FORMULAS.len() + size as usize;
-        let job = |(index, formula): (usize, Formula)| {
+        let schemes = schemes();
+        let first = seed as usize * schemes.len() + size as usize;
+        let job = |(index, scheme): (usize, Scheme)| {
             let source_count = (first + index) % MOST_WEIGHED + 1;
             let arrangement = (first + index + seed as usize) as u32;
             let (sources, targets) = cameras(random, arrangement, source_count, size as usize);
             Job {
-                formula,
-                block: WeighBlock { scheme: formula.scheme().block(), source_count: source_count as u32 },
+                scheme,
+                block: WeighBlock { scheme: scheme.block(), source_count: source_count as u32 },
                 sources: sources.iter().map(Pose::block).collect(),
                 targets: targets.iter().map(Pose::block).collect(),
             }
         };
-        FORMULAS.into_iter().enumerate().map(job).collect()
+        schemes.into_iter().enumerate().map(job).collect()
     }
 
     fn element_count(jobs: &Vec<Job>) -> usize {
@@ -117,7 +118,7 @@ impl Case for Weigh {
 /// A target's weights, zeros beyond the sources.
 fn row(job: &Job, target: &PoseBlock) -> [Option<Bounded>; MOST_WEIGHED] {
     let sources: Vec<Pose> = job.sources.iter().map(PoseBlock::pose).collect();
-    let (weights, units) = job.formula.evaluate(&sources, &target.pose(), Arithmetic::VULKAN);
+    let (weights, units) = evaluate(job.scheme, &sources, &target.pose(), Arithmetic::VULKAN);
     let mut row = [Some(Bounded::ZERO); MOST_WEIGHED];
     for ((bounded, value), units) in row.iter_mut().zip(weights).zip(units) {
         *bounded = Some(Bounded { value, error: value * units / 16_777_216.0 + NEGLIGIBLE });

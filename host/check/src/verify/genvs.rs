@@ -164,7 +164,7 @@ impl<D: Device> Comparison<'_, '_, D> {
             if self.file.tensors.tensor(&name).is_err() {
                 continue;
             }
-            let weighting: Weighting = ours.parse().map_err(|_| self.file.wrong(&name, "is no weighting of ours"))?;
+            let weighting = Weighting::open(ours).map_err(|_| self.file.wrong(&name, "is no weighting of ours"))?;
             let weights: SourceWeights = weighting.weigh(&poses, &target.pose);
             let weights: Vec<f32> = (0..weights.count()).map(|view| weights.get(view)).collect();
             let near_far = NEAR_FAR.map(|end| end * plane);

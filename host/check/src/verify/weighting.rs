@@ -103,7 +103,7 @@ fn scheme_of(method: &str) -> Option<Weighting> {
             _ => return None,
         },
     };
-    name.parse().ok()
+    Weighting::open(&name).ok()
 }
 
 /// A camera-to-world matrix, row-major, in OpenGL axes.

@@ -12,10 +12,11 @@ use super::metrics_options::MetricOptions;
 use super::model::{ModelOptions, Work};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::terminal::Terminal;
+use super::weighting::{many_help, open_all, or_every_scheme};
 use super::{on_threads, say};
 use clap::Args;
 use protocol::ProtocolOptions;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tables::{csv_of, print_means};
@@ -29,7 +30,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::dataset::{Dataset, DatasetError, Split};
 use viewfuse_scene::few_shot::Selection;
-use viewfuse_weighting::{SCHEME_NAMES, Weighting};
+use viewfuse_weighting::{Weighting, WeightingSpec};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -51,9 +52,8 @@ pub(crate) struct Arguments {
     targets: Option<String>,
     #[command(flatten)]
     sources: SourceOptions,
-    /// A weighting scheme; may be given several times [default: every scheme that needs no file]
-    #[arg(long, value_name = "SCHEME")]
-    weights: Vec<String>,
+    #[arg(long, value_name = "SCHEME", help = many_help())]
+    weights: Vec<WeightingSpec>,
     #[command(flatten)]
     protocol: ProtocolOptions,
     #[command(flatten)]
@@ -84,21 +84,13 @@ impl Arguments {
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
-    let mut names: Vec<&str> = match arguments.weights.is_empty() {
-        true => SCHEME_NAMES.to_vec(),
-        false => arguments.weights.iter().map(String::as_str).collect(),
-    };
+    let mut specs = or_every_scheme(&arguments.weights)?;
     if arguments.protocol.protocol.is_some() {
         // Once in a table is enough.
-        let mut seen = Vec::new();
-        names.retain(|name| {
-            !seen.contains(name) && {
-                seen.push(*name);
-                true
-            }
-        });
+        let mut seen = HashSet::new();
+        specs.retain(|spec| seen.insert(spec.to_string()));
     }
-    let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
+    let weightings = open_all(&specs)?;
     if let (Some(protocol), Some(folder)) = (&arguments.protocol.protocol, &arguments.output) {
         return protocol::run(arguments, protocol, folder, &weightings, values);
     }

@@ -24,7 +24,7 @@ use viewfuse_output::record::source_names;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::Album;
 use viewfuse_vulkan::GpuOptions;
-use viewfuse_weighting::Weighting;
+use viewfuse_weighting::WeightingSpec;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -45,8 +45,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     sources: SourceOptions,
     /// Weighting scheme, as for render
-    #[arg(long, value_name = "SCHEME", default_value = "error:alpha=1")]
-    weights: String,
+    #[arg(long, value_name = "SCHEME", default_value_t)]
+    weights: WeightingSpec,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -69,7 +69,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let weighting: Weighting = arguments.weights.parse()?;
+    let weighting = arguments.weights.open()?;
     let scene = Scene::open(&arguments.scene)?;
     let field = arguments.network.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);

@@ -4,6 +4,7 @@ use super::model::{GENVS, ModelOptions, Work, parse_level};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::parse::parse_count;
 use super::terminal::Terminal;
+use super::weighting::one_help;
 use super::{on_threads, say};
 use clap::Args;
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
@@ -20,10 +21,10 @@ use viewfuse_output::record::{
     FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
 };
 use viewfuse_output::sheet::{Sheet, SheetSource, depth_picture};
-use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_weighting::Weighting;
+use viewfuse_scene::{READERS, Scene, looked_for};
+use viewfuse_weighting::{Weighting, WeightingSpec};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -33,7 +34,7 @@ use viewfuse_weighting::Weighting;
     Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_sheet.png for each target, and \
     run.json.")]
 pub(crate) struct Arguments {
-    /// The scene's folder, or its transforms.json or *_par.txt
+    #[arg(help = scene_help())]
     scene: PathBuf,
     /// Views to render, as for --sources; left out of the sources [default: the scene's target poses]
     #[arg(long, value_name = "VIEWS")]
@@ -43,10 +44,8 @@ pub(crate) struct Arguments {
     orbit: Option<usize>,
     #[command(flatten)]
     sources: SourceOptions,
-    /// Weighting scheme: mean, l1, frobenius, relative-frobenius, gaussian:beta=B, distance:power=P,
-    /// error:alpha=A[,angle=axis|full], cross-attention, attention:FILE
-    #[arg(long, value_name = "SCHEME", default_value = "error:alpha=1")]
-    weights: String,
+    #[arg(long, value_name = "SCHEME", default_value_t, help = one_help())]
+    weights: WeightingSpec,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -64,9 +63,13 @@ pub(crate) struct Arguments {
     output: PathBuf,
 }
 
+fn scene_help() -> String {
+    format!("The scene: {}", looked_for(&READERS))
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
-    let weighting: Weighting = arguments.weights.parse()?;
+    let weighting = arguments.weights.open()?;
     let scene = Scene::open(&arguments.scene)?;
     let open_time = start.elapsed();
     let field = arguments.model.open(arguments.seed, arguments.reuse)?;

@@ -3,6 +3,7 @@
 use super::options::SourceOptions;
 use super::say;
 use super::table::table;
+use super::weighting::{many_help, open_all, or_every_scheme};
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -10,8 +11,8 @@ use std::process::ExitCode;
 use viewfuse_core::sources::Sources;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target};
+use viewfuse_weighting::WeightingSpec;
 use viewfuse_weighting::sources::MOST_SOURCES;
-use viewfuse_weighting::{SCHEME_NAMES, Weighting};
 
 #[derive(Args)]
 #[command(after_help = "Example:\n  viewfuse weights dino/ --target 4 --weights error:alpha=0.5 --json")]
@@ -23,20 +24,15 @@ pub(crate) struct Arguments {
     target: String,
     #[command(flatten)]
     sources: SourceOptions,
-    /// A weighting scheme; may be given several times [default: every scheme that needs no file]
-    #[arg(long, value_name = "SCHEME")]
-    weights: Vec<String>,
+    #[arg(long, value_name = "SCHEME", help = many_help())]
+    weights: Vec<WeightingSpec>,
     /// Print JSON instead of a table
     #[arg(long)]
     json: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let names: Vec<&str> = match arguments.weights.is_empty() {
-        true => SCHEME_NAMES.to_vec(),
-        false => arguments.weights.iter().map(String::as_str).collect(),
-    };
-    let weightings: Vec<Weighting> = names.into_iter().map(str::parse).collect::<Result<_, _>>()?;
+    let weightings = open_all(&or_every_scheme(&arguments.weights)?)?;
     let scene = Scene::open(&arguments.scene)?;
     let job = arguments.sources.to_selection(Some(&arguments.target), None).resolve(&scene, 1)?;
     let poses: Vec<_> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();

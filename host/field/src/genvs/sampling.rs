@@ -11,7 +11,7 @@
 mod plan;
 mod run;
 
-pub use plan::{Plan, Steps, UnknownSampler, sampler_named};
+pub use plan::{Plan, Steps};
 
 use super::super::FieldError;
 use run::Run;

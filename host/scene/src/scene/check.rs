@@ -4,36 +4,55 @@
 
 use std::path::Path;
 
-use viewfuse_core::camera::Pinhole;
+use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::{Pose, PoseError};
 
+use super::View;
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
 
-/// What a file's camera axes are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Axes {
-    /// x right, y down, z forward.
-    OpenCv,
-    /// x right, y up, z backward.
-    OpenGl,
+/// The views of a scene, those with photographs first.
+pub(super) fn views(found: &Path, form: &'static str, raw: Vec<RawView>) -> Result<Vec<View>, SceneError> {
+    let (photographs, targets): (Vec<RawView>, Vec<RawView>) = raw.into_iter().partition(|view| view.image.is_some());
+    let mut views: Vec<View> = Vec::with_capacity(photographs.len() + targets.len());
+    for view in photographs.into_iter().chain(targets) {
+        if view.name.is_empty() || view.name.contains(std::path::is_separator) {
+            return Err(SceneError::Name { path: found.to_path_buf(), name: view.name });
+        }
+        let pinhole = match (&view.intrinsics, views.first()) {
+            (Some(intrinsics), _) => pinhole_of(intrinsics, view.image.as_ref())?,
+            (None, Some(first)) => first.camera.pinhole,
+            (None, None) => return Err(SceneError::NoViews { path: found.to_path_buf(), looked_for: form }),
+        };
+        let camera = Camera { pose: pose(&view.pose)?, pinhole };
+        views.push(View { name: view.name, camera, image: view.image.map(|image| image.path().to_path_buf()) });
+    }
+    match views.first().is_some_and(|view| view.image.is_some()) {
+        true => Ok(views),
+        false => Err(SceneError::NoViews { path: found.to_path_buf(), looked_for: form }),
+    }
 }
 
-/// A pose from the 16 numbers of a row-major camera-to-world matrix.
-pub(super) fn pose(path: &Path, place: Place, world_from_camera: &[f64; 16], axes: Axes) -> Result<Pose, SceneError> {
-    let rows: [[f32; 4]; 4] =
-        std::array::from_fn(|row| std::array::from_fn(|column| world_from_camera[4 * row + column] as f32));
-    let checked: Result<Pose, PoseError> = match axes {
-        Axes::OpenCv => Pose::from_opencv(&rows),
-        Axes::OpenGl => Pose::from_opengl(&rows),
+/// A pose from the 16 numbers of a row-major matrix.
+fn pose(raw: &RawPose) -> Result<Pose, SceneError> {
+    let RawPose { matrix, form, path, place } = raw;
+    let checked = match form {
+        PoseForm::WorldFromOpenCv => Pose::from_opencv(&rows(matrix)),
+        PoseForm::WorldFromOpenGl => Pose::from_opengl(&rows(matrix)),
+        PoseForm::OpenCvFromWorld => pose_from_inverse(matrix),
     };
-    checked.map_err(|reason| SceneError::Pose { path: path.to_path_buf(), place, reason })
+    checked.map_err(|reason| SceneError::Pose { path: path.clone(), place: place.clone(), reason })
 }
 
-/// A pose from the 16 numbers of a row-major world-to-camera matrix in OpenCV axes: `[R^T | -R^T t]`.
-pub(super) fn pose_from_inverse(path: &Path, place: Place, camera_from_world: &[f64; 16]) -> Result<Pose, SceneError> {
+fn rows(matrix: &[f64; 16]) -> [[f32; 4]; 4] {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[4 * row + column] as f32))
+}
+
+/// A pose from a world-to-camera matrix in OpenCV axes: `[R^T | -R^T t]`.
+fn pose_from_inverse(camera_from_world: &[f64; 16]) -> Result<Pose, PoseError> {
     // Transposing inverts a rigid matrix only, so the matrix as given must pass too.
-    pose(path, place.clone(), camera_from_world, Axes::OpenCv)?;
+    Pose::from_opencv(&rows(camera_from_world))?;
     let m = camera_from_world;
     let mut inverse = [0.0; 16];
     for row in 0..3 {
@@ -43,59 +62,46 @@ pub(super) fn pose_from_inverse(path: &Path, place: Place, camera_from_world: &[
         inverse[4 * row + 3] = -(m[row] * m[3] + m[4 + row] * m[7] + m[8 + row] * m[11]);
     }
     inverse[15] = 1.0;
-    pose(path, place, &inverse, Axes::OpenCv)
+    Pose::from_opencv(&rows(&inverse))
 }
 
-/// Intrinsics as a file states them, for images of one size, in our image coordinates (pixel centres at halves).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Intrinsics {
-    /// Focal lengths along x and y in pixels.
-    pub(super) focal: [f64; 2],
-    /// Principal point, x and y, in pixels.
-    pub(super) principal: [f64; 2],
-    /// Width and height of the images that they are for.
-    pub(super) size: [u32; 2],
+/// The pinhole of a view: of the intrinsics' own size, or of a photograph that may be a resampled copy of such an image.
+///
+/// # Errors
+/// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale.
+fn pinhole_of(raw: &RawIntrinsics, image: Option<&ImageFile>) -> Result<Pinhole, SceneError> {
+    let RawIntrinsics { focal, principal, size, path, place, size_place } = raw;
+    let own = pinhole(path, place, *focal, *principal, *size)?;
+    let Some(image) = image else { return Ok(own) };
+    let image_size = image.size();
+    if !same_shape(*size, image_size) {
+        return Err(SceneError::SizeMismatch {
+            path: image.path().to_path_buf(),
+            width: image_size[0],
+            height: image_size[1],
+            declared_in: format!("{}{size_place}", path.display()),
+            declared_width: size[0],
+            declared_height: size[1],
+        });
+    }
+    let scale = [0, 1].map(|axis| f64::from(image_size[axis]) / f64::from(size[axis]));
+    let scaled = |pair: &[f64; 2]| [pair[0] * scale[0], pair[1] * scale[1]];
+    pinhole(path, size_place, scaled(focal), scaled(principal), image_size)
 }
 
-impl Intrinsics {
-    /// The pinhole of images of this size, if the numbers are a pinhole camera.
-    pub(super) fn pinhole(&self, path: &Path, place: Place) -> Result<Pinhole, SceneError> {
-        let single = |pair: [f64; 2]| pair.map(|value| value as f32);
-        let [width, height] = self.size;
-        Pinhole::new(single(self.focal), single(self.principal), width, height).map_err(|error| {
-            let fault = IntrinsicsFault::from_pinhole(error, self.focal, self.principal, self.size);
-            SceneError::Intrinsics { path: path.to_path_buf(), place, fault }
-        })
-    }
-
-    /// The pinhole of a photograph that may be a resampled copy: focal lengths and principal point scale with their
-    /// axis.
-    ///
-    /// # Errors
-    /// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale.
-    pub(super) fn pinhole_of(
-        &self,
-        path: &Path,
-        place: Place,
-        image: &Path,
-        image_size: [u32; 2],
-    ) -> Result<Pinhole, SceneError> {
-        self.pinhole(path, place.clone())?;
-        if !same_shape(self.size, image_size) {
-            return Err(SceneError::SizeMismatch {
-                path: image.to_path_buf(),
-                width: image_size[0],
-                height: image_size[1],
-                declared_in: format!("{}{place}", path.display()),
-                declared_width: self.size[0],
-                declared_height: self.size[1],
-            });
-        }
-        let scale = [0, 1].map(|axis| f64::from(image_size[axis]) / f64::from(self.size[axis]));
-        let scaled = |pair: [f64; 2]| [pair[0] * scale[0], pair[1] * scale[1]];
-        let resampled = Intrinsics { focal: scaled(self.focal), principal: scaled(self.principal), size: image_size };
-        resampled.pinhole(path, place)
-    }
+/// The pinhole of images of this size, if the numbers are a pinhole camera.
+fn pinhole(
+    path: &Path,
+    place: &Place,
+    focal: [f64; 2],
+    principal: [f64; 2],
+    size: [u32; 2],
+) -> Result<Pinhole, SceneError> {
+    let single = |pair: [f64; 2]| pair.map(|value| value as f32);
+    Pinhole::new(single(focal), single(principal), size[0], size[1]).map_err(|error| {
+        let fault = IntrinsicsFault::from_pinhole(error, focal, principal, size);
+        SceneError::Intrinsics { path: path.to_path_buf(), place: place.clone(), fault }
+    })
 }
 
 /// A width and a height from numbers of a file.

@@ -28,13 +28,12 @@ pub enum SceneError {
         cause: std::io::Error,
     },
     /// No known layout.
-    #[error(
-        "{path}: no scene here; looked for a folder with transforms.json or transforms_train.json (NeRF), with one \
-         *_par.txt (Middlebury), or with rgb/, pose/ and intrinsics.txt (SRN), or for such a .json or *_par.txt file"
-    )]
+    #[error("{path}: no scene here; looked for {looked_for}")]
     UnknownLayout {
         /// The folder or file that was to be opened.
         path: PathBuf,
+        /// What the readers look for.
+        looked_for: String,
     },
     /// More than one list of cameras in a folder.
     #[error("{path}: holds both {first} and {second}; give the path of one of them")]
@@ -71,6 +70,14 @@ pub enum SceneError {
         path: PathBuf,
         /// The file that was looked for.
         pose: PathBuf,
+    },
+    /// A view's name cannot be that of a file.
+    #[error("{path}: {name:?} cannot be the name of a view: it is empty or holds a separator of folders")]
+    Name {
+        /// The scene.
+        path: PathBuf,
+        /// The name.
+        name: String,
     },
     /// Two views of one name.
     #[error("{path}: two views are called {name:?}; names must differ")]

@@ -25,7 +25,10 @@ pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
 }
 
 /// A text file's contents, without the byte order mark that some editors put in front.
-pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
+///
+/// # Errors
+/// [`SceneError::Missing`], or [`SceneError::Read`] where it cannot be read or is no text.
+pub fn read_text(path: &Path) -> Result<String, SceneError> {
     let text = fs::read_to_string(path).map_err(|cause| unreadable(path, cause))?;
     Ok(match text.strip_prefix('\u{feff}') {
         Some(rest) => rest.to_string(),
@@ -35,7 +38,10 @@ pub(super) fn read_text(path: &Path) -> Result<String, SceneError> {
 
 /// The files in a folder for whose name `wanted` holds, in natural order. Hidden files are left out: archives made on
 /// a Mac hold a `._000000.png` beside each `000000.png`.
-pub(super) fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, SceneError> {
+///
+/// # Errors
+/// [`SceneError::Missing`] or [`SceneError::Read`] for a folder that cannot be listed.
+pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, SceneError> {
     let failed = |cause| unreadable(folder, cause);
     let mut paths = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
@@ -50,18 +56,21 @@ pub(super) fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<
 }
 
 /// Whether the file's name ends in one of these extensions, in either case.
-pub(super) fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     let extension = path.extension().and_then(OsStr::to_str);
     extension.is_some_and(|extension| extensions.iter().any(|wanted| extension.eq_ignore_ascii_case(wanted)))
 }
 
 /// The file's name without folder and extension.
-pub(super) fn stem(path: &Path) -> String {
+pub fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The numbers of each line that is not blank, with the line's number from 1.
-pub(super) fn number_lines(path: &Path, text: &str) -> Result<Vec<(usize, Vec<f64>)>, SceneError> {
+/// The numbers of each line that is not blank, with the line's number from 1; `path` is the text's file.
+///
+/// # Errors
+/// [`SceneError::NotANumber`] or [`SceneError::NotFinite`], with the line.
+pub fn number_lines(path: &Path, text: &str) -> Result<Vec<(usize, Vec<f64>)>, SceneError> {
     lines(text)
         .map(|(line, content)| {
             Ok((line, content.split_whitespace().map(|w| number(path, line, w)).collect::<Result<_, _>>()?))

@@ -7,18 +7,15 @@
 //! In these files pixel `(0, 0)` is the centre of the top left pixel; in our image coordinates that is `(0.5, 0.5)`,
 //! so half a pixel is added to the principal point.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use viewfuse_core::camera::Camera;
-
-use super::View;
-use super::check::{self, Intrinsics};
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
-use super::{files, images};
+use super::files;
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader};
 
 /// How the name of a list ends.
-pub(super) const SUFFIX: &str = "_par.txt";
+const SUFFIX: &str = "_par.txt";
 
 /// Numbers after the name: K, R and t.
 const NUMBER_COUNT: usize = 9 + 9 + 3;
@@ -26,8 +23,40 @@ const NUMBER_COUNT: usize = 9 + 9 + 3;
 /// Largest skew and other zero entry of K that rounding may leave, in pixels.
 const LARGEST_ROUNDING: f64 = 1.0e-6;
 
+/// Middlebury multi-view stereo: `*_par.txt` beside the images.
+pub(super) struct Middlebury;
+
+impl Reader for Middlebury {
+    fn name(&self) -> &'static str {
+        "middlebury"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with one *_par.txt, or that file (Middlebury)"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        let is_list = |path: &Path| path.to_string_lossy().ends_with(SUFFIX);
+        if !path.is_dir() {
+            return Ok(is_list(path).then(|| path.to_path_buf()));
+        }
+        match files::list(path, is_list)?.as_slice() {
+            [] => Ok(None),
+            [list] => Ok(Some(list.clone())),
+            [first, second, ..] => {
+                let name = |list: &Path| list.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                Err(SceneError::Ambiguous { path: path.to_path_buf(), first: name(first), second: name(second) })
+            }
+        }
+    }
+
+    fn read(&self, list: &Path) -> Result<Vec<RawView>, SceneError> {
+        read(list)
+    }
+}
+
 /// All views of a list, in its order.
-pub(super) fn read(list: &Path) -> Result<Vec<View>, SceneError> {
+fn read(list: &Path) -> Result<Vec<RawView>, SceneError> {
     let text = files::read_text(list)?;
     let mut lines = files::lines(&text);
     let no_views = || SceneError::NoViews { path: list.to_path_buf(), looked_for: "a count, then a line each" };
@@ -44,7 +73,7 @@ pub(super) fn read(list: &Path) -> Result<Vec<View>, SceneError> {
     if views.is_empty() { Err(no_views()) } else { Ok(views) }
 }
 
-fn read_view(list: &Path, line: usize, content: &str) -> Result<View, SceneError> {
+fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneError> {
     let path = || list.to_path_buf();
     let place = Place::Line(line);
     let mut words = content.split_whitespace();
@@ -63,18 +92,24 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<View, SceneError
     if [k[3], k[6], k[7], k[8] - 1.0].iter().any(|zero| zero.abs() > LARGEST_ROUNDING) {
         return Err(intrinsics_fault(IntrinsicsFault::Form));
     }
-    let pose = check::pose_from_inverse(
-        list,
-        place.clone(),
-        &[r[0], r[1], r[2], t[0], r[3], r[4], r[5], t[1], r[6], r[7], r[8], t[2], 0.0, 0.0, 0.0, 1.0],
-    )?;
-
+    let pose = RawPose {
+        matrix: [r[0], r[1], r[2], t[0], r[3], r[4], r[5], t[1], r[6], r[7], r[8], t[2], 0.0, 0.0, 0.0, 1.0],
+        form: PoseForm::OpenCvFromWorld,
+        path: path(),
+        place: place.clone(),
+    };
     let image = list.with_file_name(file_name);
     if !image.is_file() {
         return Err(SceneError::PoseWithoutImage { path: path(), place, image });
     }
-    let size = images::size(&image)?;
-    let intrinsics = Intrinsics { focal: [k[0], k[4]], principal: [k[2] + 0.5, k[5] + 0.5], size };
-    let pinhole = intrinsics.pinhole(list, place)?;
-    Ok(View { name: files::stem(&image), camera: Camera { pose, pinhole }, image: Some(image) })
+    let image = ImageFile::open(&image)?;
+    let intrinsics = RawIntrinsics {
+        focal: [k[0], k[4]],
+        principal: [k[2] + 0.5, k[5] + 0.5],
+        size: image.size(),
+        path: path(),
+        place: place.clone(),
+        size_place: place,
+    };
+    Ok(RawView { name: files::stem(image.path()), image: Some(image), pose, intrinsics: Some(intrinsics) })
 }

@@ -13,22 +13,41 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::pose::Pose;
-
-use super::View;
-use super::check::{self, Axes, Intrinsics};
+use super::check;
 use super::error::SceneError;
 use super::fault::Place;
 use super::files::{self, IMAGE_EXTENSIONS};
-use super::images;
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader};
 
 /// Put before the name of a view from `target_pose/`, which often counts from 1 like the photographs do. A name
 /// without a separator of folders can be the name of an output file.
 const TARGET_PREFIX: &str = "target_";
 
+/// ShapeNet scenes of Scene Representation Networks: `rgb/`, `pose/`, `intrinsics.txt`, and `target_pose/`.
+pub(super) struct Srn;
+
+impl Reader for Srn {
+    fn name(&self) -> &'static str {
+        "srn"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with rgb/, pose/ and intrinsics.txt (SRN)"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        // One of the two folders is enough, so that a scene with the other one missing is told which.
+        let is_there = path.join("rgb").is_dir() || path.join("pose").is_dir();
+        Ok(is_there.then(|| path.to_path_buf()))
+    }
+
+    fn read(&self, folder: &Path) -> Result<Vec<RawView>, SceneError> {
+        read(folder)
+    }
+}
+
 /// All views of an SRN folder: photographs first, then target poses, each in natural order.
-pub(super) fn read(folder: &Path) -> Result<Vec<View>, SceneError> {
+fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
     let image_folder = folder.join("rgb");
     let photographs = files::list(&image_folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
     let pose_folder = folder.join("pose");
@@ -42,19 +61,18 @@ pub(super) fn read(folder: &Path) -> Result<Vec<View>, SceneError> {
     let mut views = Vec::new();
     for image in photographs {
         let name = files::stem(&image);
-        let pinhole = list.pinhole_of(&image)?;
-        let pose = read_pose(&pose_folder.join(format!("{name}.txt")), list.inverse)?;
-        views.push(View { name, camera: Camera { pose, pinhole }, image: Some(image) });
+        let image = Some(ImageFile::open(&image)?);
+        let pose = read_pose(&pose_folder.join(format!("{name}.txt")), list.form)?;
+        views.push(RawView { name, image, pose, intrinsics: Some(list.intrinsics.clone()) });
     }
     let target_folder = folder.join("target_pose");
-    // A target is rendered at the size of the photographs; where these are smaller than `intrinsics.txt` says, so is it.
-    if let Some(pinhole) = views.first().map(|view| view.camera.pinhole)
-        && target_folder.is_dir()
-    {
+    if target_folder.is_dir() {
         for path in list_poses(&target_folder)? {
-            let pose = read_pose(&path, list.inverse)?;
+            let pose = read_pose(&path, list.form)?;
             let name = format!("{TARGET_PREFIX}{}", files::stem(&path));
-            views.push(View { name, camera: Camera { pose, pinhole }, image: None });
+            // A target is rendered at the size of the photographs; where these are smaller than `intrinsics.txt` says, so
+            // is it.
+            views.push(RawView { name, image: None, pose, intrinsics: None });
         }
     }
     Ok(views)
@@ -88,38 +106,21 @@ fn check_partners(
     Ok(())
 }
 
-fn read_pose(path: &Path, inverse: bool) -> Result<Pose, SceneError> {
+fn read_pose(path: &Path, form: PoseForm) -> Result<RawPose, SceneError> {
     let lines = files::number_lines(path, &files::read_text(path)?)?;
     let numbers: Vec<f64> = lines.into_iter().flat_map(|(_, numbers)| numbers).collect();
     let Ok(matrix) = <[f64; 16]>::try_from(numbers.as_slice()) else {
         let (path, place, found) = (path.to_path_buf(), Place::File, numbers.len());
         return Err(SceneError::WrongCount { path, place, of: "numbers", expected: 16, found });
     };
-    if inverse {
-        check::pose_from_inverse(path, Place::File, &matrix)
-    } else {
-        check::pose(path, Place::File, &matrix, Axes::OpenCv)
-    }
+    Ok(RawPose { matrix, form, path: path.to_path_buf(), place: Place::File })
 }
 
 /// What `intrinsics.txt` says.
 struct IntrinsicsFile {
-    path: PathBuf,
-    intrinsics: Intrinsics,
-    /// Where the focal length stands.
-    focal_line: usize,
-    /// Where the size stands.
-    size_line: usize,
-    /// The poses are world-to-camera.
-    inverse: bool,
-}
-
-impl IntrinsicsFile {
-    fn pinhole_of(&self, image: &Path) -> Result<Pinhole, SceneError> {
-        // Numbers first, so that a bad focal length is reported at its own line and not at that of the size.
-        self.intrinsics.pinhole(&self.path, Place::Line(self.focal_line))?;
-        self.intrinsics.pinhole_of(&self.path, Place::Line(self.size_line), image, images::size(image)?)
-    }
+    intrinsics: RawIntrinsics,
+    /// What the poses are.
+    form: PoseForm,
 }
 
 fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
@@ -138,14 +139,16 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
         return wrong_count(Place::File, "lines with an image size (height width)", 1, 0);
     };
     let (size_line, height, width) = (rest[at].0, rest[at].1[0], rest[at].1[1]);
-    let inverse = match &rest[at + 1..] {
-        [] => false,
-        [(_, flag)] if flag[..] == [0.0] || flag[..] == [1.0] => flag[0] == 1.0,
+    let form = match &rest[at + 1..] {
+        [(_, flag)] if flag[..] == [1.0] => PoseForm::OpenCvFromWorld,
+        [] => PoseForm::WorldFromOpenCv,
+        [(_, flag)] if flag[..] == [0.0] => PoseForm::WorldFromOpenCv,
         [(line, _), ..] => {
             return wrong_count(Place::Line(*line), "lines after the size that are not a lone 0 or 1", 0, 1);
         }
     };
-    let size = check::size(path, Place::Line(size_line), width, height)?;
-    let intrinsics = Intrinsics { focal: [focal, focal], principal: [x, y], size };
-    Ok(IntrinsicsFile { path: path.to_path_buf(), intrinsics, focal_line: *focal_line, size_line, inverse })
+    let (place, size_place) = (Place::Line(*focal_line), Place::Line(size_line));
+    let size = check::size(path, size_place.clone(), width, height)?;
+    let (focal, principal, path) = ([focal, focal], [x, y], path.to_path_buf());
+    Ok(IntrinsicsFile { intrinsics: RawIntrinsics { focal, principal, size, path, place, size_place }, form })
 }

@@ -12,18 +12,16 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use viewfuse_core::camera::{Camera, Pinhole};
 
-use super::View;
-use super::check::{self, Axes, Intrinsics};
+use super::check;
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
 use super::files::{self, IMAGE_EXTENSIONS};
-use super::images;
 use super::json::{self, Object};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader};
 
 /// Names of the file, in the order in which they are looked for.
-pub(super) const FILE_NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
+const FILE_NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
 
 /// Coefficients of lens distortion: radial, tangential, thin prism.
 const DISTORTION_KEYS: [&str; 12] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s1", "s2", "s3", "s4"];
@@ -35,8 +33,32 @@ const PROJECTION_FLAGS: [&str; 3] = ["is_fisheye", "equirectangular", "latlong"]
 const PINHOLE_MODELS: [&str; 7] =
     ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "FULL_OPENCV", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
 
+/// NeRF's `transforms.json` (Blender, instant-ngp, nerfstudio).
+pub(super) struct Transforms;
+
+impl Reader for Transforms {
+    fn name(&self) -> &'static str {
+        "transforms"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with transforms.json or transforms_train.json, or such a .json file (NeRF)"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        if !path.is_dir() {
+            return Ok(files::has_extension(path, &["json"]).then(|| path.to_path_buf()));
+        }
+        Ok(FILE_NAMES.iter().map(|name| path.join(name)).find(|file| file.is_file()))
+    }
+
+    fn read(&self, file: &Path) -> Result<Vec<RawView>, SceneError> {
+        read(file)
+    }
+}
+
 /// All views of a file, in the order of its frames.
-pub(super) fn read(path: &Path) -> Result<Vec<View>, SceneError> {
+fn read(path: &Path) -> Result<Vec<RawView>, SceneError> {
     let value = json::parse(path, &files::read_text(path)?)?;
     let top = Object::new(path, "", &value)?;
     let frames = top.array("frames")?;
@@ -61,15 +83,18 @@ struct Frame<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn view(&self) -> Result<View, SceneError> {
+    fn view(&self) -> Result<RawView, SceneError> {
         self.check_lens()?;
         let [frame, _] = &self.scopes;
-        let matrix = frame.matrix("transform_matrix")?;
-        let place = Place::Key(frame.full("transform_matrix"));
-        let pose = check::pose(self.path, place, &matrix, Axes::OpenGl)?;
-        let image = self.image(frame.text("file_path")?)?;
-        let pinhole = self.pinhole(&image)?;
-        Ok(View { name: files::stem(&image), camera: Camera { pose, pinhole }, image: Some(image) })
+        let pose = RawPose {
+            matrix: frame.matrix("transform_matrix")?,
+            form: PoseForm::WorldFromOpenGl,
+            path: self.path.to_path_buf(),
+            place: Place::Key(frame.full("transform_matrix")),
+        };
+        let image = ImageFile::open(&self.image(frame.text("file_path")?)?)?;
+        let intrinsics = Some(self.intrinsics(image.size())?);
+        Ok(RawView { name: files::stem(image.path()), image: Some(image), pose, intrinsics })
     }
 
     /// The photograph of a `file_path`, with the extension that the Blender flavour leaves out.
@@ -89,8 +114,7 @@ impl<'a> Frame<'a> {
         })
     }
 
-    fn pinhole(&self, image: &Path) -> Result<Pinhole, SceneError> {
-        let image_size = images::size(image)?;
+    fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
         let place = || Place::Key(self.key.clone());
         let size = match (self.number("w")?, self.number("h")?) {
             (None, None) => image_size,
@@ -106,8 +130,8 @@ impl<'a> Frame<'a> {
             self.number("cx")?.map_or(centre[0], |(value, _)| value),
             self.number("cy")?.map_or(centre[1], |(value, _)| value),
         ];
-        let intrinsics = Intrinsics { focal: [focal_x, focal_y], principal, size };
-        intrinsics.pinhole_of(self.path, place(), image, image_size)
+        let (path, place, size_place) = (self.path.to_path_buf(), place(), place());
+        Ok(RawIntrinsics { focal: [focal_x, focal_y], principal, size, path, place, size_place })
     }
 
     /// A focal length: what the frame says in either form, otherwise what the top of the file says.

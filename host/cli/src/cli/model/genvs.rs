@@ -5,12 +5,12 @@ use clap::Args;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
-use viewfuse_field::genvs::sampling::{Plan, Steps, sampler_named};
+use viewfuse_field::genvs::sampling::{Plan, Steps};
 
 /// How a run goes from noise to a picture, and what it keeps of the views.
 #[derive(Args)]
 pub(crate) struct RunOptions {
-    #[arg(long, value_name = "NAME", value_parser = parse_sampler, requires = "model", help = sampler_help(), help_heading = GENVS)]
+    #[arg(long, value_name = "NAME", requires = "model", help = sampler_help(), help_heading = GENVS)]
     sampler: Option<Sampler>,
     /// Noise levels: a call of the denoiser each, with heun two, but for the last [default: 10, with --exact 25]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "model", help_heading = GENVS)]
@@ -57,10 +57,6 @@ impl RunOptions {
 
 fn sampler_help() -> String {
     format!("Sampler: {} [default: ipndm, with --exact heun]", Sampler::ALL.map(Sampler::name).join(", "))
-}
-
-fn parse_sampler(text: &str) -> Result<Sampler, String> {
-    sampler_named(text).map_err(|error| error.to_string())
 }
 
 fn parse_tolerance(text: &str) -> Result<f32, String> {

@@ -62,24 +62,3 @@ impl Plan {
         Plan { steps, settled: Some(HALF_A_LEVEL), ..Plan::published(seed) }
     }
 }
-
-/// No sampler has this name.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("unknown sampler '{name}'; there are: {}", names())]
-pub struct UnknownSampler {
-    /// The name.
-    pub name: String,
-}
-
-fn names() -> String {
-    Sampler::ALL.map(Sampler::name).join(", ")
-}
-
-/// The sampler that a person calls by this name.
-///
-/// # Errors
-/// [`UnknownSampler`].
-pub fn sampler_named(name: &str) -> Result<Sampler, UnknownSampler> {
-    let sampler = Sampler::ALL.into_iter().find(|sampler| sampler.name() == name);
-    sampler.ok_or_else(|| UnknownSampler { name: name.to_owned() })
-}

@@ -6,7 +6,7 @@ use super::{Outcome, Plan, Sampled, Start};
 use std::collections::VecDeque;
 use viewfuse_core::math::{clamp, ln_ratio};
 use viewfuse_core::sampler::control::{FIRST_STEP, change_to_come, reached, verdict};
-use viewfuse_core::sampler::{History, Mix, NoiseBlock, Sampler};
+use viewfuse_core::sampler::{Corrected, History, Mix, NoiseBlock, Sampler};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 
@@ -99,7 +99,7 @@ where
             }
             self.keep(sampler, sigma, &state, denoised)?;
             let mut reached = self.mixed(&sampler.step(&self.history, next), &state, None)?;
-            if sampler == Sampler::Heun {
+            if sampler.corrected() == Corrected::ByAnotherCall {
                 let there = self.call(&reached, next)?;
                 if self.is_settled(&there.values, next) {
                     return Ok(self.finished(there.buffer, planned));
@@ -110,9 +110,9 @@ where
                 self.free.extend([std::mem::replace(&mut reached, corrected), there.buffer]);
             }
             let before = std::mem::replace(&mut state, reached);
-            match sampler {
-                Sampler::UniPc => begun = Some(before),
-                _ => self.free.push(before),
+            match sampler.corrected() {
+                Corrected::ByTheNextCall => begun = Some(before),
+                Corrected::Never | Corrected::ByAnotherCall => self.free.push(before),
             }
         }
         // Not reached: the level behind the last is 0. A schedule without levels has the picture it started with.

@@ -1,0 +1,25 @@
+//! `--weights`: what can be typed, and what it means.
+
+use viewfuse_weighting::attention::AttentionError;
+use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec, grammar, scheme_names};
+
+/// Help of an option that takes one scheme.
+pub(crate) fn one_help() -> String {
+    format!("Weighting scheme: {}", grammar())
+}
+
+/// Help of an option that can be given several times.
+pub(crate) fn many_help() -> String {
+    let grammar = grammar();
+    format!("A weighting scheme; may be given several times: {grammar} [default: every scheme that needs no file]")
+}
+
+/// What was given, or every scheme that needs no file.
+pub(crate) fn or_every_scheme(given: &[WeightingSpec]) -> Result<Vec<WeightingSpec>, WeightingError> {
+    if given.is_empty() { scheme_names().into_iter().map(str::parse).collect() } else { Ok(given.to_vec()) }
+}
+
+/// Opens all of them; reads the files of learned attention.
+pub(crate) fn open_all(specs: &[WeightingSpec]) -> Result<Vec<Weighting>, AttentionError> {
+    specs.iter().map(WeightingSpec::open).collect()
+}

@@ -1,0 +1,231 @@
+//! What a person types for a weighting, read and checked. No file is opened here.
+//!
+//! Names, keys, ranges and defaults of the formulas are those of [`viewfuse_core::weighting::ROWS`].
+
+use crate::attention::AttentionError;
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use viewfuse_core::weighting::{Choice, Parameter, ROWS, Row, Scheme};
+
+/// The published attention without parameters.
+const CROSS_ATTENTION: &str = "cross-attention";
+
+/// Learned attention; behind the colon stands its file.
+const ATTENTION: &str = "attention";
+
+/// Every scheme that needs no file, with its default parameters, as a person types it: the rows of tables over all
+/// schemes.
+pub fn scheme_names() -> Vec<&'static str> {
+    ROWS.iter().flat_map(|row| row.tables).copied().chain([CROSS_ATTENTION]).collect()
+}
+
+/// What a person can type, for help texts: `mean, l1, ..., gaussian:beta=B, ..., attention:FILE`.
+pub fn grammar() -> String {
+    let formulas = ROWS.iter().map(row_grammar);
+    formulas.chain([CROSS_ATTENTION.to_owned(), format!("{ATTENTION}:FILE")]).collect::<Vec<_>>().join(", ")
+}
+
+fn row_grammar(row: &Row) -> String {
+    // A number is called by its key's first letter.
+    let number = |p: Parameter| format!("{}={}", p.key, p.key[..1].to_uppercase());
+    let options = |choice: Choice| format!("{}={}", choice.key, choice.options.join("|"));
+    match (row.parameter.map(number), row.choice.map(options)) {
+        (None, None) => row.name.to_owned(),
+        (Some(one), None) | (None, Some(one)) => format!("{}:{one}", row.name),
+        (Some(first), Some(second)) => format!("{}:{first}[,{second}]", row.name),
+    }
+}
+
+/// Why a text is not a weighting.
+#[derive(Debug, thiserror::Error)]
+pub enum WeightingError {
+    /// No scheme has this name.
+    #[error("unknown weighting scheme '{name}'; there are: {}", grammar())]
+    UnknownScheme {
+        /// What was given.
+        name: String,
+    },
+    /// The scheme has no such parameter.
+    #[error("weighting scheme '{scheme}' has no parameter '{key}'; there are: {}", grammar())]
+    UnknownParameter {
+        /// The scheme.
+        scheme: String,
+        /// What was given.
+        key: String,
+    },
+    /// The parameter's value is not usable.
+    #[error("weighting scheme '{scheme}': {key} must be {wanted}, not '{value}'")]
+    BadValue {
+        /// The scheme.
+        scheme: String,
+        /// The parameter.
+        key: String,
+        /// What it must be.
+        wanted: String,
+        /// What was given.
+        value: String,
+    },
+    /// Learned attention without its parameters.
+    #[error("weighting scheme '{ATTENTION}' needs a file of parameters: {ATTENTION}:FILE")]
+    NoFile,
+    /// The attention parameters could not be read. Only opening gives this, not parsing.
+    #[error(transparent)]
+    Attention(#[from] AttentionError),
+}
+
+/// A weighting as a person typed it: checked, but nothing is read yet. `open` makes a
+/// [`Weighting`](crate::Weighting) of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WeightingSpec {
+    pub(crate) text: String,
+    pub(crate) kind: Kind,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Kind {
+    Formula(Scheme),
+    CrossAttention,
+    Attention(PathBuf),
+}
+
+impl WeightingSpec {
+    /// The file that opening reads, if it reads one.
+    pub fn file(&self) -> Option<&Path> {
+        match &self.kind {
+            Kind::Attention(path) => Some(path),
+            Kind::Formula(_) | Kind::CrossAttention => None,
+        }
+    }
+}
+
+impl Default for WeightingSpec {
+    /// Error weighting with `alpha = 1`, the best of the paper's formulas.
+    fn default() -> WeightingSpec {
+        WeightingSpec::from(Scheme::ERROR)
+    }
+}
+
+impl From<Scheme> for WeightingSpec {
+    fn from(scheme: Scheme) -> WeightingSpec {
+        WeightingSpec { text: scheme.to_string(), kind: Kind::Formula(scheme) }
+    }
+}
+
+impl fmt::Display for WeightingSpec {
+    /// The text as it was typed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+impl FromStr for WeightingSpec {
+    type Err = WeightingError;
+
+    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not looked at.
+    fn from_str(text: &str) -> Result<WeightingSpec, WeightingError> {
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        if name == ATTENTION {
+            return match rest {
+                "" => Err(WeightingError::NoFile),
+                file => Ok(WeightingSpec { text: text.to_owned(), kind: Kind::Attention(PathBuf::from(file)) }),
+            };
+        }
+        let mut pairs = Pairs::parse(name, rest);
+        let kind = if name == CROSS_ATTENTION {
+            Kind::CrossAttention
+        } else {
+            let row = ROWS.iter().find(|row| row.name == name);
+            let row = row.ok_or_else(|| WeightingError::UnknownScheme { name: name.to_owned() })?;
+            Kind::Formula(pairs.scheme(row)?)
+        };
+        pairs.finish()?;
+        Ok(WeightingSpec { text: text.to_owned(), kind })
+    }
+}
+
+/// The `KEY=VALUE` pairs behind a scheme's name, taken one by one.
+struct Pairs<'a> {
+    scheme: &'a str,
+    pairs: Vec<(&'a str, &'a str)>,
+}
+
+impl<'a> Pairs<'a> {
+    fn parse(scheme: &'a str, text: &'a str) -> Pairs<'a> {
+        let pairs = text.split(',').filter(|pair| !pair.is_empty());
+        Pairs { scheme, pairs: pairs.map(|pair| pair.split_once('=').unwrap_or((pair, ""))).collect() }
+    }
+
+    /// The scheme of a row with the choice and the parameter that are given, else with the defaults.
+    fn scheme(&mut self, row: &Row) -> Result<Scheme, WeightingError> {
+        let default = Scheme::of(row.formula);
+        let choice = match row.choice.and_then(|choice| Some((choice, self.take(choice.key)?))) {
+            None => default.choice(),
+            Some((choice, text)) => {
+                numbered(&choice, text).ok_or_else(|| self.bad(choice.key, &choice.to_string(), text))?
+            }
+        };
+        let (parameter, given) = match row.parameter.and_then(|parameter| Some((parameter, self.take(parameter.key)?)))
+        {
+            None => (default.parameter(), None),
+            Some((parameter, text)) => {
+                let value = text.parse().map_err(|_| self.bad(parameter.key, "a number", text))?;
+                (value, Some((parameter, text)))
+            }
+        };
+        Scheme::new(row.formula, choice, parameter).map_err(|_| match given {
+            Some((Parameter { key, wanted, .. }, text)) => self.bad(key, wanted, text),
+            // The defaults are in their ranges.
+            None => WeightingError::UnknownScheme { name: self.scheme.to_owned() },
+        })
+    }
+
+    fn take(&mut self, key: &str) -> Option<&'a str> {
+        let at = self.pairs.iter().position(|(k, _)| *k == key)?;
+        Some(self.pairs.remove(at).1)
+    }
+
+    fn bad(&self, key: &str, wanted: &str, value: &str) -> WeightingError {
+        let [scheme, key, wanted, value] = [self.scheme, key, wanted, value].map(str::to_owned);
+        WeightingError::BadValue { scheme, key, wanted, value }
+    }
+
+    fn finish(self) -> Result<(), WeightingError> {
+        match self.pairs.first() {
+            None => Ok(()),
+            Some((key, _)) => {
+                let [scheme, key] = [self.scheme, key].map(str::to_owned);
+                Err(WeightingError::UnknownParameter { scheme, key })
+            }
+        }
+    }
+}
+
+/// The number of an option. Of options that are numbers the value counts: `2.0` is `2`.
+fn numbered(choice: &Choice, text: &str) -> Option<u32> {
+    let value = |text: &str| text.parse::<f32>().ok();
+    let is_meant = |option: &&str| *option == text || value(option).is_some_and(|number| value(text) == Some(number));
+    let place = choice.options.iter().position(is_meant)?;
+    Some(choice.first + place as u32)
+}
+
+/// Whether a formula's texts for tables are what [`Scheme`]'s own text is.
+#[cfg(test)]
+mod tests {
+    use super::{Kind, ROWS, WeightingSpec, scheme_names};
+
+    #[test]
+    fn texts_of_tables_are_the_schemes_own() -> Result<(), super::WeightingError> {
+        for row in ROWS {
+            assert!(!row.tables.is_empty(), "{} is in no table", row.name);
+            for text in row.tables {
+                let spec: WeightingSpec = text.parse()?;
+                let Kind::Formula(scheme) = spec.kind else { panic!("{text} is no formula") };
+                assert_eq!((scheme.formula(), scheme.to_string().as_str()), (row.formula, *text));
+            }
+        }
+        assert_eq!(ROWS[0].name, "mean");
+        assert_eq!(scheme_names().len(), 12);
+        Ok(())
+    }
+}
