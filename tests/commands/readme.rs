@@ -266,7 +266,9 @@ fn every_package_can_stand_alone() {
         assert!(package["metadata"]["docs"]["rs"].is_object(), "{name}: docs.rs");
         assert_eq!(package["readme"], "README.md", "{name}");
         let targets = package["targets"].as_array().expect("targets");
-        if targets.iter().any(|target| target["kind"] == serde_json::json!(["lib"])) {
+        let is_there = |kind: &str| targets.iter().any(|target| target["kind"] == serde_json::json!([kind]));
+        // The command's library is its binary's.
+        if is_there("lib") && !is_there("bin") {
             assert!(read(&folder.join("README.md")).contains("```rust"), "{name}: no example");
             let its_own = read(&folder.join("src/lib.rs")).contains("include_str!(\"../README.md\")");
             let included = its_own || (name == "viewfuse-core" && elsewhere.contains("../../core/README.md"));
