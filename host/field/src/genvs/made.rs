@@ -24,3 +24,8 @@ pub fn by_formula(architecture: &Architecture) -> Checkpoint {
         values
     })
 }
+
+/// [`by_formula`] of the published size, or with a number, whatever it is, of the small member of the family.
+pub fn formula_of_size(small: Option<u16>) -> Checkpoint {
+    by_formula(&small.map_or_else(Architecture::published, |_| Architecture::small()))
+}
