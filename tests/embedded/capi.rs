@@ -42,7 +42,8 @@ fn formulas() -> String {
         let doc: String = row.doc.lines().map(|line| format!("    ///{line}\n")).collect();
         format!("{doc}    {} = {},\n", row.variant, row.formula as u32)
     };
-    let doc = "The formulas of camera weighting. Weights are proportional to `1 / (e + 1e-6)`, except for the Gaussian.";
+    let doc =
+        "The formulas of camera weighting. Weights are proportional to `1 / (e + 1e-6)`, except for the Gaussian.";
     let variants: String = rows.iter().map(variant).collect();
     format!("/// {doc}\n#[repr(u32)]\npub enum Formula {{\n{variants}}}\n")
 }

@@ -6,6 +6,7 @@
 
 mod light;
 mod linear;
+mod lists;
 mod matrices;
 mod network;
 mod normalise;
@@ -21,6 +22,7 @@ mod winograd;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use light::*;
+use lists::*;
 use matrices::*;
 use network::*;
 use normalise::*;
