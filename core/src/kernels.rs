@@ -39,8 +39,10 @@ pub use kernel::{Access, Array, Kernel, Layout, Piece, SHARED_BYTES, WORKGROUP, 
 // What the rows name.
 pub use crate::attention::{EMBEDDING, FourierEmbedding};
 pub use crate::camera::CameraBlock;
+pub use crate::compact::RUN;
 pub use crate::composite::CompositeBlock;
 pub use crate::depths::{CoarseBlock, FineBlock};
+pub use crate::finite::FINITE_RUN;
 pub use crate::fuse::FuseBlock;
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
 pub use crate::half::word_count;
@@ -311,6 +313,32 @@ macro_rules! for_each_kernel {
                 read pixels: u32,
                 read depths: f32,
                 write wanted: u32,
+            }
+            /// How many elements of each run of [`RUN`](crate::compact::RUN) a mask marks: `counts[run]` of
+            /// `mask[element]`. An element is a run.
+            CountMarked count_marked(element_count: u32) [0..element_count.div_ceil(RUN)] by compact::marked_in_run {
+                read mask: u32,
+                write counts: u32,
+            }
+            /// Where each run's part of a list begins, `offsets[run]`, with one run more than `counts[run]`, and the length
+            /// of it all, `total[0]`. There is one element.
+            SumCounts sum_counts(run_count: u32) [0..1] by compact::run_offsets {
+                read counts: u32,
+                write offsets: u32,
+                write total: u32,
+            }
+            /// What a mask marks, in order: `list[place]`. An element is a run.
+            ListMarked list_marked(element_count: u32) [0..element_count.div_ceil(RUN)] by compact::list_run {
+                read mask: u32,
+                read offsets: u32,
+                write list: u32,
+            }
+            /// Where numbers are not finite: `firsts[run]` is the index of the first infinite or NaN number of a run of
+            /// [`FINITE_RUN`](crate::finite::FINITE_RUN), or `u32::MAX`. An element is a run.
+            FindNonFinite find_non_finite(value_count: u32) [0..value_count.div_ceil(FINITE_RUN)]
+            by finite::first_non_finite {
+                read values: f32,
+                write firsts: u32,
             }
             /// Weights of samples on rays of features: `weights[ray][sample]` from `raw[ray][sample][1 + feature]`. An
             /// element is a ray.

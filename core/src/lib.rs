@@ -36,8 +36,10 @@
 
 pub mod attention;
 pub mod camera;
+pub mod compact;
 pub mod composite;
 pub mod depths;
+pub mod finite;
 pub mod fuse;
 pub mod genvs;
 pub mod half;

@@ -6,6 +6,7 @@
 
 mod light;
 mod linear;
+mod lists;
 mod matrices;
 mod network;
 mod normalise;
@@ -22,6 +23,7 @@ use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use light::*;
+use lists::*;
 use matrices::*;
 use network::*;
 use normalise::*;

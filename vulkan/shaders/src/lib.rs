@@ -11,6 +11,7 @@
 #![cfg_attr(target_arch = "spirv", no_std)]
 
 pub mod light;
+pub mod lists;
 pub mod march;
 pub mod matrices;
 pub mod network;
