@@ -7,7 +7,7 @@ use crate::case::{Case, Spoiler};
 use crate::poses::{Random, random};
 use viewfuse_core::compact::RUN;
 use viewfuse_core::finite::FINITE_RUN;
-use viewfuse_device::Device;
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Whole numbers.
@@ -56,7 +56,7 @@ fn exact(values: impl IntoIterator<Item = u32>, len: usize) -> Vec<Option<Bounde
 fn downloaded<'a, D: Device>(
     device: &D,
     buffers: impl IntoIterator<Item = &'a Buffer<D, u32>>,
-) -> Result<Vec<f32>, D::Error>
+) -> Result<Vec<f32>, DeviceError>
 where
     Buffer<D, u32>: 'a,
 {
@@ -89,7 +89,7 @@ impl Case for CountMarked {
         masks.iter().map(|mask| run_count(mask) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, masks: &Vec<Vec<u32>>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, masks: &Vec<Vec<u32>>) -> Result<Self::Loaded<D>, DeviceError> {
         // A mark behind the elements does not count.
         let load = |mask: &Vec<u32>| {
             Ok([device.upload(&[&mask[..], &[1]].concat())?, device.zeros(run_count(mask) as usize + 1)?])
@@ -97,14 +97,14 @@ impl Case for CountMarked {
         masks.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, masks: &Vec<Vec<u32>>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, masks: &Vec<Vec<u32>>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         masks
             .iter()
             .zip(loaded)
             .try_for_each(|(job, [mask, counts])| device.count_marked(&(job.len() as u32), mask, counts))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         downloaded(device, loaded.iter().map(|[_, counts]| counts))
     }
 
@@ -138,20 +138,20 @@ impl Case for SumCounts {
         jobs.len()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Vec<u32>>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Vec<u32>>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |counts: &Vec<u32>| {
             Ok([device.upload(&[&counts[..], &[7]].concat())?, device.zeros(counts.len() + 2)?, device.zeros(2)?])
         };
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Vec<u32>>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Vec<u32>>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, [counts, offsets, total])| {
             device.sum_counts(&(job.len() as u32), counts, offsets, total)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         downloaded(device, loaded.iter().flat_map(|[_, offsets, total]| [offsets, total]))
     }
 
@@ -204,7 +204,7 @@ impl Case for ListMarked {
         jobs.iter().map(|job| run_count(&job.mask) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Listing>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Listing>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Listing| {
             Ok([
                 device.upload(&[&job.mask[..], &[1]].concat())?,
@@ -215,13 +215,13 @@ impl Case for ListMarked {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Listing>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Listing>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, [mask, offsets, list])| {
             device.list_marked(&(job.mask.len() as u32), mask, offsets, list)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         downloaded(device, loaded.iter().map(|[_, _, list]| list))
     }
 
@@ -269,7 +269,7 @@ impl Case for FindNonFinite {
         jobs.iter().map(|values| values.len().div_ceil(FINITE_RUN as usize)).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Vec<f32>>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Vec<f32>>) -> Result<Self::Loaded<D>, DeviceError> {
         // A number behind those that count must not be taken along.
         let load = |values: &Vec<f32>| {
             let run_count = values.len().div_ceil(FINITE_RUN as usize);
@@ -278,13 +278,13 @@ impl Case for FindNonFinite {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Vec<f32>>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Vec<f32>>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter()
             .zip(loaded)
             .try_for_each(|(job, (values, firsts))| device.find_non_finite(&(job.len() as u32), values, firsts))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         downloaded(device, loaded.iter().map(|(_, firsts)| firsts))
     }
 
