@@ -3,5 +3,6 @@
 mod datasets;
 mod errors;
 mod layouts;
+mod outside;
 mod photographs;
 mod synthetic;
