@@ -6,8 +6,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use viewfuse::core::pose::Pose;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::photo::PhotoField;
+use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader, number_lines, read_text};
@@ -110,9 +111,10 @@ fn picture(scene: &Scene, weighting: &Weighting) -> Frame {
     let job = Selection { targets, ..Selection::default() }.resolve(scene, 2).expect("a job");
     let options = RenderOptions { size: Some([32, 32]), ..RenderOptions::default() };
     let mut frames = Vec::new();
-    render(scene, &job, weighting, &Cpu, &PhotoField::default(), &options, &Silent, |_, frame| {
+    let renderer = On { device: &Cpu, field: &TrainingFree::default() };
+    render(scene, &job, weighting, &renderer, &options, &Silent, |_, frame| {
         frames.push(frame);
-        Ok::<_, RenderError<_>>(())
+        Ok::<_, RenderError>(())
     })
     .expect("a picture");
     frames.remove(0)
