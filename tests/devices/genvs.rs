@@ -42,11 +42,7 @@ fn genvs_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
 }
 
 /// A picture from three sources, of which one has no weight.
-fn picture<D: Device>(
-    device: &D,
-    omissions: Omissions,
-    has_denoiser: bool,
-) -> Result<Vec<[f32; 4]>, FieldError<D::Error>> {
+fn picture<D: Device>(device: &D, omissions: Omissions, has_denoiser: bool) -> Result<Vec<[f32; 4]>, FieldError> {
     let mut architecture = Architecture::small();
     if !has_denoiser {
         architecture.denoiser = None;

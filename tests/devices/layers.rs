@@ -11,6 +11,7 @@ use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::product::ProductBlock;
 use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
 pub(crate) const TESTS: &[Test] = &[
@@ -62,8 +63,8 @@ impl Numbered {
     fn on<D: Device>(
         &self,
         device: &D,
-        run: impl FnOnce(&D::Buffer<f32>, &Layer<D>, &D::Buffer<f32>, &mut D::Buffer<f32>) -> Result<(), D::Error>,
-    ) -> Result<Vec<f32>, D::Error> {
+        run: impl FnOnce(&D::Buffer<f32>, &Layer<D>, &D::Buffer<f32>, &mut D::Buffer<f32>) -> Result<(), DeviceError>,
+    ) -> Result<Vec<f32>, DeviceError> {
         let layer = Layer::new(device, &self.shape, &self.weights, &self.bias)?;
         let mut outputs = device.upload(&vec![UNTOUCHED; self.output_count + 1])?;
         run(&device.upload(&self.inputs)?, &layer, &device.upload(&self.addend)?, &mut outputs)?;

@@ -36,19 +36,19 @@ pub(crate) struct Rendering {
 
 impl Rendering {
     /// On a device that did nothing else before.
-    pub(crate) fn on_vulkan(device: &Vulkan) -> Result<Rendering, RenderError<VulkanError>> {
+    pub(crate) fn on_vulkan(device: &Vulkan) -> Result<Rendering, RenderError> {
         let rendering = Rendering::on(device)?;
         Ok(Rendering { tallies: KERNELS.map(|kernel| device.tally(kernel)).to_vec(), ..rendering })
     }
 
-    fn on<D: Device>(device: &D) -> Result<Rendering, RenderError<D::Error>> {
+    fn on<D: Device>(device: &D) -> Result<Rendering, RenderError> {
         let scene = Scene::open(data("toy"))?;
         let (targets, view_count) = (Some("20,22".to_owned()), Some(SOURCE_COUNT));
         let job = Selection { targets, view_count, ..Selection::default() }.resolve(&scene, 2).expect("views of it");
         let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
         let weighting = "error:alpha=1".parse().expect("a scheme");
         let mut rendering = Rendering { pictures: Vec::new(), depths: Vec::new(), tallies: Vec::new() };
-        let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {
+        let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
             rendering.pictures.push(frame.picture);
             rendering.depths.push(frame.depths);
             Ok(())

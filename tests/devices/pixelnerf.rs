@@ -33,7 +33,7 @@ fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Faile
     }
 }
 
-fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>, RenderError<D::Error>> {
+fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>, RenderError> {
     let scene = Scene::open(data("toy"))?;
     let selection =
         Selection { targets: Some("20".to_owned()), sources: Some("1,7,13".to_owned()), ..Selection::default() };
@@ -43,7 +43,7 @@ fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>,
     let body = test_networks::body(&Architecture::small(16));
     let field = PixelNerf::new(&body, PixelNerfOptions { sampling, omissions }).expect("a made network");
     let mut colours = Vec::new();
-    let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {
+    let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
         colours = frame.colours;
         Ok(())
     };

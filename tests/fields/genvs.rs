@@ -57,7 +57,7 @@ fn try_picture(
     sources: &SourceImages,
     weights: &SourceWeights,
     target: &Camera,
-) -> Result<Rendered, FieldError<Infallible>> {
+) -> Result<Rendered, FieldError> {
     try_picture_with(field, sources, weights, target, &Silent)
 }
 
@@ -67,7 +67,7 @@ fn try_picture_with(
     weights: &SourceWeights,
     target: &Camera,
     progress: &dyn Progress,
-) -> Result<Rendered, FieldError<Infallible>> {
+) -> Result<Rendered, FieldError> {
     let prepared = field.prepare(&Cpu, sources, progress)?;
     field.encode(&Cpu, &prepared, &[], progress)?;
     field.render(&Cpu, &prepared, &(), weights, target, 0.0, progress)

@@ -17,7 +17,7 @@ use viewfuse_tests::mixture::Mixture;
 
 const COUNT: usize = 128;
 
-type Outcome = Result<Sampled<Cpu>, FieldError<Infallible>>;
+type Outcome = Result<Sampled<Cpu>, FieldError>;
 
 /// Runs a plan with a denoiser of values; also gives the states at the calls.
 fn run(

@@ -81,7 +81,7 @@ fn assert_relative(ours: f64, expected: f64) {
     assert!((ours - expected).abs() <= TOLERANCE * expected.abs(), "{ours} is not {expected}");
 }
 
-fn refusal<T>(outcome: Result<T, MetricError<std::convert::Infallible>>) -> String {
+fn refusal<T>(outcome: Result<T, MetricError>) -> String {
     match outcome {
         Ok(_) => panic!("is accepted"),
         Err(error) => error.to_string(),

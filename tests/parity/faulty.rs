@@ -1,6 +1,6 @@
 //! A device that computes on the CPU and gets one kernel wrong.
 
-use std::convert::Infallible;
+use viewfuse::device::DeviceError;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Element, KernelTime, LayerShape, Memory};
 use viewfuse_core::for_each_kernel;
@@ -54,17 +54,16 @@ impl Spoil for RayPoint {
 
 impl Memory for Faulty {
     type Buffer<T: Element> = Vec<T>;
-    type Error = Infallible;
 
     fn name(&self) -> String {
         format!("faulty {}", self.kernel.name())
     }
 
-    fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, Infallible> {
+    fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
         Cpu.upload(values)
     }
 
-    fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, Infallible> {
+    fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
         Cpu.zeros(count)
     }
 
@@ -76,7 +75,7 @@ impl Memory for Faulty {
         Cpu.busy_elements()
     }
 
-    fn finish(&self) -> Result<(), Infallible> {
+    fn finish(&self) -> Result<(), DeviceError> {
         Cpu.finish()
     }
 
@@ -84,7 +83,7 @@ impl Memory for Faulty {
         Cpu.kernel_times()
     }
 
-    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, Infallible> {
+    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, DeviceError> {
         Cpu.download(buffer)
     }
 }
@@ -120,7 +119,7 @@ macro_rules! forward {
         impl Device for Faulty {
             type Weights = <Cpu as Device>::Weights;
 
-            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, Infallible> {
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, DeviceError> {
                 Cpu.weights(shape, weights)
             }
 
@@ -130,7 +129,7 @@ macro_rules! forward {
                     $($block: &$Block,)?
                     $($($count: u32,)+)?
                     $($array: argument!($kind $host),)+
-                ) -> Result<(), Infallible> {
+                ) -> Result<(), DeviceError> {
                     Cpu.$method($($block,)? $($($count,)+)? $($array),+)?;
                     if self.kernel == Kernel::$Kernel {
                         $(spoil!($kind $array);)+

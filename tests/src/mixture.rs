@@ -93,7 +93,7 @@ impl Mixture {
         state: &D::Buffer<f32>,
         sigma: f32,
         denoised: &mut D::Buffer<f32>,
-    ) -> Result<(), FieldError<D::Error>> {
+    ) -> Result<(), FieldError> {
         let noisy: Vec<f64> = device.download(state).map_err(FieldError::Device)?.into_iter().map(f64::from).collect();
         let values: Vec<f32> = self.denoised(&noisy, f64::from(sigma)).into_iter().map(|value| value as f32).collect();
         *denoised = device.upload(&values).map_err(FieldError::Device)?;

@@ -3,6 +3,7 @@
 use super::agreement::Limits;
 use super::bounded::Bounded;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The sizes that a kernel is checked at, in elements of a dispatch: one, fewer than a workgroup, one more than a
@@ -45,19 +46,19 @@ pub trait Case {
     ///
     /// # Errors
     /// If the device has no room.
-    fn load<D: Device>(device: &D, inputs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error>;
+    fn load<D: Device>(device: &D, inputs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError>;
 
     /// Runs the kernel, once for each dispatch.
     ///
     /// # Errors
     /// If the device is lost.
-    fn run<D: Device>(device: &D, inputs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error>;
+    fn run<D: Device>(device: &D, inputs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError>;
 
     /// What the kernel wrote, all dispatches behind one another.
     ///
     /// # Errors
     /// If the device is lost.
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error>;
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError>;
 
     /// What it should have written: in `f64`, with a bound for each number that holds on every device. `None` where
     /// rounding decides.
@@ -67,7 +68,7 @@ pub trait Case {
     ///
     /// # Errors
     /// If the device fails.
-    fn results<D: Device>(device: &D, inputs: &Self::Inputs) -> Result<Vec<f32>, D::Error> {
+    fn results<D: Device>(device: &D, inputs: &Self::Inputs) -> Result<Vec<f32>, DeviceError> {
         let mut loaded = Self::load(device, inputs)?;
         Self::run(device, inputs, &mut loaded)?;
         Self::read(device, &loaded)

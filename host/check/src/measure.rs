@@ -7,6 +7,7 @@ use super::cases::visit;
 use super::report::{CheckError, DeviceReport, KernelReport};
 use std::time::{Duration, Instant};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_job::progress::Progress;
 use viewfuse_vulkan::kernel::Kernel;
@@ -70,7 +71,7 @@ impl<D: Device> Visitor for Check<'_, D> {
 
     fn visit<C: Case>(self) -> Result<KernelReport, CheckError> {
         let kernel = C::KERNEL.name();
-        let failed = |source: D::Error| CheckError::Device { kernel, source: Box::new(source) };
+        let failed = |source: DeviceError| CheckError::Device { kernel, source: Box::new(source) };
         let mut actual = Vec::new();
         let mut on_cpu = Vec::new();
         let mut expected: Vec<Option<Bounded>> = Vec::new();
@@ -81,8 +82,7 @@ impl<D: Device> Visitor for Check<'_, D> {
                 actual.extend(C::results(self.device, &inputs).map_err(failed)?);
                 expected.extend(C::expected(&inputs));
                 if self.role == Role::Other {
-                    let Ok(values) = C::results(&Cpu, &inputs);
-                    on_cpu.extend(values);
+                    on_cpu.extend(C::results(&Cpu, &inputs).map_err(failed)?);
                 }
             }
         }
@@ -112,7 +112,7 @@ impl<D: Device> Visitor for Check<'_, D> {
 
 /// The time of an element at the largest size. Runs may go on behind the call: a download waits for all of them, and its
 /// own time is taken off.
-fn seconds_per_element<C: Case, D: Device>(device: &D) -> Result<f64, D::Error> {
+fn seconds_per_element<C: Case, D: Device>(device: &D) -> Result<f64, DeviceError> {
     let inputs = C::inputs(1, SIZES[SIZES.len() - 1]);
     let mut loaded = C::load(device, &inputs)?;
     // Once for what is made at the first use.

@@ -143,7 +143,7 @@ fn rendered<D: Device>(
     let weighting = Weighting::default_scheme();
     let mut picture = None;
     let start = Instant::now();
-    let keep = |_: &_, frame: Frame| -> Result<(), RenderError<D::Error>> {
+    let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
         picture = Some(frame.picture);
         Ok(())
     };

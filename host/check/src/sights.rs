@@ -5,6 +5,7 @@ use super::poses::{Random, looking_at_origin};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::rays::{RayPoint, TargetRay};
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 
 /// Sides of images, pixels.
@@ -84,7 +85,7 @@ pub fn point(random: &mut Random, views: &[CameraBlock]) -> RayPoint {
 ///
 /// # Errors
 /// If the device has no room.
-pub fn load_rays<D: Device>(device: &D, pixels: &[u32], rays: &[TargetRay]) -> Result<Rays<D>, D::Error> {
+pub fn load_rays<D: Device>(device: &D, pixels: &[u32], rays: &[TargetRay]) -> Result<Rays<D>, DeviceError> {
     Ok(Rays { count: pixels.len() as u32, pixels: device.upload(pixels)?, rays: device.upload(rays)? })
 }
 

@@ -8,6 +8,7 @@ use viewfuse_core::photo::sweep::{OUTSIDE, SweepBlock};
 use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, PhotoScene};
 
 /// What kernels read.
@@ -143,7 +144,7 @@ impl World {
     ///
     /// # Errors
     /// If the device has no room.
-    pub fn load<D: Device>(&self, device: &D) -> Result<PhotoScene<D>, D::Error> {
+    pub fn load<D: Device>(&self, device: &D) -> Result<PhotoScene<D>, DeviceError> {
         Ok(PhotoScene {
             object: self.object,
             object_buffer: device.upload(&[self.object])?,

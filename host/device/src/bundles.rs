@@ -1,5 +1,6 @@
 //! Buffers that belong together.
 
+use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::Memory;
 use viewfuse_core::camera::CameraBlock;
@@ -21,7 +22,7 @@ impl<D: Device + ?Sized> Layer<D> {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn new(device: &D, shape: &LayerShape, weights: &[f32], bias: &[f32]) -> Result<Layer<D>, D::Error> {
+    pub fn new(device: &D, shape: &LayerShape, weights: &[f32], bias: &[f32]) -> Result<Layer<D>, DeviceError> {
         Ok(Layer { weights: device.weights(shape, weights)?, bias: device.upload(bias)? })
     }
 }

@@ -18,6 +18,7 @@ mod volumes;
 mod weighting;
 mod winograd;
 
+use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use light::*;
@@ -28,7 +29,6 @@ use photo::*;
 use points::*;
 use rays::*;
 use sampler::*;
-use std::convert::Infallible;
 use viewfuse_core::for_each_kernel;
 use viewfuse_core::kernels::*;
 use volumes::*;
@@ -42,17 +42,16 @@ pub struct Cpu;
 
 impl Memory for Cpu {
     type Buffer<T: Element> = Vec<T>;
-    type Error = Infallible;
 
     fn name(&self) -> String {
         format!("cpu ({} threads)", rayon::current_num_threads())
     }
 
-    fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, Infallible> {
+    fn upload<T: Element>(&self, values: &[T]) -> Result<Vec<T>, DeviceError> {
         Ok(values.to_vec())
     }
 
-    fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, Infallible> {
+    fn zeros<T: Element>(&self, count: usize) -> Result<Vec<T>, DeviceError> {
         Ok(vec![T::default(); count])
     }
 
@@ -64,7 +63,7 @@ impl Memory for Cpu {
         1
     }
 
-    fn finish(&self) -> Result<(), Infallible> {
+    fn finish(&self) -> Result<(), DeviceError> {
         Ok(())
     }
 
@@ -72,7 +71,7 @@ impl Memory for Cpu {
         Vec::new()
     }
 
-    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, Infallible> {
+    fn download<T: Element>(&self, buffer: &Vec<T>) -> Result<Vec<T>, DeviceError> {
         Ok(buffer.clone())
     }
 }
@@ -107,7 +106,7 @@ macro_rules! forms {
         impl Device for Cpu {
             type Weights = Weights;
 
-            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, Infallible> {
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Weights, DeviceError> {
                 Ok(Weights::new(shape, weights))
             }
 
@@ -117,7 +116,7 @@ macro_rules! forms {
                     $($block: &$Block,)?
                     $($($count: u32,)+)?
                     $($array: argument!($kind $host),)+
-                ) -> Result<(), Infallible> {
+                ) -> Result<(), DeviceError> {
                     $method($($block,)? $($($count,)+)? $(lend!($kind $array)),+);
                     Ok(())
                 }

@@ -1,5 +1,6 @@
 //! What a device runs: a method for every kernel, from the kernels' rows.
 
+use super::error::DeviceError;
 use super::memory::Memory;
 use viewfuse_core::for_each_kernel;
 use viewfuse_core::kernels::*;
@@ -45,7 +46,7 @@ macro_rules! device {
             ///
             /// # Errors
             /// If the device has no memory left.
-            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, Self::Error>;
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, DeviceError>;
 
             $(
                 $(#[$doc])*
@@ -58,7 +59,7 @@ macro_rules! device {
                     $($block: &$Block,)?
                     $($($count: u32,)+)?
                     $($array: argument!($kind $host),)+
-                ) -> Result<(), Self::Error>;
+                ) -> Result<(), DeviceError>;
             )+
         }
     };

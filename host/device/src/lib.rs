@@ -8,12 +8,14 @@
 pub mod bundles;
 pub mod choice;
 pub mod cpu;
+pub mod error;
 pub mod kernels;
 pub mod memory;
 pub mod parallel;
 pub mod vulkan;
 
 pub use bundles::{Layer, PhotoScene, Pixels, Rays};
+pub use error::DeviceError;
 pub use kernels::{Device, LayerShape};
 pub use memory::{Element, KernelTime, Memory};
 

@@ -1,5 +1,6 @@
 //! What a device holds, and what it tells about itself.
 
+use super::error::DeviceError;
 use bytemuck::Pod;
 use std::time::Duration;
 
@@ -25,9 +26,6 @@ pub trait Memory {
     /// Memory of the device that holds `T`s.
     type Buffer<T: Element>;
 
-    /// What can go wrong.
-    type Error: std::error::Error + Send + Sync + 'static;
-
     /// What the run record calls it.
     fn name(&self) -> String;
 
@@ -35,13 +33,13 @@ pub trait Memory {
     ///
     /// # Errors
     /// If the device has no room.
-    fn upload<T: Element>(&self, values: &[T]) -> Result<Self::Buffer<T>, Self::Error>;
+    fn upload<T: Element>(&self, values: &[T]) -> Result<Self::Buffer<T>, DeviceError>;
 
     /// A buffer of `count` default values.
     ///
     /// # Errors
     /// If the device has no room.
-    fn zeros<T: Element>(&self, count: usize) -> Result<Self::Buffer<T>, Self::Error>;
+    fn zeros<T: Element>(&self, count: usize) -> Result<Self::Buffer<T>, DeviceError>;
 
     /// Most elements of a buffer that is bound as a whole: what grows with the work is cut so that it fits.
     fn most_elements<T: Element>(&self) -> usize;
@@ -54,7 +52,7 @@ pub trait Memory {
     ///
     /// # Errors
     /// If the device is lost, or a kernel took too long.
-    fn finish(&self) -> Result<(), Self::Error>;
+    fn finish(&self) -> Result<(), DeviceError>;
 
     /// What each kernel took so far, kernels that never ran left out; nothing for devices that do not tell.
     fn kernel_times(&self) -> Vec<KernelTime>;
@@ -63,5 +61,5 @@ pub trait Memory {
     ///
     /// # Errors
     /// If the device is lost.
-    fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, Self::Error>;
+    fn download<T: Element>(&self, buffer: &Self::Buffer<T>) -> Result<Vec<T>, DeviceError>;
 }

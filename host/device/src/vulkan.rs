@@ -1,5 +1,6 @@
 //! Vulkan devices: every kernel a dispatch, as its row says; the work is in `viewfuse-vulkan`.
 
+use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use bytemuck::bytes_of;
@@ -33,18 +34,17 @@ impl Vulkan {
 
 impl Memory for Vulkan {
     type Buffer<T: Element> = Buffer<T>;
-    type Error = VulkanError;
 
     fn name(&self) -> String {
         format!("vulkan ({})", self.gpu.name())
     }
 
-    fn upload<T: Element>(&self, values: &[T]) -> Result<Buffer<T>, VulkanError> {
-        self.gpu.upload(values)
+    fn upload<T: Element>(&self, values: &[T]) -> Result<Buffer<T>, DeviceError> {
+        Ok(self.gpu.upload(values)?)
     }
 
-    fn zeros<T: Element>(&self, count: usize) -> Result<Buffer<T>, VulkanError> {
-        self.gpu.zeros(count)
+    fn zeros<T: Element>(&self, count: usize) -> Result<Buffer<T>, DeviceError> {
+        Ok(self.gpu.zeros(count)?)
     }
 
     fn most_elements<T: Element>(&self) -> usize {
@@ -55,8 +55,8 @@ impl Memory for Vulkan {
         BUSY_ELEMENTS
     }
 
-    fn finish(&self) -> Result<(), VulkanError> {
-        self.gpu.wait()
+    fn finish(&self) -> Result<(), DeviceError> {
+        Ok(self.gpu.wait()?)
     }
 
     fn kernel_times(&self) -> Vec<KernelTime> {
@@ -66,8 +66,8 @@ impl Memory for Vulkan {
             .collect()
     }
 
-    fn download<T: Element>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
-        self.gpu.download(buffer)
+    fn download<T: Element>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, DeviceError> {
+        Ok(self.gpu.download(buffer)?)
     }
 }
 
@@ -111,7 +111,7 @@ macro_rules! dispatches {
         impl Device for Vulkan {
             type Weights = Buffer<f32>;
 
-            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Buffer<f32>, VulkanError> {
+            fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Buffer<f32>, DeviceError> {
                 self.upload(&weights[..shape.inner_count * shape.column_count])
             }
 
@@ -121,14 +121,14 @@ macro_rules! dispatches {
                     $($block: &$Block,)?
                     $($($count: u32,)+)?
                     $($array: argument!($kind $host),)+
-                ) -> Result<(), VulkanError> {
+                ) -> Result<(), DeviceError> {
                     $($(
                         let mut told = *$told;
                         told.$flag = u32::from($array.is_some());
                         let $told = &told;
                     )?)+
                     let arrays = [$(bind!($kind $array $($other)?)),+];
-                    self.gpu.dispatch(Kernel::$Kernel, parameters!($($block)?), $elements, &arrays)
+                    Ok(self.gpu.dispatch(Kernel::$Kernel, parameters!($($block)?), $elements, &arrays)?)
                 }
             )+
         }

@@ -17,7 +17,7 @@ pub const NEAREST_COPY: &str = "nearest copy";
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
-pub enum EvaluateError<E: std::error::Error> {
+pub enum EvaluateError {
     /// The choice of views is no job.
     #[error(transparent)]
     Selection(#[from] SelectionError),
@@ -31,10 +31,10 @@ pub enum EvaluateError<E: std::error::Error> {
     },
     /// A render failed.
     #[error(transparent)]
-    Render(#[from] RenderError<E>),
+    Render(#[from] RenderError),
     /// A picture could not be scored.
     #[error(transparent)]
-    Metric(#[from] MetricError<E>),
+    Metric(#[from] MetricError),
 }
 
 /// Name of the peak signal to noise ratio in decibels, of 8-bit values; infinite for equal pictures. Names of metrics are
@@ -94,9 +94,9 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         sources: &[usize],
         targets: &[usize],
         mut seen: impl FnMut(&Weighting, &Frame, &[(String, f64)], &SourceImages),
-    ) -> Result<Vec<Score>, EvaluateError<D::Error>> {
+    ) -> Result<Vec<Score>, EvaluateError> {
         let Evaluator { weightings, device, field, options, metrics, progress } = *self;
-        let values = |prediction: &RgbImage, truth: &RgbImage| -> Result<Vec<(String, f64)>, MetricError<D::Error>> {
+        let values = |prediction: &RgbImage, truth: &RgbImage| -> Result<Vec<(String, f64)>, MetricError> {
             let scored = metrics.compare(device, prediction, truth)?;
             Ok(scored.into_iter().map(|scored| (scored.name.to_owned(), scored.value)).collect())
         };
@@ -142,7 +142,7 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
     ///
     /// # Errors
     /// [`EvaluateError`].
-    pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError<D::Error>> {
+    pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError> {
         let groups = source_groups(scene, selection, self.field.least_sources())?;
         let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
         let album = Album::open(scene, used, self.progress).map_err(RenderError::from)?;
@@ -157,11 +157,7 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
 /// Sets of sources, each with the targets that are rendered from it.
 type SourceGroups = Vec<(Vec<usize>, Vec<usize>)>;
 
-fn source_groups<E: std::error::Error>(
-    scene: &Scene,
-    selection: &Selection,
-    least_sources: usize,
-) -> Result<SourceGroups, EvaluateError<E>> {
+fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> Result<SourceGroups, EvaluateError> {
     let photographed = || (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some());
     let asked = match &selection.targets {
         Some(list) => Some(view_list(scene, list)?),

@@ -34,14 +34,14 @@ use features::{Features, Inception};
 use image::RgbImage;
 use lpips::Lpips;
 use viewfuse_core::metrics::{psnr, ssim};
-use viewfuse_device::Device;
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_field::finite::NotFinite;
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::image::HostImage;
 
 /// Why pictures could not be scored.
 #[derive(Debug, thiserror::Error)]
-pub enum MetricError<E: std::error::Error> {
+pub enum MetricError {
     /// A network's parameters cannot be used.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
@@ -66,7 +66,7 @@ pub enum MetricError<E: std::error::Error> {
     NotFinite(#[from] NotFinite),
     /// The device failed.
     #[error("the device failed")]
-    Device(#[source] E),
+    Device(#[from] DeviceError),
 }
 
 /// A score of a picture, by name.
@@ -103,12 +103,7 @@ impl<D: Device> Metrics<D> {
     ///
     /// # Errors
     /// [`MetricError`].
-    pub fn compare(
-        &self,
-        device: &D,
-        prediction: &RgbImage,
-        truth: &RgbImage,
-    ) -> Result<Vec<Scored>, MetricError<D::Error>> {
+    pub fn compare(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<Vec<Scored>, MetricError> {
         same_size(prediction, truth)?;
         let (shown, shown_truth) = (self.convention.shown(prediction), self.convention.shown(truth));
         let (width, height) = (truth.width() as usize, truth.height() as usize);
@@ -136,7 +131,7 @@ impl<D: Device> Metrics<D> {
         &self,
         device: &D,
         pictures: impl IntoIterator<Item = &'a RgbImage>,
-    ) -> Result<Option<Features>, MetricError<D::Error>> {
+    ) -> Result<Option<Features>, MetricError> {
         let shown: Vec<_> = pictures.into_iter().map(|picture| self.convention.shown(picture)).collect();
         self.features_of_truths(device, shown.iter().map(AsRef::as_ref))
     }
@@ -149,13 +144,13 @@ impl<D: Device> Metrics<D> {
         &self,
         device: &D,
         pictures: impl IntoIterator<Item = &'a RgbImage>,
-    ) -> Result<Option<Features>, MetricError<D::Error>> {
+    ) -> Result<Option<Features>, MetricError> {
         self.inception.as_ref().map(|inception| inception.features(device, pictures)).transpose()
     }
 }
 
 /// Only pictures of one size can be compared.
-fn same_size<E: std::error::Error>(prediction: &RgbImage, truth: &RgbImage) -> Result<(), MetricError<E>> {
+fn same_size(prediction: &RgbImage, truth: &RgbImage) -> Result<(), MetricError> {
     match prediction.dimensions() == truth.dimensions() {
         true => Ok(()),
         false => {

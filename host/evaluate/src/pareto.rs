@@ -110,7 +110,7 @@ impl Subject<'_> {
         settings: &[Setting<F>],
         round_count: u32,
         progress: &dyn Progress,
-    ) -> Result<Measured, RenderError<D::Error>> {
+    ) -> Result<Measured, RenderError> {
         progress.expect(settings.len() * self.job.targets.len() * (round_count as usize + 1));
         let images = self.images(settings, progress)?;
         // Later rounds only take time: they are not compared with the truth.
@@ -145,7 +145,7 @@ impl Subject<'_> {
         &self,
         settings: &[Setting<F>],
         progress: &dyn Progress,
-    ) -> Result<Vec<Arc<SourceImages>>, RenderError<D::Error>> {
+    ) -> Result<Vec<Arc<SourceImages>>, RenderError> {
         let Subject { scene, album, job, .. } = self;
         let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
         let mut images = Vec::new();
@@ -170,7 +170,7 @@ impl Subject<'_> {
         images: &Arc<SourceImages>,
         targets: &[Target],
         progress: &dyn Progress,
-    ) -> Result<Round, RenderError<D::Error>> {
+    ) -> Result<Round, RenderError> {
         let (Setting { field, options, .. }, quiet) = (setting, Silent);
         let (images, sources) = (Arc::clone(images), &self.job.sources);
         let mut stage = Stage::of_images(self.scene, self.album, sources, images, device, field, options, &quiet)?;

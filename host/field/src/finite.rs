@@ -39,7 +39,7 @@ pub fn download_finite<D: Device>(
     buffer: &D::Buffer<f32>,
     stage: &str,
     tensor: &str,
-) -> Result<Vec<f32>, FieldError<D::Error>> {
+) -> Result<Vec<f32>, FieldError> {
     let values = device.download(buffer).map_err(FieldError::Device)?;
     check_finite(&values, stage, tensor)?;
     Ok(values)

@@ -35,7 +35,7 @@ use sampling::Start;
 use std::cell::{Ref, RefCell};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::camera::{Camera, CameraBlock};
-use viewfuse_device::{Device, Memory};
+use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::Size;
@@ -43,8 +43,6 @@ use viewfuse_nn::scratch::Scratch;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_weighting::sources::SourceWeights;
 use volume::Volume;
-
-type Outcome<T, D> = Result<T, FieldError<<D as Memory>::Error>>;
 
 /// A GeNVS with its parameters, ready for any device.
 pub struct Genvs {
@@ -131,7 +129,7 @@ impl Genvs {
         (0..prepared.images.len()).filter(|view| all || weights.get(*view as u32) > 0.0).collect()
     }
 
-    fn encode_view<D: Device>(&self, device: &D, prepared: &Prepared<D>, view: usize) -> Outcome<(), D> {
+    fn encode_view<D: Device>(&self, device: &D, prepared: &Prepared<D>, view: usize) -> Result<(), FieldError> {
         let mut volume = prepared.volumes[view].borrow_mut();
         if volume.is_none() {
             let SourceView { size, values, .. } = &prepared.images[view];
@@ -162,7 +160,7 @@ impl Genvs {
         used: &[usize],
         target: &CameraBlock,
         looking: &Looking,
-    ) -> Outcome<(), D> {
+    ) -> Result<(), FieldError> {
         for view in used {
             let mut volume = prepared.volumes[*view].borrow_mut();
             let Some(volume) = volume.as_mut() else { continue };
@@ -180,7 +178,7 @@ impl Genvs {
     ///
     /// # Errors
     /// [`FieldError::NoDepths`] if there is nothing between their ends: a volume of no depth has no nodes to look up.
-    fn looking<D: Device>(&self, near_far: [f32; 2], target: &Camera) -> Outcome<Looking, D> {
+    fn looking<D: Device>(&self, near_far: [f32; 2], target: &Camera) -> Result<Looking, FieldError> {
         let [near, far] = near_far;
         // Not the other way round: NaN is no depth either.
         if !(near < far && (far - near).is_finite()) {
@@ -227,7 +225,7 @@ impl<D: Device> Field<D> for Genvs {
         Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
 
-    fn prepare(&self, device: &D, sources: &SourceImages, progress: &dyn Progress) -> Outcome<Prepared<D>, D> {
+    fn prepare(&self, device: &D, sources: &SourceImages, progress: &dyn Progress) -> Result<Prepared<D>, FieldError> {
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let near_far = self.options.rays.near_far.unwrap_or_else(|| default_near_far(&cameras));
         let images: Vec<SourceView> = sources.images.iter().map(padded).collect();
@@ -256,7 +254,7 @@ impl<D: Device> Field<D> for Genvs {
         prepared: &Prepared<D>,
         _relevance: &[SourceWeights],
         progress: &dyn Progress,
-    ) -> Outcome<(), D> {
+    ) -> Result<(), FieldError> {
         if self.options.omissions.unused_views {
             return Ok(());
         }
@@ -276,7 +274,7 @@ impl<D: Device> Field<D> for Genvs {
         (): &(),
         weights: &SourceWeights,
         progress: &dyn Progress,
-    ) -> Outcome<(), D> {
+    ) -> Result<(), FieldError> {
         let encoded_views = self.counts().encoded_views;
         for view in self.used_views(prepared, weights) {
             progress.check()?;
@@ -297,7 +295,7 @@ impl<D: Device> Field<D> for Genvs {
         target: &Camera,
         _settled: f32,
         progress: &dyn Progress,
-    ) -> Outcome<Rendered, D> {
+    ) -> Result<Rendered, FieldError> {
         let failed = FieldError::Device;
         let looking = self.looking::<D>(prepared.near_far, target)?;
         self.encode_used(device, prepared, &(), weights, progress)?;

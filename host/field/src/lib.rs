@@ -14,7 +14,7 @@ pub mod render;
 
 use finite::NotFinite;
 use viewfuse_core::camera::Camera;
-use viewfuse_device::Device;
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Interrupted;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::CheckpointError;
@@ -32,7 +32,7 @@ pub const LONGEST_DEFAULT_SIDE: u32 = 512;
 
 /// Why a field could not make a picture.
 #[derive(Debug, thiserror::Error)]
-pub enum FieldError<E: std::error::Error> {
+pub enum FieldError {
     /// The silhouettes have no point of space in common.
     #[error("no point lies inside all silhouettes of the sources")]
     NoObject,
@@ -46,7 +46,7 @@ pub enum FieldError<E: std::error::Error> {
     },
     /// The device failed.
     #[error("the device failed")]
-    Device(#[source] E),
+    Device(#[from] DeviceError),
     /// The network's parameters could not be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
@@ -58,8 +58,8 @@ pub enum FieldError<E: std::error::Error> {
     Interrupted(#[from] Interrupted),
 }
 
-impl<E: std::error::Error> From<LoadError<E>> for FieldError<E> {
-    fn from(error: LoadError<E>) -> FieldError<E> {
+impl From<LoadError> for FieldError {
+    fn from(error: LoadError) -> FieldError {
         match error {
             LoadError::Checkpoint(error) => FieldError::Checkpoint(error),
             LoadError::Device(error) => FieldError::Device(error),
@@ -166,7 +166,7 @@ pub trait Field<D: Device> {
         device: &D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Self::Prepared, FieldError<D::Error>>;
+    ) -> Result<Self::Prepared, FieldError>;
 
     /// Encodes the sources. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0.
     ///
@@ -178,7 +178,7 @@ pub trait Field<D: Device> {
         prepared: &Self::Prepared,
         relevance: &[SourceWeights],
         progress: &dyn Progress,
-    ) -> Result<Self::Latents, FieldError<D::Error>>;
+    ) -> Result<Self::Latents, FieldError>;
 
     /// Encodes what a target with these weights of the sources needs and no target before it needed, so that the time can
     /// be told apart from rendering, which does the same first. Nothing is left to do for a field that encodes all sources
@@ -193,7 +193,7 @@ pub trait Field<D: Device> {
         _latents: &Self::Latents,
         _weights: &SourceWeights,
         _progress: &dyn Progress,
-    ) -> Result<(), FieldError<D::Error>> {
+    ) -> Result<(), FieldError> {
         Ok(())
     }
 
@@ -212,5 +212,5 @@ pub trait Field<D: Device> {
         target: &Camera,
         settled: f32,
         progress: &dyn Progress,
-    ) -> Result<Rendered, FieldError<D::Error>>;
+    ) -> Result<Rendered, FieldError>;
 }

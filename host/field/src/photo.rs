@@ -60,12 +60,7 @@ impl<D: Device> Field<D> for PhotoField {
         ((picture_side as f32 * self.source_share).round() as u32).max(1)
     }
 
-    fn prepare(
-        &self,
-        device: &D,
-        sources: &SourceImages,
-        progress: &dyn Progress,
-    ) -> Result<Prepared<D>, FieldError<D::Error>> {
+    fn prepare(&self, device: &D, sources: &SourceImages, progress: &dyn Progress) -> Result<Prepared<D>, FieldError> {
         let (cameras, texels) = joined(sources);
         let object = bounds::find(&cameras, &texels).ok_or(FieldError::NoObject)?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
@@ -98,7 +93,7 @@ impl<D: Device> Field<D> for PhotoField {
         prepared: &Prepared<D>,
         relevance: &[SourceWeights],
         progress: &dyn Progress,
-    ) -> Result<D::Buffer<f32>, FieldError<D::Error>> {
+    ) -> Result<D::Buffer<f32>, FieldError> {
         let scene = &prepared.scene;
         let PhotoScene { object_buffer: object, views, texels, .. } = scene;
         let view_count = scene.object.view_count;
@@ -148,7 +143,7 @@ impl<D: Device> Field<D> for PhotoField {
         target: &Camera,
         settled: f32,
         progress: &dyn Progress,
-    ) -> Result<Rendered, FieldError<D::Error>> {
+    ) -> Result<Rendered, FieldError> {
         let failed = FieldError::Device;
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let count = (width * height) as usize;

@@ -4,6 +4,7 @@
 //! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined by weights
 //! where the published network takes their mean.
 
+use viewfuse_device::DeviceError;
 pub mod architecture;
 mod encoder;
 mod memory;
@@ -105,7 +106,7 @@ impl PixelNerf {
         (0..prepared.images.len()).filter(|view| all || weights.get(*view as u32) > 0.0).collect()
     }
 
-    fn encode_view<D: Device>(&self, device: &D, prepared: &Prepared<D>, view: usize) -> Result<(), D::Error> {
+    fn encode_view<D: Device>(&self, device: &D, prepared: &Prepared<D>, view: usize) -> Result<(), DeviceError> {
         if prepared.latents[view].get().is_some() {
             return Ok(());
         }
@@ -149,12 +150,7 @@ impl<D: Device> Field<D> for PixelNerf {
         Some(memory::estimate(device, &self.architecture, &self.options, source_sizes))
     }
 
-    fn prepare(
-        &self,
-        device: &D,
-        sources: &SourceImages,
-        _progress: &dyn Progress,
-    ) -> Result<Prepared<D>, FieldError<D::Error>> {
+    fn prepare(&self, device: &D, sources: &SourceImages, _progress: &dyn Progress) -> Result<Prepared<D>, FieldError> {
         let failed = FieldError::Device;
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let images =
@@ -176,7 +172,7 @@ impl<D: Device> Field<D> for PixelNerf {
         prepared: &Prepared<D>,
         _relevance: &[SourceWeights],
         progress: &dyn Progress,
-    ) -> Result<(), FieldError<D::Error>> {
+    ) -> Result<(), FieldError> {
         if self.options.omissions.unused_views {
             return Ok(());
         }
@@ -196,7 +192,7 @@ impl<D: Device> Field<D> for PixelNerf {
         (): &(),
         weights: &SourceWeights,
         progress: &dyn Progress,
-    ) -> Result<(), FieldError<D::Error>> {
+    ) -> Result<(), FieldError> {
         let encoded_views = self.counts().encoded_views;
         for view in self.used_views(prepared, weights) {
             progress.check()?;
@@ -217,7 +213,7 @@ impl<D: Device> Field<D> for PixelNerf {
         target: &Camera,
         settled: f32,
         progress: &dyn Progress,
-    ) -> Result<Rendered, FieldError<D::Error>> {
+    ) -> Result<Rendered, FieldError> {
         let failed = FieldError::Device;
         self.encode_used(device, prepared, &(), weights, progress)?;
         let used = self.used_views(prepared, weights);
@@ -328,7 +324,7 @@ impl PixelNerf {
 }
 
 /// An image over white, as the networks are trained: red, green, blue in `[-1, 1]`.
-fn upload_image<D: Device>(device: &D, image: &SourceImage) -> Result<Image<D>, D::Error> {
+fn upload_image<D: Device>(device: &D, image: &SourceImage) -> Result<Image<D>, DeviceError> {
     let values: Vec<f32> = image.texels.iter().flat_map(|texel| over_white(*texel)).collect();
     let (width, height) = (image.camera.pinhole.width(), image.camera.pinhole.height());
     Image::upload(device, Size { height, width, channels: 3 }, &values)

@@ -21,7 +21,7 @@ use viewfuse_weighting::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
 
 /// Why a render failed.
 #[derive(Debug, thiserror::Error)]
-pub enum RenderError<E: std::error::Error> {
+pub enum RenderError {
     /// The scene or a photograph could not be read.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -69,7 +69,7 @@ pub enum RenderError<E: std::error::Error> {
     },
     /// The field failed.
     #[error(transparent)]
-    Field(#[from] FieldError<E>),
+    Field(#[from] FieldError),
 }
 
 /// What a person can set about a render.
@@ -165,11 +165,7 @@ impl Truth {
 ///
 /// # Errors
 /// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
-pub fn working_side<E: std::error::Error>(
-    scene: &Scene,
-    options: &RenderOptions,
-    longest: u32,
-) -> Result<u32, RenderError<E>> {
+pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Result<u32, RenderError> {
     let Some([width, height]) = options.size else {
         let largest = scene.views.iter().map(|view| longest_side(&view.camera)).max();
         return Ok(largest.unwrap_or(longest).min(longest));
@@ -214,7 +210,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         field: &'a F,
         options: &'a RenderOptions,
         progress: &dyn Progress,
-    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+    ) -> Result<Stage<'a, D, F>, RenderError> {
         let side = working_side(scene, options, field.longest_side())?;
         let mut photographs = Duration::ZERO;
         let images =
@@ -243,7 +239,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         field: &'a F,
         options: &'a RenderOptions,
         progress: &dyn Progress,
-    ) -> Result<Stage<'a, D, F>, RenderError<D::Error>> {
+    ) -> Result<Stage<'a, D, F>, RenderError> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options, field.longest_side())?;
@@ -263,11 +259,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     ///
     /// # Errors
     /// [`RenderError::Field`].
-    pub fn encode(
-        &mut self,
-        weighting: &Weighting,
-        progress: &dyn Progress,
-    ) -> Result<F::Latents, RenderError<D::Error>> {
+    pub fn encode(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<F::Latents, RenderError> {
         let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
         let (field, device, prepared) = (self.field, self.device, &self.prepared);
         let latents = timed(&mut self.costs.encode, || field.encode(device, prepared, &relevance, progress))?;
@@ -284,7 +276,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         latents: &F::Latents,
         target: &Target,
         progress: &dyn Progress,
-    ) -> Result<Frame, RenderError<D::Error>> {
+    ) -> Result<Frame, RenderError> {
         let start = Instant::now();
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
@@ -316,7 +308,7 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     ///
     /// # Errors
     /// [`RenderError::Scene`] if it cannot be read.
-    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError<D::Error>> {
+    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError> {
         Ok(self.album.truth(view, size, self.images.background)?)
     }
 
@@ -324,12 +316,12 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     ///
     /// # Errors
     /// [`RenderError::Size`].
-    pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError<D::Error>> {
+    pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError> {
         let camera = self.at_working_size(&self.scene.views[view].camera)?;
         Ok([camera.pinhole.width(), camera.pinhole.height()])
     }
 
-    fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError<D::Error>> {
+    fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError> {
         let (width, height) = match (self.options.size, self.scene.views.first()) {
             (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
             (Some(_), _) => scaled_size(camera, self.side),
@@ -373,7 +365,7 @@ fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32)
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.
 #[allow(clippy::too_many_arguments)]
-pub fn render<D: Device, F: Field<D>, X: From<RenderError<D::Error>>>(
+pub fn render<D: Device, F: Field<D>, X: From<RenderError>>(
     scene: &Scene,
     job: &FewShot,
     weighting: &Weighting,

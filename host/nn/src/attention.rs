@@ -4,13 +4,14 @@ use super::image::{Image, Size};
 use super::scratch::Scratch;
 use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 
 /// Scaled dot-product attention with one head: of `qkv[pixel][query, key, value][channel]`, an image that fills its buffer,
 /// each pixel's mean of all values, weighted by the softmax of `query . key / sqrt(channels)`.
 ///
 /// # Errors
 /// If the device is lost or has no memory left.
-pub fn self_attention<D: Device>(scratch: &mut Scratch<'_, D>, qkv: &Image<D>) -> Result<Image<D>, D::Error> {
+pub fn self_attention<D: Device>(scratch: &mut Scratch<'_, D>, qkv: &Image<D>) -> Result<Image<D>, DeviceError> {
     let device = scratch.device();
     let (pixels, channels) = (qkv.size.pixel_count(), qkv.size.channels / 3);
     let table = Size { height: pixels, width: 1, channels: pixels };

@@ -7,6 +7,7 @@ use std::ops::Range;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Layer};
 
 /// A convolution with bias on a device.
@@ -87,7 +88,7 @@ impl<D: Device> Convolution<D> {
         options: ConvolutionOptions,
         image: &Image<D>,
         residual: Residual<'_, D>,
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         let mut output = scratch.image(options.out_size(image.size, self.size, self.channels))?;
         self.run_into(scratch.device(), options, image, residual, &mut output)?;
         Ok(output)
@@ -104,7 +105,7 @@ impl<D: Device> Convolution<D> {
         image: &Image<D>,
         residual: Residual<'_, D>,
         output: &mut Image<D>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let block = self.block(options, image, output);
         debug_assert_eq!([block.out_height, block.out_width], [output.size.height, output.size.width]);
         let (residual, addend_pitch, addend_first) = match residual {
@@ -127,7 +128,7 @@ impl<D: Device> Convolution<D> {
         image: &Image<D>,
         rows: Range<u32>,
         output: &mut Image<D>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let block = self.block(options, image, output);
         debug_assert_eq!([block.size, block.stride], [1, 1]);
         let (height, before) = (rows.len() as u32, rows.start * block.in_width);
@@ -173,7 +174,7 @@ impl<D: Device> Convolution<D> {
         image: &Image<D>,
         residual: Option<&D::Buffer<f32>>,
         output: &mut Image<D>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let Layer { weights, bias } = &self.layer;
         device.convolve(block, &image.values, weights, bias, residual, &mut output.values)
     }
@@ -192,7 +193,7 @@ impl<D: Device> DepthwiseConvolution<D> {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn average_pool(device: &D) -> Result<DepthwiseConvolution<D>, D::Error> {
+    pub fn average_pool(device: &D) -> Result<DepthwiseConvolution<D>, DeviceError> {
         Ok(DepthwiseConvolution { weights: device.upload(&[0.25; 4])?, size: 2, is_shared: true })
     }
 
@@ -205,7 +206,7 @@ impl<D: Device> DepthwiseConvolution<D> {
         scratch: &mut Scratch<'_, D>,
         options: ConvolutionOptions,
         image: &Image<D>,
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         debug_assert_eq!((options.scale, options.upsampling, options.relu), (1.0, 1, false));
         let size = options.out_size(image.size, self.size, image.size.channels);
         let mut output = scratch.image(size)?;
@@ -241,7 +242,7 @@ impl<D: Device> TransposedConvolution<D> {
     ///
     /// # Errors
     /// If the device is lost.
-    pub fn run_into(&self, device: &D, image: &Image<D>, output: &mut Image<D>) -> Result<(), D::Error> {
+    pub fn run_into(&self, device: &D, image: &Image<D>, output: &mut Image<D>) -> Result<(), DeviceError> {
         let block = TransposedBlock {
             in_height: image.size.height,
             in_width: image.size.width,

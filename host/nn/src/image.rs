@@ -1,5 +1,6 @@
 //! Images in a device's memory, which may be some of the channels of wider ones, and on the host.
 
+use viewfuse_device::DeviceError;
 use viewfuse_device::Memory;
 
 /// Height, width and channels of an image.
@@ -54,7 +55,7 @@ impl<D: Memory> Image<D> {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn zeros(device: &D, size: Size) -> Result<Image<D>, D::Error> {
+    pub fn zeros(device: &D, size: Size) -> Result<Image<D>, DeviceError> {
         let capacity = size.pixel_count() as usize * size.channels as usize;
         Ok(Image { values: device.zeros(capacity)?, size, pitch: size.channels, first: 0, capacity })
     }
@@ -63,7 +64,7 @@ impl<D: Memory> Image<D> {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn upload(device: &D, size: Size, values: &[f32]) -> Result<Image<D>, D::Error> {
+    pub fn upload(device: &D, size: Size, values: &[f32]) -> Result<Image<D>, DeviceError> {
         Ok(Image { values: device.upload(values)?, size, pitch: size.channels, first: 0, capacity: values.len() })
     }
 
@@ -76,7 +77,7 @@ impl<D: Memory> Image<D> {
     ///
     /// # Errors
     /// If the device is lost.
-    pub fn download(&self, device: &D) -> Result<HostImage, D::Error> {
+    pub fn download(&self, device: &D) -> Result<HostImage, DeviceError> {
         debug_assert_eq!((self.pitch, self.first), (self.size.channels, 0), "a slice is not downloaded");
         let [height, width, channels] = [self.size.height, self.size.width, self.size.channels].map(|n| n as usize);
         let mut values = device.download(&self.values)?;
@@ -124,7 +125,7 @@ impl HostImage {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn upload<D: Memory>(&self, device: &D) -> Result<Image<D>, D::Error> {
+    pub fn upload<D: Memory>(&self, device: &D) -> Result<Image<D>, DeviceError> {
         let [height, width, channels] = [self.height, self.width, self.channels].map(|n| n as u32);
         Image::upload(device, Size { height, width, channels }, &self.values)
     }

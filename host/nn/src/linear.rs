@@ -1,6 +1,7 @@
 //! Linear layers.
 
 use viewfuse_core::network::product::ProductBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Layer};
 
 /// A linear layer on a device: `outputs[row][output] = bias[output] + sum over inputs of inputs[row][input] *
@@ -41,7 +42,7 @@ impl<D: Device> Linear<D> {
         inputs: &D::Buffer<f32>,
         residual: Option<&D::Buffer<f32>>,
         outputs: &mut D::Buffer<f32>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let block = ProductBlock {
             row_count,
             inner_count: self.in_count,

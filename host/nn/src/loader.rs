@@ -5,20 +5,18 @@ use super::convolution::{Convolution, DepthwiseConvolution, TransposedConvolutio
 use super::linear::Linear;
 use super::norm::GroupNorm;
 use super::weights::{BatchNorm, ConvolutionWeights, LinearWeights, transposed};
-use viewfuse_device::{Device, Layer, LayerShape, Memory};
+use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
 
 /// Why layers could not be loaded.
 #[derive(Debug, thiserror::Error)]
-pub enum LoadError<E: std::error::Error> {
+pub enum LoadError {
     /// The parameters could not be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
     /// The device failed.
     #[error("the device failed")]
-    Device(#[source] E),
+    Device(#[from] DeviceError),
 }
-
-type Loaded<T, D> = Result<T, LoadError<<D as Memory>::Error>>;
 
 /// Tensors of a checkpoint whose names begin alike. Their shapes have been checked.
 #[derive(Clone, Copy, Debug)]
@@ -121,7 +119,7 @@ impl<'a, D: Device> Loader<'a, D> {
     ///
     /// # Errors
     /// [`LoadError`].
-    pub fn convolution(&self, name: &str, least_side: u32) -> Loaded<Convolution<D>, D> {
+    pub fn convolution(&self, name: &str, least_side: u32) -> Result<Convolution<D>, LoadError> {
         self.changed_convolution(name, least_side, |weights| weights)
     }
 
@@ -134,7 +132,7 @@ impl<'a, D: Device> Loader<'a, D> {
         name: &str,
         least_side: u32,
         change: impl FnOnce(ConvolutionWeights) -> ConvolutionWeights,
-    ) -> Loaded<Convolution<D>, D> {
+    ) -> Result<Convolution<D>, LoadError> {
         change(self.tensors.convolution(name)?).load(self.device, least_side).map_err(LoadError::Device)
     }
 
@@ -142,7 +140,7 @@ impl<'a, D: Device> Loader<'a, D> {
     ///
     /// # Errors
     /// [`LoadError`].
-    pub fn depthwise_convolution(&self, name: &str) -> Loaded<DepthwiseConvolution<D>, D> {
+    pub fn depthwise_convolution(&self, name: &str) -> Result<DepthwiseConvolution<D>, LoadError> {
         let [channels, _, size, _] = self.tensors.shape(name);
         let weights = transposed(&self.tensors.values(&format!("{name}.weight"))?, channels);
         Ok(DepthwiseConvolution { weights: self.upload(&weights)?, size: size as u32, is_shared: false })
@@ -153,7 +151,7 @@ impl<'a, D: Device> Loader<'a, D> {
     ///
     /// # Errors
     /// [`LoadError`].
-    pub fn transposed_convolution(&self, name: &str) -> Loaded<TransposedConvolution<D>, D> {
+    pub fn transposed_convolution(&self, name: &str) -> Result<TransposedConvolution<D>, LoadError> {
         let [in_channels, out_channels, size, _] = self.tensors.shape(name);
         let given = self.tensors.values(&format!("{name}.weight"))?;
         let column_count = out_channels * size * size;
@@ -169,7 +167,7 @@ impl<'a, D: Device> Loader<'a, D> {
     ///
     /// # Errors
     /// [`LoadError`].
-    pub fn linear(&self, name: &str) -> Loaded<Linear<D>, D> {
+    pub fn linear(&self, name: &str) -> Result<Linear<D>, LoadError> {
         self.tensors.linear(name)?.load(self.device).map_err(LoadError::Device)
     }
 
@@ -182,14 +180,14 @@ impl<'a, D: Device> Loader<'a, D> {
         name: &str,
         group_count: impl FnOnce(usize) -> usize,
         epsilon: f32,
-    ) -> Loaded<GroupNorm<D>, D> {
+    ) -> Result<GroupNorm<D>, LoadError> {
         let weights = self.tensors.values(&format!("{name}.weight"))?;
         let bias = self.tensors.values(&format!("{name}.bias"))?;
         let (channels, group_count) = (weights.len() as u32, group_count(weights.len()) as u32);
         Ok(GroupNorm { weights: self.upload(&weights)?, bias: self.upload(&bias)?, channels, group_count, epsilon })
     }
 
-    fn upload(&self, values: &[f32]) -> Loaded<D::Buffer<f32>, D> {
+    fn upload(&self, values: &[f32]) -> Result<D::Buffer<f32>, LoadError> {
         self.device.upload(values).map_err(LoadError::Device)
     }
 }

@@ -4,6 +4,7 @@ use super::image::Image;
 use super::scratch::Scratch;
 use viewfuse_core::network::normalise::NormaliseBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 
 /// A group norm on a device.
 pub struct GroupNorm<D: Device> {
@@ -23,7 +24,7 @@ impl<D: Device> GroupNorm<D> {
     ///
     /// # Errors
     /// If the device is lost or has no memory left.
-    pub fn run(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>, silu: bool) -> Result<Image<D>, D::Error> {
+    pub fn run(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>, silu: bool) -> Result<Image<D>, DeviceError> {
         let device = scratch.device();
         let block = NormaliseBlock {
             pixel_count: image.size.pixel_count(),

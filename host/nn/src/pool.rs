@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use viewfuse_core::network::normalise::MeanBlock;
 use viewfuse_core::network::resample::PoolBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 
 /// The largest number of square windows, channel by channel; what lies outside of the image does not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +39,7 @@ impl MaxPool {
     ///
     /// # Errors
     /// If the device is lost or has no memory left.
-    pub fn run<D: Device>(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, D::Error> {
+    pub fn run<D: Device>(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, DeviceError> {
         let count = |side: u32| self.windows().count_at_least_one(side);
         let size = Size { height: count(image.size.height), width: count(image.size.width), ..image.size };
         let block = PoolBlock {
@@ -61,7 +62,7 @@ impl MaxPool {
 ///
 /// # Errors
 /// If the device is lost or has no memory left.
-pub fn global_average_pool<D: Device>(scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, D::Error> {
+pub fn global_average_pool<D: Device>(scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, DeviceError> {
     let Size { channels, .. } = image.size;
     let mut mean = scratch.image(Size { height: 1, width: 1, channels })?;
     let block = MeanBlock { pixel_count: image.size.pixel_count(), channels };

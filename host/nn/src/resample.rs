@@ -4,6 +4,7 @@ use super::image::Image;
 use super::scratch::Scratch;
 use viewfuse_core::network::resample::UpsampleBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 
 /// Upsamples an image that fills its buffer to the size of another, bilinear with aligned corners, into the channels of that
 /// one's buffer from `first_channel` on. To an image of its own size, the values are copied.
@@ -15,7 +16,7 @@ pub fn upsample<D: Device>(
     image: &Image<D>,
     first_channel: u32,
     output: &mut Image<D>,
-) -> Result<(), D::Error> {
+) -> Result<(), DeviceError> {
     let block = UpsampleBlock {
         in_height: image.size.height,
         in_width: image.size.width,
@@ -36,7 +37,7 @@ pub fn upsample<D: Device>(
 ///
 /// # Panics
 /// Without images.
-pub fn concatenate<D: Device>(scratch: &mut Scratch<'_, D>, images: &[&Image<D>]) -> Result<Image<D>, D::Error> {
+pub fn concatenate<D: Device>(scratch: &mut Scratch<'_, D>, images: &[&Image<D>]) -> Result<Image<D>, DeviceError> {
     let channels = images.iter().map(|image| image.size.channels).sum();
     let mut wide = scratch.image(images[0].size.with_channels(channels))?;
     let mut first_channel = 0;

@@ -8,6 +8,7 @@ use super::image::Image;
 use super::pool::MaxPool;
 use super::scratch::Scratch;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 
 /// What its batch norms add to variances.
 pub const BATCH_NORM_EPSILON: f64 = 1.0e-5;
@@ -147,7 +148,7 @@ impl<D: Device> ResNet<Convolution<D>> {
         scratch: &mut Scratch<'_, D>,
         image: &Image<D>,
         output_stride: u32,
-    ) -> Result<Vec<Image<D>>, D::Error> {
+    ) -> Result<Vec<Image<D>>, DeviceError> {
         let stem = self.stem.run(scratch, STEM, image, Residual::None)?;
         let mut x = Some(POOL.run(scratch, &stem)?);
         let mut images = vec![stem];
@@ -179,7 +180,7 @@ impl<D: Device> BasicBlock<Convolution<D>> {
         scratch: &mut Scratch<'_, D>,
         options: ConvolutionOptions,
         image: &Image<D>,
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         let inside = self.conv1.run(scratch, options, image, Residual::None)?;
         let shortcut_options = ConvolutionOptions { stride: options.stride, ..ConvolutionOptions::PLAIN };
         let shortcut = match &self.shortcut {

@@ -2,6 +2,7 @@
 
 use super::image::{Image, Size};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 
 /// A device and the buffers on it that are free. Every kernel writes all of its output: what a buffer held before is never
 /// read. Dropping it frees them.
@@ -25,7 +26,7 @@ impl<'a, D: Device> Scratch<'a, D> {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn image(&mut self, size: Size) -> Result<Image<D>, D::Error> {
+    pub fn image(&mut self, size: Size) -> Result<Image<D>, DeviceError> {
         self.channel_slice(size, size.channels, 0)
     }
 
@@ -33,7 +34,7 @@ impl<'a, D: Device> Scratch<'a, D> {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn channel_slice(&mut self, size: Size, pitch: u32, first: u32) -> Result<Image<D>, D::Error> {
+    pub fn channel_slice(&mut self, size: Size, pitch: u32, first: u32) -> Result<Image<D>, DeviceError> {
         let len = size.pixel_count() as usize * pitch as usize;
         // A buffer that is much too large is kept for those that need it.
         let fits = |capacity: usize| (len..=2 * len).contains(&capacity);

@@ -2,6 +2,7 @@
 
 use super::convolution::Convolution;
 use super::linear::Linear;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Layer, LayerShape};
 
 /// Rows and columns from which on a device may convolve images in its way for large ones.
@@ -72,7 +73,7 @@ impl ConvolutionWeights {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn load<D: Device>(&self, device: &D, least_side: u32) -> Result<Convolution<D>, D::Error> {
+    pub fn load<D: Device>(&self, device: &D, least_side: u32) -> Result<Convolution<D>, DeviceError> {
         let shape = LayerShape {
             inner_count: self.size * self.size * self.in_channels,
             column_count: self.out_channels,
@@ -129,7 +130,7 @@ impl LinearWeights {
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn load<D: Device>(&self, device: &D) -> Result<Linear<D>, D::Error> {
+    pub fn load<D: Device>(&self, device: &D) -> Result<Linear<D>, DeviceError> {
         let (in_count, out_count) = (self.in_count(), self.bias.len());
         let shape = LayerShape { inner_count: in_count, column_count: out_count, has_wide_images: false };
         let layer = Layer::new(device, &shape, &self.values, &self.bias)?;

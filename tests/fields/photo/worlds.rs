@@ -34,11 +34,7 @@ impl Default for Run {
 
 impl Run {
     /// The target's picture from the sources.
-    pub(crate) fn picture(
-        &self,
-        sources: &SourceImages,
-        target: &Camera,
-    ) -> Result<Rendered, FieldError<std::convert::Infallible>> {
+    pub(crate) fn picture(&self, sources: &SourceImages, target: &Camera) -> Result<Rendered, FieldError> {
         let (field, quiet) = (self.field, Silent);
         let weighting = Weighting::open(self.scheme).expect("a scheme");
         let prepared = field.prepare(&Cpu, sources, &quiet)?;

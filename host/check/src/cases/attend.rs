@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use viewfuse_core::attention::EMBEDDING;
 use viewfuse_core::weighting::MOST_WEIGHED;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A dispatch.
@@ -55,7 +56,7 @@ impl Case for Attend {
         jobs.iter().map(|job| job.queries.len() / EMBEDDING).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             let weights = device.zeros(job.queries.len() / EMBEDDING * MOST_WEIGHED)?;
             Ok((device.upload(&job.queries)?, device.upload(&job.keys)?, weights))
@@ -63,13 +64,13 @@ impl Case for Attend {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (queries, keys, weights))| {
             device.attend(&job.source_count, (job.queries.len() / EMBEDDING) as u32, queries, keys, weights)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let rows: Vec<Vec<f32>> =
             loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
         Ok(rows.concat())

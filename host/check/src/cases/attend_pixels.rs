@@ -8,6 +8,7 @@ use crate::matrix_oracle;
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::network::attend::MatrixBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
@@ -106,7 +107,7 @@ impl Case for MultiplyMatrices {
         jobs.iter().map(|job| tile_elements(job.block.row_count, job.block.column_count) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             Ok(LoadedJob {
                 left: device.upload(&job.left)?,
@@ -117,13 +118,13 @@ impl Case for MultiplyMatrices {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { left, right, outputs })| {
             device.multiply_matrices(&job.block, left, right.as_ref().unwrap_or(left), outputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let outputs: Vec<Vec<f32>> =
             loaded.iter().map(|job| device.download(&job.outputs)).collect::<Result<_, _>>()?;
         Ok(outputs.concat())
@@ -193,18 +194,18 @@ impl Case for SoftmaxRows {
         jobs.iter().map(|job| job.row_count() as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Scores>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Scores>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Scores| Ok([device.upload(&job.scores)?, device.zeros(job.scores.len() + 1)?]);
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Scores>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Scores>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, [scores, weights])| {
             device.softmax_rows(&job.column_count, job.row_count(), scores, weights)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let weights: Vec<Vec<f32>> =
             loaded.iter().map(|[_, weights]| device.download(weights)).collect::<Result<_, _>>()?;
         Ok(weights.concat())

@@ -7,6 +7,7 @@ use crate::light_oracle::composite;
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::composite::CompositeBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -79,7 +80,7 @@ impl Case for Composite {
         jobs.iter().map(|job| job.samples.len() / job.block.sample_count as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             let ray_count = job.samples.len() / job.block.sample_count as usize;
             Ok(LoadedJob {
@@ -91,7 +92,7 @@ impl Case for Composite {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { samples, sample_depths, pixels })| {
             let ray_count = job.samples.len() as u32 / job.block.sample_count;
             let Pixels { colours, depths } = pixels;
@@ -99,7 +100,7 @@ impl Case for Composite {
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for LoadedJob { pixels, .. } in loaded {
             values.extend(device.download(&pixels.colours)?.into_flattened());

@@ -11,6 +11,7 @@ use crate::poses::{Random, random};
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
 /// What a layer of convolutions is like.
@@ -150,17 +151,17 @@ impl Case for Convolve {
         jobs.iter().map(|job| tile_elements(job.block.pixel_count(), job.block.out_channels) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         jobs.iter().map(|job| job.load(device, job.block.out_channels)).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
             device.convolve(&job.block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         read(device, loaded)
     }
 
@@ -240,17 +241,17 @@ impl Case for ConvolveTransposed {
         jobs.iter().map(|job| tile_elements(job.block.pixel_count(), job.block.column_count()) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         jobs.iter().map(|job| job.load(device, job.block.column_count())).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, outputs, .. })| {
             device.convolve_transposed(&job.block, inputs, &layer.weights, &layer.bias, outputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         read(device, loaded)
     }
 

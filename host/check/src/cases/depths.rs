@@ -8,6 +8,7 @@ use crate::ray_oracle;
 use crate::sights::{load_rays, pixels, ray};
 use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::rays::TargetRay;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -58,7 +59,7 @@ impl Case for CoarseDepths {
         jobs.iter().map(|job| job.rays.len() * job.block.sample_count as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job<CoarseBlock>| {
             let depths = device.zeros(job.rays.len() * job.block.sample_count as usize)?;
             Ok((load_rays(device, &job.pixels, &job.rays)?, depths))
@@ -66,13 +67,13 @@ impl Case for CoarseDepths {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (Rays { count, pixels, rays }, depths))| {
             device.coarse_depths(&job.block, *count, rays, pixels, depths)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let depths: Vec<Vec<f32>> =
             loaded.iter().map(|(_, depths)| device.download(depths)).collect::<Result<_, _>>()?;
         Ok(depths.concat())
@@ -121,7 +122,7 @@ impl Case for DrawChances {
         jobs.iter().map(|job| job.rays.len() * job.block.fine_count() as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job<FineBlock>| {
             let chances = device.zeros(job.rays.len() * job.block.fine_count() as usize)?;
             Ok((load_rays(device, &job.pixels, &job.rays)?, chances))
@@ -129,13 +130,13 @@ impl Case for DrawChances {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (Rays { count, pixels, .. }, chances))| {
             device.draw_chances(&job.block, *count, pixels, chances)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for (_, chances) in loaded {
             values.extend(device.download(chances)?.into_flattened());

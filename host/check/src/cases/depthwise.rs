@@ -8,6 +8,7 @@ use crate::network_oracle;
 use crate::poses::{numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::network::depthwise::DepthwiseBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -92,7 +93,7 @@ impl Case for ConvolveDepthwise {
         jobs.iter().map(Job::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             // Behind the weights lies NaN.
             let weights = [&job.weights[..], &[f32::NAN]].concat();
@@ -101,13 +102,13 @@ impl Case for ConvolveDepthwise {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, [inputs, weights, outputs])| {
             device.convolve_depthwise(&job.block, inputs, weights, outputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let outputs: Vec<Vec<f32>> =
             loaded.iter().map(|[.., outputs]| device.download(outputs)).collect::<Result<_, _>>()?;
         Ok(outputs.concat())

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, HIDDEN, POSE_FEATURES};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::initialisation;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -55,16 +56,16 @@ impl Case for EmbedPose {
         inputs.poses.len()
     }
 
-    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let embedded = device.zeros(inputs.poses.len() * EMBEDDING)?;
         Ok((device.upload(&inputs.embedding)?, device.upload(&inputs.poses)?, embedded))
     }
 
-    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         device.embed_pose(inputs.poses.len() as u32, &loaded.0, &loaded.1, &mut loaded.2)
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         device.download(&loaded.2)
     }
 

@@ -9,6 +9,7 @@ use crate::volume_oracle;
 use rayon::prelude::*;
 use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock};
 use viewfuse_core::rays::RayPoint;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -96,20 +97,20 @@ impl Case for WeighFeatures {
         jobs.iter().map(|job| job.ray_count() as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Weighed>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Weighed>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Weighed| {
             Ok((device.upload(&job.raw)?, device.upload(&job.points)?, device.zeros(job.points.len() + 1)?))
         };
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Weighed>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Weighed>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (raw, points, weights))| {
             device.weigh_features(&job.block, job.ray_count(), raw, points, weights)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let weights: Vec<Vec<f32>> =
             loaded.iter().map(|(.., weights)| device.download(weights)).collect::<Result<_, _>>()?;
         Ok(weights.concat())
@@ -185,7 +186,7 @@ impl Case for SumFeatures {
         jobs.iter().map(Summed::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Summed>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Summed>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Summed| {
             let [weights, fused, raw] = [&job.weights, &job.fused, &job.raw].map(|values| device.upload(values));
             Ok([weights?, fused?, raw?, device.zeros(job.len() + 1)?])
@@ -193,13 +194,13 @@ impl Case for SumFeatures {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Summed>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Summed>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, [weights, fused, raw, summed])| {
             device.sum_features(&job.block, job.ray_count(), weights, fused, raw, summed)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let summed: Vec<Vec<f32>> =
             loaded.iter().map(|[.., summed]| device.download(summed)).collect::<Result<_, _>>()?;
         Ok(summed.concat())
@@ -274,20 +275,20 @@ impl Case for DenoiserInput {
         jobs.iter().map(Pictures::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Pictures>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Pictures>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Pictures| {
             Ok([device.upload(&job.noisy)?, device.upload(&job.condition)?, device.zeros(job.len() + 1)?])
         };
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Pictures>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Pictures>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, [noisy, condition, inputs])| {
             device.denoiser_input(&job.block, job.pixel_count, noisy, condition, inputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let inputs: Vec<Vec<f32>> =
             loaded.iter().map(|[.., inputs]| device.download(inputs)).collect::<Result<_, _>>()?;
         Ok(inputs.concat())

@@ -9,6 +9,7 @@ use crate::sights::{load_rays, ray};
 use rayon::prelude::*;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::TargetRay;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -125,7 +126,7 @@ impl Case for FineDepths {
         jobs.iter().map(|job| job.chances.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             let colours: Vec<[f32; 4]> = job.pixels.iter().map(|[opacity, _]| [0.3, 0.6, 0.9, *opacity]).collect();
             let depths: Vec<f32> = job.pixels.iter().map(|[_, depth]| *depth).collect();
@@ -140,14 +141,14 @@ impl Case for FineDepths {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { rays, seen, pixels, chances, depths })| {
             let Pixels { colours, depths: pixel_depths } = pixels;
             device.fine_depths(&job.block, rays.count, seen, &rays.rays, colours, pixel_depths, chances, depths)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let depths: Vec<Vec<f32>> = loaded.iter().map(|job| device.download(&job.depths)).collect::<Result<_, _>>()?;
         Ok(depths.concat())
     }
@@ -222,7 +223,7 @@ impl Case for MergeDepths {
         jobs.iter().map(|job| job.coarse.len() + job.fine.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Passes>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Passes>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Passes| {
             let merged = device.zeros(job.coarse.len() + job.fine.len())?;
             Ok((device.upload(&job.coarse)?, device.upload(&job.fine)?, merged))
@@ -230,13 +231,13 @@ impl Case for MergeDepths {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Passes>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Passes>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (coarse, fine, merged))| {
             device.merge_depths(&job.block, job.ray_count() as u32, coarse, fine, merged)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let merged: Vec<Vec<f32>> =
             loaded.iter().map(|(.., merged)| device.download(merged)).collect::<Result<_, _>>()?;
         Ok(merged.concat())

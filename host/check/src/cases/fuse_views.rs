@@ -8,6 +8,7 @@ use crate::light_oracle::fuse_element;
 use crate::poses::{numbers, random};
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A dispatch.
@@ -69,20 +70,20 @@ impl Case for FuseViews {
         jobs.iter().map(|job| job.element_count).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             Ok((device.upload(&job.weights)?, device.upload(&job.latents)?, device.zeros(job.element_count)?))
         };
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (weights, latents, fused))| {
             device.fuse_views(&job.block, job.element_count as u32, weights, latents, fused)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let fused: Vec<Vec<f32>> =
             loaded.iter().map(|(_, _, fused)| device.download(fused)).collect::<Result<_, _>>()?;
         Ok(fused.concat())

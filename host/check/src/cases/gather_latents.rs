@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pixelnerf::GatherBlock;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -96,7 +97,7 @@ impl Case for GatherLatents {
         jobs.iter().map(Job::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             Ok(LoadedJob {
                 views: device.upload(&job.views)?,
@@ -109,7 +110,7 @@ impl Case for GatherLatents {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         for (job, LoadedJob { views, points, grids, addend, gathered }) in jobs.iter().zip(loaded) {
             for (grid, view) in grids.iter().zip(0..) {
                 let block = GatherBlock { view, ..job.block };
@@ -119,7 +120,7 @@ impl Case for GatherLatents {
         Ok(())
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let gathered: Vec<Vec<f32>> =
             loaded.iter().map(|job| device.download(&job.gathered)).collect::<Result<_, _>>()?;
         Ok(gathered.concat())

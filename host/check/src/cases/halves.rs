@@ -12,6 +12,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The nearest number of 16 bits, none larger than the largest.
@@ -65,7 +66,7 @@ impl Case for PackHalves {
         jobs.iter().map(|numbers| numbers.len().div_ceil(2)).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Vec<f32>>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Vec<f32>>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |numbers: &Vec<f32>| {
             // A number behind those that count must not be taken along.
             let longer = [&numbers[..], &[77.0]].concat();
@@ -74,14 +75,14 @@ impl Case for PackHalves {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Vec<f32>>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Vec<f32>>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         for (job, LoadedNumbers { numbers, words }) in jobs.iter().zip(loaded) {
             device.pack_halves(&(job.len() as u32), numbers, words)?;
         }
         Ok(())
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut halves = Vec::new();
         for LoadedNumbers { words, .. } in loaded {
             let words = device.download(words)?;
@@ -135,7 +136,7 @@ impl Case for GatherHalves {
         jobs.iter().map(Job::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             Ok(LoadedJob {
                 views: device.upload(&job.views)?,
@@ -147,7 +148,7 @@ impl Case for GatherHalves {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         for (job, LoadedJob { views, points, volumes, gathered }) in jobs.iter().zip(loaded) {
             for (volume, view) in volumes.iter().zip(0..) {
                 device.gather_halves(&VolumeBlock { view, ..job.block }, views, points, volume, gathered)?;
@@ -156,7 +157,7 @@ impl Case for GatherHalves {
         Ok(())
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let gathered: Vec<Vec<f32>> =
             loaded.iter().map(|job| device.download(&job.gathered)).collect::<Result<_, _>>()?;
         Ok(gathered.concat())

@@ -6,6 +6,7 @@ use crate::case::{Case, Spoiler};
 use crate::photo_oracle;
 use crate::world::World;
 use rayon::prelude::*;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, PhotoScene};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -32,18 +33,18 @@ impl Case for HullEntry {
         world.texels.len()
     }
 
-    fn load<D: Device>(device: &D, world: &World) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, world: &World) -> Result<Self::Loaded<D>, DeviceError> {
         Ok((world.load(device)?, device.zeros(world.texels.len())?))
     }
 
-    fn run<D: Device>(device: &D, _: &World, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, _: &World, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let (PhotoScene { object_buffer, views, texels, cameras, .. }, entries) = loaded;
         (0..).zip(&*cameras).try_for_each(|(view, camera)| {
             device.hull_entry(&view, camera.width * camera.height, object_buffer, views, texels, entries)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         device.download(&loaded.1)
     }
 

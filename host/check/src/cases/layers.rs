@@ -8,6 +8,7 @@ use crate::network_oracle::{self, LayerInputs};
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::network::product::ProductBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Layer, LayerShape, Memory};
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
@@ -72,7 +73,7 @@ impl<B> Job<B> {
         }
     }
 
-    pub(super) fn load<D: Device>(&self, device: &D, columns: u32) -> Result<LoadedJob<D>, D::Error> {
+    pub(super) fn load<D: Device>(&self, device: &D, columns: u32) -> Result<LoadedJob<D>, DeviceError> {
         let longer = |values: &[f32]| [values, &[f32::NAN; SLACK]].concat();
         let column_count = columns as usize;
         let shape = LayerShape {
@@ -107,7 +108,7 @@ pub(super) fn spoil<B>(jobs: &mut [Job<B>], input: impl Fn(&mut Job<B>) -> &mut 
     jobs.iter_mut().for_each(|job| input(job).iter_mut().for_each(|value| *value *= 1.01));
 }
 
-pub(super) fn read<D: Device>(device: &D, loaded: &[LoadedJob<D>]) -> Result<Vec<f32>, D::Error> {
+pub(super) fn read<D: Device>(device: &D, loaded: &[LoadedJob<D>]) -> Result<Vec<f32>, DeviceError> {
     let outputs: Vec<Vec<f32>> = loaded.iter().map(|job| device.download(&job.outputs)).collect::<Result<_, _>>()?;
     Ok(outputs.concat())
 }
@@ -166,17 +167,17 @@ impl Case for Product {
         jobs.iter().map(|job| tile_elements(job.block.row_count, job.block.column_count) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         jobs.iter().map(|job| job.load(device, job.block.column_count)).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
             device.product(&job.block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         read(device, loaded)
     }
 

@@ -7,6 +7,7 @@ use crate::photo_oracle;
 use crate::world::World;
 use rayon::prelude::*;
 use viewfuse_core::photo::march::MarchBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, PhotoScene, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -59,7 +60,7 @@ impl Case for March {
         (inputs.block.target.width * inputs.block.target.height) as usize
     }
 
-    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let count = Self::element_count(inputs);
         Ok(Loaded {
             scene: inputs.world.load(device)?,
@@ -69,7 +70,7 @@ impl Case for March {
         })
     }
 
-    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let Loaded { scene, depths, weights, pixels } = loaded;
         let height = inputs.block.target.height;
         let middle = height / 2;
@@ -94,7 +95,7 @@ impl Case for March {
         Ok(())
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = device.download(&loaded.pixels.colours)?.into_flattened();
         values.extend(device.download(&loaded.pixels.depths)?);
         Ok(values)

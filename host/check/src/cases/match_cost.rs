@@ -7,6 +7,7 @@ use crate::photo_oracle;
 use crate::world::World;
 use rayon::prelude::*;
 use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, PhotoScene};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -57,7 +58,7 @@ impl Case for MatchCost {
         (inputs.sweep.row_count * inputs.sweep.width) as usize
     }
 
-    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let world = &inputs.world;
         Ok(Loaded {
             scene: world.load(device)?,
@@ -67,13 +68,13 @@ impl Case for MatchCost {
         })
     }
 
-    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let Loaded { scene, entries, pair_weights, costs } = loaded;
         let PhotoScene { object_buffer, views, texels, .. } = scene;
         device.match_cost(&inputs.sweep, object_buffer, views, texels, entries, pair_weights, costs)
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         device.download(&loaded.costs)
     }
 

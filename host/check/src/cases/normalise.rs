@@ -9,6 +9,7 @@ use crate::normalise_oracle;
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock};
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -90,18 +91,18 @@ impl Case for ChannelMeans {
         jobs.iter().map(|(block, _)| block.channels as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |(block, inputs): &(MeanBlock, Vec<f32>)| {
             Ok([device.upload(inputs)?, device.zeros(block.channels as usize + 1)?])
         };
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|((block, _), [inputs, means])| device.channel_means(block, inputs, means))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let means: Vec<Vec<f32>> = loaded.iter().map(|[_, means]| device.download(means)).collect::<Result<_, _>>()?;
         Ok(means.concat())
     }
@@ -143,7 +144,7 @@ impl Case for PartMoments {
         jobs.iter().map(|(block, _)| (block.part_count() * block.group_count) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |(block, inputs): &(NormaliseBlock, Vec<f32>)| {
             let parts = device.zeros((block.part_count() * block.group_count) as usize + 1)?;
             Ok((device.upload(inputs)?, parts))
@@ -151,11 +152,11 @@ impl Case for PartMoments {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|((block, _), (inputs, parts))| device.part_moments(block, inputs, parts))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let parts: Vec<_> = loaded.iter().map(|(_, parts)| device.download(parts)).collect::<Result<_, _>>()?;
         Ok(parts.concat().into_flattened())
     }
@@ -230,19 +231,19 @@ impl Case for MergeMoments {
         jobs.iter().map(|(block, _)| block.group_count as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |(block, parts): &(NormaliseBlock, Vec<[f32; 2]>)| {
             Ok([device.upload(parts)?, device.zeros(block.group_count as usize + 1)?])
         };
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let mut jobs = jobs.iter().zip(loaded);
         jobs.try_for_each(|((block, _), [parts, moments])| device.merge_moments(block, parts, moments))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let moments: Vec<_> = loaded.iter().map(|[_, moments]| device.download(moments)).collect::<Result<_, _>>()?;
         Ok(moments.concat().into_flattened())
     }
@@ -324,7 +325,7 @@ impl Case for Normalise {
         jobs.iter().map(Job::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             Ok(LoadedJob {
                 inputs: device.upload(&job.inputs)?,
@@ -337,13 +338,13 @@ impl Case for Normalise {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, moments, weights, bias, outputs })| {
             device.normalise(&job.block, inputs, moments, weights, bias, outputs)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let outputs: Vec<Vec<f32>> =
             loaded.iter().map(|job| device.download(&job.outputs)).collect::<Result<_, _>>()?;
         Ok(outputs.concat())

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use viewfuse_core::photo::NO_SURFACE;
 use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, PhotoScene};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -79,9 +80,9 @@ impl Case for PickDepth {
         2 * inputs.bands.iter().map(count).sum::<usize>()
     }
 
-    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let count = inputs.world.depths.len();
-        let guess = |guess: &Vec<f32>| Ok((device.upload(guess)?, device.zeros(count)?));
+        let guess = |guess: &Vec<f32>| Ok::<_, DeviceError>((device.upload(guess)?, device.zeros(count)?));
         Ok(Loaded {
             scene: inputs.world.load(device)?,
             entries: device.upload(&inputs.world.entries)?,
@@ -90,7 +91,7 @@ impl Case for PickDepth {
         })
     }
 
-    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let Loaded { scene, entries, means, guesses } = loaded;
         for (guess, picked) in guesses {
             for ((sweep, _), means) in inputs.bands.iter().zip(&*means) {
@@ -102,7 +103,7 @@ impl Case for PickDepth {
         Ok(())
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let maps: Vec<Vec<f32>> =
             loaded.guesses.iter().map(|(_, picked)| device.download(picked)).collect::<Result<_, _>>()?;
         Ok(maps.concat())

@@ -8,6 +8,7 @@ use crate::poses::{numbers, random};
 use crate::ray_oracle;
 use viewfuse_core::sampler::{MOST_RESULTS, Mix, NoiseBlock};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A dispatch of `mix_pictures`.
@@ -65,7 +66,7 @@ impl Case for MixPictures {
         jobs.iter().map(|job| job.element_count).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<MixJob>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<MixJob>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &MixJob| {
             let [a, b, c, d] = job.results.each_ref().map(|values| device.upload(values));
             Ok((device.upload(&job.state)?, [a?, b?, c?, d?], device.zeros(job.element_count)?))
@@ -73,14 +74,14 @@ impl Case for MixPictures {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<MixJob>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<MixJob>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (state, results, mixed))| {
             let [newest, second, third, fourth] = results.each_ref();
             device.mix_pictures(&job.mix, job.element_count as u32, state, newest, second, third, fourth, mixed)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mixed: Vec<Vec<f32>> =
             loaded.iter().map(|(_, _, mixed)| device.download(mixed)).collect::<Result<_, _>>()?;
         Ok(mixed.concat())
@@ -143,17 +144,17 @@ impl Case for AddNoise {
         jobs.iter().map(|job| job.picture.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<NoiseJob>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<NoiseJob>) -> Result<Self::Loaded<D>, DeviceError> {
         jobs.iter().map(|job| Ok((device.upload(&job.picture)?, device.zeros(job.picture.len())?))).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<NoiseJob>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<NoiseJob>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (picture, noisy))| {
             device.add_noise(&job.block, job.picture.len() as u32, picture, noisy)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let noisy: Vec<Vec<f32>> = loaded.iter().map(|(_, noisy)| device.download(noisy)).collect::<Result<_, _>>()?;
         Ok(noisy.concat())
     }

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -72,7 +73,7 @@ impl Case for EmbedPoints {
         jobs.iter().map(|job| job.views.len() * job.points.len() * job.block.row_len() as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Embed>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Embed>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Embed| {
             let embedded = device.zeros(job.views.len() * job.points.len() * job.block.row_len() as usize + 1)?;
             Ok((device.upload(&job.views)?, device.upload(&job.points)?, embedded))
@@ -80,13 +81,13 @@ impl Case for EmbedPoints {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Embed>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Embed>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (views, points, embedded))| {
             device.embed_points(&job.block, job.views.len() as u32, views, points, embedded)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let embedded: Vec<Vec<f32>> =
             loaded.iter().map(|(.., embedded)| device.download(embedded)).collect::<Result<_, _>>()?;
         Ok(embedded.concat())
@@ -156,7 +157,7 @@ impl Case for VisibleWeights {
         jobs.iter().map(|job| job.views.len() * job.points.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Visible>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Visible>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Visible| {
             let visible = device.zeros(job.views.len() * job.points.len())?;
             Ok((device.upload(&job.views)?, device.upload(&job.weights)?, device.upload(&job.points)?, visible))
@@ -164,14 +165,14 @@ impl Case for VisibleWeights {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Visible>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Visible>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (views, weights, points, visible))| {
             let (view_count, point_count) = (job.views.len() as u32, job.points.len() as u32);
             device.visible_weights(&view_count, point_count, views, weights, points, visible)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let visible: Vec<Vec<f32>> =
             loaded.iter().map(|(.., visible)| device.download(visible)).collect::<Result<_, _>>()?;
         Ok(visible.concat())
@@ -232,15 +233,15 @@ impl Case for Radiance {
         said.points.len()
     }
 
-    fn load<D: Device>(device: &D, said: &Said) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, said: &Said) -> Result<Self::Loaded<D>, DeviceError> {
         Ok((device.upload(&said.raw)?, device.upload(&said.points)?, device.zeros(said.sample_count)?))
     }
 
-    fn run<D: Device>(device: &D, said: &Said, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, said: &Said, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         device.radiance(said.points.len() as u32, &loaded.0, &loaded.1, &mut loaded.2)
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         Ok(device.download(&loaded.2)?.into_flattened())
     }
 

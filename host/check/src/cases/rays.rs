@@ -8,6 +8,7 @@ use crate::poses::random;
 use crate::ray_oracle;
 use crate::sights::{camera, load_rays, ray};
 use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay};
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -54,7 +55,7 @@ impl Case for CastRays {
         jobs.iter().map(|job| job.pixels.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Cast>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Cast>) -> Result<Self::Loaded<D>, DeviceError> {
         // One more than is asked for.
         let load = |job: &Cast| {
             let pixels = device.upload(&[&job.pixels[..], &[0]].concat())?;
@@ -63,13 +64,13 @@ impl Case for CastRays {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Cast>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Cast>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter()
             .zip(loaded)
             .try_for_each(|(job, Rays { count, pixels, rays })| device.cast_rays(&job.block, *count, pixels, rays))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for rays in loaded {
             for TargetRay { origin, near, direction, far } in device.download(&rays.rays)? {
@@ -149,7 +150,7 @@ impl Case for PlacePoints {
         jobs.iter().map(|job| job.samples.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Placed>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Placed>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Placed| {
             // Which pixels these are does not matter here.
             let rays = load_rays(device, &vec![0; job.rays.len()], &job.rays)?;
@@ -159,13 +160,13 @@ impl Case for PlacePoints {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Placed>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Placed>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (rays, depths, samples, points))| {
             device.place_points(&job.sample_count, job.samples.len() as u32, samples, &rays.rays, depths, points)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for (.., points) in loaded {
             // Numbers of samples are small enough to be exact.

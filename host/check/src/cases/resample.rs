@@ -8,6 +8,7 @@ use crate::network_oracle;
 use crate::poses::{numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -28,12 +29,12 @@ impl<B> Job<B> {
     }
 
     /// Inputs and, one number longer than needed, outputs.
-    fn load<D: Device>(&self, device: &D) -> Result<Images<D>, D::Error> {
+    fn load<D: Device>(&self, device: &D) -> Result<Images<D>, DeviceError> {
         Ok((device.upload(&self.inputs)?, device.zeros(self.output_count + 1)?))
     }
 }
 
-fn read<D: Device>(device: &D, loaded: &[Images<D>]) -> Result<Vec<f32>, D::Error> {
+fn read<D: Device>(device: &D, loaded: &[Images<D>]) -> Result<Vec<f32>, DeviceError> {
     let outputs: Vec<Vec<f32>> =
         loaded.iter().map(|(_, outputs)| device.download(outputs)).collect::<Result<_, _>>()?;
     Ok(outputs.concat())
@@ -75,15 +76,15 @@ impl Case for MaxPool {
         jobs.iter().map(|job| job.output_count).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         jobs.iter().map(|job| job.load(device)).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (inputs, outputs))| device.max_pool(&job.block, inputs, outputs))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         read(device, loaded)
     }
 
@@ -142,15 +143,15 @@ impl Case for Upsample {
         jobs.iter().map(|job| count(job.block) as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         jobs.iter().map(|job| job.load(device)).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (inputs, outputs))| device.upsample(&job.block, inputs, outputs))
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         read(device, loaded)
     }
 

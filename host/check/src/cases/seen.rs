@@ -11,6 +11,7 @@ use crate::sights::{load_rays, ray};
 use rayon::prelude::*;
 use viewfuse_core::rays::TargetRay;
 use viewfuse_core::wanted::WantedBlock;
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -67,18 +68,18 @@ impl Case for WeighSamples {
         jobs.iter().map(|job| job.ray_count as usize).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Samples>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Samples>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Samples| Ok((device.upload(&job.samples)?, device.zeros(job.samples.len())?));
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Samples>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Samples>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (samples, seen))| {
             device.weigh_samples(&job.sample_count, job.ray_count, samples, seen)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for (_, seen) in loaded {
             values.extend(device.download(seen)?.into_flattened());
@@ -179,7 +180,7 @@ impl Case for WantedSamples {
         jobs.iter().map(|job| job.depths.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Looks>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Looks>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Looks| {
             Ok(LoadedLooks {
                 rays: load_rays(device, &job.pixels, &job.rays)?,
@@ -191,13 +192,13 @@ impl Case for WantedSamples {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Looks>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Looks>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedLooks { rays, depths, seen, wanted })| {
             device.wanted_samples(&job.block, rays.count, seen, &rays.rays, &rays.pixels, depths, wanted)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
         for LoadedLooks { wanted, .. } in loaded {
             values.extend(device.download(wanted)?.into_iter().map(|wanted| wanted as f32));

@@ -12,6 +12,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Views with their volumes: a dispatch each.
@@ -114,7 +115,7 @@ impl Case for GatherVolume {
         jobs.iter().map(Job::len).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             Ok(LoadedJob {
                 views: device.upload(&job.views)?,
@@ -126,7 +127,7 @@ impl Case for GatherVolume {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         for (job, LoadedJob { views, points, volumes, gathered }) in jobs.iter().zip(loaded) {
             for (volume, view) in volumes.iter().zip(0..) {
                 device.gather_volume(&VolumeBlock { view, ..job.block }, views, points, volume, gathered)?;
@@ -135,7 +136,7 @@ impl Case for GatherVolume {
         Ok(())
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let gathered: Vec<Vec<f32>> =
             loaded.iter().map(|job| device.download(&job.gathered)).collect::<Result<_, _>>()?;
         Ok(gathered.concat())

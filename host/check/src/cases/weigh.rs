@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Weights below this may be cut off: the exponential knows no subnormals, and devices may flush them.
@@ -90,7 +91,7 @@ impl Case for Weigh {
         jobs.iter().map(|job| job.targets.len()).sum()
     }
 
-    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
             let weights = device.zeros(job.targets.len() * MOST_WEIGHED)?;
             Ok((device.upload(&job.sources)?, device.upload(&job.targets)?, weights))
@@ -98,13 +99,13 @@ impl Case for Weigh {
         jobs.iter().map(load).collect()
     }
 
-    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (sources, targets, weights))| {
             device.weigh(&job.block, job.targets.len() as u32, sources, targets, weights)
         })
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let rows: Vec<Vec<f32>> =
             loaded.iter().map(|(_, _, weights)| device.download(weights)).collect::<Result<_, _>>()?;
         Ok(rows.concat())

@@ -8,6 +8,7 @@ use crate::world::{Numbers, World, costs};
 use rayon::prelude::*;
 use viewfuse_core::photo::sweep::{SweepBlock, sum_row};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A band's costs and their sums over rows.
@@ -60,15 +61,15 @@ impl Case for SumRow {
         inputs.costs.len()
     }
 
-    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         Ok((device.upload(&inputs.costs)?, device.zeros(inputs.costs.len())?))
     }
 
-    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         device.sum_row(&inputs.sweep, &loaded.0, &mut loaded.1)
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         Ok(device.download(&loaded.1)?.into_flattened())
     }
 
@@ -106,15 +107,15 @@ impl Case for MeanColumn {
         inputs.costs.len()
     }
 
-    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, D::Error> {
+    fn load<D: Device>(device: &D, inputs: &Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         Ok((device.upload(&inputs.costs)?, device.upload(&inputs.row_sums)?, device.zeros(inputs.costs.len())?))
     }
 
-    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), D::Error> {
+    fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         device.mean_column(&inputs.sweep, &loaded.0, &loaded.1, &mut loaded.2)
     }
 
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, D::Error> {
+    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         device.download(&loaded.2)
     }
 

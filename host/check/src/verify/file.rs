@@ -10,7 +10,7 @@ use viewfuse_field::FieldError;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
 /// An error with its cause.
-pub(super) fn full<E: std::error::Error>(error: &FieldError<E>) -> String {
+pub(super) fn full(error: &FieldError) -> String {
     match error {
         FieldError::Device(cause) => format!("{error}: {cause}"),
         error => error.to_string(),

@@ -93,7 +93,7 @@ struct Comparison<'a, 'b, D: Device> {
 }
 
 impl<D: Device> Comparison<'_, '_, D> {
-    fn failed<E: std::error::Error>(&self, error: &viewfuse_field::FieldError<E>) -> VerifyError {
+    fn failed(&self, error: &viewfuse_field::FieldError) -> VerifyError {
         self.file.wrong("genvs", full(error))
     }
 

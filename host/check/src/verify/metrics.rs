@@ -194,7 +194,7 @@ impl<'a> Pairs<'a> {
         (Checkpoint::in_memory(&self.file.path.display().to_string(), heads, BTreeMap::new()), names)
     }
 
-    fn failed<E: std::error::Error + 'static>(&self, name: &str, error: &MetricError<E>) -> VerifyError {
+    fn failed(&self, name: &str, error: &MetricError) -> VerifyError {
         let cause = std::error::Error::source(error).map_or(String::new(), |cause| format!(": {cause}"));
         self.file.wrong(name, format!("{error}{cause}"))
     }

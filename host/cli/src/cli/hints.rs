@@ -1,11 +1,9 @@
 //! What a person can do about an error of the library, which knows no options: the words behind the error's.
 
-use std::convert::Infallible;
 use viewfuse_evaluate::run_folder::FolderError;
 use viewfuse_field::render::RenderError;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_scene::photographs::PhotographsError;
-use viewfuse_vulkan::VulkanError;
 
 /// The option, if there is one, that may help with an error or one of its causes.
 pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
@@ -13,9 +11,8 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let few_shot = cause.downcast_ref::<SelectionError>().and_then(of_few_shot);
         let photographs = cause.downcast_ref::<PhotographsError>().and_then(of_photographs);
         let folder = cause.downcast_ref::<FolderError>().and_then(of_run_folder);
-        let on_cpu = cause.downcast_ref::<RenderError<Infallible>>().and_then(of_render);
-        let on_vulkan = cause.downcast_ref::<RenderError<VulkanError>>().and_then(of_render);
-        few_shot.or(photographs).or(folder).or(on_cpu).or(on_vulkan).or_else(|| of_training(cause))
+        let render = cause.downcast_ref::<RenderError>().and_then(of_render);
+        few_shot.or(photographs).or(folder).or(render).or_else(|| of_training(cause))
     })
 }
 
@@ -43,7 +40,7 @@ fn of_run_folder(error: &FolderError) -> Option<&'static str> {
     }
 }
 
-fn of_render<E: std::error::Error>(error: &RenderError<E>) -> Option<&'static str> {
+fn of_render(error: &RenderError) -> Option<&'static str> {
     match error {
         RenderError::Shape { .. } | RenderError::Size { .. } => Some("give another --size"),
         RenderError::NoObject { .. } => Some("`viewfuse inspect` shows the poses, --background takes the background"),

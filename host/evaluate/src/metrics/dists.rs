@@ -39,11 +39,11 @@ impl<D: Device> Dists<D> {
     ///
     /// # Errors
     /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
-    pub fn new(device: &D, trunk: &Checkpoint, weights: &Checkpoint) -> Result<Dists<D>, MetricError<D::Error>> {
+    pub fn new(device: &D, trunk: &Checkpoint, weights: &Checkpoint) -> Result<Dists<D>, MetricError> {
         let expected =
             ["alpha", "beta"].map(|name| TensorShape { name: name.to_owned(), shape: vec![1, CHANNELS, 1, 1] });
         weights.check(&expected, |_| false)?;
-        let read = |name: &str| -> Result<Vec<f64>, MetricError<D::Error>> {
+        let read = |name: &str| -> Result<Vec<f64>, MetricError> {
             Ok(weights.tensor(name)?.into_iter().map(f64::from).collect())
         };
         let (mut alpha, mut beta) = (read("alpha")?, read("beta")?);
@@ -58,9 +58,9 @@ impl<D: Device> Dists<D> {
     ///
     /// # Errors
     /// [`MetricError`] if the sizes differ, or if the device fails.
-    pub fn distance(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<f64, MetricError<D::Error>> {
+    pub fn distance(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<f64, MetricError> {
         same_size(prediction, truth)?;
-        let maps = |picture| -> Result<Vec<HostImage>, MetricError<D::Error>> {
+        let maps = |picture| -> Result<Vec<HostImage>, MetricError> {
             let plain = seen(picture, |_, level| level / 255.0);
             let scaled = |channel: usize, level: f32| (level / 255.0 - MEAN[channel]) / DEVIATION[channel];
             let mut maps = vec![plain];

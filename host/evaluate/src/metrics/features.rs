@@ -118,7 +118,7 @@ impl<D: Device> Inception<D> {
     ///
     /// # Errors
     /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
-    pub fn new(device: &D, checkpoint: &Checkpoint) -> Result<Inception<D>, MetricError<D::Error>> {
+    pub fn new(device: &D, checkpoint: &Checkpoint) -> Result<Inception<D>, MetricError> {
         let kind = kind_of(checkpoint)?;
         let optional = |name: &str| {
             name.starts_with("fc.") || name.starts_with("AuxLogits.") || name.ends_with(".num_batches_tracked")
@@ -139,7 +139,7 @@ impl<D: Device> Inception<D> {
         &self,
         device: &D,
         pictures: impl IntoIterator<Item = &'a RgbImage>,
-    ) -> Result<Features, MetricError<D::Error>> {
+    ) -> Result<Features, MetricError> {
         let mut values = Vec::new();
         for picture in pictures {
             let resized = resized(&seen(picture, |_, level| level / 255.0), SIDE);

@@ -101,12 +101,7 @@ impl<D: Device> Lpips<D> {
     ///
     /// # Errors
     /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
-    pub fn new(
-        device: &D,
-        kind: LpipsTrunk,
-        trunk: &Checkpoint,
-        heads: &Checkpoint,
-    ) -> Result<Lpips<D>, MetricError<D::Error>> {
+    pub fn new(device: &D, kind: LpipsTrunk, trunk: &Checkpoint, heads: &Checkpoint) -> Result<Lpips<D>, MetricError> {
         let shape = |(tap, channels): (usize, &usize)| TensorShape {
             name: format!("lin{tap}.model.1.weight"),
             shape: vec![1, *channels, 1, 1],
@@ -128,7 +123,7 @@ impl<D: Device> Lpips<D> {
     ///
     /// # Errors
     /// [`MetricError`] if the sizes differ or are too small for the network, or if the device fails.
-    pub fn distance(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<f64, MetricError<D::Error>> {
+    pub fn distance(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<f64, MetricError> {
         same_size(prediction, truth)?;
         let taps = |picture| {
             let scaled = |channel: usize, level: f32| (level / 127.5 - 1.0 - SHIFT[channel]) / SCALE[channel];

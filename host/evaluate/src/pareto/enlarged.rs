@@ -48,12 +48,7 @@ impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
         self.field.memory_estimate(device, source_sizes)
     }
 
-    fn prepare(
-        &self,
-        device: &D,
-        sources: &SourceImages,
-        progress: &dyn Progress,
-    ) -> Result<F::Prepared, FieldError<D::Error>> {
+    fn prepare(&self, device: &D, sources: &SourceImages, progress: &dyn Progress) -> Result<F::Prepared, FieldError> {
         self.field.prepare(device, sources, progress)
     }
 
@@ -63,7 +58,7 @@ impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
         prepared: &F::Prepared,
         relevance: &[SourceWeights],
         progress: &dyn Progress,
-    ) -> Result<F::Latents, FieldError<D::Error>> {
+    ) -> Result<F::Latents, FieldError> {
         self.field.encode(device, prepared, relevance, progress)
     }
 
@@ -74,7 +69,7 @@ impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
         latents: &F::Latents,
         weights: &SourceWeights,
         progress: &dyn Progress,
-    ) -> Result<(), FieldError<D::Error>> {
+    ) -> Result<(), FieldError> {
         self.field.encode_used(device, prepared, latents, weights, progress)
     }
 
@@ -87,7 +82,7 @@ impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
         target: &Camera,
         settled: f32,
         progress: &dyn Progress,
-    ) -> Result<Rendered, FieldError<D::Error>> {
+    ) -> Result<Rendered, FieldError> {
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         // A camera that cannot be made so small is left as it is.
         let pinhole = target.pinhole.resized(width.div_ceil(self.factor), height.div_ceil(self.factor));

@@ -5,6 +5,7 @@
 //! et al. 2021. An image that skips from the encoder to the decoder is written, when it is made, behind the channels that
 //! will stand in front of it there: nothing is copied.
 
+use viewfuse_device::DeviceError;
 mod block;
 mod embedding;
 
@@ -15,7 +16,7 @@ use embedding::{Embedding, ShiftLayers};
 use std::f32::consts::FRAC_1_SQRT_2;
 use viewfuse_core::genvs::DenoiserInputBlock;
 use viewfuse_core::schedule::Preconditioning;
-use viewfuse_device::{Device, Memory};
+use viewfuse_device::Device;
 use viewfuse_nn::convolution::{Convolution, ConvolutionOptions, Residual};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::loader::Loader;
@@ -29,10 +30,8 @@ const GROUP_NORM_EPSILON: f32 = 1.0e-6;
 
 const PLAIN: ConvolutionOptions = ConvolutionOptions::PLAIN;
 
-type Outcome<T, D> = Result<T, FieldError<<D as Memory>::Error>>;
-
 /// A group norm with as many groups as published.
-fn group_norm<D: Device>(loader: &Loader<'_, D>, name: &str) -> Outcome<GroupNorm<D>, D> {
+fn group_norm<D: Device>(loader: &Loader<'_, D>, name: &str) -> Result<GroupNorm<D>, FieldError> {
     Ok(loader.group_norm(name, group_count, GROUP_NORM_EPSILON)?)
 }
 
@@ -73,14 +72,14 @@ struct Blocks<'a, 'b, D: Device> {
 }
 
 impl<D: Device> Blocks<'_, '_, D> {
-    fn load(&mut self, level: &str, what: &str, resample: Resample, side: u32) -> Outcome<Block<D>, D> {
+    fn load(&mut self, level: &str, what: &str, resample: Resample, side: u32) -> Result<Block<D>, FieldError> {
         let name = format!("{level}_{what}");
         let first_shift = self.shifts.push(&self.loader.tensors, &name)?;
         Block::load(self.loader, &name, resample, side, first_shift)
     }
 
     /// `block0`, `block1` and so on, as many as there are.
-    fn load_all(&mut self, level: &str, side: u32) -> Outcome<Vec<Block<D>>, D> {
+    fn load_all(&mut self, level: &str, side: u32) -> Result<Vec<Block<D>>, FieldError> {
         let mut blocks = Vec::new();
         while self.loader.tensors.has(&format!("{level}_block{}.norm0.weight", blocks.len())) {
             blocks.push(self.load(level, &format!("block{}", blocks.len()), Resample::None, side)?);
@@ -95,7 +94,7 @@ impl<D: Device> Denoiser<D> {
     ///
     /// # Errors
     /// If the checkpoint cannot be read, or the device has no room.
-    pub(super) fn load(loader: &Loader<'_, D>, side: u32, resolutions: &[u32]) -> Outcome<Denoiser<D>, D> {
+    pub(super) fn load(loader: &Loader<'_, D>, side: u32, resolutions: &[u32]) -> Result<Denoiser<D>, FieldError> {
         let mut blocks = Blocks { loader, shifts: ShiftLayers::default() };
         let (mut levels, mut decoder_levels) = (Vec::new(), Vec::new());
         for (depth, resolution) in resolutions.iter().enumerate() {
@@ -143,7 +142,7 @@ impl<D: Device> Denoiser<D> {
         noisy: &D::Buffer<f32>,
         condition: &Image<D>,
         at: &Preconditioning,
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         let (device, size) = (scratch.device(), condition.size);
         let block = DenoiserInputBlock {
             picture_channels: PICTURE_CHANNELS,
@@ -168,7 +167,7 @@ impl<D: Device> Denoiser<D> {
         scratch: &mut Scratch<'_, D>,
         inputs: Image<D>,
         shifts: &D::Buffer<f32>,
-    ) -> Result<Vec<Image<D>>, D::Error> {
+    ) -> Result<Vec<Image<D>>, DeviceError> {
         let device = scratch.device();
         let mut in_front = self.channels_in_front().into_iter();
         let mut place = |scratch: &mut Scratch<'_, D>, size: Size| {
@@ -228,7 +227,7 @@ impl<D: Device> Denoiser<D> {
         scratch: &mut Scratch<'_, D>,
         mut skips: Vec<Image<D>>,
         shifts: &D::Buffer<f32>,
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         let mut x: Option<Image<D>> = None;
         for level in &self.decoder_levels {
             let count = level.plain.len() + level.skipped.len();

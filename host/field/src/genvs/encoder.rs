@@ -7,6 +7,7 @@ use super::architecture::{self, ASPP_RATES};
 use crate::FieldError;
 use std::ops::Range;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::convolution::{
     Convolution, ConvolutionOptions, DepthwiseConvolution, Residual, TransposedConvolution,
 };
@@ -68,14 +69,14 @@ impl<D: Device> Encoder<D> {
         loader: &Loader<'_, D>,
         sizes: &architecture::Encoder,
         side: u32,
-    ) -> Result<Encoder<D>, FieldError<D::Error>> {
+    ) -> Result<Encoder<D>, FieldError> {
         let trunk = ResNet::new(sizes.stem_channels, &sizes.levels).try_map(|layer: &ResNetLayer| {
             // Only the first level has windows at every pixel, without gaps, throughout.
             loader.convolution(&format!("encoder.{}", layer.name), if layer.level == 1 { side / 4 } else { 0 })
         })?;
         let stage = |name: &str, side: u32| {
             let layer = |index: usize| loader.convolution(&format!("{name}.{index}"), side);
-            Ok::<_, FieldError<D::Error>>([layer(0)?, layer(2)?, layer(4)?])
+            Ok::<_, FieldError>([layer(0)?, layer(2)?, layer(4)?])
         };
         let (up, head) = ("decoder.modified_up", "volume_head.up");
         let upconv = |name: String| loader.transposed_convolution(&format!("{name}.0"));
@@ -105,7 +106,12 @@ impl<D: Device> Encoder<D> {
     ///
     /// # Errors
     /// If the device is lost or has no memory left.
-    pub(super) fn encode(&self, scratch: &mut Scratch<'_, D>, image: &[f32], size: Size) -> Result<Image<D>, D::Error> {
+    pub(super) fn encode(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        image: &[f32],
+        size: Size,
+    ) -> Result<Image<D>, DeviceError> {
         let input = Image::upload(scratch.device(), size, image)?;
         let levels = self.trunk.run(scratch, &input, SIDE_STEP)?;
         let levels = <[Image<D>; 5]>::try_from(levels);
@@ -148,13 +154,13 @@ impl<D: Device> Encoder<D> {
         deep: &Image<D>,
         rows: Range<u32>,
         volume: &mut Image<D>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         self.volume.run_rows(device, RELU, deep, rows, volume)
     }
 }
 
 impl<D: Device> Aspp<D> {
-    fn load(loader: &Loader<'_, D>) -> Result<Aspp<D>, FieldError<D::Error>> {
+    fn load(loader: &Loader<'_, D>) -> Result<Aspp<D>, FieldError> {
         let branch = |index: usize| format!("decoder.aspp.0.convs.{index}");
         let dilated = 1..=ASPP_RATES.len();
         let pooled = format!("{}.1", branch(ASPP_RATES.len() + 1));
@@ -169,7 +175,7 @@ impl<D: Device> Aspp<D> {
         })
     }
 
-    fn run(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, D::Error> {
+    fn run(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>) -> Result<Image<D>, DeviceError> {
         let device = scratch.device();
         let channels = self.plain.channels;
         let branch_count = self.dilated.len() as u32 + 2;
@@ -194,7 +200,7 @@ impl<D: Device> Aspp<D> {
 }
 
 impl<D: Device> SeparableConvolution<D> {
-    fn load(loader: &Loader<'_, D>, name: &str) -> Result<SeparableConvolution<D>, FieldError<D::Error>> {
+    fn load(loader: &Loader<'_, D>, name: &str) -> Result<SeparableConvolution<D>, FieldError> {
         Ok(SeparableConvolution {
             depthwise: loader.depthwise_convolution(&format!("{name}.0"))?,
             pointwise: loader.convolution(&format!("{name}.1"), 0)?,
@@ -207,7 +213,7 @@ impl<D: Device> SeparableConvolution<D> {
         scratch: &mut Scratch<'_, D>,
         options: ConvolutionOptions,
         image: &Image<D>,
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         let inside = self.depthwise.run(scratch, options, image)?;
         let output = self.pointwise.run(scratch, RELU, &inside, Residual::None)?;
         scratch.recycle(inside);
@@ -221,7 +227,7 @@ impl<D: Device> SeparableConvolution<D> {
         options: ConvolutionOptions,
         image: &Image<D>,
         output: &mut Image<D>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let inside = self.depthwise.run(scratch, options, image)?;
         self.pointwise.run_into(scratch.device(), RELU, &inside, Residual::None, output)?;
         scratch.recycle(inside);
@@ -236,7 +242,7 @@ fn run_up<D: Device>(
     stage: &Stage<D>,
     image: Image<D>,
     skip: &Image<D>,
-) -> Result<Image<D>, D::Error> {
+) -> Result<Image<D>, DeviceError> {
     let (own, above) = (skip.size.channels, upconv.channels);
     let mut wide = scratch.image(skip.size.with_channels(own + above))?;
     upsample(scratch.device(), skip, 0, &mut wide)?;
@@ -250,7 +256,7 @@ fn run_stage<D: Device>(
     scratch: &mut Scratch<'_, D>,
     stage: &Stage<D>,
     mut image: Image<D>,
-) -> Result<Image<D>, D::Error> {
+) -> Result<Image<D>, DeviceError> {
     for layer in stage {
         let next = layer.run(scratch, RELU, &image, Residual::None)?;
         scratch.recycle(image);

@@ -13,6 +13,7 @@ use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
 use viewfuse_core::rays::CastBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::linear::{Linear, LinearOptions};
@@ -24,8 +25,6 @@ use viewfuse_nn::scratch::Scratch;
 const LEAST_RAYS: usize = 64;
 /// Length of the last sample as published: whatever is there is opaque.
 pub const LAST_LENGTH: f32 = 1.0e10;
-
-type Outcome<T, D> = Result<T, FieldError<<D as viewfuse_device::Memory>::Error>>;
 
 /// The views that a target uses.
 pub(super) struct Views<'a, D: Device> {
@@ -47,7 +46,7 @@ pub(super) struct PointNetwork<D: Device> {
 
 impl<D: Device> PointNetwork<D> {
     /// Reads it: `features` of a point, `width` inside.
-    pub(super) fn load(loader: &Loader<'_, D>, features: u32, width: u32) -> Outcome<PointNetwork<D>, D> {
+    pub(super) fn load(loader: &Loader<'_, D>, features: u32, width: u32) -> Result<PointNetwork<D>, FieldError> {
         let layer = |index: usize| loader.linear(&format!("mlp.layers.{index}"));
         Ok(PointNetwork { layers: [layer(0)?, layer(1)?, layer(2)?], features, width })
     }
@@ -60,7 +59,7 @@ impl<D: Device> PointNetwork<D> {
         fused: &D::Buffer<f32>,
         hidden: &mut [D::Buffer<f32>; 2],
         raw: &mut D::Buffer<f32>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let rectified = LinearOptions { relu_inputs: false, relu_outputs: true };
         let [first, second, third] = &self.layers;
         let [inside, next] = hidden;
@@ -70,7 +69,7 @@ impl<D: Device> PointNetwork<D> {
     }
 
     /// Room for what is inside it at so many points.
-    pub(super) fn hidden(&self, device: &D, point_count: usize) -> Result<[D::Buffer<f32>; 2], D::Error> {
+    pub(super) fn hidden(&self, device: &D, point_count: usize) -> Result<[D::Buffer<f32>; 2], DeviceError> {
         let room = || device.zeros(point_count * self.width as usize);
         Ok([room()?, room()?])
     }
@@ -85,7 +84,7 @@ pub(super) fn render<D: Device>(
     target: &CameraBlock,
     looking: &Looking,
     progress: &dyn Progress,
-) -> Outcome<Image<D>, D> {
+) -> Result<Image<D>, FieldError> {
     let failed = FieldError::Device;
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
     let at_once = (device.busy_elements() / looking.sample_count as usize).max(LEAST_RAYS);
@@ -156,7 +155,7 @@ impl<'a, D: Device> Tile<'a, D> {
         views: &'a Views<'a, D>,
         looking: &'a Looking,
         ray_count: usize,
-    ) -> Result<Tile<'a, D>, D::Error> {
+    ) -> Result<Tile<'a, D>, DeviceError> {
         let count = ray_count * looking.sample_count as usize;
         let features = network.features as usize;
         Ok(Tile {
@@ -176,7 +175,7 @@ impl<'a, D: Device> Tile<'a, D> {
     }
 
     /// `[ray][feature]` of some pixels.
-    fn render(&mut self, pixels: &[u32], cast: &CastBlock) -> Result<Vec<f32>, D::Error> {
+    fn render(&mut self, pixels: &[u32], cast: &CastBlock) -> Result<Vec<f32>, DeviceError> {
         let Tile { device, network, views, looking, .. } = *self;
         let Looking { near_far: [near, far], sample_count, jitter, seed, ray_length, inclusive } = *looking;
         let ray_count = pixels.len() as u32;

@@ -1,7 +1,6 @@
 //! The network's parts on a device, and what each makes of its inputs. What a part makes is looked at before the next one
 //! gets it: numbers that are none are found where they arise.
 
-use super::Outcome;
 use super::architecture::{Architecture, COLOUR_CHANNELS};
 use super::denoiser::Denoiser;
 use super::encoder::Encoder;
@@ -16,6 +15,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::sampler::Mix;
 use viewfuse_core::schedule::Preconditioning;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::image::{Image, Size};
@@ -41,7 +41,7 @@ impl<D: Device> Parts<D> {
         checkpoint: &Checkpoint,
         architecture: &Architecture,
         side: u32,
-    ) -> Outcome<Parts<D>, D> {
+    ) -> Result<Parts<D>, FieldError> {
         let loader = |prefix| Loader::new(device, checkpoint, prefix);
         let features = architecture.encoder.feature_count;
         let denoiser = architecture.denoiser.as_ref().map(|denoiser| {
@@ -57,13 +57,19 @@ impl<D: Device> Parts<D> {
     }
 
     /// A view's volume, without its rows.
-    pub(super) fn encode(&self, device: &D, values: &[f32], size: Size, view: usize) -> Outcome<Volume<D>, D> {
+    pub(super) fn encode(&self, device: &D, values: &[f32], size: Size, view: usize) -> Result<Volume<D>, FieldError> {
         check_finite(values, &encoding(view), "image [row][column][3]")?;
         Volume::encode(device, &self.encoder, values, size).map_err(FieldError::Device)
     }
 
     /// Computes rows of a volume that are not there yet. Returns how many.
-    pub(super) fn fill(&self, device: &D, volume: &mut Volume<D>, rows: Range<u32>, view: usize) -> Outcome<u32, D> {
+    pub(super) fn fill(
+        &self,
+        device: &D,
+        volume: &mut Volume<D>,
+        rows: Range<u32>,
+        view: usize,
+    ) -> Result<u32, FieldError> {
         let failed = FieldError::Device;
         let new_rows = volume.fill(device, &self.encoder, rows).map_err(failed)?;
         if new_rows == 0 {
@@ -88,7 +94,7 @@ impl<D: Device> Parts<D> {
         target: &CameraBlock,
         looking: &Looking,
         progress: &dyn Progress,
-    ) -> Outcome<Image<D>, D> {
+    ) -> Result<Image<D>, FieldError> {
         render(device, scratch, &self.points, views, target, looking, progress)
     }
 
@@ -107,7 +113,7 @@ impl<D: Device> Parts<D> {
         plan: &Plan,
         start: Start<'_, D>,
         progress: &dyn Progress,
-    ) -> Outcome<Sampled<D>, D> {
+    ) -> Result<Sampled<D>, FieldError> {
         let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
         if self.denoiser.is_none() {
             let values = device.download(&features.values).map_err(FieldError::Device)?;
@@ -133,7 +139,7 @@ impl<D: Device> Parts<D> {
         features: &Image<D>,
         level: f32,
         denoised: &mut D::Buffer<f32>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let Some(denoiser) = &self.denoiser else { return Ok(()) };
         let at = Preconditioning::at(level);
         let output = denoiser.run(scratch, noisy, features, &at)?;

@@ -3,11 +3,12 @@
 use super::feature_image::Views;
 use super::looking::Looking;
 use super::sampling::{Plan, Start};
-use super::{Architecture, Genvs, Outcome, Prepared};
+use super::{Architecture, Genvs, Prepared};
 use crate::{Field, FieldError};
 use std::cell::Ref;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Silent;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
@@ -25,7 +26,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn new(field: &'a Genvs, device: &'a D, sources: &SourceImages) -> Outcome<Self, D> {
+    pub fn new(field: &'a Genvs, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError> {
         let prepared = field.prepare(device, sources, &Silent)?;
         Ok(Reference { field, device, prepared })
     }
@@ -39,7 +40,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn encode(&self, view: usize) -> Outcome<(), D> {
+    pub fn encode(&self, view: usize) -> Result<(), FieldError> {
         let Reference { field, device, prepared } = self;
         field.encode_view(*device, prepared, view)?;
         if let Some(volume) = prepared.volumes[view].borrow_mut().as_mut() {
@@ -52,7 +53,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn volume(&self, view: usize) -> Outcome<Vec<f32>, D> {
+    pub fn volume(&self, view: usize) -> Result<Vec<f32>, FieldError> {
         self.encode(view)?;
         match &*self.prepared.volumes[view].borrow() {
             Some(volume) => volume.values(self.device).map_err(FieldError::Device),
@@ -64,7 +65,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn points(&self, looked_up: &[f32]) -> Outcome<Vec<f32>, D> {
+    pub fn points(&self, looked_up: &[f32]) -> Result<Vec<f32>, FieldError> {
         let Reference { device, prepared, .. } = self;
         let network = prepared.parts.points();
         let features = network.features as usize;
@@ -94,7 +95,7 @@ impl<'a, D: Device> Reference<'a, D> {
         target: &CameraBlock,
         near_far: [f32; 2],
         ray_length: f32,
-    ) -> Outcome<Vec<f32>, D> {
+    ) -> Result<Vec<f32>, FieldError> {
         let Reference { field, device, prepared } = self;
         let failed = FieldError::Device;
         let rays = field.options.rays;
@@ -128,7 +129,13 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn denoised(&self, noisy: &[f32], features: &[f32], size: [u32; 2], level: f32) -> Outcome<Vec<f32>, D> {
+    pub fn denoised(
+        &self,
+        noisy: &[f32],
+        features: &[f32],
+        size: [u32; 2],
+        level: f32,
+    ) -> Result<Vec<f32>, FieldError> {
         let Reference { device, prepared, .. } = self;
         let run = || {
             let mut scratch = Scratch::new(*device);
@@ -145,7 +152,13 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn sampled(&self, latents: &[f32], features: &[f32], size: [u32; 2], plan: &Plan) -> Outcome<Vec<f32>, D> {
+    pub fn sampled(
+        &self,
+        latents: &[f32],
+        features: &[f32],
+        size: [u32; 2],
+        plan: &Plan,
+    ) -> Result<Vec<f32>, FieldError> {
         let Reference { device, prepared, .. } = self;
         let failed = FieldError::Device;
         let mut scratch = Scratch::new(*device);
@@ -166,7 +179,7 @@ impl<'a, D: Device> Reference<'a, D> {
         scratch: &mut Scratch<'_, D>,
         features: &[f32],
         [height, width]: [u32; 2],
-    ) -> Result<Image<D>, D::Error> {
+    ) -> Result<Image<D>, DeviceError> {
         Image::upload(
             scratch.device(),
             Size { height, width, channels: (features.len() as u32) / (height * width) },

@@ -15,7 +15,7 @@ pub use plan::{Plan, Steps};
 
 use super::super::FieldError;
 use run::Run;
-use viewfuse_device::{Device, Memory};
+use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 
 /// What a run starts from.
@@ -62,8 +62,6 @@ impl<D: Device> Sampled<D> {
 }
 
 /// What running a plan can end with.
-pub type Outcome<T, D> = Result<T, FieldError<<D as Memory>::Error>>;
-
 /// Makes a picture of `element_count` values. `denoise(state, level, denoised)` writes what it believes is behind a noisy
 /// picture at a level. The noise is that of the plan's seed, the same on every device; progress counts calls. Between calls
 /// the run can be interrupted.
@@ -77,8 +75,8 @@ pub fn sample<D: Device>(
     element_count: usize,
     start: Start<'_, D>,
     progress: &dyn Progress,
-    denoise: impl FnMut(&D::Buffer<f32>, f32, &mut D::Buffer<f32>) -> Outcome<(), D>,
-) -> Outcome<Sampled<D>, D> {
+    denoise: impl FnMut(&D::Buffer<f32>, f32, &mut D::Buffer<f32>) -> Result<(), FieldError>,
+) -> Result<Sampled<D>, FieldError> {
     let run = Run::new(device, plan, element_count, progress, denoise);
     match plan.steps {
         Steps::Fixed { sampler, level_count } => run.over_levels(sampler, level_count.max(1), start),

@@ -10,6 +10,7 @@ use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::half::{fetch_half, word_count};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
 
@@ -39,7 +40,12 @@ impl<D: Device> Volume<D> {
     ///
     /// # Errors
     /// If the device is lost or has no room.
-    pub(super) fn encode(device: &D, encoder: &Encoder<D>, values: &[f32], size: Size) -> Result<Volume<D>, D::Error> {
+    pub(super) fn encode(
+        device: &D,
+        encoder: &Encoder<D>,
+        values: &[f32],
+        size: Size,
+    ) -> Result<Volume<D>, DeviceError> {
         // Its own: what an encoding needs in between is not kept beside the volumes.
         let mut scratch = Scratch::new(device);
         let deep = encoder.encode(&mut scratch, values, size)?;
@@ -69,7 +75,7 @@ impl<D: Device> Volume<D> {
     ///
     /// # Errors
     /// If the device is lost.
-    pub(super) fn fill(&mut self, device: &D, encoder: &Encoder<D>, rows: Range<u32>) -> Result<u32, D::Error> {
+    pub(super) fn fill(&mut self, device: &D, encoder: &Encoder<D>, rows: Range<u32>) -> Result<u32, DeviceError> {
         let filled = self.filled.clone();
         let Nodes::Whole { deep, image } = &mut self.nodes else { return Ok(0) };
         if rows.is_empty() {
@@ -102,7 +108,7 @@ impl<D: Device> Volume<D> {
     ///
     /// # Errors
     /// If the device is lost or has no room.
-    pub(super) fn pack(&mut self, device: &D) -> Result<(), D::Error> {
+    pub(super) fn pack(&mut self, device: &D) -> Result<(), DeviceError> {
         let Nodes::Whole { image, .. } = &self.nodes else { return Ok(()) };
         let number_count = self.number_count();
         let mut words = device.zeros(word_count(number_count) as usize)?;
@@ -122,7 +128,7 @@ impl<D: Device> Volume<D> {
         views: &D::Buffer<CameraBlock>,
         points: &D::Buffer<RayPoint>,
         gathered: &mut D::Buffer<f32>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         match &self.nodes {
             Nodes::Whole { image, .. } => device.gather_volume(block, views, points, &image.values, gathered),
             Nodes::Halves(words) => device.gather_halves(block, views, points, words, gathered),
@@ -133,7 +139,7 @@ impl<D: Device> Volume<D> {
     ///
     /// # Errors
     /// If the device is lost.
-    pub(super) fn values(&self, device: &D) -> Result<Vec<f32>, D::Error> {
+    pub(super) fn values(&self, device: &D) -> Result<Vec<f32>, DeviceError> {
         match &self.nodes {
             Nodes::Whole { image, .. } => device.download(&image.values),
             Nodes::Halves(words) => {

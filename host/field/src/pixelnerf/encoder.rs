@@ -4,6 +4,7 @@
 use super::architecture::Architecture;
 use super::parameters::{DeviceParameters, PointNetwork};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::convolution::Convolution;
 use viewfuse_nn::image::Image;
 use viewfuse_nn::linear::{Linear, LinearOptions};
@@ -27,7 +28,7 @@ pub(super) fn encode<D: Device>(
     parameters: &DeviceParameters<D>,
     image: &Image<D>,
     maps: bool,
-) -> Result<ViewLatents<D>, D::Error> {
+) -> Result<ViewLatents<D>, DeviceError> {
     let latents = run_trunk(device, architecture, &parameters.trunk, image)?;
     let grid_size = [latents.size.height, latents.size.width];
     let grids = match maps {
@@ -45,7 +46,7 @@ fn map_latents<D: Device>(
     device: &D,
     network: &PointNetwork<Linear<D>>,
     latents: &Image<D>,
-) -> Result<Vec<D::Buffer<f32>>, D::Error> {
+) -> Result<Vec<D::Buffer<f32>>, DeviceError> {
     let row_count = latents.size.pixel_count();
     let map = |layer: &Linear<D>| {
         let mut grid = device.zeros(row_count as usize * layer.out_count as usize)?;
@@ -61,7 +62,7 @@ fn run_trunk<D: Device>(
     architecture: &Architecture,
     trunk: &ResNet<Convolution<D>>,
     image: &Image<D>,
-) -> Result<Image<D>, D::Error> {
+) -> Result<Image<D>, DeviceError> {
     // Its levels halve the image as often as there are levels.
     let levels = trunk.run(&mut Scratch::new(device), image, u32::MAX)?;
     let mut latents = Image::zeros(device, levels[0].size.with_channels(architecture.latent_channels() as u32))?;

@@ -9,6 +9,7 @@ use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::linear::{Linear, LinearOptions};
 
 /// Floats that a buffer of activations holds on the CPU: 4 MiB, which a few cores' caches hold together. Quarter and four
@@ -52,7 +53,7 @@ impl<D: Device> Workspace<D> {
         view_count: usize,
         most_points: usize,
         maps: bool,
-    ) -> Result<Workspace<D>, D::Error> {
+    ) -> Result<Workspace<D>, DeviceError> {
         let Architecture { width, .. } = *architecture;
         let points = points_at_once(device, architecture, view_count, most_points, maps);
         let rows = points * view_count;
@@ -114,7 +115,7 @@ impl<D: Device> Network<'_, D> {
         workspace: &mut Workspace<D>,
         views: &Views<'_, D>,
         point_count: u32,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let Network { device, architecture, layers, .. } = self;
         let view_count = views.latents.len() as u32;
         let width = architecture.width as u32;
@@ -153,7 +154,7 @@ impl<D: Device> Network<'_, D> {
         workspace: &mut Workspace<D>,
         views: &Views<'_, D>,
         point_count: u32,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let channel_count = self.architecture.latent_channels() as u32;
         for (view, known) in (0..).zip(&views.latents) {
             let block = self.gather(known, view, point_count, channel_count);
@@ -170,7 +171,7 @@ impl<D: Device> Network<'_, D> {
         views: &Views<'_, D>,
         point_count: u32,
         block: usize,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let width = self.architecture.width as u32;
         let Workspace { points, latents, flow, next, .. } = workspace;
         match self.grids {
@@ -198,7 +199,7 @@ impl<D: Device> Network<'_, D> {
     }
 
     /// A residual block: `flow + fc_1(relu(fc_0(relu(flow))))`.
-    fn run_block(&self, workspace: &mut Workspace<D>, row_count: u32, block: usize) -> Result<(), D::Error> {
+    fn run_block(&self, workspace: &mut Workspace<D>, row_count: u32, block: usize) -> Result<(), DeviceError> {
         let [fc_0, fc_1] = &self.layers.blocks[block];
         let rectified = LinearOptions { relu_inputs: true, relu_outputs: true };
         let Workspace { flow, next, inside, .. } = workspace;

@@ -2,6 +2,7 @@
 
 use super::architecture::{Architecture, Pass};
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::convolution::Convolution;
 use viewfuse_nn::linear::Linear;
@@ -47,7 +48,7 @@ impl HostParameters {
     }
 
     /// Takes them to a device.
-    pub(super) fn load<D: Device>(&self, device: &D) -> Result<DeviceParameters<D>, D::Error> {
+    pub(super) fn load<D: Device>(&self, device: &D) -> Result<DeviceParameters<D>, DeviceError> {
         // Images of the trunk are too small for another way of convolving them.
         let trunk = self.trunk.try_map(|convolution| convolution.load(device, 0))?;
         let network = |network: &PointNetwork<LinearWeights>| {
@@ -55,11 +56,11 @@ impl HostParameters {
             Ok(PointNetwork {
                 lin_in: network.lin_in.load(device)?,
                 lin_z: network.lin_z.iter().map(|layer| layer.load(device)).collect::<Result<_, _>>()?,
-                blocks: network.blocks.iter().map(block).collect::<Result<_, D::Error>>()?,
+                blocks: network.blocks.iter().map(block).collect::<Result<_, DeviceError>>()?,
                 lin_out: network.lin_out.load(device)?,
             })
         };
-        Ok(Parameters { trunk, networks: self.networks.iter().map(network).collect::<Result<_, D::Error>>()? })
+        Ok(Parameters { trunk, networks: self.networks.iter().map(network).collect::<Result<_, DeviceError>>()? })
     }
 }
 

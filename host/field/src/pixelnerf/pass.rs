@@ -68,8 +68,6 @@ pub(super) struct Samples<D: Device> {
     count: u32,
 }
 
-pub(super) type Outcome<T, D> = Result<T, FieldError<<D as viewfuse_device::Memory>::Error>>;
-
 impl<D: Device> Renderer<'_, D> {
     /// The colours and depths (along the rays) of some pixels.
     pub(super) fn render(
@@ -78,7 +76,7 @@ impl<D: Device> Renderer<'_, D> {
         pixels: &[u32],
         seen: Option<&Seen<D>>,
         asked: &mut [Asked; 2],
-    ) -> Outcome<Pixels<D>, D> {
+    ) -> Result<Pixels<D>, FieldError> {
         let device = self.device;
         let failed = FieldError::Device;
         let rays = self.rays(pixels)?;
@@ -125,7 +123,7 @@ impl<D: Device> Renderer<'_, D> {
         rays: &Rays<D>,
         seen: Option<&Seen<D>>,
         asked: &mut Asked,
-    ) -> Outcome<Samples<D>, D> {
+    ) -> Result<Samples<D>, FieldError> {
         let block = self.coarse_block();
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
         self.device
@@ -158,7 +156,7 @@ impl<D: Device> Renderer<'_, D> {
         rays: &Rays<D>,
         samples: &Samples<D>,
         wanted: Option<(&WantedBlock, &D::Buffer<[f32; 2]>)>,
-    ) -> Outcome<Vec<u32>, D> {
+    ) -> Result<Vec<u32>, FieldError> {
         let all = 0..rays.count * samples.count;
         let Some((block, seen)) = wanted else { return Ok(all.collect()) };
         let mut marks = self.zeros(all.len())?;
@@ -178,7 +176,7 @@ impl<D: Device> Renderer<'_, D> {
         samples: &mut Samples<D>,
         list: &[u32],
         asked: &mut Asked,
-    ) -> Outcome<(), D> {
+    ) -> Result<(), FieldError> {
         let device = self.device;
         let failed = FieldError::Device;
         asked.samples += u64::from(rays.count * samples.count);
@@ -196,7 +194,7 @@ impl<D: Device> Renderer<'_, D> {
         Ok(())
     }
 
-    fn composite(&self, samples: &Samples<D>, ray_count: u32, pixels: &mut Pixels<D>) -> Outcome<(), D> {
+    fn composite(&self, samples: &Samples<D>, ray_count: u32, pixels: &mut Pixels<D>) -> Result<(), FieldError> {
         // A ray that meets nothing ends where looking ends.
         let CastBlock { far, .. } = self.cast;
         let block = CompositeBlock { background: self.background, empty_depth: far, sample_count: samples.count };
@@ -206,23 +204,23 @@ impl<D: Device> Renderer<'_, D> {
             .map_err(FieldError::Device)
     }
 
-    pub(super) fn rays(&self, pixels: &[u32]) -> Outcome<Rays<D>, D> {
+    pub(super) fn rays(&self, pixels: &[u32]) -> Result<Rays<D>, FieldError> {
         let (count, pixel_buffer) = (pixels.len() as u32, self.device.upload(pixels).map_err(FieldError::Device)?);
         let mut rays = Rays { count, pixels: pixel_buffer, rays: self.zeros(pixels.len())? };
         self.device.cast_rays(&self.cast, count, &rays.pixels, &mut rays.rays).map_err(FieldError::Device)?;
         Ok(rays)
     }
 
-    fn samples(&self, ray_count: usize, count: u32) -> Outcome<Samples<D>, D> {
+    fn samples(&self, ray_count: usize, count: u32) -> Result<Samples<D>, FieldError> {
         let all = ray_count * count as usize;
         Ok(Samples { depths: self.zeros(all)?, values: self.zeros(all)?, count })
     }
 
-    fn pixels(&self, count: usize) -> Outcome<Pixels<D>, D> {
+    fn pixels(&self, count: usize) -> Result<Pixels<D>, FieldError> {
         Ok(Pixels { colours: self.zeros(count)?, depths: self.zeros(count)? })
     }
 
-    pub(super) fn zeros<T: viewfuse_device::Element>(&self, count: usize) -> Outcome<D::Buffer<T>, D> {
+    pub(super) fn zeros<T: viewfuse_device::Element>(&self, count: usize) -> Result<D::Buffer<T>, FieldError> {
         self.device.zeros(count).map_err(FieldError::Device)
     }
 

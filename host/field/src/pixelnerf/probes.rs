@@ -2,7 +2,7 @@
 
 use super::network::Workspace;
 use super::options::LEAST_SHARE;
-use super::pass::{Asked, Outcome, Renderer, Seen, rays_at_once};
+use super::pass::{Asked, Renderer, Seen, rays_at_once};
 use crate::FieldError;
 use viewfuse_core::composite::Compositor;
 use viewfuse_device::Device;
@@ -13,7 +13,12 @@ const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 /
 
 impl<D: Device> Renderer<'_, D> {
     /// Looks at one ray in every square of `step` pixels, and at those of the last row and column, by the first pass.
-    pub(super) fn probe(&self, workspace: &mut Workspace<D>, step: u32, asked: &mut Asked) -> Outcome<Seen<D>, D> {
+    pub(super) fn probe(
+        &self,
+        workspace: &mut Workspace<D>,
+        step: u32,
+        asked: &mut Asked,
+    ) -> Result<Seen<D>, FieldError> {
         let failed = FieldError::Device;
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
         let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);

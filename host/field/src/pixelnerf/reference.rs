@@ -7,6 +7,7 @@ use crate::{Field, FieldError};
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{RayPoint, TargetRay};
+use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_job::progress::Silent;
 use viewfuse_scene::photographs::SourceImages;
@@ -34,7 +35,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn new(field: &'a PixelNerf, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError<D::Error>> {
+    pub fn new(field: &'a PixelNerf, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError> {
         let prepared = field.prepare(device, sources, &Silent)?;
         Ok(Reference { field, device, prepared })
     }
@@ -53,7 +54,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn latents(&self) -> Result<Vec<f32>, D::Error> {
+    pub fn latents(&self) -> Result<Vec<f32>, DeviceError> {
         let mut all = Vec::new();
         for image in &self.prepared.images {
             let Prepared { parameters, .. } = &self.prepared;
@@ -68,7 +69,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn radiance(&self, pass: Pass, weights: &[f32], points: &[RayPoint]) -> Result<Vec<[f32; 4]>, D::Error> {
+    pub fn radiance(&self, pass: Pass, weights: &[f32], points: &[RayPoint]) -> Result<Vec<[f32; 4]>, DeviceError> {
         let Reference { field, device, prepared } = self;
         for view in 0..prepared.images.len() {
             field.encode_view(*device, prepared, view)?;
@@ -94,7 +95,13 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn look(&self, pass: Pass, weights: &[f32], rays: &[TargetRay], depths: &[f32]) -> Result<SeenRays, D::Error> {
+    pub fn look(
+        &self,
+        pass: Pass,
+        weights: &[f32],
+        rays: &[TargetRay],
+        depths: &[f32],
+    ) -> Result<SeenRays, DeviceError> {
         let device = self.device;
         let sample_count = (depths.len() / rays.len()) as u32;
         let rays = self.load(rays)?;
@@ -141,7 +148,7 @@ impl<'a, D: Device> Reference<'a, D> {
         coarse_weights: &[f32],
         depths: &[f32],
         chances: &[[f32; 2]],
-    ) -> Result<[Vec<f32>; 2], D::Error> {
+    ) -> Result<[Vec<f32>; 2], DeviceError> {
         let device = self.device;
         let block = FineBlock { depth_times_opacity: 1, ..*block };
         let rays = self.load(rays)?;
@@ -158,7 +165,7 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok([device.download(&fine)?, device.download(&merged)?])
     }
 
-    fn load(&self, rays: &[TargetRay]) -> Result<Rays<D>, D::Error> {
+    fn load(&self, rays: &[TargetRay]) -> Result<Rays<D>, DeviceError> {
         let count = rays.len() as u32;
         let pixels: Vec<u32> = (0..count).collect();
         Ok(Rays { count, pixels: self.device.upload(&pixels)?, rays: self.device.upload(rays)? })

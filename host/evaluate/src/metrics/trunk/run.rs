@@ -17,8 +17,6 @@ use viewfuse_nn::weights::ConvolutionWeights;
 /// What Inception's batch norms add to variances.
 const BATCH_NORM_EPSILON: f64 = 1.0e-3;
 
-type Outcome<D, T> = Result<T, MetricError<<D as Memory>::Error>>;
-
 /// A trunk with its parameters on a device.
 pub struct Trunk<D: Device> {
     steps: Vec<Step<LoadedConvolution<D>>>,
@@ -42,7 +40,7 @@ impl<D: Device> Trunk<D> {
         checkpoint: &Checkpoint,
         steps: &[Step<Convolution>],
         optional: impl Fn(&str) -> bool,
-    ) -> Result<Trunk<D>, MetricError<D::Error>> {
+    ) -> Result<Trunk<D>, MetricError> {
         checkpoint.check(&tensors(steps, 3).0, optional)?;
         Ok(Trunk { steps: load(device, checkpoint, steps)? })
     }
@@ -52,7 +50,7 @@ impl<D: Device> Trunk<D> {
     /// # Errors
     /// [`MetricError::Small`] if a window is larger than what it is to slide over; [`MetricError::NotFinite`];
     /// [`MetricError::Device`].
-    pub fn taps(&self, device: &D, input: &HostImage) -> Result<Vec<HostImage>, MetricError<D::Error>> {
+    pub fn taps(&self, device: &D, input: &HostImage) -> Result<Vec<HostImage>, MetricError> {
         let mut run = Run { scratch: Scratch::new(device), input, taps: Vec::new() };
         let image = input.upload(device).map_err(MetricError::Device)?;
         run.steps(&self.steps, Rc::new(image))?;
@@ -65,7 +63,7 @@ fn load<D: Device>(
     device: &D,
     checkpoint: &Checkpoint,
     steps: &[Step<Convolution>],
-) -> Outcome<D, Vec<Step<LoadedConvolution<D>>>> {
+) -> Result<Vec<Step<LoadedConvolution<D>>>, MetricError> {
     let step = |step: &Step<Convolution>| {
         Ok(match step {
             Step::Convolve(convolution) => Step::Convolve(LoadedConvolution::load(device, checkpoint, convolution)?),
@@ -87,7 +85,7 @@ impl<D: Device> LoadedConvolution<D> {
         device: &D,
         checkpoint: &Checkpoint,
         convolution: &Convolution,
-    ) -> Result<LoadedConvolution<D>, MetricError<D::Error>> {
+    ) -> Result<LoadedConvolution<D>, MetricError> {
         let weights = weights(checkpoint, convolution)?;
         // Windows of one row or one column have become squares, which begin so much further out.
         let [above, left] = convolution.window.map(|length| (weights.size - length) / 2);
@@ -120,7 +118,11 @@ struct Run<'a, D: Device> {
 }
 
 impl<D: Device> Run<'_, D> {
-    fn steps(&mut self, steps: &[Step<LoadedConvolution<D>>], mut image: Rc<Image<D>>) -> Outcome<D, Rc<Image<D>>> {
+    fn steps(
+        &mut self,
+        steps: &[Step<LoadedConvolution<D>>],
+        mut image: Rc<Image<D>>,
+    ) -> Result<Rc<Image<D>>, MetricError> {
         for step in steps {
             image = match step {
                 Step::Convolve(LoadedConvolution { layer, options }) => {
@@ -154,16 +156,20 @@ impl<D: Device> Run<'_, D> {
         Ok(image)
     }
 
-    fn on_host(&self, image: &Image<D>, step: impl FnOnce(&HostImage) -> HostImage) -> Outcome<D, Rc<Image<D>>> {
+    fn on_host(
+        &self,
+        image: &Image<D>,
+        step: impl FnOnce(&HostImage) -> HostImage,
+    ) -> Result<Rc<Image<D>>, MetricError> {
         let output = step(&self.download(image)?);
         Ok(Rc::new(output.upload(self.scratch.device()).map_err(MetricError::Device)?))
     }
 
-    fn download(&self, image: &Image<D>) -> Outcome<D, HostImage> {
+    fn download(&self, image: &Image<D>) -> Result<HostImage, MetricError> {
         image.download(self.scratch.device()).map_err(MetricError::Device)
     }
 
-    fn small(&self) -> MetricError<D::Error> {
+    fn small(&self) -> MetricError {
         MetricError::Small { width: self.input.width, height: self.input.height }
     }
 }

@@ -1,9 +1,10 @@
 //! A residual block of the U-Net, and self-attention behind it.
 
-use super::{Outcome, PLAIN, group_norm};
+use super::{PLAIN, group_norm};
 use crate::FieldError;
 use std::f32::consts::FRAC_1_SQRT_2;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::attention::self_attention;
 use viewfuse_nn::convolution::{Convolution, ConvolutionOptions, DepthwiseConvolution, Residual};
 use viewfuse_nn::image::{Image, Size};
@@ -59,7 +60,7 @@ impl<D: Device> Block<D> {
         resample: Resample,
         side: u32,
         first_shift: u32,
-    ) -> Outcome<Block<D>, D> {
+    ) -> Result<Block<D>, FieldError> {
         let layer = |layer: &str| format!("{name}.{layer}");
         let conv0 = loader.convolution(&layer("conv0"), side)?;
         let has = |name: &str| loader.tensors.has(&layer(&format!("{name}.weight")));
@@ -68,7 +69,7 @@ impl<D: Device> Block<D> {
             _ => weights,
         };
         let attention = || {
-            Ok::<_, FieldError<D::Error>>(Attention {
+            Ok::<_, FieldError>(Attention {
                 norm2: group_norm(loader, &layer("norm2"))?,
                 // Published: the three of a channel lie together.
                 qkv: loader.changed_convolution(&layer("qkv"), 0, |weights| {
@@ -112,7 +113,7 @@ impl<D: Device> Block<D> {
         shifts: &D::Buffer<f32>,
         image: &Image<D>,
         output: &mut Image<D>,
-    ) -> Result<(), D::Error> {
+    ) -> Result<(), DeviceError> {
         let mut normalised = self.norm0.run(scratch, image, true)?;
         if let Some(halving) = &self.halving {
             let options = ConvolutionOptions { stride: 2, padding: Some(0), ..PLAIN };
@@ -153,7 +154,12 @@ impl<D: Device> Block<D> {
 
 impl<D: Device> Attention<D> {
     /// The image plus what attention makes of it.
-    fn run_into(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>, output: &mut Image<D>) -> Result<(), D::Error> {
+    fn run_into(
+        &self,
+        scratch: &mut Scratch<'_, D>,
+        image: &Image<D>,
+        output: &mut Image<D>,
+    ) -> Result<(), DeviceError> {
         let normalised = self.norm2.run(scratch, image, false)?;
         let qkv = self.qkv.run(scratch, PLAIN, &normalised, Residual::None)?;
         let attended = self_attention(scratch, &qkv)?;

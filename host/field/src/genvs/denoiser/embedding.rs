@@ -3,11 +3,11 @@
 //! Source: `networks.py` (`PositionalEmbedding` with `endpoint`, its halves exchanged, and `map_layer0`, `map_layer1`,
 //! `affine`). The embedding runs on the host, once a call and not once a pixel; the layers of all blocks are one linear layer.
 
-use super::Outcome;
 use crate::FieldError;
 use viewfuse_core::math::{exp, ln, sin_cos};
 use viewfuse_core::network::normalise::silu;
 use viewfuse_device::Device;
+use viewfuse_device::DeviceError;
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::linear::{Linear, LinearOptions};
 use viewfuse_nn::loader::{Loader, Tensors};
@@ -43,7 +43,7 @@ pub(super) struct Embedding<D: Device> {
 }
 
 impl<D: Device> Embedding<D> {
-    pub(super) fn load(loader: &Loader<'_, D>, shifts: ShiftLayers) -> Outcome<Embedding<D>, D> {
+    pub(super) fn load(loader: &Loader<'_, D>, shifts: ShiftLayers) -> Result<Embedding<D>, FieldError> {
         let [map_layer0, map_layer1] = ["map_layer0", "map_layer1"].map(|name| loader.tensors.linear(name));
         let (map_layer0, map_layer1) = (map_layer0?, map_layer1?);
         let affine = LinearWeights::concatenated(&shifts.layers, map_layer1.bias.len());
@@ -52,7 +52,7 @@ impl<D: Device> Embedding<D> {
     }
 
     /// The shifts of all blocks at a noise level, given as [`viewfuse_core::schedule::Preconditioning::noise`].
-    pub(super) fn shifts(&self, device: &D, noise: f32) -> Result<D::Buffer<f32>, D::Error> {
+    pub(super) fn shifts(&self, device: &D, noise: f32) -> Result<D::Buffer<f32>, DeviceError> {
         let mapped =
             |layer: &LinearWeights, inputs: &[f32]| layer.run(inputs).into_iter().map(silu).collect::<Vec<f32>>();
         let waves = waves(noise, self.map_layer0.in_count());

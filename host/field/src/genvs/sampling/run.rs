@@ -2,7 +2,7 @@
 
 use super::super::super::FieldError;
 use super::super::super::finite::download_finite;
-use super::{Outcome, Plan, Sampled, Start};
+use super::{Plan, Sampled, Start};
 use std::collections::VecDeque;
 use viewfuse_core::math::{clamp, ln_ratio};
 use viewfuse_core::sampler::control::{FIRST_STEP, change_to_come, reached, verdict};
@@ -39,7 +39,7 @@ struct Denoised<D: Device> {
 
 impl<'a, D: Device, F> Run<'a, D, F>
 where
-    F: FnMut(&D::Buffer<f32>, f32, &mut D::Buffer<f32>) -> Outcome<(), D>,
+    F: FnMut(&D::Buffer<f32>, f32, &mut D::Buffer<f32>) -> Result<(), FieldError>,
 {
     pub(super) fn new(
         device: &'a D,
@@ -68,7 +68,7 @@ where
         sampler: Sampler,
         level_count: u32,
         start: Start<'_, D>,
-    ) -> Outcome<Sampled<D>, D> {
+    ) -> Result<Sampled<D>, FieldError> {
         let schedule = self.plan.schedule;
         let level = |index: u32| schedule.level(index, level_count);
         let is_reached = |index: &u32| level(*index) <= start.highest();
@@ -125,7 +125,7 @@ where
         tolerance: f32,
         most_calls: u32,
         start: Start<'_, D>,
-    ) -> Outcome<Sampled<D>, D> {
+    ) -> Result<Sampled<D>, FieldError> {
         let sampler = Sampler::UniPc;
         let [largest, smallest] = [0, 1].map(|index| self.plan.schedule.level(index, 2));
         let highest = clamp(start.highest(), smallest, largest);
@@ -167,7 +167,7 @@ where
     }
 
     /// A call of the denoiser. What it says is finite.
-    fn call(&mut self, state: &D::Buffer<f32>, sigma: f32) -> Outcome<Denoised<D>, D> {
+    fn call(&mut self, state: &D::Buffer<f32>, sigma: f32) -> Result<Denoised<D>, FieldError> {
         self.progress.check()?;
         let mut buffer = self.buffer()?;
         (self.denoise)(state, sigma, &mut buffer)?;
@@ -185,7 +185,13 @@ where
     }
 
     /// Keeps what later steps need of a call.
-    fn keep(&mut self, sampler: Sampler, sigma: f32, state: &D::Buffer<f32>, denoised: Denoised<D>) -> Outcome<(), D> {
+    fn keep(
+        &mut self,
+        sampler: Sampler,
+        sigma: f32,
+        state: &D::Buffer<f32>,
+        denoised: Denoised<D>,
+    ) -> Result<(), FieldError> {
         let Denoised { buffer, values } = denoised;
         let kept = match sampler.kept(sigma) {
             None => buffer,
@@ -218,7 +224,7 @@ where
         mix: &Mix,
         state: &D::Buffer<f32>,
         said: Option<&D::Buffer<f32>>,
-    ) -> Outcome<D::Buffer<f32>, D> {
+    ) -> Result<D::Buffer<f32>, FieldError> {
         let mut mixed = self.buffer()?;
         // What is not there has coefficient 0.
         let mut all = said.into_iter().chain(&self.results);
@@ -231,7 +237,7 @@ where
     }
 
     /// The state at a run's first level.
-    fn begun(&mut self, start: &Start<'_, D>, level: f32) -> Outcome<D::Buffer<f32>, D> {
+    fn begun(&mut self, start: &Start<'_, D>, level: f32) -> Result<D::Buffer<f32>, FieldError> {
         match start {
             Start::Noise => self.noisy(None, level, START),
             Start::Picture { picture, .. } => self.noisy(Some(picture), level, START),
@@ -240,7 +246,12 @@ where
     }
 
     /// A picture, or nothing, with noise.
-    fn noisy(&mut self, picture: Option<&D::Buffer<f32>>, scale: f32, stream: u32) -> Outcome<D::Buffer<f32>, D> {
+    fn noisy(
+        &mut self,
+        picture: Option<&D::Buffer<f32>>,
+        scale: f32,
+        stream: u32,
+    ) -> Result<D::Buffer<f32>, FieldError> {
         let mut noisy = self.buffer()?;
         let block = NoiseBlock { seed: [self.plan.seed as u32, (self.plan.seed >> 32) as u32], stream, scale };
         let nothing;
@@ -255,7 +266,7 @@ where
         Ok(noisy)
     }
 
-    fn buffer(&mut self) -> Outcome<D::Buffer<f32>, D> {
+    fn buffer(&mut self) -> Result<D::Buffer<f32>, FieldError> {
         match self.free.pop() {
             Some(buffer) => Ok(buffer),
             None => self.device.zeros(self.element_count).map_err(FieldError::Device),
