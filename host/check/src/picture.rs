@@ -11,11 +11,10 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::metrics::psnr;
-use viewfuse_device::Device;
+use viewfuse_device::choice::AnyDevice;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_field::Field;
-use viewfuse_field::photo::PhotoField;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse_field::{AnyField, Renderer};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Selection};
@@ -72,20 +71,21 @@ impl Picture {
             sources: None,
             view_count: Some(MOST_SOURCES),
         };
-        let job = selection.resolve(&scene, Field::<Cpu>::least_sources(&PhotoField::default()))?;
+        let job = selection.resolve(&scene, AnyField::default().about().least_sources)?;
         let options =
             RenderOptions { size: job.targets.first().and_then(|t| size(&t.camera)), ..RenderOptions::default() };
-        let (reference, reference_time) = rendered(&Cpu, &scene, &job, &options, progress)?;
+        let (reference, reference_time) =
+            rendered(AnyField::default().on(&AnyDevice::Cpu(Cpu)).as_ref(), &scene, &job, &options, progress)?;
         Ok(Picture { scene, name, job, options, reference, reference_time, _folder: folder })
     }
 
-    /// Renders it on a device and compares it with the CPU's.
+    /// Renders it with the training-free field on a device and compares it with the CPU's.
     ///
     /// # Errors
     /// [`CheckError::Picture`].
-    pub fn check<D: Device>(
+    pub fn check(
         &self,
-        device: &D,
+        renderer: &dyn Renderer,
         role: Role,
         progress: &dyn Progress,
     ) -> Result<PictureReport, CheckError> {
@@ -101,7 +101,8 @@ impl Picture {
         // The CPU's picture is not compared with itself.
         if role == Role::Other {
             let failed = |source| CheckError::Picture { scene: self.name.clone(), source };
-            let (picture, time) = rendered(device, &self.scene, &self.job, &self.options, progress).map_err(failed)?;
+            let (picture, time) =
+                rendered(renderer, &self.scene, &self.job, &self.options, progress).map_err(failed)?;
             report.seconds = time.as_secs_f64();
             let (versus, breach) = compare(&picture, &self.reference);
             (report.versus_cpu, report.breach) = (versus, breach);
@@ -133,8 +134,8 @@ fn synthetic() -> Result<TempDir, AnyError> {
 }
 
 /// The picture of a job's only target, and the time from the photographs to it.
-fn rendered<D: Device>(
-    device: &D,
+fn rendered(
+    renderer: &dyn Renderer,
     scene: &Scene,
     job: &FewShot,
     options: &RenderOptions,
@@ -147,7 +148,7 @@ fn rendered<D: Device>(
         picture = Some(frame.picture);
         Ok(())
     };
-    render(scene, job, &weighting, device, &PhotoField::default(), options, progress, keep)?;
+    render(scene, job, &weighting, renderer, options, progress, keep)?;
     let time = start.elapsed();
     Ok((picture.ok_or("the scene has no view to render")?, time))
 }

@@ -1,10 +1,9 @@
 //! How good is each weighting scheme: views are left out of the sources, rendered, and compared with their photographs.
 
-use crate::metrics::{MetricError, Metrics};
+use crate::metrics::{MetricError, Scorer};
 use image::RgbImage;
 use std::time::{Duration, Instant};
-use viewfuse_device::Device;
-use viewfuse_field::Field;
+use viewfuse_field::Renderer;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
@@ -66,22 +65,20 @@ impl Score {
 }
 
 /// What renders and scores.
-pub struct Evaluator<'a, D: Device, F> {
+pub struct Evaluator<'a> {
     /// The schemes.
     pub weightings: &'a [Weighting],
-    /// Where kernels run.
-    pub device: &'a D,
     /// What makes the pictures.
-    pub field: &'a F,
+    pub renderer: &'a dyn Renderer,
     /// How.
     pub options: &'a RenderOptions,
     /// What scores them.
-    pub metrics: &'a Metrics<D>,
+    pub scorer: &'a dyn Scorer,
     /// Where progress and warnings are shown.
     pub progress: &'a dyn Progress,
 }
 
-impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
+impl Evaluator<'_> {
     /// Scores every scheme on targets that share their sources, after copying the nearest source. `seen` gets each rendered
     /// frame with its scheme, its values and the sources at working size.
     ///
@@ -95,9 +92,9 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         targets: &[usize],
         mut seen: impl FnMut(&Weighting, &Frame, &[(String, f64)], &SourceImages),
     ) -> Result<Vec<Score>, EvaluateError> {
-        let Evaluator { weightings, device, field, options, metrics, progress } = *self;
+        let Evaluator { weightings, renderer, options, scorer, progress } = *self;
         let values = |prediction: &RgbImage, truth: &RgbImage| -> Result<Vec<(String, f64)>, MetricError> {
-            let scored = metrics.compare(device, prediction, truth)?;
+            let scored = scorer.score(prediction, truth)?;
             Ok(scored.into_iter().map(|scored| (scored.name.to_owned(), scored.value)).collect())
         };
         let score = |scheme: &str, target: usize, values: Vec<(String, f64)>, time: Duration| Score {
@@ -107,7 +104,7 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
             values,
             time,
         };
-        let mut stage = Stage::prepare(scene, album, sources, device, field, options, progress)?;
+        let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
         let mut scores = Vec::new();
         for &target in targets {
             let nearest = nearest_source(scene, sources, target);
@@ -119,10 +116,10 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for weighting in weightings {
             let start = Instant::now();
-            let latents = stage.encode(weighting, progress)?;
+            stage.weigh(weighting, progress)?;
             let encode_share = start.elapsed() / targets.len().max(1) as u32;
             for &target in targets {
-                let frame = stage.frame(weighting, &latents, &target_of(scene, target), progress)?;
+                let frame = stage.frame(weighting, &target_of(scene, target), progress)?;
                 if let Some(truth) = &frame.truth {
                     let time = encode_share + frame.time.saturating_sub(frame.encode);
                     shared += frame.encode;
@@ -143,7 +140,7 @@ impl<D: Device, F: Field<D>> Evaluator<'_, D, F> {
     /// # Errors
     /// [`EvaluateError`].
     pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError> {
-        let groups = source_groups(scene, selection, self.field.least_sources())?;
+        let groups = source_groups(scene, selection, self.renderer.about().least_sources)?;
         let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
         let album = Album::open(scene, used, self.progress).map_err(RenderError::from)?;
         let mut scores = Vec::new();

@@ -5,7 +5,7 @@ use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::photo::ObjectBlock;
-use viewfuse_field::photo::find_object;
+use viewfuse_field::training_free::find_object;
 use viewfuse_job::progress::Interrupted;
 use viewfuse_job::progress::Progress;
 use viewfuse_output::canvas::{BLUE, Canvas, GREY, INK, LINE_HEIGHT, RED};

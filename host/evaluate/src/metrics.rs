@@ -149,6 +149,29 @@ impl<D: Device> Metrics<D> {
     }
 }
 
+/// What scores pictures, wherever its networks run.
+pub trait Scorer {
+    /// Scores a prediction, as [`Metrics::compare`] does.
+    ///
+    /// # Errors
+    /// [`MetricError`].
+    fn score(&self, prediction: &RgbImage, truth: &RgbImage) -> Result<Vec<Scored>, MetricError>;
+}
+
+/// Metrics with the device that holds their networks.
+pub struct MetricsOn<'a, D: Device> {
+    /// The device.
+    pub device: &'a D,
+    /// The metrics.
+    pub metrics: Metrics<D>,
+}
+
+impl<D: Device> Scorer for MetricsOn<'_, D> {
+    fn score(&self, prediction: &RgbImage, truth: &RgbImage) -> Result<Vec<Scored>, MetricError> {
+        self.metrics.compare(self.device, prediction, truth)
+    }
+}
+
 /// Only pictures of one size can be compared.
 fn same_size(prediction: &RgbImage, truth: &RgbImage) -> Result<(), MetricError> {
     match prediction.dimensions() == truth.dimensions() {

@@ -8,7 +8,6 @@
 //! falls on all of them; still, times on a shared machine are noisy, and differences of a few percent mean nothing.
 
 pub mod difference;
-pub mod enlarged;
 pub mod front;
 #[cfg(feature = "plot")]
 pub mod plot;
@@ -19,9 +18,9 @@ use difference::Difference;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use std::time::Duration;
-use viewfuse_device::Device;
+use viewfuse_device::choice::AnyDevice;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
-use viewfuse_field::{Denoising, Field, LeftOut};
+use viewfuse_field::{AnyField, Record, Renderer};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target};
@@ -29,12 +28,12 @@ use viewfuse_scene::photographs::{Album, SourceImages};
 use viewfuse_weighting::Weighting;
 
 /// One way to make the pictures.
-#[derive(Clone, Debug)]
-pub struct Setting<F> {
+#[derive(Clone)]
+pub struct Setting {
     /// In a few words, for tables and labels.
     pub words: String,
     /// The field, set up for it.
-    pub field: F,
+    pub field: AnyField,
     /// What is set outside of the field. The size must be the same in all settings.
     pub options: RenderOptions,
 }
@@ -55,10 +54,8 @@ pub struct Point {
     /// Peak signal to noise ratio against the photographs in decibels, of 8-bit values, the mean over the targets that
     /// have one.
     pub truth_psnr: Option<f64>,
-    /// What the field left out in one round.
-    pub left_out: Vec<LeftOut>,
-    /// How the field went from noise to the pictures of one round; `None` for fields that do not.
-    pub denoising: Option<Denoising>,
+    /// What the field did and left out in one round.
+    pub record: Record,
     /// Whether every round gave the same pictures, bit for bit.
     pub is_repeatable: bool,
 }
@@ -104,10 +101,10 @@ impl Subject<'_> {
     ///
     /// # Errors
     /// [`RenderError`].
-    pub fn measure<D: Device, F: Field<D>>(
+    pub fn measure(
         &self,
-        device: &D,
-        settings: &[Setting<F>],
+        device: &AnyDevice,
+        settings: &[Setting],
         round_count: u32,
         progress: &dyn Progress,
     ) -> Result<Measured, RenderError> {
@@ -120,17 +117,20 @@ impl Subject<'_> {
         let mut size = [0; 2];
         let mut firsts: Vec<First> = Vec::new();
         for (setting, images) in settings.iter().zip(&images) {
-            let Round { frames, .. } = self.round(device, setting, images, &self.job.targets, progress)?;
+            let renderer = setting.field.on(device);
+            let Round { frames, record, .. } =
+                self.round(renderer.as_ref(), &setting.options, images, &self.job.targets, progress)?;
             if exact.is_empty() {
                 exact = frames.iter().map(|frame| frame.colours.clone()).collect();
                 size = frames.first().map_or(size, |frame| frame.picture.dimensions().into());
             }
-            firsts.push(First::of::<D, F>(&frames, &exact, &setting.field));
+            firsts.push(First::of(&frames, &exact, record));
         }
         let mut times: Vec<Vec<[f64; 2]>> = vec![Vec::new(); settings.len()];
         for _ in 0..round_count {
             for (index, (setting, images)) in settings.iter().zip(&images).enumerate() {
-                let round = self.round(device, setting, images, &without_truth, progress)?;
+                let renderer = setting.field.on(device);
+                let round = self.round(renderer.as_ref(), &setting.options, images, &without_truth, progress)?;
                 times[index].push(round.seconds_a_target());
                 firsts[index].is_repeatable &= fingerprint(&round.frames) == firsts[index].fingerprint;
             }
@@ -141,16 +141,13 @@ impl Subject<'_> {
     }
 
     /// The sources for each setting; those of one size are prepared once.
-    fn images<D: Device, F: Field<D>>(
-        &self,
-        settings: &[Setting<F>],
-        progress: &dyn Progress,
-    ) -> Result<Vec<Arc<SourceImages>>, RenderError> {
+    fn images(&self, settings: &[Setting], progress: &dyn Progress) -> Result<Vec<Arc<SourceImages>>, RenderError> {
         let Subject { scene, album, job, .. } = self;
         let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
         let mut images = Vec::new();
         for Setting { field, options, .. } in settings {
-            let side = field.source_side(working_side(scene, options, field.longest_side())?);
+            let about = field.about();
+            let side = about.source_side.of(working_side(scene, options, about.longest_side)?);
             if !known.iter().any(|(known_side, _)| *known_side == side) {
                 let prepared = album.sources(&job.sources, side, options.background, progress)?;
                 if let Some(warning) = &prepared.warning {
@@ -163,26 +160,25 @@ impl Subject<'_> {
         Ok(images)
     }
 
-    fn round<D: Device, F: Field<D>>(
+    fn round(
         &self,
-        device: &D,
-        setting: &Setting<F>,
+        renderer: &dyn Renderer,
+        options: &RenderOptions,
         images: &Arc<SourceImages>,
         targets: &[Target],
         progress: &dyn Progress,
     ) -> Result<Round, RenderError> {
-        let (Setting { field, options, .. }, quiet) = (setting, Silent);
-        let (images, sources) = (Arc::clone(images), &self.job.sources);
-        let mut stage = Stage::of_images(self.scene, self.album, sources, images, device, field, options, &quiet)?;
+        let (images, sources, quiet) = (Arc::clone(images), &self.job.sources, Silent);
+        let mut stage = Stage::of_images(self.scene, self.album, sources, images, renderer, options, &quiet)?;
         // What was sent to the device must not end within the first measured time.
-        device.finish().map_err(viewfuse_field::FieldError::Device)?;
-        let latents = stage.encode(self.weighting, &quiet)?;
+        renderer.finish().map_err(viewfuse_field::FieldError::Device)?;
+        stage.weigh(self.weighting, &quiet)?;
         let mut frames = Vec::new();
         for target in targets {
-            frames.push(stage.frame(self.weighting, &latents, target, &quiet)?);
+            frames.push(stage.frame(self.weighting, target, &quiet)?);
             progress.step();
         }
-        Ok(Round { encode: stage.costs.encode, frames })
+        Ok(Round { encode: stage.costs.encode, record: stage.record(), frames })
     }
 }
 
@@ -190,6 +186,7 @@ impl Subject<'_> {
 struct Round {
     /// What the targets share.
     encode: Duration,
+    record: Record,
     frames: Vec<Frame>,
 }
 
@@ -206,33 +203,25 @@ impl Round {
 struct First {
     difference: Difference,
     truth_psnr: Option<f64>,
-    left_out: Vec<LeftOut>,
-    denoising: Option<Denoising>,
+    record: Record,
     fingerprint: u64,
     is_repeatable: bool,
 }
 
 impl First {
-    fn of<D: Device, F: Field<D>>(frames: &[Frame], exact: &[Vec<[f32; 4]>], field: &F) -> First {
+    fn of(frames: &[Frame], exact: &[Vec<[f32; 4]>], record: Record) -> First {
         let mut difference = Difference::default();
         for (frame, exact) in frames.iter().zip(exact) {
             difference.add(&frame.colours, exact);
         }
         let scores: Vec<f64> = frames.iter().filter_map(|frame| Some(frame.truth.as_ref()?.psnr)).collect();
         let truth_psnr = (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / scores.len() as f64);
-        First {
-            difference,
-            truth_psnr,
-            left_out: field.left_out(),
-            denoising: field.denoising(),
-            fingerprint: fingerprint(frames),
-            is_repeatable: true,
-        }
+        First { difference, truth_psnr, record, fingerprint: fingerprint(frames), is_repeatable: true }
     }
 
     /// `times[round]`: in all and for encoding.
     fn point(self, words: &str, times: &[[f64; 2]]) -> Point {
-        let First { difference, truth_psnr, left_out, denoising, is_repeatable, .. } = self;
+        let First { difference, truth_psnr, record, is_repeatable, .. } = self;
         let all = sorted(times.iter().map(|[all, _]| *all));
         let encode = sorted(times.iter().map(|[_, encode]| *encode));
         let end = |time: Option<&f64>| time.copied().unwrap_or(f64::NAN);
@@ -243,8 +232,7 @@ impl First {
             encode_seconds: median(&encode),
             difference,
             truth_psnr,
-            left_out,
-            denoising,
+            record,
             is_repeatable,
         }
     }

@@ -17,6 +17,27 @@ pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
     NEAR_FAR_SHARES.map(|share| share * if distance > 0.0 { distance } else { 1.0 })
 }
 
+/// Rays are to end where they begin or before, or one of the two is NaN or infinite.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("rays from depth {near} to depth {far} have nothing between their ends")]
+pub struct NoDepths {
+    /// Where they begin.
+    pub near: f32,
+    /// Where they end.
+    pub far: f32,
+}
+
+impl NoDepths {
+    /// Near and far bounds as they are, if there is something between them.
+    ///
+    /// # Errors
+    /// [`NoDepths`].
+    pub fn check([near, far]: [f32; 2]) -> Result<[f32; 2], NoDepths> {
+        // Not the other way round: NaN is no depth either.
+        if near < far && (far - near).is_finite() { Ok([near, far]) } else { Err(NoDepths { near, far }) }
+    }
+}
+
 /// A texel (colour times opacity, opacity) over white: red, green, blue in `[-1, 1]`.
 pub(super) fn over_white([red, green, blue, alpha]: [f32; 4]) -> [f32; 3] {
     [red, green, blue].map(|colour| 2.0 * (colour + 1.0 - alpha) - 1.0)

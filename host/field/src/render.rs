@@ -1,6 +1,6 @@
 //! The way of the data, from a scene to pictures.
 
-use crate::{Field, FieldError, Rendered};
+use crate::{FieldError, Record, Rendered, Renderer, Session};
 use image::RgbImage;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -8,12 +8,10 @@ use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_core::weights::{Omission, Weights};
-use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{
-    Album, BackgroundChoice, PhotographsError, SourceImage, SourceImages, longest_side, reduced_size, scaled_size,
-    to_rgb8,
+    Album, BackgroundChoice, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8,
 };
 use viewfuse_scene::{Scene, SceneError, View};
 use viewfuse_weighting::Weighting;
@@ -33,8 +31,8 @@ pub enum RenderError {
     Sources(SourcesError),
     /// The size does not fit the scene.
     #[error(
-        "a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); \
-             for this width it would be {width}x{fitting_height}"
+        "a size of {width}x{height} does not keep the shape of the views ({view_width}x{view_height}); for this width it \
+         would be {width}x{fitting_height}"
     )]
     Shape {
         /// Asked for.
@@ -58,24 +56,41 @@ pub enum RenderError {
         /// Why not.
         error: PinholeError,
     },
-    /// The silhouettes have no point of space in common.
-    #[error(
-        "{scene}: the silhouettes of the sources have no common object: no point lies inside all of them; check the \
-         poses and the background"
-    )]
-    NoObject {
+    /// The scene does not suit the field.
+    #[error("{scene}: {reason}")]
+    Unsuitable {
         /// The scene's path.
         scene: String,
+        /// The field's own error.
+        reason: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The field failed.
     #[error(transparent)]
     Field(#[from] FieldError),
 }
 
+impl RenderError {
+    /// A field's error, with the scene's path where it is about the scene.
+    fn of(error: FieldError, scene: &Scene) -> RenderError {
+        match error {
+            FieldError::Unsuitable(reason) => {
+                RenderError::Unsuitable { scene: scene.path.display().to_string(), reason }
+            }
+            error => error.into(),
+        }
+    }
+
+    /// Whether the device failed, and not the work.
+    pub fn is_of_device(&self) -> bool {
+        matches!(self, RenderError::Field(FieldError::Device(_)))
+    }
+}
+
 /// What a person can set about a render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Width and height of the pictures; otherwise the views' size, at most the field's [`Field::longest_side`] on a side.
+    /// Width and height of the pictures; otherwise the views' size, at most the field's
+    /// [`About::longest_side`](crate::About::longest_side) on a side.
     pub size: Option<[u32; 2]>,
     /// What is behind the object.
     pub background: BackgroundChoice,
@@ -113,8 +128,6 @@ pub struct StageCosts {
     pub prepare: Duration,
     /// Encoding the sources, as far as it does not wait for the frames that need them ([`Frame::encode`]).
     pub encode: Duration,
-    /// What the run was estimated to take of memory, in bytes; see [`Field::memory_estimate`].
-    pub memory_estimate: Option<u64>,
 }
 
 /// One target's picture with all that led to it.
@@ -161,7 +174,7 @@ impl Truth {
 }
 
 /// The longest side of the pictures of a run: what was asked for, or that of the largest photograph, at most `longest`
-/// (a field's [`Field::longest_side`]).
+/// (a field's [`About::longest_side`](crate::About::longest_side)).
 ///
 /// # Errors
 /// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
@@ -182,22 +195,20 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
 }
 
 /// A set of sources on a device: everything that no weighting and no target changes.
-pub struct Stage<'a, D: Device, F: Field<D>> {
+pub struct Stage<'a> {
     scene: &'a Scene,
     album: &'a Album<'a>,
-    device: &'a D,
-    field: &'a F,
     options: &'a RenderOptions,
     side: u32,
     sources: SourcePoses,
     /// The sources at working size.
     pub images: Arc<SourceImages>,
-    prepared: F::Prepared,
+    session: Session<'a>,
     /// What the stages took so far.
     pub costs: StageCosts,
 }
 
-impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
+impl<'a> Stage<'a> {
     /// Prepares these source views on the device.
     ///
     /// # Errors
@@ -206,20 +217,19 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         scene: &'a Scene,
         album: &'a Album<'a>,
         sources: &[usize],
-        device: &'a D,
-        field: &'a F,
+        renderer: &'a dyn Renderer,
         options: &'a RenderOptions,
         progress: &dyn Progress,
-    ) -> Result<Stage<'a, D, F>, RenderError> {
-        let side = working_side(scene, options, field.longest_side())?;
+    ) -> Result<Stage<'a>, RenderError> {
+        let about = renderer.about();
+        let source_side = about.source_side.of(working_side(scene, options, about.longest_side)?);
         let mut photographs = Duration::ZERO;
-        let images =
-            timed(&mut photographs, || album.sources(sources, field.source_side(side), options.background, progress))?;
+        let images = timed(&mut photographs, || album.sources(sources, source_side, options.background, progress))?;
         if let Some(warning) = &images.warning {
             progress.warn(&format!("{}: {warning}", scene.path.display()));
         }
         let images = Arc::new(images);
-        let mut stage = Stage::of_images(scene, album, sources, images, device, field, options, progress)?;
+        let mut stage = Stage::of_images(scene, album, sources, images, renderer, options, progress)?;
         stage.costs.photographs = photographs;
         Ok(stage)
     }
@@ -235,35 +245,34 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         album: &'a Album<'a>,
         sources: &[usize],
         images: Arc<SourceImages>,
-        device: &'a D,
-        field: &'a F,
+        renderer: &'a dyn Renderer,
         options: &'a RenderOptions,
         progress: &dyn Progress,
-    ) -> Result<Stage<'a, D, F>, RenderError> {
+    ) -> Result<Stage<'a>, RenderError> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
-        let side = working_side(scene, options, field.longest_side())?;
+        let side = working_side(scene, options, renderer.about().longest_side)?;
         let mut costs = StageCosts::default();
-        let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
-        let sizes: Vec<[u32; 2]> = images.images.iter().map(size).collect();
-        costs.memory_estimate = field.memory_estimate(device, &sizes);
-        let prepared =
-            timed(&mut costs.prepare, || field.prepare(device, &images, progress)).map_err(|error| match error {
-                FieldError::NoObject => RenderError::NoObject { scene: scene.path.display().to_string() },
-                error => error.into(),
-            })?;
-        Ok(Stage { scene, album, device, field, options, side, sources: source_poses, images, prepared, costs })
+        let session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))
+            .map_err(|error| RenderError::of(error, scene))?;
+        Ok(Stage { scene, album, options, side, sources: source_poses, images, session, costs })
     }
 
-    /// Encodes the sources under a weighting: each source as a target of the others.
+    /// Begins a weighting, for the frames that follow: encodes the sources as far as that does not wait for the frames, each
+    /// source as a target of the others.
     ///
     /// # Errors
-    /// [`RenderError::Field`].
-    pub fn encode(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<F::Latents, RenderError> {
+    /// [`RenderError`].
+    pub fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
         let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
-        let (field, device, prepared) = (self.field, self.device, &self.prepared);
-        let latents = timed(&mut self.costs.encode, || field.encode(device, prepared, &relevance, progress))?;
-        Ok(latents)
+        let session = &mut self.session;
+        timed(&mut self.costs.encode, || session.weigh(&relevance, progress))
+            .map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// What the field did and left out so far.
+    pub fn record(&self) -> Record {
+        self.session.record()
     }
 
     /// Weighs the sources for a target, leaves out what does not count, renders, and compares with the truth.
@@ -271,9 +280,8 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
     /// # Errors
     /// [`RenderError`].
     pub fn frame(
-        &self,
+        &mut self,
         weighting: &Weighting,
-        latents: &F::Latents,
         target: &Target,
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
@@ -281,19 +289,11 @@ impl<'a, D: Device, F: Field<D>> Stage<'a, D, F> {
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
         let camera = self.at_working_size(&target.camera)?;
+        let failed = |error| RenderError::of(error, self.scene);
         let mut encode = Duration::ZERO;
-        timed(&mut encode, || {
-            self.field.encode_used(self.device, &self.prepared, latents, &omission.weights, progress)
-        })?;
-        let rendered = self.field.render(
-            self.device,
-            &self.prepared,
-            latents,
-            &omission.weights,
-            &camera,
-            self.options.settled,
-            progress,
-        )?;
+        timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
+        let settled = self.options.settled;
+        let rendered = self.session.render(&camera, &omission.weights, settled, progress).map_err(failed)?;
         let time = start.elapsed();
         let Rendered { colours, depths, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);
@@ -359,32 +359,39 @@ fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32)
         .collect()
 }
 
-/// Renders every target of a job and hands each frame over as soon as it is done. Returns the times of what the frames
-/// share.
+/// What a run tells when it is done.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Finished {
+    /// The times of what the frames share.
+    pub costs: StageCosts,
+    /// What the field did and left out.
+    pub record: Record,
+}
+
+/// Renders every target of a job and hands each frame over as soon as it is done.
 ///
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.
 #[allow(clippy::too_many_arguments)]
-pub fn render<D: Device, F: Field<D>, X: From<RenderError>>(
+pub fn render<X: From<RenderError>>(
     scene: &Scene,
     job: &FewShot,
     weighting: &Weighting,
-    device: &D,
-    field: &F,
+    renderer: &dyn Renderer,
     options: &RenderOptions,
     progress: &dyn Progress,
     mut deliver: impl FnMut(&SourceImages, Frame) -> Result<(), X>,
-) -> Result<StageCosts, X> {
+) -> Result<Finished, X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
     let album = Album::open(scene, shown, progress).map_err(RenderError::from)?;
-    let mut stage = Stage::prepare(scene, &album, &job.sources, device, field, options, progress)?;
-    let latents = stage.encode(weighting, progress)?;
+    let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
+    stage.weigh(weighting, progress)?;
     for target in &job.targets {
-        let frame = stage.frame(weighting, &latents, target, progress)?;
+        let frame = stage.frame(weighting, target, progress)?;
         deliver(&stage.images, frame)?;
     }
-    Ok(stage.costs)
+    Ok(Finished { costs: stage.costs, record: stage.record() })
 }
 
 /// Runs a piece of work and adds its time.

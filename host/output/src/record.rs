@@ -47,6 +47,8 @@ pub struct RunRecord {
     pub sources: Vec<String>,
     /// What it was estimated to take of memory beside photographs and pictures, in bytes; null for fields that cannot tell.
     pub memory_estimate: Option<u64>,
+    /// Near and far bounds of rays, world units; null for fields that find their own.
+    pub near_far: Option<[f32; 2]>,
     /// Times of what all frames share.
     pub times: TimesRecord,
     /// What each kernel took, for devices that tell.

@@ -51,8 +51,8 @@ pub(super) fn verify<D: Device>(
     if sources.images.iter().any(|image| image.texels.len() != side * side) {
         return Err(file.wrong("images", format!("are not {side}x{side}")));
     }
-    let reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
-    let comparison = Comparison { file: &file, reference: &reference, side };
+    let mut reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
+    let mut comparison = Comparison { file: &file, reference: &mut reference, side };
     let mut known: Vec<String> = ["images", "src_poses", "tgt_pose", "focal_normalized"].map(str::to_owned).to_vec();
     known.extend(comparison.volumes(report)?);
     known.extend(comparison.points(report)?);
@@ -87,7 +87,7 @@ fn doubles(file: &File<'_>, name: &str) -> Result<Vec<f64>, VerifyError> {
 /// A device's network and the file.
 struct Comparison<'a, 'b, D: Device> {
     file: &'a File<'a>,
-    reference: &'a Reference<'b, D>,
+    reference: &'a mut Reference<'b, D>,
     /// Of the images.
     side: usize,
 }
@@ -117,7 +117,7 @@ impl<D: Device> Comparison<'_, '_, D> {
         (0..values.len()).map(|at| values[at % channels * pixels + at / channels]).collect()
     }
 
-    fn volumes(&self, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    fn volumes(&mut self, report: &mut Report) -> Result<Vec<String>, VerifyError> {
         let encoder = &self.reference.architecture().encoder;
         let (features, depths, pixels) = (encoder.feature_count, encoder.volume_depth, self.side * self.side);
         let view_len = features * depths * pixels;
@@ -149,7 +149,7 @@ impl<D: Device> Comparison<'_, '_, D> {
         Ok(["mlp_in", "mlp_out"].map(str::to_owned).to_vec())
     }
 
-    fn features(&self, sources: &[Camera], report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    fn features(&mut self, sources: &[Camera], report: &mut Report) -> Result<Vec<String>, VerifyError> {
         let rows = self.file.rows::<16>("tgt_pose")?;
         let pose = self.file.pose("tgt_pose", &rows[0])?;
         let poses: Vec<_> = sources.iter().map(|camera| camera.pose).collect();

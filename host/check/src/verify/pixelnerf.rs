@@ -43,17 +43,17 @@ pub(super) fn verify<D: Device>(
     let latent_layers = Omissions { latent_layers: true, ..Omissions::NONE };
     let field = PixelNerf::new(&checkpoint, options(Omissions::NONE)).map_err(|error| failed(error.to_string()))?;
     let exact = Comparison { file: &file, suffix: "" };
-    let reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
+    let mut reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
     exact.latents(&reference, &sources, report)?;
-    exact.points(&reference, report)?;
-    exact.rays(&reference, report)?;
+    exact.points(&mut reference, report)?;
+    exact.rays(&mut reference, report)?;
     drop(reference);
     // The same with the latent layers moved to the grids: exact up to rounding, and held to the same tolerances.
     let field = field.with_options(options(latent_layers));
-    let reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
+    let mut reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
     let mapped = Comparison { file: &file, suffix: ", latent layers on the grid" };
-    mapped.points(&reference, report)?;
-    mapped.rays(&reference, report)?;
+    mapped.points(&mut reference, report)?;
+    mapped.rays(&mut reference, report)?;
     Ok(NAMES.map(str::to_owned).to_vec())
 }
 
@@ -141,7 +141,7 @@ impl Comparison<'_> {
         Ok(())
     }
 
-    fn points<D: Device>(&self, reference: &Reference<'_, D>, report: &mut Report) -> Result<(), VerifyError> {
+    fn points<D: Device>(&self, reference: &mut Reference<'_, D>, report: &mut Report) -> Result<(), VerifyError> {
         let (positions, directions) = (self.file.rows::<3>("points")?, self.file.rows::<3>("viewdirs")?);
         let points: Vec<RayPoint> = positions
             .into_iter()
@@ -176,7 +176,7 @@ impl Comparison<'_> {
         Ok(())
     }
 
-    fn rays<D: Device>(&self, reference: &Reference<'_, D>, report: &mut Report) -> Result<(), VerifyError> {
+    fn rays<D: Device>(&self, reference: &mut Reference<'_, D>, report: &mut Report) -> Result<(), VerifyError> {
         let file = self.file;
         let rays = rays(file)?;
         let weights = file.many(&format!("weights.{RAY_WEIGHTS}"), reference.view_count())?;

@@ -12,9 +12,8 @@ use viewfuse_check::measure::{DEFAULT_SEED_COUNT, Role};
 use viewfuse_check::picture::Picture;
 use viewfuse_check::report::{PictureVersusCpu, VersusCpu};
 use viewfuse_check::{CheckError, DeviceReport, KernelReport, PictureReport, Report, check_device};
-use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
-use viewfuse_job::progress::Progress;
+use viewfuse_field::AnyField;
 use viewfuse_vulkan::GpuOptions;
 
 #[derive(Args)]
@@ -49,9 +48,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     };
     for device in devices {
         let checked = match &device {
-            AnyDevice::Cpu(cpu) => check(cpu, Role::Reference, arguments.seeds, &picture, &progress),
-            AnyDevice::Vulkan(vulkan) => check(vulkan.as_ref(), Role::Other, arguments.seeds, &picture, &progress),
+            AnyDevice::Cpu(cpu) => check_device(cpu, Role::Reference, arguments.seeds, &progress),
+            AnyDevice::Vulkan(vulkan) => check_device(vulkan.as_ref(), Role::Other, arguments.seeds, &progress),
         };
+        let role = if matches!(device, AnyDevice::Cpu(_)) { Role::Reference } else { Role::Other };
+        let checked = checked.and_then(|kernels| {
+            let picture = picture.check(AnyField::default().on(&device).as_ref(), role, &progress)?;
+            Ok(DeviceReport { picture: Some(picture), ..kernels })
+        });
         match checked {
             Ok(checked) => report.devices.push(checked),
             Err(error @ CheckError::Interrupted(_)) => return Err(error.into()),
@@ -69,17 +73,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         report.failures.iter().try_for_each(|failure| say(format_args!("FAILED: {failure}")))?;
     }
     Ok(ExitCode::from(report.exit_code()))
-}
-
-fn check<D: Device>(
-    device: &D,
-    role: Role,
-    seed_count: u32,
-    picture: &Picture,
-    progress: &dyn Progress,
-) -> Result<DeviceReport, CheckError> {
-    let kernels = check_device(device, role, seed_count, progress)?;
-    Ok(DeviceReport { picture: Some(picture.check(device, role, progress)?), ..kernels })
 }
 
 fn print_device(report: &DeviceReport) -> std::io::Result<()> {

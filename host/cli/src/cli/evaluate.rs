@@ -9,7 +9,7 @@ mod protocol;
 mod tables;
 
 use super::metrics_options::MetricOptions;
-use super::model::{ModelOptions, Work};
+use super::model::ModelOptions;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::terminal::Terminal;
 use super::weighting::{many_help, open_all, or_every_scheme};
@@ -20,17 +20,12 @@ use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use tables::{csv_of, print_means};
-use viewfuse_device::Device;
 use viewfuse_device::choice::Chosen;
 use viewfuse_evaluate::{Evaluator, Score, means};
-use viewfuse_field::Field;
-use viewfuse_field::render::RenderOptions;
 use viewfuse_job::files::{check_writable, write_whole};
-use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::dataset::{Dataset, DatasetError, Split};
-use viewfuse_scene::few_shot::Selection;
-use viewfuse_weighting::{Weighting, WeightingSpec};
+use viewfuse_weighting::WeightingSpec;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -97,7 +92,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
-    let options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
+    let options = arguments.picture.to_render_options(arguments.model.exact, &field.about())?;
     let Chosen { device, reason } = arguments.device.open()?;
     let mut all: Vec<Score> = Vec::new();
     let mut scene_of: Vec<String> = Vec::new();
@@ -106,15 +101,18 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
     for (path, scene) in paths.iter().zip(&scenes) {
         let progress = Terminal::new("evaluating");
-        let job = Job {
-            scene,
-            selection: &selection,
-            weightings: &weightings,
-            options: &options,
-            metrics: &arguments.metrics,
-            progress: &progress,
+        let score = || -> anyhow::Result<Vec<Score>> {
+            let (renderer, scorer) = (field.on(&device), arguments.metrics.on(&device)?);
+            let evaluator = Evaluator {
+                weightings: &weightings,
+                renderer: renderer.as_ref(),
+                options: &options,
+                scorer: scorer.as_ref(),
+                progress: &progress,
+            };
+            Ok(evaluator.score_all(scene, &selection)?)
         };
-        let scores = on_threads(arguments.picture.threads, || field.on(&device, &job))??;
+        let scores = on_threads(arguments.picture.threads, score)??;
         drop(progress);
         print_means(&path.display().to_string(), &means(&scores))?;
         scene_of.extend(scores.iter().map(|_| path.display().to_string()));
@@ -130,25 +128,4 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         say(format_args!("{}", path.display()))?;
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// What is evaluated of a scene.
-struct Job<'a> {
-    scene: &'a Scene,
-    selection: &'a Selection,
-    weightings: &'a [Weighting],
-    options: &'a RenderOptions,
-    metrics: &'a MetricOptions,
-    progress: &'a dyn Progress,
-}
-
-impl Work for Job<'_> {
-    type Output = anyhow::Result<Vec<Score>>;
-
-    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<Vec<Score>> {
-        let Job { scene, selection, weightings, options, metrics, progress } = *self;
-        let metrics = &metrics.open(device)?;
-        let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
-        Ok(evaluator.score_all(scene, selection)?)
-    }
 }

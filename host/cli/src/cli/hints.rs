@@ -2,6 +2,7 @@
 
 use viewfuse_evaluate::run_folder::FolderError;
 use viewfuse_field::render::RenderError;
+use viewfuse_field::training_free::NoObject;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_scene::photographs::PhotographsError;
 
@@ -43,7 +44,9 @@ fn of_run_folder(error: &FolderError) -> Option<&'static str> {
 fn of_render(error: &RenderError) -> Option<&'static str> {
     match error {
         RenderError::Shape { .. } | RenderError::Size { .. } => Some("give another --size"),
-        RenderError::NoObject { .. } => Some("`viewfuse inspect` shows the poses, --background takes the background"),
+        RenderError::Unsuitable { reason, .. } if reason.is::<NoObject>() => {
+            Some("`viewfuse inspect` shows the poses, --background takes the background")
+        }
         RenderError::Photographs(error) => of_photographs(error),
         _ => None,
     }

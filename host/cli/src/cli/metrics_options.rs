@@ -6,12 +6,13 @@ use anyhow::Context;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
-use viewfuse_evaluate::metrics::Metrics;
+use viewfuse_device::choice::AnyDevice;
 use viewfuse_evaluate::metrics::convention::Convention;
 use viewfuse_evaluate::metrics::dists::Dists;
 use viewfuse_evaluate::metrics::features::Inception;
 use viewfuse_evaluate::metrics::heads::{published_dists, published_lpips};
 use viewfuse_evaluate::metrics::lpips::{Lpips, LpipsTrunk};
+use viewfuse_evaluate::metrics::{Metrics, MetricsOn, Scorer};
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 
 /// Heading of these options.
@@ -69,6 +70,16 @@ impl MetricOptions {
             }
             None => Ok(()),
         }
+    }
+
+    /// Reads the networks and takes them to one of the devices.
+    pub(crate) fn on<'a>(&self, device: &'a AnyDevice) -> anyhow::Result<Box<dyn Scorer + 'a>> {
+        Ok(match device {
+            AnyDevice::Cpu(device) => Box::new(MetricsOn { device, metrics: self.open(device)? }),
+            AnyDevice::Vulkan(device) => {
+                Box::new(MetricsOn { device: device.as_ref(), metrics: self.open(device.as_ref())? })
+            }
+        })
     }
 
     /// Reads the networks and takes them to a device.

@@ -1,35 +1,27 @@
 //! Which field makes the pictures, and how.
 //!
 //! ```text
-//! any         a field of any kind, and work with it
 //! name        what --model takes
-//! omission    what --compute takes
 //! genvs       from noise to a picture
 //! ```
 
-mod any;
 mod genvs;
 mod name;
-mod omission;
 
-pub(crate) use any::{AnyField, Work};
 pub(crate) use genvs::parse_level;
 
 use super::parse::parse_share;
 use super::wrong;
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use genvs::{RunOptions, parse_noise};
 use name::Model;
-use omission::{Omission, of_genvs, of_pixelnerf};
 use std::path::Path;
 use viewfuse_core::schedule::NoiseSchedule;
-use viewfuse_field::family::Family;
-use viewfuse_field::genvs::sampling::Plan;
-use viewfuse_field::genvs::{Genvs, GenvsOptions, Omissions as GenvsOmissions, Rays};
-use viewfuse_field::photo::PhotoField;
-use viewfuse_field::pixelnerf::{Omissions as PixelNerfOmissions, PixelNerf, PixelNerfOptions, Sampling};
-use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_field::AnyField;
+use viewfuse_field::family::{self, Family, VIEWS};
+use viewfuse_field::options::{FieldOptions, OpenError};
 
 /// Heading of the options of any network.
 const NETWORK: &str = "Options of networks";
@@ -37,9 +29,6 @@ const NETWORK: &str = "Options of networks";
 const PIXELNERF: &str = "Options of PixelNeRF";
 /// Heading of the options of one family.
 pub(crate) const GENVS: &str = "Options of GeNVS";
-
-/// Names of options, and whether they were given.
-type Given = Vec<(&'static str, bool)>;
 
 /// Which network makes the pictures, and where it looks.
 #[derive(Args)]
@@ -75,8 +64,8 @@ pub(crate) struct ModelOptions {
     #[arg(long, conflicts_with_all = ["compute", "probe_step", "probe_error", "leave_out", "settled"], help_heading = NETWORK)]
     pub(crate) exact: bool,
     /// Compute these although the scene does not need them
-    #[arg(long, value_name = "WHAT", value_enum, value_delimiter = ',', requires = "model", help_heading = NETWORK)]
-    compute: Vec<Omission>,
+    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(computable()), value_delimiter = ',', requires = "model", help_heading = NETWORK)]
+    compute: Vec<String>,
     /// Probe one ray in every square of this many pixels on a side for empty space [default: 4]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(2..=64), requires = "model", help_heading = PIXELNERF)]
     probe_step: Option<u32>,
@@ -89,33 +78,13 @@ pub(crate) struct ModelOptions {
 }
 
 /// What `--samples` says.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Samples {
-    /// As GeNVS takes it.
-    One(u32),
-    /// As PixelNeRF takes it.
-    Three([u32; 3]),
-}
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Samples(Vec<u32>);
 
-/// A network that is not set up yet.
-struct Unset<'a> {
-    model: &'a Model,
-    checkpoint: Checkpoint,
-    family: Family,
-}
-
-impl Unset<'_> {
-    /// Arguments that were given for the other family are refused.
-    fn refuse(&self, given: Given) -> anyhow::Result<()> {
-        match given.into_iter().find(|(_, is_given)| *is_given) {
-            Some((option, _)) => Err(self.refused(&format!("{option} cannot be used"))),
-            None => Ok(()),
-        }
-    }
-
-    fn refused(&self, what: &str) -> anyhow::Error {
-        wrong(format_args!("{what} with '--model {}', which is a {}", self.model, self.family))
-    }
+/// What `--compute` takes.
+fn computable() -> Vec<PossibleValue> {
+    let all = [VIEWS].into_iter().chain(Family::ALL.into_iter().flat_map(|family| family.computable()).copied());
+    all.map(|(name, help)| PossibleValue::new(name).help(help)).collect()
 }
 
 impl NetworkOptions {
@@ -135,74 +104,24 @@ impl NetworkOptions {
     /// Reads the field, as it is unless a person says otherwise.
     #[cfg(feature = "pareto")]
     pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
-        match self.unset()? {
-            None => Ok(AnyField::Photo(PhotoField::default())),
-            Some(network) => match network.family {
-                Family::PixelNerf => self.pixelnerf(&network, seed, PixelNerfOmissions::default()),
-                Family::Genvs => {
-                    let plan = Plan { schedule: self.schedule(), ..Plan::fast(seed) };
-                    self.genvs(network, plan, GenvsOmissions::default(), Given::new())
-                }
-            },
-        }
+        self.open_with(FieldOptions { seed, ..FieldOptions::default() })
     }
 
-    fn unset(&self) -> anyhow::Result<Option<Unset<'_>>> {
-        let Some(model) = &self.model else { return Ok(None) };
-        let checkpoint = model.checkpoint()?;
-        let family = Family::of(&checkpoint).context("--model")?;
-        Ok(Some(Unset { model, checkpoint, family }))
-    }
-
-    fn schedule(&self) -> NoiseSchedule {
-        self.noise.unwrap_or_else(NoiseSchedule::published)
-    }
-
-    fn pixelnerf(&self, network: &Unset<'_>, seed: u64, omissions: PixelNerfOmissions) -> anyhow::Result<AnyField> {
-        network.refuse(vec![("--noise", self.noise.is_some())])?;
-        let default = Sampling::default();
-        let [coarse_count, importance_count, depth_count] = match self.samples {
-            None => [default.coarse_count, default.importance_count, default.depth_count],
-            Some(Samples::Three(counts)) => counts,
-            Some(Samples::One(_)) => return Err(network.refused("--samples takes three numbers")),
-        };
-        let sampling = Sampling {
-            coarse_count,
-            importance_count,
-            depth_count,
-            seed,
+    /// Reads the field, with further options.
+    fn open_with(&self, options: FieldOptions) -> anyhow::Result<AnyField> {
+        let Some(model) = &self.model else { return Ok(AnyField::default()) };
+        let options = FieldOptions {
             near_far: self.near_far,
+            samples: self.samples.as_ref().map_or_else(Vec::new, |Samples(counts)| counts.clone()),
             published_depth: self.published_depth,
-            ..default
+            noise: self.noise,
+            ..options
         };
-        let field = PixelNerf::new(&network.checkpoint, PixelNerfOptions { sampling, omissions }).context("--model")?;
-        Ok(AnyField::PixelNerf(Box::new(field)))
-    }
-
-    /// `denoising` are options that only a denoiser understands.
-    fn genvs(
-        &self,
-        network: Unset<'_>,
-        plan: Plan,
-        omissions: GenvsOmissions,
-        denoising: Given,
-    ) -> anyhow::Result<AnyField> {
-        network.refuse(vec![("--published-depth", self.published_depth)])?;
-        let default = Rays::default();
-        let sample_count = match self.samples {
-            None => default.sample_count,
-            Some(Samples::One(count)) if count >= 2 => count,
-            Some(_) => return Err(network.refused("--samples takes one number, at least 2,")),
-        };
-        let rays = Rays { sample_count, near_far: self.near_far, ..default };
-        let model = network.model;
-        let field = Genvs::new(network.checkpoint, GenvsOptions { rays, plan, omissions }).context("--model")?;
-        let given = denoising.into_iter().chain([("--noise", self.noise.is_some())]).find(|(_, is_given)| *is_given);
-        match (given, &field.architecture().denoiser) {
-            (Some((option, _)), None) => {
-                Err(wrong(format_args!("{option} cannot be used with '--model {model}', which has no denoiser")))
+        match family::open(model.checkpoint()?, &options) {
+            Err(OpenError::Refused { option, problem, reason }) => {
+                Err(wrong(format_args!("--{option} {problem} with '--model {model}', which {reason}")))
             }
-            _ => Ok(AnyField::Genvs(Box::new(field))),
+            opened => opened.context("--model"),
         }
     }
 }
@@ -220,42 +139,20 @@ impl ModelOptions {
 
     /// Reads the field. A GeNVS starts each frame from the one before at level `reuse`, if there is one.
     pub(crate) fn open(&self, seed: u64, reuse: Option<f32>) -> anyhow::Result<AnyField> {
-        let Some(network) = self.network.unset()? else { return Ok(AnyField::Photo(PhotoField::default())) };
-        if let Some(other) = self.compute.iter().find(|what| !what.is_of(network.family)) {
-            let name = other.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned());
-            return Err(network.refused(&format!("--compute {name} cannot be used")));
-        }
-        let mut denoising = self.run.given();
-        denoising.push(("--reuse", reuse.is_some()));
-        let computes = |what| self.exact || self.compute.contains(&what);
-        match network.family {
-            Family::PixelNerf => {
-                network.refuse(denoising)?;
-                let all = PixelNerfOmissions::default();
-                let probe_step = self.probe_step.unwrap_or(all.empty_space);
-                let probe_error = if self.exact { 0.0 } else { self.probe_error.unwrap_or(all.probe_error) };
-                self.network.pixelnerf(&network, seed, of_pixelnerf(computes, probe_step, probe_error))
-            }
-            Family::Genvs => {
-                network.refuse(vec![
-                    ("--probe-step", self.probe_step.is_some()),
-                    ("--probe-error", self.probe_error.is_some()),
-                ])?;
-                let plan = self.run.plan(seed, self.network.schedule(), self.exact, computes(Omission::Calls));
-                let omissions = of_genvs(computes, reuse, self.run.half_volumes);
-                self.network.genvs(network, plan, omissions, denoising)
-            }
-        }
+        let ModelOptions { exact, probe_step, probe_error, .. } = *self;
+        let compute = self.compute.clone();
+        let options = FieldOptions { seed, exact, compute, probe_step, probe_error, reuse, ..FieldOptions::default() };
+        self.network.open_with(self.run.given_to(options))
     }
 }
 
 fn parse_samples(text: &str) -> Result<Samples, String> {
     let counts: Option<Vec<u32>> = text.split(',').map(|count| count.trim().parse().ok()).collect();
     match counts.as_deref() {
-        Some(&[coarse, importance, depth]) if (1..=1024).contains(&coarse) && importance <= 1024 && depth <= 1024 => {
-            Ok(Samples::Three([coarse, importance, depth]))
+        Some(&[first, importance, depth]) if (1..=1024).contains(&first) && importance <= 1024 && depth <= 1024 => {
+            Ok(Samples(vec![first, importance, depth]))
         }
-        Some(&[count]) if (1..=1024).contains(&count) => Ok(Samples::One(count)),
+        Some(&[count]) if (1..=1024).contains(&count) => Ok(Samples(vec![count])),
         _ => Err("one or three whole numbers up to 1024, the first at least 1, for example 64 or 64,16,16".to_owned()),
     }
 }

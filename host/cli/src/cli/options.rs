@@ -1,13 +1,13 @@
 //! Options that several commands share.
 
 use super::environment::device_options;
-use super::model::AnyField;
 use super::parse::{parse_count, parse_seconds, parse_share, parse_size};
 use super::wrong;
 use clap::{ArgMatches, Args, Command};
 use std::collections::BTreeMap;
 use std::time::Duration;
 use viewfuse_device::choice::{self, Chosen, DeviceChoice};
+use viewfuse_field::About;
 use viewfuse_field::render::{DEFAULT_LEAVE_OUT, DEFAULT_SETTLED, RenderOptions};
 use viewfuse_scene::few_shot::Selection;
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -36,11 +36,11 @@ pub(crate) struct PictureOptions {
 
 impl PictureOptions {
     /// With `exact`, nothing is left out. What the field does not know must not have been given.
-    pub(crate) fn to_render_options(&self, exact: bool, field: &AnyField) -> anyhow::Result<RenderOptions> {
-        if self.settled.is_some() && !field.ends_rays() {
+    pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
+        if self.settled.is_some() && !field.ends_rays {
             return Err(wrong("--settled cannot be used with a GeNVS, whose rays go on to the end"));
         }
-        let settled = if exact || !field.ends_rays() { 0.0 } else { self.settled.unwrap_or(DEFAULT_SETTLED) };
+        let settled = if exact || !field.ends_rays { 0.0 } else { self.settled.unwrap_or(DEFAULT_SETTLED) };
         let leave_out = if exact { 0.0 } else { self.leave_out };
         Ok(RenderOptions { size: self.size, background: self.background, leave_out, settled })
     }

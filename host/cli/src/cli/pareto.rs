@@ -1,7 +1,7 @@
 //! `viewfuse pareto`.
 
 use super::environment::device_options;
-use super::model::{AnyField, NetworkOptions};
+use super::model::NetworkOptions;
 use super::options::{PictureOptions, SourceOptions};
 use super::table::table;
 use super::terminal::Terminal;
@@ -10,14 +10,13 @@ use clap::Args;
 use comfy_table::CellAlignment;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_device::Device;
 use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
 use viewfuse_evaluate::pareto::front::{LARGEST_LOSS, SAME_LOOK};
 use viewfuse_evaluate::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
-use viewfuse_evaluate::pareto::settings::{EXACT, of_genvs, of_photo, of_pixelnerf};
+use viewfuse_evaluate::pareto::settings::{self, EXACT};
 use viewfuse_evaluate::pareto::{Measured, Setting, Subject, plot};
-use viewfuse_field::render::{RenderError, RenderOptions};
-use viewfuse_field::{Field, FieldError, LeftOut};
+use viewfuse_field::render::RenderOptions;
+use viewfuse_field::{AnyField, LeftOut};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::Progress;
 use viewfuse_output::record::source_names;
@@ -73,8 +72,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     let field = arguments.network.open(arguments.seed)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
-    let job = selection.resolve(&scene, field.least_sources())?;
-    let options = arguments.picture.to_render_options(false, &field)?;
+    let job = selection.resolve(&scene, field.about().least_sources)?;
+    let options = arguments.picture.to_render_options(false, &field.about())?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
@@ -88,7 +87,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let mut record = ParetoRecord {
         viewfuse: env!("CARGO_PKG_VERSION"),
         scene: arguments.scene.display().to_string(),
-        field: field.name(),
+        field: field.about().name,
         model: arguments.network.label(),
         weighting: weighting.to_string(),
         seed: arguments.seed,
@@ -156,37 +155,21 @@ struct Sweep<'a> {
 
 impl Sweep<'_> {
     fn on(&self, device: &AnyDevice, field: &AnyField) -> Result<Measured, Failure> {
-        match device {
-            AnyDevice::Cpu(cpu) => self.on_one(cpu, field),
-            AnyDevice::Vulkan(vulkan) => self.on_one(vulkan.as_ref(), field),
-        }
-    }
-
-    fn on_one<D: Device>(&self, device: &D, field: &AnyField) -> Result<Measured, Failure> {
-        match field {
-            AnyField::Photo(field) => self.measure(device, of_photo(field, self.options)),
-            AnyField::PixelNerf(field) => self.measure(device, of_pixelnerf(field, self.options)),
-            AnyField::Genvs(field) => {
-                self.measure(device, of_genvs(field, self.options, self.subject.job.targets.len()))
-            }
-        }
-    }
-
-    fn measure<D: Device, F: Field<D>>(&self, device: &D, settings: Vec<Setting<F>>) -> Result<Measured, Failure> {
-        let begins = |setting: &Setting<F>, words: &String| setting.words.starts_with(words.as_str());
+        let settings = settings::of(field, self.options, self.subject.job.targets.len());
+        let begins = |setting: &Setting, words: &String| setting.words.starts_with(words.as_str());
         if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
             let all: Vec<&str> = settings.iter().map(|setting| setting.words.as_str()).collect();
             let message = format!("--only {none}: no setting begins with it; there are: {}", all.join("; "));
             return Err(Failure::Other(wrong(message)));
         }
-        let is_exact = |setting: &Setting<F>| setting.words == EXACT;
-        let is_asked = |setting: &Setting<F>| self.only.iter().any(|words| begins(setting, words));
-        let settings: Vec<Setting<F>> = settings
+        let is_exact = |setting: &Setting| setting.words == EXACT;
+        let is_asked = |setting: &Setting| self.only.iter().any(|words| begins(setting, words));
+        let settings: Vec<Setting> = settings
             .into_iter()
             .filter(|setting| self.only.is_empty() || is_exact(setting) || is_asked(setting))
             .collect();
         self.subject.measure(device, &settings, self.round_count, self.progress).map_err(|error| match error {
-            RenderError::Field(FieldError::Device(_)) => Failure::Device(format!("{:#}", anyhow::Error::from(error))),
+            error if error.is_of_device() => Failure::Device(format!("{:#}", anyhow::Error::from(error))),
             error => Failure::Other(error.into()),
         })
     }

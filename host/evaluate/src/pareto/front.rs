@@ -83,8 +83,7 @@ mod tests {
             encode_seconds: 0.0,
             difference,
             truth_psnr,
-            left_out: Vec::new(),
-            denoising: None,
+            record: viewfuse_field::Record::default(),
             is_repeatable: true,
         }
     }

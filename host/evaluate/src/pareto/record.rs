@@ -121,8 +121,8 @@ impl DeviceRecord {
             versus_exact: point.difference.into(),
             truth_psnr: point.truth_psnr.and_then(finite),
             truth_loss: loss(points, point).and_then(finite),
-            left_out: point.left_out.clone(),
-            denoising: point.denoising,
+            left_out: point.record.left_out.clone(),
+            denoising: point.record.denoising,
             repeatable: point.is_repeatable,
         };
         let words = |point: Option<&Point>| point.map(|point| point.setting.clone());

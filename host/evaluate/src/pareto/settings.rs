@@ -2,17 +2,34 @@
 
 mod genvs;
 
-pub use genvs::of_genvs;
-
 use super::Setting;
-use viewfuse_field::photo::PhotoField;
+use genvs::of_genvs;
+use viewfuse_field::AnyField;
+use viewfuse_field::genvs::Genvs;
 use viewfuse_field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions, Sampling};
 use viewfuse_field::render::RenderOptions;
+use viewfuse_field::training_free::TrainingFree;
 
 /// What the setting that leaves nothing out is called.
 pub const EXACT: &str = "exact";
 /// What the setting is called that leaves out all that a run leaves out unless told otherwise.
 pub const ALL: &str = "all";
+
+/// The settings of a field, for so many targets. Of `options` is taken what `all` leaves out, besides the size and the
+/// background. A field without a list of its own has two settings: nothing left out, and what `options` say.
+pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Setting> {
+    if let Some(field) = field.downcast_ref::<TrainingFree>() {
+        of_training_free(field, options)
+    } else if let Some(field) = field.downcast_ref::<PixelNerf>() {
+        of_pixelnerf(field, options)
+    } else if let Some(field) = field.downcast_ref::<Genvs>() {
+        of_genvs(field, options, target_count)
+    } else {
+        let exact = RenderOptions { leave_out: 0.0, settled: 0.0, ..options.clone() };
+        let setting = |words: &str, options| Setting { words: words.to_owned(), field: field.clone(), options };
+        vec![setting(EXACT, exact), setting(ALL, options.clone())]
+    }
+}
 
 const NONE: Omissions = Omissions::NONE;
 const VIEWS: Omissions = Omissions { unused_views: true, ..NONE };
@@ -57,11 +74,11 @@ const SAMPLES: [[u32; 2]; 8] = [[6, 6], [4, 4], [3, 3], [2, 2], [1, 1], [8, 0], 
 
 /// The settings of a PixelNeRF. Of `field` the sampling is taken, and of `options` what `all` leaves out, besides the size
 /// and the background; what the field itself leaves out does not matter.
-pub fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting<PixelNerf>> {
+fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting> {
     let full = field.options().sampling;
     let setting = |words: &str, sampling, omissions, leave_out, settled| Setting {
         words: words.to_owned(),
-        field: field.with_options(PixelNerfOptions { sampling, omissions }),
+        field: AnyField::new(field.with_options(PixelNerfOptions { sampling, omissions })),
         options: RenderOptions { leave_out, settled, ..options.clone() },
     };
     let all =
@@ -90,8 +107,8 @@ pub fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting<P
     settings
 }
 
-/// The weight-free field: words, `--leave-out`, `--settled`, alone.
-const PHOTO: [(&str, f32, f32); 8] = [
+/// The training-free field: words, `--leave-out`, `--settled`, alone.
+const EARLY: [(&str, f32, f32); 8] = [
     ("leave out 0.01", 0.01, 0.0),
     ("leave out 0.05", 0.05, 0.0),
     ("leave out 0.1", 0.1, 0.0),
@@ -102,19 +119,19 @@ const PHOTO: [(&str, f32, f32); 8] = [
     ("settled 1/16", 0.0, 1.0 / 16.0),
 ];
 
-/// The weight-free field: the sources' side as a share of the pictures', alone and with all.
+/// The training-free field: the sources' side as a share of the pictures', alone and with all.
 const SOURCES: [(&str, f32); 3] = [("3/4", 0.75), ("1/2", 0.5), ("1/4", 0.25)];
 
-/// The settings of the field that needs no network. Of `options` is taken what `all` leaves out, besides the size and the
+/// The settings of the training-free field. Of `options` is taken what `all` leaves out, besides the size and the
 /// background.
-pub fn of_photo(field: &PhotoField, options: &RenderOptions) -> Vec<Setting<PhotoField>> {
+fn of_training_free(field: &TrainingFree, options: &RenderOptions) -> Vec<Setting> {
     let setting = |words: &str, source_share, leave_out, settled| Setting {
         words: words.to_owned(),
-        field: PhotoField { source_share, ..*field },
+        field: AnyField::new(TrainingFree { source_share, ..*field }),
         options: RenderOptions { leave_out, settled, ..options.clone() },
     };
     let mut settings = vec![setting(EXACT, 1.0, 0.0, 0.0)];
-    settings.extend(PHOTO.map(|(words, leave_out, settled)| setting(words, 1.0, leave_out, settled)));
+    settings.extend(EARLY.map(|(words, leave_out, settled)| setting(words, 1.0, leave_out, settled)));
     settings.extend(SOURCES.map(|(words, share)| setting(&format!("sources {words}"), share, 0.0, 0.0)));
     let RenderOptions { leave_out, settled, .. } = *options;
     settings.push(setting(ALL, 1.0, leave_out, settled));

@@ -1,22 +1,19 @@
 //! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
 
 use super::encoder::encode;
-use super::network::{Views, Workspace};
-use super::{Architecture, Pass, PixelNerf, Prepared};
-use crate::{Field, FieldError};
+use super::network::Workspace;
+use super::{Architecture, Pass, PixelNerf, Views};
+use crate::FieldError;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{RayPoint, TargetRay};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels, Rays};
-use viewfuse_job::progress::Silent;
 use viewfuse_scene::photographs::SourceImages;
 
 /// Sources on a device, with the network.
 pub struct Reference<'a, D: Device> {
-    field: &'a PixelNerf,
-    device: &'a D,
-    prepared: Prepared<D>,
+    views: Views<'a, D>,
 }
 
 /// What was seen of rays.
@@ -36,18 +33,17 @@ impl<'a, D: Device> Reference<'a, D> {
     /// # Errors
     /// [`FieldError`].
     pub fn new(field: &'a PixelNerf, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError> {
-        let prepared = field.prepare(device, sources, &Silent)?;
-        Ok(Reference { field, device, prepared })
+        Ok(Reference { views: field.views(device, sources)? })
     }
 
     /// The network's sizes.
     pub fn architecture(&self) -> &Architecture {
-        &self.field.architecture
+        &self.views.field.architecture
     }
 
     /// How many sources there are.
     pub fn view_count(&self) -> usize {
-        self.prepared.images.len()
+        self.views.images.len()
     }
 
     /// `[view][row][column][channel]`: the latents of all views.
@@ -56,10 +52,10 @@ impl<'a, D: Device> Reference<'a, D> {
     /// If the device fails.
     pub fn latents(&self) -> Result<Vec<f32>, DeviceError> {
         let mut all = Vec::new();
-        for image in &self.prepared.images {
-            let Prepared { parameters, .. } = &self.prepared;
-            let view = encode(self.device, &self.field.architecture, parameters, image, false)?;
-            all.extend(self.device.download(&view.grids[0][0])?);
+        let Views { field, device, parameters, .. } = &self.views;
+        for image in &self.views.images {
+            let view = encode(*device, &field.architecture, parameters, image, false)?;
+            all.extend(device.download(&view.grids[0][0])?);
         }
         Ok(all)
     }
@@ -69,19 +65,18 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn radiance(&self, pass: Pass, weights: &[f32], points: &[RayPoint]) -> Result<Vec<[f32; 4]>, DeviceError> {
-        let Reference { field, device, prepared } = self;
-        for view in 0..prepared.images.len() {
-            field.encode_view(*device, prepared, view)?;
+    pub fn radiance(&mut self, pass: Pass, weights: &[f32], points: &[RayPoint]) -> Result<Vec<[f32; 4]>, DeviceError> {
+        let all: Vec<usize> = (0..self.view_count()).collect();
+        for view in &all {
+            if self.views.latents[*view].is_none() {
+                self.views.encode_view(*view)?;
+            }
         }
-        let views = Views {
-            cameras: device.upload(&prepared.cameras)?,
-            weights: device.upload(weights)?,
-            latents: prepared.latents.iter().filter_map(|latents| latents.get()).collect(),
-        };
+        let Views { field, device, .. } = &self.views;
+        let views = self.views.used(&all, weights)?;
         let maps = field.options.omissions.latent_layers;
-        let mut workspace = Workspace::new(*device, &field.architecture, prepared.images.len(), points.len(), maps)?;
-        let network = field.network(*device, prepared, pass);
+        let mut workspace = Workspace::new(*device, &field.architecture, all.len(), points.len(), maps)?;
+        let network = self.views.network(pass);
         let mut samples = device.zeros(points.len())?;
         for some in points.chunks(workspace.point_count as usize) {
             workspace.points = device.upload(some)?;
@@ -96,13 +91,13 @@ impl<'a, D: Device> Reference<'a, D> {
     /// # Errors
     /// If the device fails.
     pub fn look(
-        &self,
+        &mut self,
         pass: Pass,
         weights: &[f32],
         rays: &[TargetRay],
         depths: &[f32],
     ) -> Result<SeenRays, DeviceError> {
-        let device = self.device;
+        let device = self.views.device;
         let sample_count = (depths.len() / rays.len()) as u32;
         let rays = self.load(rays)?;
         let depths = device.upload(depths)?;
@@ -149,7 +144,7 @@ impl<'a, D: Device> Reference<'a, D> {
         depths: &[f32],
         chances: &[[f32; 2]],
     ) -> Result<[Vec<f32>; 2], DeviceError> {
-        let device = self.device;
+        let device = self.views.device;
         let block = FineBlock { depth_times_opacity: 1, ..*block };
         let rays = self.load(rays)?;
         // With an opacity of 1 the depth stays as it is.
@@ -168,6 +163,6 @@ impl<'a, D: Device> Reference<'a, D> {
     fn load(&self, rays: &[TargetRay]) -> Result<Rays<D>, DeviceError> {
         let count = rays.len() as u32;
         let pixels: Vec<u32> = (0..count).collect();
-        Ok(Rays { count, pixels: self.device.upload(&pixels)?, rays: self.device.upload(rays)? })
+        Ok(Rays { count, pixels: self.views.device.upload(&pixels)?, rays: self.views.device.upload(rays)? })
     }
 }

@@ -81,3 +81,17 @@ fn computed(
 ) -> Checkpoint {
     Checkpoint::computed(label, architecture.tensors(), BTreeMap::new(), values)
 }
+
+/// [`deterministic`] of the published size, or of the small member of a width.
+pub fn deterministic_of_width(width: Option<u16>) -> Checkpoint {
+    deterministic(&of_width(width))
+}
+
+/// [`body`] of the published size, or of the small member of a width.
+pub fn body_of_width(width: Option<u16>) -> Checkpoint {
+    body(&of_width(width))
+}
+
+fn of_width(width: Option<u16>) -> Architecture {
+    width.map_or_else(Architecture::published, |width| Architecture::small(width.into()))
+}

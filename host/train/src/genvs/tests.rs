@@ -58,7 +58,7 @@ fn the_graph_is_the_renderers() {
     let network = Genvs::frozen(&made, 64, DType::F64).expect("a network");
     let field = Field::new(made, GenvsOptions::default()).expect("a network");
     let (sources, target) = (photographs(3, 64), target(64, 2.0));
-    let reference = Reference::new(&field, &Cpu, &sources).expect("sources");
+    let mut reference = Reference::new(&field, &Cpu, &sources).expect("sources");
     let views = views(&sources, &[target], 1);
     let weights = [0.5_f32, 0.2, 0.3];
 

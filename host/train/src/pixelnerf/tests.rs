@@ -53,7 +53,7 @@ fn the_graph_is_the_renderers() {
     let file = Checkpoint::in_memory("made", tensors, metadata);
     let field = Field::new(&file, PixelNerfOptions::default()).expect("a network");
     let sources = photographs(3, 64);
-    let reference = Reference::new(&field, &Cpu, &sources).expect("sources");
+    let mut reference = Reference::new(&field, &Cpu, &sources).expect("sources");
     let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
     let blocks = vec![cameras.iter().map(|camera| camera.block(0)).collect::<Vec<CameraBlock>>()];
     let shown = |texel: &[f32; 4]| [0, 1, 2].map(|channel| 2.0 * (texel[channel] + 1.0 - texel[3]) - 1.0);

@@ -4,15 +4,13 @@ use super::super::terminal::Terminal;
 use super::Arguments;
 use super::tables::{csv_of, print_table};
 use crate::cli::metrics_options::MetricOptions;
-use crate::cli::model::Work;
 use crate::cli::{on_threads, say};
 use anyhow::Context;
 use clap::Args;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
-use viewfuse_device::Device;
-use viewfuse_device::choice::Chosen;
+use viewfuse_device::choice::{AnyDevice, Chosen};
 use viewfuse_evaluate::Evaluator;
 use viewfuse_evaluate::gallery::Gallery;
 use viewfuse_evaluate::protocol::{Draws, Job, Plan, Protocol};
@@ -20,7 +18,7 @@ use viewfuse_evaluate::run_folder::{
     Finished, FolderError, RunFolder, SETTINGS, SceneSettings, Settings, Shard, missing,
 };
 use viewfuse_evaluate::summary::tables;
-use viewfuse_field::Field;
+use viewfuse_field::AnyField;
 use viewfuse_field::render::RenderOptions;
 use viewfuse_job::digest::sha256_of;
 use viewfuse_job::files::{check_writable, write_whole};
@@ -65,14 +63,14 @@ pub(super) fn run(
 ) -> anyhow::Result<ExitCode> {
     check_writable(&folder.join(SETTINGS))?;
     let field = arguments.model.open(arguments.seed, None)?;
-    let render_options = arguments.picture.to_render_options(arguments.model.exact, &field)?;
+    let render_options = arguments.picture.to_render_options(arguments.model.exact, &field.about())?;
     let scenes: Vec<Scene> = arguments.paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
     let draws = Draws {
         seed: arguments.seed,
         trial_count: arguments.protocol.trials,
         target_count: arguments.protocol.targets_per_trial.into(),
     };
-    let plan = protocol.plan(&scenes, draws, field.least_sources())?;
+    let plan = protocol.plan(&scenes, draws, field.about().least_sources)?;
     NO_SETTINGS.iter().for_each(|option| {
         options.remove(*option);
     });
@@ -86,7 +84,7 @@ pub(super) fn run(
         viewfuse: env!("CARGO_PKG_VERSION").to_owned(),
         protocol: protocol.to_string(),
         schemes: weightings.iter().map(Weighting::to_string).collect(),
-        field: field.name().to_owned(),
+        field: field.about().name.to_owned(),
         options,
         files,
         job_count: plan.jobs.len(),
@@ -109,7 +107,7 @@ pub(super) fn run(
         metrics: &arguments.metrics,
         progress: &progress,
     };
-    let (folder, done) = on_threads(arguments.picture.threads, || field.on(&device, &work))??;
+    let (folder, done) = on_threads(arguments.picture.threads, || work.run(&device, &field))??;
     drop(progress);
     plan.notes.iter().take(NAMED).try_for_each(|note| say(format_args!("note: {note}")))?;
     if plan.notes.len() > NAMED {
@@ -154,13 +152,11 @@ struct Jobs<'a> {
     progress: &'a dyn Progress,
 }
 
-impl Work for Jobs<'_> {
-    /// The folder, and how many were done.
-    type Output = anyhow::Result<(RunFolder, usize)>;
-
-    fn run<D: Device, F: Field<D>>(&self, device: &D, field: &F) -> anyhow::Result<(RunFolder, usize)> {
+impl Jobs<'_> {
+    /// Returns the folder, and how many were done.
+    fn run(&self, device: &AnyDevice, field: &AnyField) -> anyhow::Result<(RunFolder, usize)> {
         let Jobs { path, settings, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
-        let metrics = &metrics.open(device)?;
+        let (renderer, scorer) = (field.on(device), metrics.on(device)?);
         // Only now, that nothing which a person gave can be wrong: a folder keeps its settings.
         let folder = RunFolder::begin(path, settings.clone())?;
         let mut journal = folder.journal(shard)?;
@@ -168,7 +164,8 @@ impl Work for Jobs<'_> {
         for (number, done) in &finished {
             self.check(*number, done)?;
         }
-        let evaluator = Evaluator { weightings, device, field, options, metrics, progress };
+        let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
+        let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
         let mut count = 0;
         for (number, job) in plan.jobs.iter().enumerate() {
             if !shard.does(number) || finished.contains_key(&number) {

@@ -1,11 +1,10 @@
 //! GeNVS: from noise to a picture.
 
-use super::{GENVS, Given};
+use super::GENVS;
 use clap::Args;
 use viewfuse_core::sampler::Sampler;
-use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
-use viewfuse_field::genvs::sampling::{Plan, Steps};
+use viewfuse_field::options::FieldOptions;
 
 /// How a run goes from noise to a picture, and what it keeps of the views.
 #[derive(Args)]
@@ -24,34 +23,14 @@ pub(crate) struct RunOptions {
     churn: Option<f32>,
     /// Keep views' features in 16 bits: half the memory, every row of them computed
     #[arg(long, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
-    pub(super) half_volumes: bool,
+    half_volumes: bool,
 }
 
 impl RunOptions {
-    /// Those that were given.
-    pub(super) fn given(&self) -> Given {
-        vec![
-            ("--sampler", self.sampler.is_some()),
-            ("--steps", self.steps.is_some()),
-            ("--tolerance", self.tolerance.is_some()),
-            ("--churn", self.churn.is_some()),
-            ("--half-volumes", self.half_volumes),
-        ]
-    }
-
-    /// The plan of a run: the published one if it is `exact`, otherwise the fast one, but for what was given.
-    pub(super) fn plan(&self, seed: u64, schedule: NoiseSchedule, exact: bool, all_calls: bool) -> Plan {
-        let plan = if exact { Plan::published(seed) } else { Plan::fast(seed) };
-        let steps = match (self.tolerance, Plan::careful(seed).steps, plan.steps) {
-            (Some(tolerance), Steps::Chosen { most_calls, .. }, _) => Steps::Chosen { tolerance, most_calls },
-            (_, _, Steps::Fixed { sampler, level_count }) => Steps::Fixed {
-                sampler: self.sampler.unwrap_or(sampler),
-                level_count: self.steps.unwrap_or(level_count),
-            },
-            (_, _, steps) => steps,
-        };
-        let churn = Churn { amount: self.churn.unwrap_or(0.0), ..Churn::NONE };
-        Plan { steps, schedule, churn, settled: plan.settled.filter(|_| !all_calls), seed }
+    /// Options with what was given of these.
+    pub(super) fn given_to(&self, options: FieldOptions) -> FieldOptions {
+        let RunOptions { sampler, steps, tolerance, churn, half_volumes } = *self;
+        FieldOptions { sampler, steps, tolerance, churn, half_volumes, ..options }
     }
 }
 

@@ -3,20 +3,16 @@
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
-use viewfuse_field::{genvs, pixelnerf};
+use viewfuse_field::family::{Family, Small, TestNetwork};
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// Where a network's parameters come from.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone)]
 pub(crate) enum Model {
     /// A checkpoint.
     File(PathBuf),
-    /// PixelNeRF, computed from the tensors' names; the width of a small member of the family, or the published size.
-    Formula(Option<u16>),
-    /// PixelNeRF, a solid body, for measuring.
-    Body(Option<u16>),
-    /// GeNVS, computed from the tensors' names: the small member of its family, or the published size.
-    Genvs { small: bool },
+    /// A test network: the published size, or a small member of its family.
+    Test(&'static TestNetwork, Option<u16>),
 }
 
 impl FromStr for Model {
@@ -27,35 +23,32 @@ impl FromStr for Model {
             Some((name, size)) => (name, Some(size)),
             None => (text, None),
         };
-        let width = || match size.map(str::parse::<u16>) {
-            None => Ok(None),
-            Some(Ok(width)) if (8..=2048).contains(&width) && width % 8 == 0 => Ok(Some(width)),
-            Some(_) => Err(format!("'{text}': a width is a multiple of 8 from 8 to 2048")),
+        let mut networks = Family::ALL.into_iter().flat_map(Family::test_networks);
+        let Some(network) = networks.find(|network| network.name == name) else {
+            return Ok(Model::File(PathBuf::from(text)));
         };
-        match name {
-            "formula" => Ok(Model::Formula(width()?)),
-            "body" => Ok(Model::Body(width()?)),
-            "genvs" => match size {
-                None => Ok(Model::Genvs { small: false }),
-                Some("small") => Ok(Model::Genvs { small: true }),
-                Some(_) => Err(format!("'{text}': there is genvs, of the published size, and genvs:small")),
+        let size = match (network.small, size) {
+            (_, None) => None,
+            (Small::One, Some("small")) => Some(0),
+            (Small::One, Some(_)) => {
+                return Err(format!("'{text}': there is {name}, of the published size, and {name}:small"));
+            }
+            (Small::Width, Some(width)) => match width.parse::<u16>() {
+                Ok(width) if (8..=2048).contains(&width) && width % 8 == 0 => Some(width),
+                _ => return Err(format!("'{text}': a width is a multiple of 8 from 8 to 2048")),
             },
-            _ => Ok(Model::File(PathBuf::from(text))),
-        }
+        };
+        Ok(Model::Test(network, size))
     }
 }
 
 impl fmt::Display for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (name, width) = match self {
-            Model::File(path) => return write!(f, "{}", path.display()),
-            Model::Formula(width) => ("formula", width),
-            Model::Body(width) => ("body", width),
-            Model::Genvs { small } => return f.write_str(if *small { "genvs:small" } else { "genvs" }),
-        };
-        match width {
-            Some(width) => write!(f, "{name}:{width}"),
-            None => f.write_str(name),
+        match self {
+            Model::File(path) => write!(f, "{}", path.display()),
+            Model::Test(network, None) => f.write_str(network.name),
+            Model::Test(TestNetwork { name, small: Small::One, .. }, Some(_)) => write!(f, "{name}:small"),
+            Model::Test(TestNetwork { name, small: Small::Width, .. }, Some(width)) => write!(f, "{name}:{width}"),
         }
     }
 }
@@ -63,16 +56,9 @@ impl fmt::Display for Model {
 impl Model {
     /// The parameters.
     pub(crate) fn checkpoint(&self) -> anyhow::Result<Checkpoint> {
-        let sizes = |width: &Option<u16>| match width {
-            Some(width) => pixelnerf::Architecture::small(usize::from(*width)),
-            None => pixelnerf::Architecture::published(),
-        };
         Ok(match self {
             Model::File(path) => Checkpoint::open(path)?,
-            Model::Formula(width) => pixelnerf::test_networks::deterministic(&sizes(width)),
-            Model::Body(width) => pixelnerf::test_networks::body(&sizes(width)),
-            Model::Genvs { small: true } => genvs::test_networks::deterministic(&genvs::Architecture::small()),
-            Model::Genvs { small: false } => genvs::test_networks::deterministic(&genvs::Architecture::published()),
+            Model::Test(network, size) => (network.checkpoint)(*size),
         })
     }
 }
@@ -90,7 +76,7 @@ mod tests {
             assert_eq!(matches!(model, Model::File(_)), text.ends_with(".pkl"));
         }
         for text in ["formula:7", "body:", "genvs:", "genvs:64", "genvs:Small"] {
-            let message = text.parse::<Model>().expect_err(text);
+            let message = text.parse::<Model>().err().expect(text);
             assert!(message.starts_with(&format!("'{text}': ")), "{message}");
         }
     }

@@ -3,7 +3,7 @@
 use super::{Convolution, Step, tensors};
 use crate::metrics::MetricError;
 use std::rc::Rc;
-use viewfuse_device::{Device, Memory};
+use viewfuse_device::Device;
 use viewfuse_field::finite::check_finite;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::convolution::{Convolution as Layer, ConvolutionOptions, Residual};

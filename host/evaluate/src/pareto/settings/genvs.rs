@@ -1,10 +1,11 @@
 //! What is tried of GeNVS.
 
 use super::super::Setting;
-use super::super::enlarged::Enlarged;
 use super::{ALL, EXACT};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::control::HALF_A_LEVEL;
+use viewfuse_field::AnyField;
+use viewfuse_field::enlarged::Enlarged;
 use viewfuse_field::genvs::sampling::{Plan, Steps};
 use viewfuse_field::genvs::{Genvs, GenvsOptions, Omissions, Rays};
 use viewfuse_field::render::RenderOptions;
@@ -29,7 +30,7 @@ const REUSED: [f32; 2] = [20.0, 2.0];
 /// The settings of a GeNVS, for so many targets. Calls of the denoiser cost nearly all of the time: what else can be left out
 /// is tried with as few of them as a run makes unless told otherwise. Of `field` the rays, the levels' ends and the seed are taken, of `options`
 /// how much weight `all` leaves out, besides the size and the background; what the field itself leaves out does not matter.
-pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> Vec<Setting<Enlarged<Genvs>>> {
+pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> Vec<Setting> {
     let GenvsOptions { rays, plan: own, .. } = field.options();
     let exact = Plan { schedule: own.schedule, ..Plan::published(own.seed) };
     let over = |plan: Plan, sampler, level_count| Plan { steps: Steps::Fixed { sampler, level_count }, ..plan };
@@ -39,7 +40,7 @@ pub fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> 
     };
     let setting = |words: &str, rays, plan, omissions, leave_out, factor| Setting {
         words: words.to_owned(),
-        field: Enlarged { field: field.with_options(GenvsOptions { rays, plan, omissions }), factor },
+        field: AnyField::new(Enlarged { field: field.with_options(GenvsOptions { rays, plan, omissions }), factor }),
         options: RenderOptions { leave_out, settled: 0.0, ..options.clone() },
     };
     let fewer = |divisor: u32| Rays { sample_count: rays.sample_count.div_ceil(divisor), ..rays };

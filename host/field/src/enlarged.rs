@@ -1,8 +1,8 @@
 //! A field's pictures made smaller and enlarged: what a person gets who asks for a preview.
 
+use super::{About, Field, FieldError, Prepared, Record, Rendered, Request};
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
-use viewfuse_field::{Denoising, Field, FieldError, LeftOut, Rendered};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
@@ -16,79 +16,48 @@ pub struct Enlarged<F> {
     pub factor: u32,
 }
 
-impl<D: Device, F: Field<D>> Field<D> for Enlarged<F> {
-    type Prepared = F::Prepared;
-    type Latents = F::Latents;
+/// The field's views.
+struct Views<'a> {
+    inner: Box<dyn Prepared + 'a>,
+    factor: u32,
+}
 
-    fn name(&self) -> &'static str {
-        self.field.name()
+impl<F: Field> Field for Enlarged<F> {
+    fn about(&self) -> About {
+        self.field.about()
     }
 
-    fn least_sources(&self) -> usize {
-        self.field.least_sources()
-    }
-
-    fn source_side(&self, picture_side: u32) -> u32 {
-        self.field.source_side(picture_side)
-    }
-
-    fn longest_side(&self) -> u32 {
-        self.field.longest_side()
-    }
-
-    fn left_out(&self) -> Vec<LeftOut> {
-        self.field.left_out()
-    }
-
-    fn denoising(&self) -> Option<Denoising> {
-        self.field.denoising()
-    }
-
-    fn memory_estimate(&self, device: &D, source_sizes: &[[u32; 2]]) -> Option<u64> {
-        self.field.memory_estimate(device, source_sizes)
-    }
-
-    fn prepare(&self, device: &D, sources: &SourceImages, progress: &dyn Progress) -> Result<F::Prepared, FieldError> {
-        self.field.prepare(device, sources, progress)
-    }
-
-    fn encode(
-        &self,
-        device: &D,
-        prepared: &F::Prepared,
-        relevance: &[SourceWeights],
+    fn prepare<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<F::Latents, FieldError> {
-        self.field.encode(device, prepared, relevance, progress)
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        Ok(Box::new(Views { inner: self.field.prepare(device, sources, progress)?, factor: self.factor }))
+    }
+}
+
+impl Prepared for Views<'_> {
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.inner.weigh(relevance)
     }
 
-    fn encode_used(
-        &self,
-        device: &D,
-        prepared: &F::Prepared,
-        latents: &F::Latents,
-        weights: &SourceWeights,
-        progress: &dyn Progress,
-    ) -> Result<(), FieldError> {
-        self.field.encode_used(device, prepared, latents, weights, progress)
+    fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        self.inner.encode(view, progress)
     }
 
-    fn render(
-        &self,
-        device: &D,
-        prepared: &F::Prepared,
-        latents: &F::Latents,
-        weights: &SourceWeights,
-        target: &Camera,
-        settled: f32,
-        progress: &dyn Progress,
-    ) -> Result<Rendered, FieldError> {
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        let target = request.camera;
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         // A camera that cannot be made so small is left as it is.
         let pinhole = target.pinhole.resized(width.div_ceil(self.factor), height.div_ceil(self.factor));
         let small = Camera { pinhole: pinhole.unwrap_or(target.pinhole), ..*target };
-        let rendered = self.field.render(device, prepared, latents, weights, &small, settled, progress)?;
+        let rendered = self.inner.render(&Request { camera: &small, ..*request }, progress)?;
         Ok(enlarged(rendered, [width, height]))
+    }
+
+    fn record(&self) -> Record {
+        self.inner.record()
     }
 }
 

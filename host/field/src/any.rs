@@ -1,0 +1,62 @@
+//! A field of any kind on any of the devices: what an application holds that lets a person choose both.
+
+use super::field::{About, Field};
+use super::renderer::{On, Renderer};
+use super::training_free::TrainingFree;
+use std::any::Any;
+use std::sync::Arc;
+use viewfuse_device::choice::AnyDevice;
+
+/// A field of any kind. Copies share it.
+#[derive(Clone)]
+pub struct AnyField(Arc<dyn OnAnyDevice>);
+
+/// What is compiled once a field: it on each of the devices.
+trait OnAnyDevice: Any + Send + Sync {
+    fn about(&self) -> About;
+
+    fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a>;
+}
+
+impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
+    fn about(&self) -> About {
+        Field::about(self)
+    }
+
+    fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a> {
+        match device {
+            AnyDevice::Cpu(device) => Box::new(On { device, field: self }),
+            AnyDevice::Vulkan(device) => Box::new(On { device: device.as_ref(), field: self }),
+        }
+    }
+}
+
+impl AnyField {
+    /// A field without its type.
+    pub fn new(field: impl Field + Send + Sync + 'static) -> AnyField {
+        AnyField(Arc::new(field))
+    }
+
+    /// What it wants, and how it works.
+    pub fn about(&self) -> About {
+        self.0.about()
+    }
+
+    /// It on a device.
+    pub fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a> {
+        self.0.on(device)
+    }
+
+    /// The field, if it is of this type.
+    pub fn downcast_ref<F: Field + 'static>(&self) -> Option<&F> {
+        let field: &dyn Any = self.0.as_ref();
+        field.downcast_ref()
+    }
+}
+
+impl Default for AnyField {
+    /// The training-free field.
+    fn default() -> AnyField {
+        AnyField::new(TrainingFree::default())
+    }
+}

@@ -1,0 +1,49 @@
+//! Why a field could not make a picture.
+
+use super::finite::NotFinite;
+use std::error::Error;
+use viewfuse_device::DeviceError;
+use viewfuse_job::progress::Interrupted;
+use viewfuse_nn::checkpoint::CheckpointError;
+use viewfuse_nn::loader::LoadError;
+
+/// Why a field could not make a picture.
+#[derive(Debug, thiserror::Error)]
+pub enum FieldError {
+    /// The field cannot work with these sources or settings, for a reason of its own: [`FieldError::unsuitable`].
+    #[error(transparent)]
+    Unsuitable(Box<dyn Error + Send + Sync>),
+    /// The device failed.
+    #[error("the device failed")]
+    Device(#[from] DeviceError),
+    /// The network's parameters could not be read.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A stage produced a value that is NaN or infinite.
+    #[error(transparent)]
+    NotFinite(#[from] NotFinite),
+    /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
+    #[error("{0}")]
+    Interrupted(#[from] Interrupted),
+}
+
+impl FieldError {
+    /// From a field's own error.
+    pub fn unsuitable(reason: impl Into<Box<dyn Error + Send + Sync>>) -> FieldError {
+        FieldError::Unsuitable(reason.into())
+    }
+
+    /// Whether the field's own reason is of this type.
+    pub fn is<E: Error + 'static>(&self) -> bool {
+        matches!(self, FieldError::Unsuitable(reason) if reason.is::<E>())
+    }
+}
+
+impl From<LoadError> for FieldError {
+    fn from(error: LoadError) -> FieldError {
+        match error {
+            LoadError::Checkpoint(error) => FieldError::Checkpoint(error),
+            LoadError::Device(error) => FieldError::Device(error),
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Source views on a device: their volumes, and the pictures that are made of them.
+
+use super::encoder::SIDE_STEP;
+use super::feature_image;
+use super::looking::Looking;
+use super::parts::Parts;
+use super::sampling::Start;
+use super::volume::Volume;
+use super::{COLOUR_CHANNELS, Genvs, Omissions, Rays};
+use crate::learned::over_white;
+use crate::{FieldError, LeftOut, Prepared, Record, Rendered, Request};
+use std::ops::Range;
+use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_device::{Device, DeviceError};
+use viewfuse_job::progress::Progress;
+use viewfuse_nn::image::Size;
+use viewfuse_nn::scratch::Scratch;
+use viewfuse_scene::photographs::SourceImage;
+
+/// Photographs and parameters on a device, with the volumes of the views that are encoded.
+pub(super) struct Views<'a, D: Device> {
+    pub(super) field: &'a Genvs,
+    pub(super) device: &'a D,
+    pub(super) parts: Parts<D>,
+    pub(super) images: Vec<SourceView>,
+    /// `[view]`: none before it is encoded.
+    pub(super) volumes: Vec<Option<Volume<D>>>,
+    pub(super) near_far: [f32; 2],
+    pub(super) memory_estimate: u64,
+    /// The last frame's picture, and its size.
+    pub(super) earlier: Option<(Size, D::Buffer<f32>)>,
+    pub(super) counts: Counts,
+}
+
+/// A source as the encoder is shown it: over white, with rows and columns added until it can be halved often enough.
+pub(super) struct SourceView {
+    pub(super) size: Size,
+    values: Vec<f32>,
+    pub(super) camera: CameraBlock,
+}
+
+/// What was done and what was left out so far.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Counts {
+    volume_rows: u64,
+    filled_rows: u64,
+    /// As they are computed.
+    volume_bytes: u64,
+    /// As they are kept.
+    kept_bytes: u64,
+    planned_calls: u64,
+    calls: u64,
+}
+
+impl<D: Device> Views<'_, D> {
+    /// Encodes a view.
+    pub(super) fn encode_view(&mut self, view: usize) -> Result<(), FieldError> {
+        let Views { field, device, parts, .. } = self;
+        let SourceView { size, values, .. } = &self.images[view];
+        let mut encoded = parts.encode(*device, values, *size, view)?;
+        let (row_count, whole_bytes) = (encoded.row_count(), encoded.byte_count());
+        let mut filled_rows = 0;
+        if field.options.omissions.half_volumes {
+            // One view after the other: never is more than one there in full.
+            filled_rows = parts.fill(*device, &mut encoded, 0..row_count, view)?;
+            encoded.pack(*device)?;
+        }
+        self.counts.volume_rows += u64::from(row_count);
+        self.counts.filled_rows += u64::from(filled_rows);
+        self.counts.volume_bytes += whole_bytes;
+        self.counts.kept_bytes += encoded.byte_count();
+        self.volumes[view] = Some(encoded);
+        Ok(())
+    }
+
+    /// Computes rows of a view's volume that are not there yet; nothing if it is not encoded.
+    pub(super) fn fill(&mut self, view: usize, rows: impl FnOnce(&Volume<D>) -> Range<u32>) -> Result<(), FieldError> {
+        let Some(volume) = &mut self.volumes[view] else { return Ok(()) };
+        let rows = rows(volume);
+        self.counts.filled_rows += u64::from(self.parts.fill(self.device, volume, rows, view)?);
+        Ok(())
+    }
+
+    /// Computes the rows of volumes that a target looks at.
+    pub(super) fn fill_seen(
+        &mut self,
+        views: &[usize],
+        target: &CameraBlock,
+        looking: &Looking,
+    ) -> Result<(), FieldError> {
+        let unseen_rows = self.field.options.omissions.unseen_rows;
+        for &view in views {
+            let camera = self.images[view].camera;
+            self.fill(view, |volume| match unseen_rows {
+                true => volume.rows_seen(&camera, target, looking),
+                false => 0..volume.row_count(),
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Some of the views, with these weights.
+    pub(super) fn used(&self, views: &[usize], weights: &[f32]) -> Result<feature_image::Views<'_, D>, DeviceError> {
+        let cameras: Vec<CameraBlock> = views.iter().map(|view| self.images[*view].camera).collect();
+        Ok(feature_image::Views {
+            cameras: self.device.upload(&cameras)?,
+            weights: self.device.upload(weights)?,
+            volumes: views.iter().filter_map(|view| self.volumes[*view].as_ref()).collect(),
+        })
+    }
+
+    /// How rays go through volumes, for a target.
+    fn looking(&self, target: &Camera) -> Looking {
+        let Rays { sample_count, jitter, length, inclusive, .. } = self.field.options.rays;
+        let focal = 2.0 * target.pinhole.focal()[1] / target.pinhole.height() as f32;
+        let ray_length = length.unwrap_or(1.0 / focal);
+        let (near_far, seed) = (self.near_far, self.field.options.plan.seed);
+        Looking { near_far, sample_count, jitter, seed, ray_length, inclusive }
+    }
+}
+
+impl<D: Device> Prepared for Views<'_, D> {
+    fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
+        self.encode_view(view)
+    }
+
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        let (field, device, target) = (self.field, self.device, request.camera);
+        let looking = self.looking(target);
+        let step = field.picture_step();
+        let size = Size {
+            height: target.pinhole.height().next_multiple_of(step),
+            width: target.pinhole.width().next_multiple_of(step),
+            channels: COLOUR_CHANNELS as u32,
+        };
+        let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
+        self.fill_seen(request.views, &camera, &looking)?;
+        let views = self.used(request.views, &request.view_weights())?;
+        let mut scratch = Scratch::new(device);
+        let features = self.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
+        let start = match (&self.earlier, field.options.omissions.reuse) {
+            (Some((of_size, picture)), Some(level)) if *of_size == size => Start::Picture { picture, level },
+            _ => Start::Noise,
+        };
+        let sampled = self.parts.picture(device, &mut scratch, &features, &field.options.plan, start, progress)?;
+        self.counts.calls += u64::from(sampled.call_count());
+        self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
+        let values = device.download(&sampled.picture)?;
+        if field.options.omissions.reuse.is_some() {
+            self.earlier = Some((size, sampled.picture));
+        }
+        Ok(cropped(&values, size, target))
+    }
+
+    fn record(&self) -> Record {
+        let Counts { volume_rows, filled_rows, volume_bytes, kept_bytes, planned_calls, calls } = self.counts;
+        let Genvs { architecture, options, .. } = self.field;
+        let Omissions { unseen_rows, reuse, half_volumes, .. } = options.omissions;
+        let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
+        let ends = options.plan.settled.is_some();
+        let left_out = vec![
+            line(
+                "volume rows",
+                unseen_rows && !half_volumes,
+                volume_rows - filled_rows.min(volume_rows),
+                volume_rows,
+                "nothing",
+            ),
+            line(
+                "volume bytes",
+                half_volumes,
+                volume_bytes - kept_bytes.min(volume_bytes),
+                volume_bytes,
+                "2^-11 of a feature",
+            ),
+            line(
+                "denoiser calls",
+                ends || reuse.is_some(),
+                planned_calls - calls,
+                planned_calls,
+                "changes of a pixel that cannot be seen; what starting from the frame before costs, only a measurement tells",
+            ),
+        ];
+        let has_denoiser = architecture.denoiser.is_some();
+        let denoising = has_denoiser.then(|| options.denoising(calls, planned_calls.saturating_sub(calls)));
+        let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
+        Record { left_out, denoising, memory_estimate, near_far }
+    }
+}
+
+/// A source as the encoder is shown it, with white around its right and lower border.
+pub(super) fn padded(image: &SourceImage) -> SourceView {
+    let (width, height) = (image.camera.pinhole.width(), image.camera.pinhole.height());
+    let size = Size {
+        height: height.next_multiple_of(SIDE_STEP),
+        width: width.next_multiple_of(SIDE_STEP),
+        channels: COLOUR_CHANNELS as u32,
+    };
+    let mut values = vec![1.0; size.pixel_count() as usize * COLOUR_CHANNELS];
+    let rows = values.chunks_exact_mut(size.width as usize * COLOUR_CHANNELS);
+    for (row, texels) in rows.zip(image.texels.chunks_exact(width as usize)) {
+        for (value, texel) in row.chunks_exact_mut(COLOUR_CHANNELS).zip(texels) {
+            value.copy_from_slice(&over_white(*texel));
+        }
+    }
+    // Nothing moves: the image's pixels are where they were.
+    SourceView { size, values, camera: CameraBlock { height: size.height, width: size.width, ..image.camera.block(0) } }
+}
+
+/// The target's part of a picture `[row][column][3]` in `[-1, 1]`; opaque, and without depth.
+fn cropped(values: &[f32], size: Size, target: &Camera) -> Rendered {
+    let (width, height) = (target.pinhole.width(), target.pinhole.height());
+    let rows = values.chunks_exact(size.width as usize * COLOUR_CHANNELS).take(height as usize);
+    let pixels = rows.flat_map(|row| row.chunks_exact(COLOUR_CHANNELS).take(width as usize));
+    let colour = |pixel: &[f32]| {
+        let [red, green, blue] = [0, 1, 2].map(|channel| (0.5 * (pixel[channel] + 1.0)).clamp(0.0, 1.0));
+        [red, green, blue, 1.0]
+    };
+    let colours: Vec<[f32; 4]> = pixels.map(colour).collect();
+    Rendered { depths: Vec::new(), colours, width, height }
+}

@@ -1,0 +1,143 @@
+//! The life cycle of source views, once for all fields: prepared, encoded when they are needed, rendered from.
+
+use super::error::FieldError;
+use super::field::{About, Encoding, Prepared, Rendered, Request};
+use super::record::{LeftOut, Record};
+use super::renderer::Renderer;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::weights::Weights;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::SourceImages;
+use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
+
+/// Source views on a renderer's device. It knows which of them are encoded, under the weighting in force if that matters.
+pub struct Session<'a> {
+    renderer: &'a dyn Renderer,
+    about: About,
+    prepared: Box<dyn Prepared + 'a>,
+    /// `[view]`.
+    encoded: Vec<bool>,
+    is_weighed: bool,
+}
+
+impl<'a> Session<'a> {
+    /// Takes source views to the device.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn open(
+        renderer: &'a dyn Renderer,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Session<'a>, FieldError> {
+        let prepared = renderer.prepare(sources, progress)?;
+        let encoded = vec![false; sources.images.len()];
+        Ok(Session { renderer, about: renderer.about(), prepared, encoded, is_weighed: false })
+    }
+
+    /// Begins a weighting: encodes what does not wait for the targets that use it. `relevance[view]` are the weights of all
+    /// sources for source `view` as a target, its own 0.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
+        match self.about.encoding {
+            Encoding::WhenUsed => return Ok(()),
+            Encoding::AllFirst => {}
+            Encoding::EachWeighting => {
+                self.encoded.fill(false);
+                self.prepared.weigh(relevance)?;
+                self.is_weighed = true;
+            }
+        }
+        progress.expect(self.encoded.iter().filter(|encoded| !**encoded).count());
+        for view in 0..self.encoded.len() {
+            if self.encode_view(view, progress)? {
+                progress.step();
+            }
+        }
+        Ok(self.renderer.finish()?)
+    }
+
+    /// Encodes what a target with these weights needs and no target before it needed, so that the time can be told apart
+    /// from rendering, which does the same first. Where encodings depend on the weighting and none has begun, all sources
+    /// count the same.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn encode(&mut self, weights: &SourceWeights, progress: &dyn Progress) -> Result<(), FieldError> {
+        if self.about.encoding == Encoding::EachWeighting && !self.is_weighed {
+            self.weigh(&even(self.encoded.len()), progress)?;
+        }
+        let mut is_new = false;
+        for view in self.views(weights) {
+            is_new |= self.encode_view(view, progress)?;
+        }
+        if is_new {
+            self.renderer.finish()?;
+        }
+        Ok(())
+    }
+
+    /// Renders a target with the sources' weights for it. `settled` is the transmittance at which a ray may end early.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        settled: f32,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, FieldError> {
+        self.encode(weights, progress)?;
+        let views = &self.views(weights);
+        self.prepared.render(&Request { camera, weights, views, settled }, progress)
+    }
+
+    /// What was done and left out so far.
+    pub fn record(&self) -> Record {
+        let mut record = self.prepared.record();
+        let skips_unused = match self.about.encoding {
+            Encoding::EachWeighting => return record,
+            Encoding::AllFirst => false,
+            Encoding::WhenUsed => true,
+        };
+        let count = |views: usize| views as u64;
+        let line = LeftOut {
+            what: "encoded views",
+            switch: skips_unused,
+            left_out: count(self.encoded.iter().filter(|encoded| !**encoded).count()),
+            of: count(self.encoded.len()),
+            cost: "nothing",
+        };
+        record.left_out.insert(0, line);
+        record
+    }
+
+    /// The views that take part in a picture.
+    fn views(&self, weights: &SourceWeights) -> Vec<usize> {
+        let all = self.about.encoding != Encoding::WhenUsed;
+        (0..self.encoded.len()).filter(|view| all || weights.get(*view as u32) > 0.0).collect()
+    }
+
+    /// Encodes a view unless it is; says whether it was not.
+    fn encode_view(&mut self, view: usize, progress: &dyn Progress) -> Result<bool, FieldError> {
+        progress.check()?;
+        if self.encoded[view] {
+            return Ok(false);
+        }
+        self.prepared.encode(view, progress)?;
+        self.encoded[view] = true;
+        Ok(true)
+    }
+}
+
+/// The weights of all sources for each as a target where none says more than another.
+fn even(count: usize) -> Vec<SourceWeights> {
+    let weights = |own: usize| {
+        let score = |view: usize| f32::from(view < count && view != own);
+        Weights::from_scores(&std::array::from_fn::<f32, MOST_SOURCES, _>(score), count as u32)
+    };
+    (0..count).map(weights).collect()
+}
