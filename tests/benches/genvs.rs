@@ -28,7 +28,7 @@ fn main() {
     let (mut encoder, mut calls) = (Vec::new(), Vec::new());
     for _ in 0..rounds {
         // Anew in every round: volumes are kept.
-        let reference = Reference::new(&field, &Cpu, &photographs).expect("sources on the device");
+        let mut reference = Reference::new(&field, &Cpu, &photographs).expect("sources on the device");
         let start = Instant::now();
         for view in 0..SOURCES as usize {
             reference.encode(view).expect("a volume");

@@ -16,8 +16,9 @@ use std::path::Path;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::field::photo::{PhotoField, find_object};
+use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderOptions, Stage};
+use viewfuse::field::training_free::{TrainingFree, find_object};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{Target, target_of};
@@ -75,26 +76,29 @@ fn stages(criterion: &mut Criterion) {
     let options = RenderOptions::default();
     let weighting = Weighting::default_scheme();
     let progress = Silent;
-    let field = PhotoField::default();
-    let stage = || Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &progress).expect("prepared");
+    let field = TrainingFree::default();
+    let renderer = On { device: &Cpu, field: &field };
+    let stage = || Stage::prepare(&scene, &album, &sources, &renderer, &options, &progress).expect("prepared");
     let mut group = criterion.benchmark_group("sample scene 128x128, 20 sources");
     group.sample_size(10);
     group.bench_function("prepare", |bencher| bencher.iter(stage));
     group.bench_function("encode", |bencher| {
         bencher.iter_batched_ref(
             stage,
-            |stage| black_box(stage.encode(&weighting, &progress).expect("encoded")),
+            |stage| stage.weigh(&weighting, &progress).expect("encoded"),
             BatchSize::PerIteration,
         );
     });
     let mut stage = stage();
-    let depths = stage.encode(&weighting, &progress).expect("encoded");
+    stage.weigh(&weighting, &progress).expect("encoded");
     let target = target_of(&scene, 20);
     group.bench_function("render", |bencher| {
-        bencher.iter(|| black_box(stage.frame(&weighting, &depths, &target, &progress).expect("rendered")));
+        bencher.iter(|| black_box(stage.frame(&weighting, &target, &progress).expect("rendered")));
     });
     group.finish();
 
+    let relevance = vec![Weights::mean(sources.len() as u32); sources.len()];
+    let depths = field.depth_maps(&Cpu, &stage.images, &relevance, &progress).expect("depths");
     let object = find_object(&stage.images).expect("an object");
     let mut texels = Vec::new();
     let mut views = Vec::new();
@@ -134,7 +138,7 @@ fn own_scene(criterion: &mut Criterion) {
     let pinhole = scene.views[0].camera.pinhole;
     let size = [160, (160.0 * pinhole.height() as f32 / pinhole.width() as f32).round() as u32];
     let options = RenderOptions { size: Some(size), ..RenderOptions::default() };
-    let (field, target) = (PhotoField::default(), target_of(&scene, 0));
+    let (field, target) = (TrainingFree::default(), target_of(&scene, 0));
     let mut group = criterion.benchmark_group(format!("own scene, {} sources, {}x{}", sources.len(), size[0], size[1]));
     group.sample_size(10);
     let views = Views { scene: &scene, album: &album, sources: &sources, options: &options, field: &field };
@@ -154,17 +158,18 @@ struct Views<'a> {
     album: &'a Album<'a>,
     sources: &'a [usize],
     options: &'a RenderOptions,
-    field: &'a PhotoField,
+    field: &'a TrainingFree,
 }
 
 impl Views<'_> {
     /// From photographs to a picture.
-    fn picture<D: Device>(&self, device: &D, target: &Target) -> Frame {
+    fn picture<D: Device + Sync>(&self, device: &D, target: &Target) -> Frame {
         let Views { scene, album, sources, options, field } = self;
         let (weighting, progress) = (Weighting::default_scheme(), Silent);
-        let mut stage = Stage::prepare(scene, album, sources, device, *field, options, &progress).expect("prepared");
-        let latents = stage.encode(&weighting, &progress).expect("encoded");
-        black_box(stage.frame(&weighting, &latents, target, &progress).expect("rendered"))
+        let renderer = On { device, field: *field };
+        let mut stage = Stage::prepare(scene, album, sources, &renderer, options, &progress).expect("prepared");
+        stage.weigh(&weighting, &progress).expect("encoded");
+        black_box(stage.frame(&weighting, target, &progress).expect("rendered"))
     }
 }
 

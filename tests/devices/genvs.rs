@@ -6,12 +6,13 @@ use std::error::Error;
 use viewfuse::check::verify::verify;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::FieldError;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
-use viewfuse::field::{Field, FieldError};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{photographs, target};
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::GpuOptions;
@@ -42,7 +43,11 @@ fn genvs_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
 }
 
 /// A picture from three sources, of which one has no weight.
-fn picture<D: Device>(device: &D, omissions: Omissions, has_denoiser: bool) -> Result<Vec<[f32; 4]>, FieldError> {
+fn picture<D: Device + Sync>(
+    device: &D,
+    omissions: Omissions,
+    has_denoiser: bool,
+) -> Result<Vec<[f32; 4]>, FieldError> {
     let mut architecture = Architecture::small();
     if !has_denoiser {
         architecture.denoiser = None;
@@ -51,13 +56,11 @@ fn picture<D: Device>(device: &D, omissions: Omissions, has_denoiser: bool) -> R
     let plan = Plan { steps, ..Plan::published(0) };
     let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
     let field = Genvs::new(test_networks::deterministic(&architecture), options)?;
-    let quiet = Silent;
-    let prepared = field.prepare(device, &photographs(3, 30), &quiet)?;
-    field.encode(device, &prepared, &[], &quiet)?;
     let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
     (scores[0], scores[2]) = (0.7, 0.3);
     let weights = Weights::from_scores(&scores, 3);
-    Ok(field.render(device, &prepared, &(), &weights, &target(22), 0.0, &quiet)?.colours)
+    let sources = photographs(3, 30);
+    Ok(fields::picture(device, &field, &sources, &weights, &target(22), 0.0, &Silent)?.0.colours)
 }
 
 /// An error with its cause.

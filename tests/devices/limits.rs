@@ -5,6 +5,7 @@ use crate::candidate::{Candidate, Test, assert_works};
 use crate::picture::{KERNELS, Rendering, SIDE, SOURCE_COUNT};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
+use viewfuse::device::DeviceError;
 use viewfuse::field::FieldError;
 use viewfuse::field::render::RenderError;
 use viewfuse_core::fuse::FuseBlock;
@@ -133,7 +134,7 @@ fn a_picture_that_cannot_be_cut_names_the_limit(candidate: &Candidate) -> Result
         ] {
             let device = candidate.vulkan(&under(limits))?;
             let outcome = match Rendering::on_vulkan(&device) {
-                Err(RenderError::Field(FieldError::Device(error))) => Err(error),
+                Err(RenderError::Field(FieldError::Device(DeviceError::Vulkan(error)))) => Err(error),
                 Err(error) => return Err(error.to_string().into()),
                 Ok(_) => Ok(()),
             };

@@ -8,8 +8,9 @@ use viewfuse::check::picture::compare;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
-use viewfuse::field::photo::PhotoField;
+use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
+use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
@@ -41,7 +42,7 @@ impl Rendering {
         Ok(Rendering { tallies: KERNELS.map(|kernel| device.tally(kernel)).to_vec(), ..rendering })
     }
 
-    fn on<D: Device>(device: &D) -> Result<Rendering, RenderError> {
+    fn on<D: Device + Sync>(device: &D) -> Result<Rendering, RenderError> {
         let scene = Scene::open(data("toy"))?;
         let (targets, view_count) = (Some("20,22".to_owned()), Some(SOURCE_COUNT));
         let job = Selection { targets, view_count, ..Selection::default() }.resolve(&scene, 2).expect("views of it");
@@ -53,7 +54,8 @@ impl Rendering {
             rendering.depths.push(frame.depths);
             Ok(())
         };
-        render(&scene, &job, &weighting, device, &PhotoField::default(), &options, &Silent, keep)?;
+        let renderer = On { device, field: &TrainingFree::default() };
+        render(&scene, &job, &weighting, &renderer, &options, &Silent, keep)?;
         Ok(rendering)
     }
 

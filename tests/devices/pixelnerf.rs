@@ -5,6 +5,7 @@ use libtest_mimic::Failed;
 use viewfuse::check::verify::verify;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::On;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
 use viewfuse::job::progress::Silent;
@@ -33,7 +34,7 @@ fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Faile
     }
 }
 
-fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>, RenderError> {
+fn picture<D: Device + Sync>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>, RenderError> {
     let scene = Scene::open(data("toy"))?;
     let selection =
         Selection { targets: Some("20".to_owned()), sources: Some("1,7,13".to_owned()), ..Selection::default() };
@@ -48,7 +49,7 @@ fn picture<D: Device>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>,
         Ok(())
     };
     let weighting = "error:alpha=1".parse().expect("a scheme");
-    render(&scene, &job, &weighting, device, &field, &options, &Silent, keep)?;
+    render(&scene, &job, &weighting, &On { device, field: &field }, &options, &Silent, keep)?;
     Ok(colours)
 }
 

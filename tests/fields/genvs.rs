@@ -7,17 +7,17 @@ mod omissions;
 mod sizes;
 mod values;
 
-use std::convert::Infallible;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
-use viewfuse::field::{Field, FieldError, Rendered};
+use viewfuse::field::{FieldError, Record, Rendered};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{photographs, target};
 
 /// Everything is computed, in three calls of the denoiser.
@@ -68,9 +68,12 @@ fn try_picture_with(
     target: &Camera,
     progress: &dyn Progress,
 ) -> Result<Rendered, FieldError> {
-    let prepared = field.prepare(&Cpu, sources, progress)?;
-    field.encode(&Cpu, &prepared, &[], progress)?;
-    field.render(&Cpu, &prepared, &(), weights, target, 0.0, progress)
+    Ok(fields::picture(&Cpu, field, sources, weights, target, 0.0, progress)?.0)
+}
+
+/// A picture, and what the field says of it.
+fn recorded(field: &Genvs, sources: &SourceImages, weights: &SourceWeights, target: &Camera) -> (Rendered, Record) {
+    fields::picture(&Cpu, field, sources, weights, target, 0.0, &Silent).expect("a picture")
 }
 
 fn picture_with(field: &Genvs, sources: &SourceImages, weights: &SourceWeights, target: &Camera) -> Rendered {

@@ -6,12 +6,13 @@ mod sizes;
 
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, test_networks};
-use viewfuse::field::{Field, Rendered};
+use viewfuse::field::{Field, Record, Rendered, SourceSide};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields;
 use viewfuse_tests::lorry::{orbit, photographs, target};
 
 /// Width of the made networks.
@@ -47,10 +48,18 @@ fn picture_with(
     target: &Camera,
     settled: f32,
 ) -> Rendered {
-    let quiet = Silent;
-    let prepared = field.prepare(&Cpu, sources, &quiet).expect("sources on the device");
-    field.encode(&Cpu, &prepared, &[], &quiet).expect("latents");
-    field.render(&Cpu, &prepared, &(), weights, target, settled, &quiet).expect("a picture")
+    recorded(field, sources, weights, target, settled).0
+}
+
+/// A picture, and what the field says of it.
+fn recorded(
+    field: &PixelNerf,
+    sources: &SourceImages,
+    weights: &SourceWeights,
+    target: &Camera,
+    settled: f32,
+) -> (Rendered, Record) {
+    fields::picture(&Cpu, field, sources, weights, target, settled, &Silent).expect("a picture")
 }
 
 fn picture(field: &PixelNerf, sources: &SourceImages, target: &Camera) -> Rendered {
@@ -124,7 +133,7 @@ fn the_order_of_the_sources_is_only_rounding() {
 #[test]
 fn the_size_of_the_sources_is_the_networks_not_the_pictures() {
     let field = body(PixelNerfOptions::default());
-    assert_eq!(Field::<Cpu>::source_side(&field, 512), 128);
+    assert_eq!(field.about().source_side, SourceSide::Pixels(128));
     // The same place in a picture of twice the size has the same colour, up to sampling.
     let sources = sources(2);
     let (small, large) = (picture(&field, &sources, &target(16)), picture(&field, &sources, &target(32)));

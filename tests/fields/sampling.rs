@@ -2,7 +2,6 @@
 //! numbers that are none. That it gives what the samplers' formulas give is in `numerics/sampler.rs`, that other devices give
 //! the same in `devices/sampling.rs`.
 
-use std::convert::Infallible;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::FieldError;
 use viewfuse::field::finite::NotFinite;

@@ -5,13 +5,14 @@ use viewfuse::check::poses::Random;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
-use viewfuse::field::{Field, LeftOut, Rendered};
+use viewfuse::field::{Record, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::half::{LARGEST, fetch_half, half_bits, half_value, packed_halves, word_count};
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields::{self, line};
 
 #[test]
 fn all_there_are() {
@@ -113,16 +114,8 @@ fn sources() -> SourceImages {
     SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
 }
 
-fn picture(field: &Genvs, sources: &SourceImages) -> Rendered {
-    let quiet = Silent;
-    let prepared = field.prepare(&Cpu, sources, &quiet).expect("sources on the device");
-    field.encode(&Cpu, &prepared, &[], &quiet).expect("nothing to do");
-    field.render(&Cpu, &prepared, &(), &Weights::mean(VIEWS), &target(), 0.0, &quiet).expect("a picture")
-}
-
-fn left_out(field: &Genvs, what: &str) -> LeftOut {
-    let lines = Field::<Cpu>::left_out(field);
-    lines.into_iter().find(|line| line.what == what).expect("a line")
+fn picture(field: &Genvs, sources: &SourceImages) -> (Rendered, Record) {
+    fields::picture(&Cpu, field, sources, &Weights::mean(VIEWS), &target(), 0.0, &Silent).expect("a picture")
 }
 
 #[test]
@@ -130,7 +123,7 @@ fn a_volume_is_the_nearest_of_16_bits() {
     let sources = sources();
     let volume = |half_volumes| {
         let field = field(half_volumes);
-        let reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
+        let mut reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
         reference.volume(1).expect("a volume")
     };
     let (whole, halves) = (volume(false), volume(true));
@@ -145,7 +138,7 @@ fn features_and_pictures_hardly_change() {
     let sources = sources();
     let features = |half_volumes| {
         let field = field(half_volumes);
-        let reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
+        let mut reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
         let weights = [1.0 / VIEWS as f32; VIEWS as usize];
         reference.features(&weights, &target().block(0), [0.8, 1.8], 1.0).expect("features")
     };
@@ -155,7 +148,7 @@ fn features_and_pictures_hardly_change() {
     assert!(off > 0.0 && off < 0.5_f32.powi(11) * largest, "{off:e} of {largest:e}");
 
     let (exact, packed) = (field(false), field(true));
-    let [whole, halves] = [&exact, &packed].map(|field| picture(field, &sources).colours);
+    let [whole, halves] = [&exact, &packed].map(|field| picture(field, &sources).0.colours);
     let pairs = whole.iter().flatten().zip(halves.iter().flatten());
     let off = pairs.fold(0.0_f32, |off, (whole, half)| off.max((whole - half).abs()));
     assert!(off > 0.0 && off < 0.5 / 255.0, "{off:e}");
@@ -165,19 +158,17 @@ fn features_and_pictures_hardly_change() {
 fn half_the_memory() {
     let sources = sources();
     let (exact, packed) = (field(false), field(true));
-    for field in [&exact, &packed] {
-        picture(field, &sources);
-    }
-    let whole = left_out(&exact, "volume bytes");
-    let halves = left_out(&packed, "volume bytes");
+    let [in_whole, in_halves] = [&exact, &packed].map(|field| picture(field, &sources).1);
+    let whole = line(&in_whole, "volume bytes");
+    let halves = line(&in_halves, "volume bytes");
     assert_eq!((whole.switch, whole.left_out), (false, 0));
     assert_eq!((halves.switch, halves.left_out * 2, halves.of), (true, whole.of, whole.of));
     // Rows cannot be left out then: what they are made of is not kept.
-    assert!(left_out(&exact, "volume rows").switch);
-    let rows = left_out(&packed, "volume rows");
+    assert!(line(&in_whole, "volume rows").switch);
+    let rows = line(&in_halves, "volume rows");
     assert_eq!((rows.switch, rows.left_out, rows.of), (false, 0, u64::from(VIEWS * SIDE)));
     // Before anything is there, more views cost less than half.
-    let estimate = |field: &Genvs, count| field.memory_estimate(&Cpu, &vec![[SIDE; 2]; count]).expect("a number");
+    let estimate = |field: &Genvs, count| field.memory_estimate(&Cpu, &vec![[SIDE; 2]; count]);
     let per_view = |field| (estimate(field, 9) - estimate(field, 1)) / 8;
     assert_eq!(per_view(&packed), whole.of / u64::from(VIEWS) / 2);
     assert!(2 * per_view(&packed) < per_view(&exact));

@@ -1,6 +1,5 @@
 //! Photographs on their way to a field: where they are kept and how large they are worked on changes what it should.
 
-use std::convert::Infallible;
 use viewfuse::field::LONGEST_DEFAULT_SIDE;
 use viewfuse::field::render::{RenderOptions, working_side};
 use viewfuse::job::progress::Silent;
@@ -28,7 +27,7 @@ fn the_largest_photograph_decides_the_size_up_to_the_limit() {
     let side = |folder: &scenes::Folder, size: Option<[u32; 2]>| {
         let scene = Scene::open(folder.path()).expect("a scene");
         let options = RenderOptions { size, ..RenderOptions::default() };
-        working_side::<Infallible>(&scene, &options, LONGEST_DEFAULT_SIDE).expect("a size")
+        working_side(&scene, &options, LONGEST_DEFAULT_SIDE).expect("a size")
     };
     let folder = scenes::srn();
     assert_eq!(side(&folder, None), 16);

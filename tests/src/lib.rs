@@ -8,6 +8,7 @@ pub mod command;
 pub mod contract;
 pub mod devices;
 pub mod emulator;
+pub mod fields;
 pub mod lorry;
 pub mod mixture;
 pub mod module;

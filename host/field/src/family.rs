@@ -17,7 +17,7 @@ macro_rules! families {
     ($($(#[$doc:meta])* $Family:ident {
         title: $title:literal, prefix: $prefix:literal, open: $open:path,
         options: $options:expr, computable: $computable:expr,
-        untrained: $untrained:expr $(,)?
+        test_networks: $test_networks:expr $(,)?
     })+) => {
         /// A family of networks.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,9 +49,9 @@ macro_rules! families {
                 match self { $(Family::$Family => $computable,)+ }
             }
 
-            /// Its networks without training, for measuring.
-            pub const fn untrained(self) -> &'static [Untrained] {
-                match self { $(Family::$Family => $untrained,)+ }
+            /// Its test networks, with deterministic initialisation.
+            pub const fn test_networks(self) -> &'static [TestNetwork] {
+                match self { $(Family::$Family => $test_networks,)+ }
             }
 
             fn constructor(self) -> fn(Checkpoint, &FieldOptions) -> Result<AnyField, OpenError> {
@@ -67,9 +67,9 @@ families! {
         title: "PixelNeRF", prefix: "encoder.model.", open: pixelnerf::open,
         options: &["published-depth", "probe-step", "probe-error"],
         computable: pixelnerf::COMPUTABLE,
-        untrained: &[
-            Untrained { name: "formula", small: Small::Width, checkpoint: pixelnerf::test_networks::formula_of_width },
-            Untrained { name: "body", small: Small::Width, checkpoint: pixelnerf::test_networks::body_of_width },
+        test_networks: &[
+            TestNetwork { name: "formula", small: Small::Width, checkpoint: pixelnerf::test_networks::deterministic_of_width },
+            TestNetwork { name: "body", small: Small::Width, checkpoint: pixelnerf::test_networks::body_of_width },
         ],
     }
     /// [`super::genvs`].
@@ -77,14 +77,13 @@ families! {
         title: "GeNVS", prefix: "pixel_nerf_net.", open: genvs::open,
         options: &["sampler", "steps", "tolerance", "churn", "half-volumes", "reuse", "noise"],
         computable: genvs::COMPUTABLE,
-        untrained: &[Untrained { name: "genvs", small: Small::One, checkpoint: genvs::test_networks::formula_of_size }],
+        test_networks: &[TestNetwork { name: "genvs", small: Small::One, checkpoint: genvs::test_networks::deterministic_of_size }],
     }
 }
 
-/// A network whose parameters are computed from the names of its tensors, not trained: for measuring, and for checks
-/// against other implementations.
+/// A network with deterministic initialisation: for measuring, and for checks against other implementations.
 #[derive(Clone, Copy)]
-pub struct Untrained {
+pub struct TestNetwork {
     /// Its name.
     pub name: &'static str,
     /// Which small members its family has.
@@ -150,9 +149,9 @@ mod tests {
     #[test]
     fn told_by_names() {
         for family in Family::ALL {
-            for untrained in family.untrained() {
-                let checkpoint = (untrained.checkpoint)(Some(8));
-                assert_eq!(Family::of(&checkpoint).ok(), Some(family), "{}", untrained.name);
+            for network in family.test_networks() {
+                let checkpoint = (network.checkpoint)(Some(8));
+                assert_eq!(Family::of(&checkpoint).ok(), Some(family), "{}", network.name);
             }
         }
     }
@@ -169,7 +168,7 @@ mod tests {
     #[test]
     fn options_of_the_other_family_are_refused() {
         for family in Family::ALL {
-            let checkpoint = || (family.untrained()[0].checkpoint)(Some(8));
+            let checkpoint = || (family.test_networks()[0].checkpoint)(Some(8));
             let computing = FieldOptions { compute: vec!["everything".to_owned()], ..FieldOptions::default() };
             let other =
                 FieldOptions { published_depth: true, sampler: None, churn: Some(1.0), ..FieldOptions::default() };

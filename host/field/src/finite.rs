@@ -40,7 +40,7 @@ pub fn download_finite<D: Device>(
     stage: &str,
     tensor: &str,
 ) -> Result<Vec<f32>, FieldError> {
-    let values = device.download(buffer).map_err(FieldError::Device)?;
+    let values = device.download(buffer)?;
     check_finite(&values, stage, tensor)?;
     Ok(values)
 }

@@ -75,6 +75,11 @@ impl Genvs {
         Genvs { architecture, checkpoint, options: options.checked() }
     }
 
+    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures.
+    pub fn memory_estimate<D: Device>(&self, device: &D, source_sizes: &[[u32; 2]]) -> u64 {
+        memory::estimate(device, &self.architecture, &self.options, source_sizes)
+    }
+
     /// Rows and columns of pictures are multiples of this: so often the denoiser halves them, and rays are cast at half
     /// the resolution.
     fn picture_step(&self) -> u32 {
@@ -97,7 +102,7 @@ impl Genvs {
             images,
             // A volume of no depth has no nodes to look up.
             near_far: NoDepths::check(near_far).map_err(FieldError::unsuitable)?,
-            memory_estimate: memory::estimate(device, &self.architecture, &self.options, &sizes),
+            memory_estimate: self.memory_estimate(device, &sizes),
             earlier: None,
             counts: Counts::default(),
         })

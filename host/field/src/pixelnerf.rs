@@ -96,6 +96,11 @@ impl PixelNerf {
         PixelNerf { architecture, parameters, options: options.checked() }
     }
 
+    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures.
+    pub fn memory_estimate<D: Device>(&self, device: &D, source_sizes: &[[u32; 2]]) -> u64 {
+        memory::estimate(device, &self.architecture, &self.options, source_sizes)
+    }
+
     /// Takes photographs and parameters to a device.
     fn views<'a, D: Device>(&'a self, device: &'a D, sources: &SourceImages) -> Result<Views<'a, D>, DeviceError> {
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
@@ -110,7 +115,7 @@ impl PixelNerf {
             latents: cameras.iter().map(|_| None).collect(),
             near_far: self.options.sampling.near_far.unwrap_or_else(|| default_near_far(&cameras)),
             background: sources.background,
-            memory_estimate: memory::estimate(device, &self.architecture, &self.options, &sizes),
+            memory_estimate: self.memory_estimate(device, &sizes),
             counts: Counts::default(),
         })
     }

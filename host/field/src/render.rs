@@ -291,9 +291,9 @@ impl<'a> Stage<'a> {
         let camera = self.at_working_size(&target.camera)?;
         let failed = |error| RenderError::of(error, self.scene);
         let mut encode = Duration::ZERO;
-        timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
+        timed(&mut encode, || self.session.encode(&omission.weights, progress))?;
         let settled = self.options.settled;
-        let rendered = self.session.render(&camera, &omission.weights, settled, progress).map_err(failed)?;
+        let rendered = self.session.render(&camera, &omission.weights, settled, progress)?;
         let time = start.elapsed();
         let Rendered { colours, depths, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);

@@ -77,24 +77,35 @@ struct Sweep<D: Device> {
     first_guess: D::Buffer<f32>,
 }
 
-impl Field for TrainingFree {
-    fn about(&self) -> About {
-        About {
-            // One view shows no depth.
-            least_sources: 2,
-            source_side: SourceSide::Share(self.source_share),
-            encoding: Encoding::EachWeighting,
-            ends_rays: true,
-            ..About::new("photo")
+impl TrainingFree {
+    /// The depth maps of all sources, one behind another, row-major: depths along the principal axis in world units,
+    /// [`NO_SURFACE`] where nothing was found. `relevance[view]` are the weights of all sources for source `view`.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn depth_maps<D: Device>(
+        &self,
+        device: &D,
+        sources: &SourceImages,
+        relevance: &[SourceWeights],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f32>, FieldError> {
+        let mut views = self.views(device, sources, progress)?;
+        views.weigh(relevance)?;
+        for view in 0..sources.images.len() {
+            views.encode(view, progress)?;
         }
+        let depths = views.depths.ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
+        Ok(device.download(&depths.maps)?)
     }
 
-    fn prepare<'a, D: Device>(
+    /// Takes the photographs to a device and finds the object.
+    fn views<'a, D: Device>(
         &'a self,
         device: &'a D,
         sources: &SourceImages,
         progress: &dyn Progress,
-    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+    ) -> Result<Views<'a, D>, FieldError> {
         let (cameras, texels) = joined(sources);
         let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
@@ -118,7 +129,29 @@ impl Field for TrainingFree {
         }
         device.finish()?;
         let (texel_count, background) = (texels.len(), sources.background);
-        Ok(Box::new(Views { field: self, device, scene, entries, texel_count, background, depths: None }))
+        Ok(Views { field: self, device, scene, entries, texel_count, background, depths: None })
+    }
+}
+
+impl Field for TrainingFree {
+    fn about(&self) -> About {
+        About {
+            // One view shows no depth.
+            least_sources: 2,
+            source_side: SourceSide::Share(self.source_share),
+            encoding: Encoding::EachWeighting,
+            ends_rays: true,
+            ..About::new("photo")
+        }
+    }
+
+    fn prepare<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        Ok(Box::new(self.views(device, sources, progress)?))
     }
 }
 

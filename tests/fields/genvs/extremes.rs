@@ -2,9 +2,9 @@
 
 use super::{assert_sound, exact, made, picture, picture_with, sources, target, try_picture, weights};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::FieldError;
 use viewfuse::field::genvs::Genvs;
 use viewfuse::field::genvs::reference::Reference;
+use viewfuse::field::learned::NoDepths;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
@@ -63,7 +63,7 @@ fn rays_of_no_length_are_an_error() {
     let infinite = f32::INFINITY;
     for (near, far) in [(1.0, 1.0), (1.8, 0.8), (f32::NAN, 1.0), (1.0, f32::NAN), (1.0, infinite), (-3.0e38, 3.0e38)] {
         match try_picture(&between(near, far), &sources(2), &Weights::mean(2), &target(8)) {
-            Err(error @ FieldError::NoDepths { .. }) => {
+            Err(error) if error.is::<NoDepths>() => {
                 let expected = format!("rays from depth {near} to depth {far} have nothing between their ends");
                 assert_eq!(error.to_string(), expected);
             }

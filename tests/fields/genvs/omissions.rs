@@ -1,39 +1,35 @@
 //! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
 
 use super::{
-    assert_sound, exact, largest_difference, leaving_out, made, picture, picture_with, sources, target, weights,
+    assert_sound, exact, largest_difference, leaving_out, made, picture_with, recorded, sources, target, weights,
     without_denoiser,
 };
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::genvs::{Genvs, GenvsOptions, Omissions};
-use viewfuse::field::{Field, LeftOut};
+use viewfuse::field::genvs::{GenvsOptions, Omissions};
+use viewfuse::field::{LeftOut, On, Session};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields::line;
 
 fn in_18_calls() -> Plan {
     let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 18 };
     Plan { steps, ..Plan::fast(0) }
 }
 
-fn line(field: &Genvs, what: &str) -> LeftOut {
-    let lines = Field::<Cpu>::left_out(field);
-    *lines.iter().find(|line| line.what == what).unwrap_or_else(|| panic!("no line '{what}'"))
-}
-
 #[test]
 fn nothing_is_left_out_where_nothing_may() {
-    let field = made(exact());
-    picture(&field, &sources(3), &target(16));
-    for line in Field::<Cpu>::left_out(&field) {
+    let (_, record) = recorded(&made(exact()), &sources(3), &Weights::mean(3), &target(16));
+    assert_eq!(record.left_out.len(), 4);
+    for line in &record.left_out {
         assert!(!line.switch && line.left_out == 0 && line.of > 0, "{line:?}");
     }
-    assert_eq!(line(&field, "encoded views").of, 3);
-    assert_eq!(line(&field, "volume rows").of, 3 * 32);
-    assert_eq!(line(&field, "denoiser calls").of, 3);
+    assert_eq!(line(&record, "encoded views").of, 3);
+    assert_eq!(line(&record, "volume rows").of, 3 * 32);
+    assert_eq!(line(&record, "denoiser calls").of, 3);
 }
 
 #[test]
@@ -41,8 +37,9 @@ fn views_that_no_target_uses_are_not_encoded() {
     let (sources, target, weights) = (sources(4), target(16), weights([0.0, 0.25, 0.0, 0.75], 4));
     let reference = picture_with(&made(exact()), &sources, &weights, &target);
     let field = made(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
-    assert_eq!(picture_with(&field, &sources, &weights, &target), reference, "zeros are added exactly");
-    let LeftOut { left_out, of, switch, .. } = line(&field, "encoded views");
+    let (picture, record) = recorded(&field, &sources, &weights, &target);
+    assert_eq!(picture, reference, "zeros are added exactly");
+    let LeftOut { left_out, of, switch, .. } = line(&record, "encoded views");
     assert_eq!((left_out, of, switch), (2, 4, true));
 }
 
@@ -59,11 +56,11 @@ fn rows_that_no_ray_reaches_are_not_computed() {
     let quiet = Silent;
     let with = |omissions| {
         let field = without_denoiser(leaving_out(omissions));
-        let prepared = field.prepare(&Cpu, &sources, &quiet).expect("sources on the device");
-        field.encode(&Cpu, &prepared, &[], &quiet).expect("volumes");
+        let renderer = On { device: &Cpu, field: &field };
+        let mut session = Session::open(&renderer, &sources, &quiet).expect("sources on the device");
         let render = |target: &Camera| {
-            let picture = field.render(&Cpu, &prepared, &(), &Weights::mean(3), target, 0.0, &quiet);
-            (picture.expect("a picture"), line(&field, "volume rows").left_out)
+            let picture = session.render(target, &Weights::mean(3), 0.0, &quiet);
+            (picture.expect("a picture"), line(&session.record(), "volume rows").left_out)
         };
         targets.iter().map(render).collect::<Vec<_>>()
     };
@@ -91,14 +88,14 @@ fn an_earlier_frame_saves_calls() {
     let frames = |reuse| {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
         let field = made(GenvsOptions { plan: Plan { settled: None, ..in_18_calls() }, ..options });
-        let prepared = field.prepare(&Cpu, &sources, &quiet).expect("sources on the device");
-        field.encode(&Cpu, &prepared, &[], &quiet).expect("volumes");
-        let render = |camera| field.render(&Cpu, &prepared, &(), &Weights::mean(2), camera, 0.0, &quiet);
+        let renderer = On { device: &Cpu, field: &field };
+        let mut session = Session::open(&renderer, &sources, &quiet).expect("sources on the device");
+        let mut render = |camera| session.render(camera, &Weights::mean(2), 0.0, &quiet);
         let frames = cameras.each_ref().map(|camera| render(camera).expect("a picture"));
         // A frame of another size begins anew.
         let smaller = render(&target(8)).expect("a picture");
         assert_sound(&smaller);
-        (frames, line(&field, "denoiser calls"))
+        (frames, line(&session.record(), "denoiser calls"))
     };
     let (whole, all) = frames(None);
     assert_eq!((all.left_out, all.of, all.switch), (0, 3 * 18, false));
@@ -117,7 +114,8 @@ fn a_settled_picture_ends_early() {
     let (sources, target) = (sources(2), target(16));
     let with = |settled| {
         let field = made(GenvsOptions { plan: Plan { settled, ..in_18_calls() }, ..exact() });
-        (picture(&field, &sources, &target), line(&field, "denoiser calls"))
+        let (picture, record) = recorded(&field, &sources, &Weights::mean(2), &target);
+        (picture, line(&record, "denoiser calls"))
     };
     let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).settled));
     let difference = largest_difference(&whole, &early);
@@ -132,14 +130,15 @@ fn without_denoiser_the_first_features_are_the_picture() {
     let mut options = exact();
     (options.rays.near_far, options.rays.length) = (Some([0.8, 1.8]), Some(0.5));
     let field = without_denoiser(options);
-    let picture = picture(&field, &sources, &target);
+    let (picture, record) = recorded(&field, &sources, &Weights::mean(2), &target);
     assert_sound(&picture);
-    let reference = Reference::new(&field, &Cpu, &sources).expect("sources on the device");
+    assert_eq!(record.denoising, None);
+    let mut reference = Reference::new(&field, &Cpu, &sources).expect("sources on the device");
     let features = reference.features(&[0.5, 0.5], &target.block(0), [0.8, 1.8], 0.5).expect("features");
     for (colour, features) in picture.colours.iter().zip(features.chunks_exact(16)) {
         let expected = [0, 1, 2].map(|channel| (0.5 * (features[channel] + 1.0)).clamp(0.0, 1.0));
         assert_eq!(colour[..3], expected);
     }
-    let calls = line(&field, "denoiser calls");
+    let calls = line(&record, "denoiser calls");
     assert_eq!((calls.left_out, calls.of), (0, 0));
 }

@@ -2,7 +2,7 @@
 
 use super::worlds::{Run, assert_shows_an_object, assert_sound, ball, ball_views, orbit, source, target, views};
 use image::{Rgba, RgbaImage};
-use viewfuse::field::FieldError;
+use viewfuse::field::training_free::NoObject;
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::synthetic::render;
 use viewfuse_core::camera::Camera;
@@ -19,7 +19,7 @@ fn identical_sources() {
     // One camera twice says nothing about where along its rays the object is.
     sources.images = vec![sources.images[0].clone(); 2];
     let outcome = Run::default().picture(&sources, &target(32));
-    assert!(matches!(outcome, Err(FieldError::NoObject)), "{:?}", outcome.map(|picture| picture.width));
+    assert!(outcome.as_ref().is_err_and(|error| error.is::<NoObject>()), "{:?}", outcome.map(|picture| picture.width));
 }
 
 #[test]

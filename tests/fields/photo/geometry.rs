@@ -4,8 +4,8 @@ use super::worlds::{
     RADIUS, Run, assert_shows_an_object, assert_sound, ball_views, largest_difference, lorry_views, share_within,
     target, views,
 };
-use viewfuse::field::FieldError;
 use viewfuse::field::Rendered;
+use viewfuse::field::training_free::NoObject;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::toy::lorry;
 use viewfuse_core::Vec3;
@@ -136,7 +136,7 @@ fn silhouettes_that_do_not_meet_are_no_object() {
     };
     let images = sources.images.iter().step_by(2).enumerate().map(wandering).collect();
     let outcome = Run::default().picture(&SourceImages { images, ..sources }, &target(32));
-    assert!(matches!(outcome, Err(FieldError::NoObject)), "{:?}", outcome.map(|picture| picture.width));
+    assert!(outcome.as_ref().is_err_and(|error| error.is::<NoObject>()), "{:?}", outcome.map(|picture| picture.width));
 }
 
 #[test]

@@ -4,10 +4,11 @@ use image::{Rgba, RgbaImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::evaluate::metrics::Metrics;
+use viewfuse::evaluate::metrics::{Metrics, MetricsOn};
 use viewfuse::evaluate::{Evaluator, Mean, NEAREST_COPY, PSNR, SSIM, means};
-use viewfuse::field::photo::PhotoField;
+use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderOptions, Stage};
+use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{Selection, target_of};
@@ -31,13 +32,12 @@ fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {
     let scene = Scene::open(folder).expect("the sample");
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<Weighting> = schemes.iter().map(|name| scheme(name)).collect();
-    let (field, options, quiet) = (PhotoField::default(), RenderOptions::default(), Silent);
+    let (field, options, quiet) = (TrainingFree::default(), RenderOptions::default(), Silent);
     let evaluator = Evaluator {
         weightings: &weightings,
-        device: &Cpu,
-        field: &field,
+        renderer: &On { device: &Cpu, field: &field },
         options: &options,
-        metrics: &Metrics::plain(),
+        scorer: &MetricsOn { device: &Cpu, metrics: Metrics::plain() },
         progress: &quiet,
     };
     let scores = evaluator.score_all(&scene, &selection).expect("scores");
@@ -101,11 +101,12 @@ fn frame(leave_out: f32) -> (Frame, image::RgbImage) {
     let sources: Vec<usize> = (0..20).step_by(3).collect();
     let options = RenderOptions { size: Some([48, 48]), leave_out, ..RenderOptions::default() };
     let album = Album::open(&scene, 0..24, &Silent).expect("photographs");
-    let (field, quiet) = (PhotoField::default(), Silent);
-    let mut stage = Stage::prepare(&scene, &album, &sources, &Cpu, &field, &options, &quiet).expect("a stage");
+    let (field, quiet) = (TrainingFree::default(), Silent);
+    let renderer = On { device: &Cpu, field: &field };
+    let mut stage = Stage::prepare(&scene, &album, &sources, &renderer, &options, &quiet).expect("a stage");
     let weighting = scheme("error:alpha=1");
-    let latents = stage.encode(&weighting, &quiet).expect("latents");
-    let frame = stage.frame(&weighting, &latents, &target_of(&scene, 20), &quiet).expect("a frame");
+    stage.weigh(&weighting, &quiet).expect("depths");
+    let frame = stage.frame(&weighting, &target_of(&scene, 20), &quiet).expect("a frame");
     let mut camera = frame.target.camera;
     camera.pinhole = camera.pinhole.resized(48, 48).expect("a size");
     let plain = Run::default().picture(&stage.images, &camera).expect("a picture");

@@ -2,8 +2,8 @@
 
 use image::RgbaImage;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::photo::PhotoField;
-use viewfuse::field::{Field, FieldError, Rendered};
+use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::{FieldError, On, Rendered, Session};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::toy::{lorry, training_cameras};
@@ -21,29 +21,29 @@ pub(crate) const RADIUS: f32 = 0.4;
 /// Everything about a run that a test may change.
 #[derive(Clone, Copy)]
 pub(crate) struct Run {
-    pub(crate) field: PhotoField,
+    pub(crate) field: TrainingFree,
     pub(crate) scheme: &'static str,
     pub(crate) settled: f32,
 }
 
 impl Default for Run {
     fn default() -> Run {
-        Run { field: PhotoField::default(), scheme: "error:alpha=1", settled: 1.0 / 256.0 }
+        Run { field: TrainingFree::default(), scheme: "error:alpha=1", settled: 1.0 / 256.0 }
     }
 }
 
 impl Run {
     /// The target's picture from the sources.
     pub(crate) fn picture(&self, sources: &SourceImages, target: &Camera) -> Result<Rendered, FieldError> {
-        let (field, quiet) = (self.field, Silent);
+        let quiet = Silent;
         let weighting = Weighting::open(self.scheme).expect("a scheme");
-        let prepared = field.prepare(&Cpu, sources, &quiet)?;
-        let relevance = relevance(sources, &weighting);
-        let latents = field.encode(&Cpu, &prepared, &relevance, &quiet)?;
+        let renderer = On { device: &Cpu, field: &self.field };
+        let mut session = Session::open(&renderer, sources, &quiet)?;
+        session.weigh(&relevance(sources, &weighting), &quiet)?;
         let all: Vec<_> = sources.images.iter().map(|image| image.camera.pose).collect();
         let all = Sources::<MOST_SOURCES>::new(&all).expect("sources");
         let weights = weighting.weigh(&all, &target.pose);
-        field.render(&Cpu, &prepared, &latents, &weights, target, self.settled, &quiet)
+        session.render(target, &weights, self.settled, &quiet)
     }
 }
 

@@ -1,25 +1,24 @@
 //! Each thing that can be left out, alone: what it saves and what it costs, against the exact picture.
 
-use super::{body, exact, largest_difference, leaving_out, mist, picture, picture_with, sources, target};
-use viewfuse::device::cpu::Cpu;
-use viewfuse::field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions};
-use viewfuse::field::{Field, LeftOut, Rendered};
+use super::{body, exact, largest_difference, leaving_out, mist, picture, picture_with, recorded, sources, target};
+use viewfuse::field::pixelnerf::{Omissions, PixelNerfOptions};
+use viewfuse::field::{LeftOut, Rendered};
 use viewfuse::weighting::sources::MOST_SOURCES;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields::line;
 
-fn line(field: &PixelNerf, what: &str) -> LeftOut {
-    let lines = Field::<Cpu>::left_out(field);
-    *lines.iter().find(|line| line.what == what).unwrap_or_else(|| panic!("no line '{what}'"))
-}
+/// Transmittance at which rays end.
+const SETTLED: f32 = 1.0 / 256.0;
 
 /// Difference from the exact picture of the body, and the share of the samples of a pass that was left out.
 fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
     let (sources, target) = (sources(3), target(32));
     let reference = picture(&body(exact()), &sources, &target);
     let field = body(leaving_out(omissions));
-    let difference = largest_difference(&picture(&field, &sources, &target), &reference);
-    let LeftOut { left_out, of, switch, .. } = line(&field, what);
+    let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, SETTLED);
+    let difference = largest_difference(&picture, &reference);
+    let LeftOut { left_out, of, switch, .. } = line(&record, what);
     assert!(switch && of > 0);
     let share = left_out as f64 / of as f64;
     println!("{what}: {share:.3} left out, largest difference {difference:.1e}");
@@ -28,9 +27,9 @@ fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
 
 #[test]
 fn nothing_is_left_out_where_nothing_may() {
-    let field = body(exact());
-    picture(&field, &sources(3), &target(16));
-    for line in Field::<Cpu>::left_out(&field) {
+    let (_, record) = recorded(&body(exact()), &sources(3), &Weights::mean(3), &target(16), SETTLED);
+    assert_eq!(record.left_out.len(), 4);
+    for line in &record.left_out {
         assert!(!line.switch && line.left_out == 0 && line.of > 0, "{line:?}");
     }
 }
@@ -43,8 +42,9 @@ fn views_that_no_target_uses_are_not_encoded() {
     let weights = Weights::from_scores(&scores, 4);
     let reference = picture_with(&body(exact()), &sources, &weights, &target, 0.0);
     let field = body(leaving_out(Omissions { unused_views: true, ..Omissions::NONE }));
-    assert_eq!(picture_with(&field, &sources, &weights, &target, 0.0), reference, "zeros are added exactly");
-    let LeftOut { left_out, of, .. } = line(&field, "encoded views");
+    let (picture, record) = recorded(&field, &sources, &weights, &target, 0.0);
+    assert_eq!(picture, reference, "zeros are added exactly");
+    let LeftOut { left_out, of, .. } = line(&record, "encoded views");
     assert_eq!((left_out, of), (2, 4));
 }
 
@@ -54,12 +54,13 @@ fn latent_layers_on_the_grid_are_only_rounding() {
     let (sources, target) = (sources(3), target(24));
     let reference = picture(&mist(exact()), &sources, &target);
     let field = mist(leaving_out(Omissions { latent_layers: true, ..Omissions::NONE }));
-    let difference = largest_difference(&picture(&field, &sources, &target), &reference);
+    let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, SETTLED);
+    let difference = largest_difference(&picture, &reference);
     println!("latent layers on the grid: {difference:.1e}");
     assert!(difference > 0.0, "the same bits: the layers were not moved");
     // A fine sample may fall into the next part where two sums round apart.
     assert!(difference < 2.0e-3, "{difference}");
-    let LeftOut { left_out, of, .. } = line(&field, "latent layers at points");
+    let LeftOut { left_out, of, .. } = line(&record, "latent layers at points");
     assert!(left_out == of && of > 0);
 }
 
@@ -117,15 +118,15 @@ fn all_together_save_most_and_cost_little() {
     let (sources, target) = (sources(3), target(32));
     let reference = picture(&body(exact()), &sources, &target);
     let field = body(PixelNerfOptions::default());
-    let default = picture(&field, &sources, &target);
+    let (default, record) = recorded(&field, &sources, &Weights::mean(3), &target, SETTLED);
     let squares =
         default.colours.iter().flatten().zip(reference.colours.iter().flatten()).map(|(a, b)| (a - b).powi(2));
     let psnr = -10.0 * (squares.map(f64::from).sum::<f64>() / (4 * default.colours.len()) as f64).log10();
     println!("everything together: {psnr:.1} dB");
     assert!(psnr > 50.0, "{psnr} dB");
     let unasked: u64 =
-        ["first-pass samples", "second-pass samples"].iter().map(|what| line(&field, what).left_out).sum();
-    let all: u64 = ["first-pass samples", "second-pass samples"].iter().map(|what| line(&field, what).of).sum();
+        ["first-pass samples", "second-pass samples"].iter().map(|what| line(&record, what).left_out).sum();
+    let all: u64 = ["first-pass samples", "second-pass samples"].iter().map(|what| line(&record, what).of).sum();
     assert!(unasked as f64 > 0.8 * all as f64, "{unasked} of {all}");
 }
 
@@ -136,8 +137,8 @@ fn a_higher_limit_for_settled_rays_saves_more_and_costs_more() {
     let weights = Weights::mean(3);
     let with = |settled| {
         let field = body(leaving_out(Omissions { hidden_samples: true, ..Omissions::NONE }));
-        let picture = picture_with(&field, &sources, &weights, &target, settled);
-        (largest_difference(&picture, &reference), line(&field, "second-pass samples").left_out)
+        let (picture, record) = recorded(&field, &sources, &weights, &target, settled);
+        (largest_difference(&picture, &reference), line(&record, "second-pass samples").left_out)
     };
     let (strict, loose) = (with(1.0e-4), with(0.5));
     println!("settled at 1e-4: {:.1e}, {} left out; at 0.5: {:.1e}, {} left out", strict.0, strict.1, loose.0, loose.1);

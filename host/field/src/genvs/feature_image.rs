@@ -85,24 +85,23 @@ pub(super) fn render<D: Device>(
     looking: &Looking,
     progress: &dyn Progress,
 ) -> Result<Image<D>, FieldError> {
-    let failed = FieldError::Device;
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
     let at_once = (device.busy_elements() / looking.sample_count as usize).max(LEAST_RAYS);
     // What is looked up in all views is bound as a whole.
     let a_ray = looking.sample_count as usize * network.features as usize * views.volumes.len();
     let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);
     let pixels: Vec<u32> = (0..half.pixel_count()).collect();
-    let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len())).map_err(failed)?;
+    let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len()))?;
     let cast = cast_block(target, looking.near_far, looking.sample_count);
     let mut features = Vec::with_capacity(pixels.len() * network.features as usize);
     for pixels in pixels.chunks(at_once) {
         progress.check()?;
-        features.extend(tile.render(pixels, &cast).map_err(failed)?);
+        features.extend(tile.render(pixels, &cast)?);
     }
     check_finite(&features, "rendering the target's features", "feature image")?;
-    let half_image = Image::upload(scratch.device(), half, &features).map_err(failed)?;
-    let mut image = scratch.image(half.doubled()).map_err(failed)?;
-    upsample(device, &half_image, 0, &mut image).map_err(failed)?;
+    let half_image = Image::upload(scratch.device(), half, &features)?;
+    let mut image = scratch.image(half.doubled())?;
+    upsample(device, &half_image, 0, &mut image)?;
     scratch.recycle(half_image);
     Ok(image)
 }

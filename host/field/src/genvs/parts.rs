@@ -59,7 +59,7 @@ impl<D: Device> Parts<D> {
     /// A view's volume, without its rows.
     pub(super) fn encode(&self, device: &D, values: &[f32], size: Size, view: usize) -> Result<Volume<D>, FieldError> {
         check_finite(values, &encoding(view), "image [row][column][3]")?;
-        Volume::encode(device, &self.encoder, values, size).map_err(FieldError::Device)
+        Ok(Volume::encode(device, &self.encoder, values, size)?)
     }
 
     /// Computes rows of a volume that are not there yet. Returns how many.
@@ -70,15 +70,14 @@ impl<D: Device> Parts<D> {
         rows: Range<u32>,
         view: usize,
     ) -> Result<u32, FieldError> {
-        let failed = FieldError::Device;
-        let new_rows = volume.fill(device, &self.encoder, rows).map_err(failed)?;
+        let new_rows = volume.fill(device, &self.encoder, rows)?;
         if new_rows == 0 {
             return Ok(0);
         }
         let Some(image) = volume.image() else { return Ok(new_rows) };
         // A mean is no number where one of its summands is none: a small download tells whether to look at all of them.
-        let means = global_average_pool(&mut Scratch::new(device), image).map_err(failed)?;
-        let means = device.download(&means.values).map_err(failed)?;
+        let means = global_average_pool(&mut Scratch::new(device), image)?;
+        let means = device.download(&means.values)?;
         if means.iter().any(|mean| !mean.is_finite()) {
             download_finite(device, &image.values, &encoding(view), "volume [row][column][depth][feature]")?;
         }
@@ -116,16 +115,16 @@ impl<D: Device> Parts<D> {
     ) -> Result<Sampled<D>, FieldError> {
         let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
         if self.denoiser.is_none() {
-            let values = device.download(&features.values).map_err(FieldError::Device)?;
+            let values = device.download(&features.values)?;
             let colours: Vec<f32> = values
                 .chunks_exact(features.size.channels as usize)
                 .flat_map(|features| features[..COLOUR_CHANNELS].to_vec())
                 .collect();
-            let picture = device.upload(&colours).map_err(FieldError::Device)?;
+            let picture = device.upload(&colours)?;
             return Ok(Sampled { picture, levels: Vec::new(), left_out: 0 });
         }
         sample(device, plan, count, start, progress, |noisy, level, denoised| {
-            self.denoise(device, scratch, noisy, features, level, denoised).map_err(FieldError::Device)
+            Ok(self.denoise(device, scratch, noisy, features, level, denoised)?)
         })
     }
 

@@ -26,6 +26,6 @@ pub fn deterministic(architecture: &Architecture) -> Checkpoint {
 }
 
 /// [`deterministic`] of the published size, or with a number, whatever it is, of the small member of the family.
-pub fn formula_of_size(small: Option<u16>) -> Checkpoint {
+pub fn deterministic_of_size(small: Option<u16>) -> Checkpoint {
     deterministic(&small.map_or_else(Architecture::published, |_| Architecture::small()))
 }

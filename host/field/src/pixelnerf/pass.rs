@@ -78,7 +78,6 @@ impl<D: Device> Renderer<'_, D> {
         asked: &mut [Asked; 2],
     ) -> Result<Pixels<D>, FieldError> {
         let device = self.device;
-        let failed = FieldError::Device;
         let rays = self.rays(pixels)?;
         let coarse = self.first_pass(workspace, &rays, seen, &mut asked[0])?;
         let mut found = self.pixels(pixels.len())?;
@@ -89,17 +88,15 @@ impl<D: Device> Renderer<'_, D> {
         }
         let (ray_count, fine_count) = (pixels.len(), block.fine_count() as usize);
         let mut parts = self.zeros(ray_count * coarse.count as usize)?;
-        device.weigh_samples(&coarse.count, rays.count, &coarse.values, &mut parts).map_err(failed)?;
+        device.weigh_samples(&coarse.count, rays.count, &coarse.values, &mut parts)?;
         let mut chances = self.zeros(ray_count * fine_count)?;
-        device.draw_chances(&block, rays.count, &rays.pixels, &mut chances).map_err(failed)?;
+        device.draw_chances(&block, rays.count, &rays.pixels, &mut chances)?;
         let mut added = self.zeros(ray_count * fine_count)?;
         let Pixels { colours, depths } = &found;
-        device
-            .fine_depths(&block, rays.count, &parts, &rays.rays, colours, depths, &chances, &mut added)
-            .map_err(failed)?;
+        device.fine_depths(&block, rays.count, &parts, &rays.rays, colours, depths, &chances, &mut added)?;
         let count = coarse.count + block.fine_count();
         let mut fine = self.samples(ray_count, count)?;
-        device.merge_depths(&block, rays.count, &coarse.depths, &added, &mut fine.depths).map_err(failed)?;
+        device.merge_depths(&block, rays.count, &coarse.depths, &added, &mut fine.depths)?;
         let Omissions { empty_rays, empty_parts, hidden_samples, .. } = self.omissions;
         let wanted = (empty_rays || empty_parts || hidden_samples).then_some(WantedBlock {
             sample_count: count,
@@ -126,9 +123,7 @@ impl<D: Device> Renderer<'_, D> {
     ) -> Result<Samples<D>, FieldError> {
         let block = self.coarse_block();
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
-        self.device
-            .coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)
-            .map_err(FieldError::Device)?;
+        self.device.coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)?;
         let wanted = seen.map(|seen| {
             let block = WantedBlock {
                 sample_count: block.sample_count,
@@ -160,10 +155,8 @@ impl<D: Device> Renderer<'_, D> {
         let all = 0..rays.count * samples.count;
         let Some((block, seen)) = wanted else { return Ok(all.collect()) };
         let mut marks = self.zeros(all.len())?;
-        self.device
-            .wanted_samples(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut marks)
-            .map_err(FieldError::Device)?;
-        let marks = self.device.download(&marks).map_err(FieldError::Device)?;
+        self.device.wanted_samples(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut marks)?;
+        let marks = self.device.download(&marks)?;
         Ok(all.filter(|sample| marks[*sample as usize] != 0).collect())
     }
 
@@ -178,18 +171,15 @@ impl<D: Device> Renderer<'_, D> {
         asked: &mut Asked,
     ) -> Result<(), FieldError> {
         let device = self.device;
-        let failed = FieldError::Device;
         asked.samples += u64::from(rays.count * samples.count);
         asked.asked += list.len() as u64;
         for some in list.chunks(workspace.point_count as usize) {
             self.progress.check()?;
             let count = some.len() as u32;
-            let some = device.upload(some).map_err(failed)?;
-            device
-                .place_points(&samples.count, count, &some, &rays.rays, &samples.depths, &mut workspace.points)
-                .map_err(failed)?;
-            network.ask(workspace, self.views, count).map_err(failed)?;
-            device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values).map_err(failed)?;
+            let some = device.upload(some)?;
+            device.place_points(&samples.count, count, &some, &rays.rays, &samples.depths, &mut workspace.points)?;
+            network.ask(workspace, self.views, count)?;
+            device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values)?;
         }
         Ok(())
     }
@@ -199,15 +189,13 @@ impl<D: Device> Renderer<'_, D> {
         let CastBlock { far, .. } = self.cast;
         let block = CompositeBlock { background: self.background, empty_depth: far, sample_count: samples.count };
         let Pixels { colours, depths } = pixels;
-        self.device
-            .composite(&block, ray_count, &samples.values, &samples.depths, colours, depths)
-            .map_err(FieldError::Device)
+        Ok(self.device.composite(&block, ray_count, &samples.values, &samples.depths, colours, depths)?)
     }
 
     pub(super) fn rays(&self, pixels: &[u32]) -> Result<Rays<D>, FieldError> {
-        let (count, pixel_buffer) = (pixels.len() as u32, self.device.upload(pixels).map_err(FieldError::Device)?);
+        let (count, pixel_buffer) = (pixels.len() as u32, self.device.upload(pixels)?);
         let mut rays = Rays { count, pixels: pixel_buffer, rays: self.zeros(pixels.len())? };
-        self.device.cast_rays(&self.cast, count, &rays.pixels, &mut rays.rays).map_err(FieldError::Device)?;
+        self.device.cast_rays(&self.cast, count, &rays.pixels, &mut rays.rays)?;
         Ok(rays)
     }
 
@@ -221,7 +209,7 @@ impl<D: Device> Renderer<'_, D> {
     }
 
     pub(super) fn zeros<T: viewfuse_device::Element>(&self, count: usize) -> Result<D::Buffer<T>, FieldError> {
-        self.device.zeros(count).map_err(FieldError::Device)
+        Ok(self.device.zeros(count)?)
     }
 
     fn coarse_block(&self) -> CoarseBlock {

@@ -19,7 +19,6 @@ impl<D: Device> Renderer<'_, D> {
         step: u32,
         asked: &mut Asked,
     ) -> Result<Seen<D>, FieldError> {
-        let failed = FieldError::Device;
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
         let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
         let place = |index: u32, side: u32| (index * step).min(side - 1);
@@ -32,10 +31,10 @@ impl<D: Device> Renderer<'_, D> {
             let rays = self.rays(some)?;
             let samples = self.first_pass(workspace, &rays, None, asked)?;
             let mut part = self.zeros(some.len() * count as usize)?;
-            self.device.weigh_samples(&count, rays.count, &samples.values, &mut part).map_err(failed)?;
+            self.device.weigh_samples(&count, rays.count, &samples.values, &mut part)?;
             parts.push(part);
             if self.omissions.probe_error > 0.0 {
-                let values = self.device.download(&samples.values).map_err(failed)?;
+                let values = self.device.download(&samples.values)?;
                 for ray in values.chunks(count as usize) {
                     let own = SHARES.map(|share| change(ray, share, &self.background));
                     changes.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
@@ -48,9 +47,9 @@ impl<D: Device> Renderer<'_, D> {
             Err(parts) => {
                 let mut all = Vec::with_capacity(pixels.len() * count as usize);
                 for part in &parts {
-                    all.extend(self.device.download(part).map_err(failed)?);
+                    all.extend(self.device.download(part)?);
                 }
-                self.device.upload(&all).map_err(failed)?
+                self.device.upload(&all)?
             }
         };
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;

@@ -83,7 +83,7 @@ fn computed(
 }
 
 /// [`deterministic`] of the published size, or of the small member of a width.
-pub fn formula_of_width(width: Option<u16>) -> Checkpoint {
+pub fn deterministic_of_width(width: Option<u16>) -> Checkpoint {
     deterministic(&of_width(width))
 }
 

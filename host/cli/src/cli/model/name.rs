@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
-use viewfuse_field::family::{Family, Small, Untrained};
+use viewfuse_field::family::{Family, Small, TestNetwork};
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// Where a network's parameters come from.
@@ -11,8 +11,8 @@ use viewfuse_nn::checkpoint::Checkpoint;
 pub(crate) enum Model {
     /// A checkpoint.
     File(PathBuf),
-    /// A network without training: the published size, or a small member of its family.
-    Untrained(&'static Untrained, Option<u16>),
+    /// A test network: the published size, or a small member of its family.
+    Test(&'static TestNetwork, Option<u16>),
 }
 
 impl FromStr for Model {
@@ -23,8 +23,8 @@ impl FromStr for Model {
             Some((name, size)) => (name, Some(size)),
             None => (text, None),
         };
-        let mut untrained = Family::ALL.into_iter().flat_map(Family::untrained);
-        let Some(network) = untrained.find(|network| network.name == name) else {
+        let mut networks = Family::ALL.into_iter().flat_map(Family::test_networks);
+        let Some(network) = networks.find(|network| network.name == name) else {
             return Ok(Model::File(PathBuf::from(text)));
         };
         let size = match (network.small, size) {
@@ -38,7 +38,7 @@ impl FromStr for Model {
                 _ => return Err(format!("'{text}': a width is a multiple of 8 from 8 to 2048")),
             },
         };
-        Ok(Model::Untrained(network, size))
+        Ok(Model::Test(network, size))
     }
 }
 
@@ -46,9 +46,9 @@ impl fmt::Display for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Model::File(path) => write!(f, "{}", path.display()),
-            Model::Untrained(network, None) => f.write_str(network.name),
-            Model::Untrained(Untrained { name, small: Small::One, .. }, Some(_)) => write!(f, "{name}:small"),
-            Model::Untrained(Untrained { name, small: Small::Width, .. }, Some(width)) => write!(f, "{name}:{width}"),
+            Model::Test(network, None) => f.write_str(network.name),
+            Model::Test(TestNetwork { name, small: Small::One, .. }, Some(_)) => write!(f, "{name}:small"),
+            Model::Test(TestNetwork { name, small: Small::Width, .. }, Some(width)) => write!(f, "{name}:{width}"),
         }
     }
 }
@@ -58,7 +58,7 @@ impl Model {
     pub(crate) fn checkpoint(&self) -> anyhow::Result<Checkpoint> {
         Ok(match self {
             Model::File(path) => Checkpoint::open(path)?,
-            Model::Untrained(network, size) => (network.checkpoint)(*size),
+            Model::Test(network, size) => (network.checkpoint)(*size),
         })
     }
 }

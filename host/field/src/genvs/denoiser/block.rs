@@ -83,7 +83,7 @@ impl<D: Device> Block<D> {
         let norm0 = group_norm(loader, &layer("norm0"))?;
         Ok(Block {
             resample,
-            halving: halving.transpose().map_err(FieldError::Device)?,
+            halving: halving.transpose()?,
             in_channels: norm0.channels,
             channels: conv0.channels,
             norm0,

@@ -47,7 +47,7 @@ impl<D: Device> Embedding<D> {
         let [map_layer0, map_layer1] = ["map_layer0", "map_layer1"].map(|name| loader.tensors.linear(name));
         let (map_layer0, map_layer1) = (map_layer0?, map_layer1?);
         let affine = LinearWeights::concatenated(&shifts.layers, map_layer1.bias.len());
-        let affine = affine.load(loader.device).map_err(FieldError::Device)?;
+        let affine = affine.load(loader.device)?;
         Ok(Embedding { map_layer0, map_layer1, affine })
     }
 

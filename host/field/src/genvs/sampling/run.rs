@@ -149,7 +149,7 @@ where
                 self.free.push(predicted);
                 let corrector = sampler.correction(&self.history, next);
                 let beyond = self.mixed(&corrector.correction_beyond(&predictor), &state, Some(&denoised.buffer))?;
-                let error = root_mean_square(&self.device.download(&beyond).map_err(FieldError::Device)?);
+                let error = root_mean_square(&self.device.download(&beyond)?);
                 self.free.push(beyond);
                 let known = self.history.count().min(sampler.result_count());
                 let verdict = verdict(error, tolerance, ln_ratio(sigma, next), known + 1);
@@ -198,9 +198,7 @@ where
             Some(mix) => {
                 let mut kept = self.buffer()?;
                 let count = self.element_count as u32;
-                self.device
-                    .mix_pictures(&mix, count, state, &buffer, state, state, state, &mut kept)
-                    .map_err(FieldError::Device)?;
+                self.device.mix_pictures(&mix, count, state, &buffer, state, state, state, &mut kept)?;
                 self.free.push(buffer);
                 kept
             }
@@ -230,9 +228,7 @@ where
         let mut all = said.into_iter().chain(&self.results);
         let [newest, second, third, fourth] = std::array::from_fn(|_| all.next().unwrap_or(state));
         let count = self.element_count as u32;
-        self.device
-            .mix_pictures(mix, count, state, newest, second, third, fourth, &mut mixed)
-            .map_err(FieldError::Device)?;
+        self.device.mix_pictures(mix, count, state, newest, second, third, fourth, &mut mixed)?;
         Ok(mixed)
     }
 
@@ -258,18 +254,18 @@ where
         let picture = match picture {
             Some(picture) => picture,
             None => {
-                nothing = self.device.zeros(self.element_count).map_err(FieldError::Device)?;
+                nothing = self.device.zeros(self.element_count)?;
                 &nothing
             }
         };
-        self.device.add_noise(&block, self.element_count as u32, picture, &mut noisy).map_err(FieldError::Device)?;
+        self.device.add_noise(&block, self.element_count as u32, picture, &mut noisy)?;
         Ok(noisy)
     }
 
     fn buffer(&mut self) -> Result<D::Buffer<f32>, FieldError> {
         match self.free.pop() {
             Some(buffer) => Ok(buffer),
-            None => self.device.zeros(self.element_count).map_err(FieldError::Device),
+            None => Ok(self.device.zeros(self.element_count)?),
         }
     }
 
