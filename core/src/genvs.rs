@@ -163,6 +163,8 @@ pub struct FeatureBlock {
     /// Whether a sample shades itself, as in published checkpoints: its weight is multiplied by the transmittance behind
     /// it, not in front of it.
     pub inclusive: u32,
+    /// Where the first ray's sums go, counted in rays.
+    pub first_ray: u32,
 }
 
 /// Weights of a ray's samples, one at a time and front to back: `weigh(sample, weight)`. `raw[sample][0]` is the network's

@@ -58,9 +58,9 @@ pub use crate::photo::march::MarchBlock;
 pub use crate::photo::sweep::SweepBlock;
 pub use crate::pixelnerf::{EmbedBlock, GatherBlock};
 pub use crate::pose::PoseBlock;
-pub use crate::rays::{CastBlock, RayPoint, TargetRay};
+pub use crate::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};
 pub use crate::sampler::{Mix, NoiseBlock};
-pub use crate::wanted::WantedBlock;
+pub use crate::wanted::{RaysBlock, WantedBlock};
 pub use crate::weighting::{MOST_WEIGHED, WeighBlock};
 
 /// Calls `$callback!` with the rows of all kernels, in the order of the data; see [`kernels`](crate::kernels). What the
@@ -101,10 +101,10 @@ macro_rules! for_each_kernel {
                 read pixels: u32,
                 write depths: f32,
             }
-            /// Points of the samples in a list, which number rays and samples flat: `points[point]` from
+            /// Points of the samples in a list, which number rays and samples flat, or of all samples: `points[point]` from
             /// `depths[ray][sample]`. An element is a point.
-            PlacePoints place_points(sample_count: u32; point_count) [0..point_count] by rays::place_point {
-                read samples: u32,
+            PlacePoints place_points(block: PlaceBlock; point_count) [0..point_count] by rays::place_point {
+                optional samples: u32 = depths if !block.has_samples,
                 read rays: TargetRay,
                 read depths: f32,
                 write points: RayPoint,
@@ -272,9 +272,9 @@ macro_rules! for_each_kernel {
                 write colours: [f32; 4],
                 write depths: f32,
             }
-            /// Weights of samples on rays: `seen[ray][sample]` is weight and transmittance in front, from
+            /// Weights of samples on rays: `seen[first ray + ray][sample]` is weight and transmittance in front, from
             /// `samples[ray][sample]` (red, green, blue, optical depth). An element is a ray.
-            WeighSamples weigh_samples(sample_count: u32; ray_count) [0..ray_count] by wanted::weigh_sample {
+            WeighSamples weigh_samples(block: RaysBlock; ray_count) [0..ray_count] by wanted::weigh_sample {
                 read samples: [f32; 4],
                 write seen: [f32; 2],
             }
@@ -347,7 +347,7 @@ macro_rules! for_each_kernel {
                 read points: RayPoint,
                 write weights: f32,
             }
-            /// Sums of features along rays: `summed[ray][feature]`. An element is a feature of a ray.
+            /// Sums of features along rays: `summed[first ray + ray][feature]`. An element is a feature of a ray.
             SumFeatures sum_features(block: FeatureBlock; ray_count) [0..ray_count * block.feature_count]
             by genvs::summed_feature, twin {
                 read weights: f32,

@@ -66,6 +66,27 @@ pub struct RayPoint {
     pub sample: u32,
 }
 
+/// A dispatch of [`place_point`], as plain data. The yes-or-no field is 0 or 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PlaceBlock {
+    /// Samples on each ray.
+    pub sample_count: u32,
+    /// The first place of the list that becomes a point.
+    pub first: u32,
+    /// Whether there is a list of samples; without one every sample is in it, in order.
+    pub has_samples: u32,
+}
+
+impl PlaceBlock {
+    /// The sample that point `point` is of.
+    #[inline]
+    pub fn sample(&self, samples: &(impl Fetch<u32> + ?Sized), point: u32) -> u32 {
+        let place = self.first + point;
+        if self.has_samples != 0 { samples.fetch(place as usize) } else { place }
+    }
+}
+
 /// The point of sample number `sample` of `depths[ray][sample]`, which increase along each ray of `sample_count`.
 #[inline]
 pub fn place_point(

@@ -20,6 +20,16 @@ pub fn weigh_sample(optical_depth_before: f32, optical_depth: f32) -> ([f32; 2],
     ([before - exp(-sum), before], sum)
 }
 
+/// Rays among the samples of more rays, as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RaysBlock {
+    /// Samples on each ray.
+    pub sample_count: u32,
+    /// Where the first ray's results go, counted in rays.
+    pub first_ray: u32,
+}
+
 /// A dispatch of [`is_wanted`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]

@@ -137,7 +137,7 @@ fn outside_there_is_nothing() {
 }
 
 fn features(sample_count: u32, inclusive: u32, last_length: f32) -> FeatureBlock {
-    FeatureBlock { sample_count, feature_count: 1, length_scale: 0.5, last_length, inclusive }
+    FeatureBlock { sample_count, feature_count: 1, length_scale: 0.5, last_length, inclusive, first_ray: 0 }
 }
 
 /// Weights of a ray with these densities and lengths; the second ray of two.

@@ -2,6 +2,7 @@
 //! exists, and store in the right place what core computes. Bits, not tolerances. Kernels that compute tiles wait for one
 //! another at barriers and cannot run so: their cases of parity cover them.
 
+mod lists;
 mod networks;
 mod photo;
 mod volumes;
@@ -15,10 +16,10 @@ use viewfuse_core::fuse::{FuseBlock, fuse_element};
 use viewfuse_core::pages::StartingAt;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, embedded_value, gathered_value, radiance, visible_weight};
 use viewfuse_core::pose::{Pose, PoseBlock};
-use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay, cast_ray, place_point};
+use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
 use viewfuse_core::sampler::{Mix, NoiseBlock, noisy_element};
 use viewfuse_core::sources::Sources;
-use viewfuse_core::wanted::{WantedBlock, is_wanted, weigh_sample};
+use viewfuse_core::wanted::{RaysBlock, WantedBlock, is_wanted, weigh_sample};
 use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock, weigh};
 use viewfuse_shaders::{Piece, Push, light, points, rays, sampler, weighting};
 
@@ -184,9 +185,16 @@ fn rays_are_core_s() {
 
     let samples: Vec<u32> = (0..350).filter(|sample| sample % 3 != 1).collect();
     let mut placed = vec![RayPoint::default(); samples.len()];
-    dispatch(5, samples.len() as u32, |id, push| rays::place_points(id, push, &samples, &cast, &depths, &mut placed));
+    let block = PlaceBlock { sample_count: 5, first: 0, has_samples: 1 };
+    dispatch(block, samples.len() as u32, |id, push| rays::place_points(id, push, &samples, &cast, &depths, &mut placed));
     let expected: Vec<RayPoint> =
         samples.iter().map(|sample| place_point(&cast[..], &depths[..], 5, *sample)).collect();
+    assert_eq!(placed, expected);
+    // Without a list, from a place on.
+    let block = PlaceBlock { sample_count: 5, first: 40, has_samples: 0 };
+    let mut placed = vec![RayPoint::default(); 310];
+    dispatch(block, 310, |id, push| rays::place_points(id, push, &[0], &cast, &depths, &mut placed));
+    let expected: Vec<RayPoint> = (40..350).map(|sample| place_point(&cast[..], &depths[..], 5, sample)).collect();
     assert_eq!(placed, expected);
 }
 
@@ -194,7 +202,8 @@ fn rays_are_core_s() {
 fn what_was_seen_is_core_s() {
     let samples: Vec<[f32; 4]> = optical_depths(70 * 6).iter().map(|depth| [9.0, 9.0, 9.0, *depth]).collect();
     let mut seen = vec![[UNTOUCHED; 2]; 420];
-    dispatch(6, 70, |id, push| rays::weigh_samples(id, push, &samples, &mut seen));
+    let block = RaysBlock { sample_count: 6, first_ray: 0 };
+    dispatch(block, 70, |id, push| rays::weigh_samples(id, push, &samples, &mut seen));
     assert_eq!(seen, seen_by(70, 6));
 
     let (pixels, cast, _) = rays_of(&World::new(1));

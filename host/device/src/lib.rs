@@ -17,7 +17,7 @@ pub mod vulkan;
 pub use bundles::{Layer, PhotoScene, Pixels, Rays};
 pub use error::DeviceError;
 pub use kernels::{Device, LayerShape};
-pub use memory::{Element, KernelTime, Memory};
+pub use memory::{Element, KernelTime, Memory, Transfers};
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

@@ -21,6 +21,19 @@ pub struct KernelTime {
     pub time: Duration,
 }
 
+/// What went over the border of a device's memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Transfers {
+    /// How many arrays went to the device.
+    pub uploads: u64,
+    /// Their bytes.
+    pub uploaded_bytes: u64,
+    /// How many arrays came back.
+    pub downloads: u64,
+    /// Their bytes.
+    pub downloaded_bytes: u64,
+}
+
 /// Memory that kernels work on.
 pub trait Memory {
     /// Memory of the device that holds `T`s.
@@ -56,6 +69,11 @@ pub trait Memory {
 
     /// What each kernel took so far, kernels that never ran left out; nothing for devices that do not tell.
     fn kernel_times(&self) -> Vec<KernelTime>;
+
+    /// What was transferred so far; nothing for devices whose memory is the host's.
+    fn transfers(&self) -> Transfers {
+        Transfers::default()
+    }
 
     /// The values of a buffer.
     ///

@@ -2,9 +2,9 @@
 
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
-use super::memory::{Element, KernelTime, Memory};
+use super::memory::{Element, KernelTime, Memory, Transfers};
 use bytemuck::bytes_of;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::for_each_kernel;
 use viewfuse_core::kernels::*;
 use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
@@ -12,6 +12,7 @@ use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanE
 /// A Vulkan device. Calls return when their work is on its way; only a download waits for it.
 pub struct Vulkan {
     gpu: Gpu,
+    transfers: Mutex<Transfers>,
 }
 
 /// Elements that keep a graphics processor busy.
@@ -23,7 +24,11 @@ impl Vulkan {
     /// # Errors
     /// [`VulkanError`].
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Vulkan, VulkanError> {
-        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)? })
+        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)?, transfers: Mutex::default() })
+    }
+
+    fn counted(&self) -> MutexGuard<'_, Transfers> {
+        self.transfers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What a kernel did, up to the last download.
@@ -40,7 +45,11 @@ impl Memory for Vulkan {
     }
 
     fn upload<T: Element>(&self, values: &[T]) -> Result<Buffer<T>, DeviceError> {
-        Ok(self.gpu.upload(values)?)
+        let buffer = self.gpu.upload(values)?;
+        let mut transfers = self.counted();
+        transfers.uploads += 1;
+        transfers.uploaded_bytes += size_of_val(values) as u64;
+        Ok(buffer)
     }
 
     fn zeros<T: Element>(&self, count: usize) -> Result<Buffer<T>, DeviceError> {
@@ -66,8 +75,16 @@ impl Memory for Vulkan {
             .collect()
     }
 
+    fn transfers(&self) -> Transfers {
+        *self.counted()
+    }
+
     fn download<T: Element>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, DeviceError> {
-        Ok(self.gpu.download(buffer)?)
+        let values = self.gpu.download(buffer)?;
+        let mut transfers = self.counted();
+        transfers.downloads += 1;
+        transfers.downloaded_bytes += size_of_val(&values[..]) as u64;
+        Ok(values)
     }
 }
 

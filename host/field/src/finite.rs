@@ -1,6 +1,7 @@
 //! Numbers that are none are found where they arise, and not in the picture at the end.
 
 use super::FieldError;
+use viewfuse_core::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_device::Device;
 
 /// A tensor has an element that is infinite or not a number.
@@ -28,6 +29,26 @@ pub fn check_finite(values: &[f32], stage: &str, tensor: &str) -> Result<(), Not
             Err(NotFinite { stage: stage.to_owned(), tensor: tensor.to_owned(), index, value: values[index] })
         }
     }
+}
+
+/// Looks at the first `count` values of a tensor that a stage made, on the device: only where one is not finite the tensor
+/// comes to the host, to say which value it is.
+///
+/// # Errors
+/// [`FieldError::NotFinite`] with the first value that is not finite; [`FieldError::Device`] if the device is lost.
+pub fn check_finite_on<D: Device>(
+    device: &D,
+    buffer: &D::Buffer<f32>,
+    count: u32,
+    stage: &str,
+    tensor: &str,
+) -> Result<(), FieldError> {
+    let mut firsts = device.zeros(count.div_ceil(FINITE_RUN) as usize)?;
+    device.find_non_finite(&count, buffer, &mut firsts)?;
+    if device.download(&firsts)?.iter().any(|first| *first != ALL_FINITE) {
+        check_finite(&device.download(buffer)?[..count as usize], stage, tensor)?;
+    }
+    Ok(())
 }
 
 /// Downloads a tensor that a stage made, and looks at all its values.

@@ -3,7 +3,7 @@
 
 use super::error::FieldError;
 use super::field::{About, Field, Prepared};
-use viewfuse_device::{Device, DeviceError, KernelTime};
+use viewfuse_device::{Device, DeviceError, KernelTime, Transfers};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 
@@ -33,6 +33,9 @@ pub trait Renderer: Sync {
 
     /// What each kernel took so far; nothing for devices that do not tell.
     fn kernel_times(&self) -> Vec<KernelTime>;
+
+    /// What went to the device and came back so far; nothing for devices whose memory is the host's.
+    fn transfers(&self) -> Transfers;
 }
 
 /// A renderer from a device and a field, whoever wrote them.
@@ -67,5 +70,9 @@ impl<D: Device + Sync, F: Field + Sync> Renderer for On<'_, D, F> {
 
     fn kernel_times(&self) -> Vec<KernelTime> {
         self.device.kernel_times()
+    }
+
+    fn transfers(&self) -> Transfers {
+        self.device.transfers()
     }
 }

@@ -229,6 +229,37 @@ impl<D: Device> DepthwiseConvolution<D> {
     }
 }
 
+/// The first `channels` channels of an image as an image of their own: a depthwise convolution with a window of one pixel
+/// and weight 1.
+///
+/// # Errors
+/// If the device is lost or has no memory left.
+pub fn leading_channels<D: Device>(
+    scratch: &mut Scratch<'_, D>,
+    image: &Image<D>,
+    channels: u32,
+) -> Result<Image<D>, DeviceError> {
+    let size = image.size.with_channels(channels);
+    let weights = scratch.device().upload(&[1.0])?;
+    let mut output = scratch.image(size)?;
+    let block = DepthwiseBlock {
+        in_height: size.height,
+        in_width: size.width,
+        in_pitch: image.pitch,
+        in_first: image.first,
+        out_height: size.height,
+        out_width: size.width,
+        channels,
+        size: 1,
+        stride: 1,
+        dilation: 1,
+        padding: 0,
+        is_shared: 1,
+    };
+    scratch.device().convolve_depthwise(&block, &image.values, &weights, &mut output.values)?;
+    Ok(output)
+}
+
 /// A transposed convolution with bias whose stride is its window's size, on a device.
 pub struct TransposedConvolution<D: Device> {
     pub(crate) layer: Layer<D>,

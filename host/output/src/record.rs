@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use std::time::Duration;
-use viewfuse_device::KernelTime;
+use viewfuse_device::{KernelTime, Transfers};
 use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
 use viewfuse_field::{Denoising, LeftOut};
 use viewfuse_scene::Scene;
@@ -53,6 +53,8 @@ pub struct RunRecord {
     pub times: TimesRecord,
     /// What each kernel took, for devices that tell.
     pub kernels: Vec<KernelRecord>,
+    /// What went to the device and came back; zeros for devices whose memory is the host's.
+    pub transfers: TransfersRecord,
     /// One entry a target.
     pub frames: Vec<FrameRecord>,
 }
@@ -96,6 +98,26 @@ pub struct KernelRecord {
     pub seconds: f64,
     /// Its share of the time of all kernels.
     pub share: f64,
+}
+
+/// See [`RunRecord::transfers`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct TransfersRecord {
+    /// How many arrays went to the device.
+    pub uploads: u64,
+    /// Their bytes.
+    pub uploaded_bytes: u64,
+    /// How many arrays came back.
+    pub downloads: u64,
+    /// Their bytes.
+    pub downloaded_bytes: u64,
+}
+
+impl From<Transfers> for TransfersRecord {
+    fn from(transfers: Transfers) -> TransfersRecord {
+        let Transfers { uploads, uploaded_bytes, downloads, downloaded_bytes } = transfers;
+        TransfersRecord { uploads, uploaded_bytes, downloads, downloaded_bytes }
+    }
 }
 
 /// What each kernel took.

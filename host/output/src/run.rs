@@ -132,6 +132,7 @@ impl RunWriter {
             near_far: record.near_far,
             times: times_record(open_time, costs, self.frame_time, total_time),
             kernels: kernel_records(&renderer.kernel_times()),
+            transfers: renderer.transfers().into(),
             frames: self.frames,
         };
         let json = serde_json::to_vec_pretty(&record)

@@ -5,8 +5,8 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::depths::{self, CoarseBlock, FineBlock};
 use viewfuse_core::pages::StartingAt;
-use viewfuse_core::rays::{self, CastBlock, RayPoint, TargetRay};
-use viewfuse_core::wanted::{self, WantedBlock};
+use viewfuse_core::rays::{self, CastBlock, PlaceBlock, RayPoint, TargetRay};
+use viewfuse_core::wanted::{self, RaysBlock, WantedBlock};
 
 /// Ray number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "cast_rays"))]
@@ -41,11 +41,11 @@ pub fn coarse_depths(
     depths[element as usize] = depths::coarse_depth(&rays[ray], pixels[ray], element % block.sample_count, block);
 }
 
-/// Point number `first + id.x` of a list of samples; the parameter is how many samples a ray has.
+/// Point number `first + id.x` of a list of samples.
 #[spirv(compute(threads(64), entry_point_name = "place_points"))]
 pub fn place_points(
     #[spirv(global_invocation_id)] id: UVec3,
-    #[spirv(push_constant)] push: &Push<u32>,
+    #[spirv(push_constant)] push: &Push<PlaceBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] samples: &[u32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] rays: &[TargetRay],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] depths: &[f32],
@@ -54,28 +54,29 @@ pub fn place_points(
     if id.x >= push.piece.count {
         return;
     }
-    let point = (push.piece.first + id.x) as usize;
-    points[point] = rays::place_point(rays, depths, push.parameters, samples[point]);
+    let (block, point) = (&push.parameters, push.piece.first + id.x);
+    points[point as usize] = rays::place_point(rays, depths, block.sample_count, block.sample(samples, point));
 }
 
-/// Weights and transmittances of the samples on ray number `first + id.x`; the parameter is how many samples a ray has.
+/// Weights and transmittances of the samples on ray number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "weigh_samples"))]
 pub fn weigh_samples(
     #[spirv(global_invocation_id)] id: UVec3,
-    #[spirv(push_constant)] push: &Push<u32>,
+    #[spirv(push_constant)] push: &Push<RaysBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] samples: &[[f32; 4]],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] seen: &mut [[f32; 2]],
 ) {
     if id.x >= push.piece.count {
         return;
     }
-    let first = (push.piece.first + id.x) * push.parameters;
+    let RaysBlock { sample_count, first_ray } = push.parameters;
+    let ray = push.piece.first + id.x;
     let mut optical_depth = 0.0;
     let mut sample = 0;
-    while sample < push.parameters {
-        let at = (first + sample) as usize;
+    while sample < sample_count {
+        let at = (ray * sample_count + sample) as usize;
         let (weighed, sum) = wanted::weigh_sample(optical_depth, samples[at][3]);
-        seen[at] = weighed;
+        seen[at + (first_ray * sample_count) as usize] = weighed;
         optical_depth = sum;
         sample += 1;
     }

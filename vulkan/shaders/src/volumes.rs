@@ -88,8 +88,9 @@ pub fn sum_features(
     if id.x >= push.piece.count {
         return;
     }
-    let element = (push.piece.first + id.x) as usize;
-    summed[element] = genvs::summed_feature(weights, fused, raw, &push.parameters, element);
+    let (block, element) = (&push.parameters, (push.piece.first + id.x) as usize);
+    let first = (block.first_ray * block.feature_count) as usize;
+    summed[first + element] = genvs::summed_feature(weights, fused, raw, block, element);
 }
 
 /// Channel of a pixel number `first + id.x`, flat in `[pixel][channel]`.

@@ -29,6 +29,7 @@ fn block(
     (sample_count, feature_count, last_length, ..): (u32, u32, f32, f64, f64),
 ) -> FeatureBlock {
     FeatureBlock {
+        first_ray: 0,
         sample_count,
         feature_count,
         length_scale: random.range(0.3, 1.0) as f32,
@@ -145,6 +146,11 @@ impl Summed {
     fn len(&self) -> usize {
         (self.ray_count() * self.block.feature_count) as usize
     }
+
+    /// Where the sums begin.
+    fn first(&self) -> usize {
+        (self.block.first_ray * self.block.feature_count) as usize
+    }
 }
 
 /// See the module.
@@ -170,7 +176,7 @@ impl Case for SumFeatures {
     fn inputs(seed: u64, size: u32) -> Vec<Summed> {
         let random = &mut random(31, seed, size);
         let job = |kind| {
-            let block = block(random, kind);
+            let block = FeatureBlock { first_ray: 3, ..block(random, kind) };
             let [samples, features] = [block.sample_count, block.feature_count].map(|count| count as usize);
             let count = (size.div_ceil(block.feature_count)) as usize * samples;
             // They sum to less than 1.
@@ -189,7 +195,7 @@ impl Case for SumFeatures {
     fn load<D: Device>(device: &D, jobs: &Vec<Summed>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Summed| {
             let [weights, fused, raw] = [&job.weights, &job.fused, &job.raw].map(|values| device.upload(values));
-            Ok([weights?, fused?, raw?, device.zeros(job.len() + 1)?])
+            Ok([weights?, fused?, raw?, device.zeros(job.first() + job.len() + 1)?])
         };
         jobs.iter().map(load).collect()
     }
@@ -217,8 +223,9 @@ impl Case for SumFeatures {
                 let (weights, fused) = (&weights[part(1)], &fused[part(features)]);
                 volume_oracle::summed_feature(weights, fused, &raw[part(features + 1)], block, feature)
             };
-            let summed = (0..job.len()).into_par_iter().map(own);
-            summed.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
+            let before = vec![Bounded::ZERO; job.first()];
+            let summed: Vec<Bounded> = (0..job.len()).into_par_iter().map(own).collect();
+            before.into_iter().chain(summed).chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(summed).collect()
     }

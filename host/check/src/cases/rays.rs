@@ -7,7 +7,7 @@ use crate::case::{Case, Spoiler};
 use crate::poses::random;
 use crate::ray_oracle;
 use crate::sights::{camera, load_rays, ray};
-use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay};
+use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
@@ -92,10 +92,16 @@ impl Case for CastRays {
 /// Samples on rays, and which of them become points.
 #[derive(Clone, Debug)]
 pub struct Placed {
-    sample_count: u32,
+    block: PlaceBlock,
     rays: Vec<TargetRay>,
     depths: Vec<f32>,
     samples: Vec<u32>,
+}
+
+impl Placed {
+    fn point_count(&self) -> u32 {
+        self.samples.len() as u32 - self.block.first
+    }
 }
 
 /// Rays, depths, the list of samples, points.
@@ -127,7 +133,7 @@ impl Case for PlacePoints {
 
     fn inputs(seed: u64, size: u32) -> Vec<Placed> {
         let random = &mut random(6, seed, size);
-        let job = |sample_count: u32| {
+        let job = |(sample_count, has_samples): (u32, u32)| {
             let ray_count = size.div_ceil(sample_count) + 1;
             let rays: Vec<TargetRay> = (0..ray_count).map(|_| ray(random)).collect();
             let mut depths = Vec::new();
@@ -141,20 +147,22 @@ impl Case for PlacePoints {
                 depths.extend(own);
             }
             let samples = (0..size).map(|_| random.below(depths.len()) as u32).collect();
-            Placed { sample_count, rays, depths, samples }
+            let first = (size / 3).min(size - 1);
+            Placed { block: PlaceBlock { sample_count, first, has_samples }, rays, depths, samples }
         };
-        [1, 5, 96].map(job).to_vec()
+        // The last ones without a list.
+        [(1, 1), (5, 1), (96, 1), (1, 0), (96, 0)].map(job).to_vec()
     }
 
     fn element_count(jobs: &Vec<Placed>) -> usize {
-        jobs.iter().map(|job| job.samples.len()).sum()
+        jobs.iter().map(|job| job.point_count() as usize).sum()
     }
 
     fn load<D: Device>(device: &D, jobs: &Vec<Placed>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Placed| {
             // Which pixels these are does not matter here.
             let rays = load_rays(device, &vec![0; job.rays.len()], &job.rays)?;
-            let points = device.zeros(job.samples.len() + 1)?;
+            let points = device.zeros(job.point_count() as usize + 1)?;
             Ok((rays, device.upload(&job.depths)?, device.upload(&job.samples)?, points))
         };
         jobs.iter().map(load).collect()
@@ -162,7 +170,8 @@ impl Case for PlacePoints {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Placed>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, (rays, depths, samples, points))| {
-            device.place_points(&job.sample_count, job.samples.len() as u32, samples, &rays.rays, depths, points)
+            let samples = (job.block.has_samples != 0).then_some(&*samples);
+            device.place_points(&job.block, job.point_count(), samples, &rays.rays, depths, points)
         })
     }
 
@@ -179,8 +188,11 @@ impl Case for PlacePoints {
 
     fn expected(jobs: &Vec<Placed>) -> Vec<Option<Bounded>> {
         let points = |job: &Placed| {
-            let place = |sample: &u32| ray_oracle::place_point(&job.rays, &job.depths, job.sample_count, *sample);
-            job.samples.iter().map(place).chain([[Bounded::ZERO; 8]]).flatten().map(Some).collect::<Vec<_>>()
+            let PlaceBlock { sample_count, first, has_samples } = job.block;
+            let list: Vec<u32> =
+                if has_samples != 0 { job.samples.clone() } else { (0..job.samples.len() as u32).collect() };
+            let place = |sample: &u32| ray_oracle::place_point(&job.rays, &job.depths, sample_count, *sample);
+            list[first as usize..].iter().map(place).chain([[Bounded::ZERO; 8]]).flatten().map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(points).collect()
     }

@@ -10,7 +10,7 @@ use crate::ray_oracle;
 use crate::sights::{load_rays, ray};
 use rayon::prelude::*;
 use viewfuse_core::rays::TargetRay;
-use viewfuse_core::wanted::WantedBlock;
+use viewfuse_core::wanted::{RaysBlock, WantedBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
@@ -26,6 +26,13 @@ pub struct Samples {
 /// Samples on a ray, and the least and greatest optical depth of one.
 const KINDS: [(u32, f64, f64); 5] =
     [(1, 0.1, 2.0), (2, 1.0e-3, 1.0), (17, 1.0, 1.0e3), (64, 1.0e-3, 0.3), (128, 1.0e-5, 1.0e-2)];
+
+/// Results begin behind so many rays.
+const FIRST_RAY: usize = 2;
+
+fn block(job: &Samples) -> RaysBlock {
+    RaysBlock { sample_count: job.sample_count, first_ray: FIRST_RAY as u32 }
+}
 
 /// See the module.
 pub enum WeighSamples {}
@@ -69,14 +76,16 @@ impl Case for WeighSamples {
     }
 
     fn load<D: Device>(device: &D, jobs: &Vec<Samples>) -> Result<Self::Loaded<D>, DeviceError> {
-        let load = |job: &Samples| Ok((device.upload(&job.samples)?, device.zeros(job.samples.len())?));
+        let load = |job: &Samples| {
+            Ok((device.upload(&job.samples)?, device.zeros(job.samples.len() + FIRST_RAY * job.sample_count as usize)?))
+        };
         jobs.iter().map(load).collect()
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Samples>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (samples, seen))| {
-            device.weigh_samples(&job.sample_count, job.ray_count, samples, seen)
-        })
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|(job, (samples, seen))| device.weigh_samples(&block(job), job.ray_count, samples, seen))
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
@@ -90,7 +99,8 @@ impl Case for WeighSamples {
     fn expected(jobs: &Vec<Samples>) -> Vec<Option<Bounded>> {
         let rays = |job: &Samples| {
             let rays = job.samples.chunks_exact(job.sample_count as usize).flat_map(ray_oracle::weigh_samples);
-            rays.flatten().map(Some).collect::<Vec<_>>()
+            let before = vec![Bounded::ZERO; 2 * FIRST_RAY * job.sample_count as usize];
+            before.into_iter().chain(rays.flatten()).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(rays).collect()
     }

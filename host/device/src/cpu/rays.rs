@@ -2,8 +2,8 @@
 
 use crate::parallel::{for_each, for_each_row};
 use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, draw_chance, fine_depth, merged_depth};
-use viewfuse_core::rays::{CastBlock, RayPoint, TargetRay, cast_ray, place_point};
-use viewfuse_core::wanted::{WantedBlock, is_wanted, weigh_sample};
+use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
+use viewfuse_core::wanted::{RaysBlock, WantedBlock, is_wanted, weigh_sample};
 
 /// Runs a kernel for every sample of every ray, rays in parallel; it gets ray, sample and where to write.
 fn for_each_sample<T: Send>(
@@ -92,21 +92,24 @@ pub(super) fn wanted_samples(
 }
 
 pub(super) fn place_points(
-    sample_count: &u32,
+    block: &PlaceBlock,
     point_count: u32,
-    samples: &[u32],
+    samples: Option<&[u32]>,
     rays: &[TargetRay],
     depths: &[f32],
     points: &mut [RayPoint],
 ) {
+    let block = PlaceBlock { has_samples: u32::from(samples.is_some()), ..*block };
     for_each(&mut points[..point_count as usize], 1024, |point, value| {
-        *value = place_point(rays, depths, *sample_count, samples[point]);
+        let sample = block.sample(samples.unwrap_or(&[]), point as u32);
+        *value = place_point(rays, depths, block.sample_count, sample);
     });
 }
 
-pub(super) fn weigh_samples(sample_count: &u32, ray_count: u32, samples: &[[f32; 4]], seen: &mut [[f32; 2]]) {
-    let count = *sample_count as usize;
-    for_each_row(&mut seen[..ray_count as usize * count], count, 2048, |ray, seen| {
+pub(super) fn weigh_samples(block: &RaysBlock, ray_count: u32, samples: &[[f32; 4]], seen: &mut [[f32; 2]]) {
+    let count = block.sample_count as usize;
+    let seen = &mut seen[block.first_ray as usize * count..][..ray_count as usize * count];
+    for_each_row(seen, count, 2048, |ray, seen| {
         let mut optical_depth = 0.0;
         for (seen, sample) in seen.iter_mut().zip(&samples[ray * count..]) {
             (*seen, optical_depth) = weigh_sample(optical_depth, sample[3]);

@@ -91,7 +91,8 @@ pub(super) fn sum_features(
     summed: &mut [f32],
 ) {
     let (features, samples) = (block.feature_count as usize, block.sample_count as usize);
-    for_each_row(&mut summed[..ray_count as usize * features], features, 1024, |ray, summed| {
+    let summed = &mut summed[block.first_ray as usize * features..][..ray_count as usize * features];
+    for_each_row(summed, features, 1024, |ray, summed| {
         Arch::new().dispatch(
             #[inline(always)]
             || {

@@ -6,12 +6,12 @@
 use super::looking::Looking;
 use super::volume::Volume;
 use crate::FieldError;
-use crate::finite::check_finite;
+use crate::finite::check_finite_on;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
-use viewfuse_core::rays::CastBlock;
+use viewfuse_core::rays::{CastBlock, PlaceBlock};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Progress;
@@ -93,13 +93,13 @@ pub(super) fn render<D: Device>(
     let pixels: Vec<u32> = (0..half.pixel_count()).collect();
     let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len()))?;
     let cast = cast_block(target, looking.near_far, looking.sample_count);
-    let mut features = Vec::with_capacity(pixels.len() * network.features as usize);
-    for pixels in pixels.chunks(at_once) {
+    let mut half_image = scratch.image(half)?;
+    for (index, pixels) in pixels.chunks(at_once).enumerate() {
         progress.check()?;
-        features.extend(tile.render(pixels, &cast)?);
+        tile.render(pixels, (index * at_once) as u32, &cast, &mut half_image.values)?;
     }
-    check_finite(&features, "rendering the target's features", "feature image")?;
-    let half_image = Image::upload(scratch.device(), half, &features)?;
+    let count = half.pixel_count() * half.channels;
+    check_finite_on(device, &half_image.values, count, "rendering the target's features", "feature image")?;
     let mut image = scratch.image(half.doubled())?;
     upsample(device, &half_image, 0, &mut image)?;
     scratch.recycle(half_image);
@@ -136,8 +136,6 @@ struct Tile<'a, D: Device> {
     network: &'a PointNetwork<D>,
     views: &'a Views<'a, D>,
     looking: &'a Looking,
-    /// Every sample of every ray.
-    samples: D::Buffer<u32>,
     depths: D::Buffer<f32>,
     points: D::Buffer<viewfuse_core::rays::RayPoint>,
     gathered: D::Buffer<f32>,
@@ -162,7 +160,6 @@ impl<'a, D: Device> Tile<'a, D> {
             network,
             views,
             looking,
-            samples: device.upload(&(0..count as u32).collect::<Vec<u32>>())?,
             depths: device.zeros(count)?,
             points: device.zeros(count)?,
             gathered: device.zeros(count * features * views.volumes.len())?,
@@ -173,8 +170,14 @@ impl<'a, D: Device> Tile<'a, D> {
         })
     }
 
-    /// `[ray][feature]` of some pixels.
-    fn render(&mut self, pixels: &[u32], cast: &CastBlock) -> Result<Vec<f32>, DeviceError> {
+    /// The features of some pixels, into `summed[pixel][feature]` from pixel `first_ray` on.
+    fn render(
+        &mut self,
+        pixels: &[u32],
+        first_ray: u32,
+        cast: &CastBlock,
+        summed: &mut D::Buffer<f32>,
+    ) -> Result<(), DeviceError> {
         let Tile { device, network, views, looking, .. } = *self;
         let Looking { near_far: [near, far], sample_count, jitter, seed, ray_length, inclusive } = *looking;
         let ray_count = pixels.len() as u32;
@@ -183,7 +186,8 @@ impl<'a, D: Device> Tile<'a, D> {
         device.cast_rays(cast, ray_count, &pixels, &mut rays)?;
         let coarse = CoarseBlock { seed: [seed as u32, (seed >> 32) as u32], sample_count, jitter };
         device.coarse_depths(&coarse, ray_count, &rays, &pixels, &mut self.depths)?;
-        device.place_points(&sample_count, point_count, &self.samples, &rays, &self.depths, &mut self.points)?;
+        let block = PlaceBlock { sample_count, ..PlaceBlock::default() };
+        device.place_points(&block, point_count, None, &rays, &self.depths, &mut self.points)?;
         let features = network.features;
         for (view, volume) in (0..).zip(&views.volumes) {
             let block = VolumeBlock {
@@ -212,10 +216,9 @@ impl<'a, D: Device> Tile<'a, D> {
             length_scale: ray_length / (far - near),
             last_length: LAST_LENGTH,
             inclusive: u32::from(inclusive),
+            first_ray,
         };
         device.weigh_features(&block, ray_count, &self.raw, &self.points, &mut self.weights)?;
-        let mut summed = device.zeros((ray_count * features) as usize)?;
-        device.sum_features(&block, ray_count, &self.weights, &self.fused, &self.raw, &mut summed)?;
-        device.download(&summed)
+        device.sum_features(&block, ray_count, &self.weights, &self.fused, &self.raw, summed)
     }
 }

@@ -9,7 +9,7 @@ use super::looking::Looking;
 use super::sampling::{Plan, Sampled, Start, sample};
 use super::volume::Volume;
 use crate::FieldError;
-use crate::finite::{check_finite, download_finite};
+use crate::finite::{check_finite, check_finite_on};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::sampler::Mix;
@@ -18,9 +18,9 @@ use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_nn::convolution::leading_channels;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::loader::Loader;
-use viewfuse_nn::pool::global_average_pool;
 use viewfuse_nn::scratch::Scratch;
 
 /// The parts of a network.
@@ -75,12 +75,8 @@ impl<D: Device> Parts<D> {
             return Ok(0);
         }
         let Some(image) = volume.image() else { return Ok(new_rows) };
-        // A mean is no number where one of its summands is none: a small download tells whether to look at all of them.
-        let means = global_average_pool(&mut Scratch::new(device), image)?;
-        let means = device.download(&means.values)?;
-        if means.iter().any(|mean| !mean.is_finite()) {
-            download_finite(device, &image.values, &encoding(view), "volume [row][column][depth][feature]")?;
-        }
+        let count = image.size.pixel_count() * image.size.channels;
+        check_finite_on(device, &image.values, count, &encoding(view), "volume [row][column][depth][feature]")?;
         Ok(new_rows)
     }
 
@@ -115,13 +111,8 @@ impl<D: Device> Parts<D> {
     ) -> Result<Sampled<D>, FieldError> {
         let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
         if self.denoiser.is_none() {
-            let values = device.download(&features.values)?;
-            let colours: Vec<f32> = values
-                .chunks_exact(features.size.channels as usize)
-                .flat_map(|features| features[..COLOUR_CHANNELS].to_vec())
-                .collect();
-            let picture = device.upload(&colours)?;
-            return Ok(Sampled { picture, levels: Vec::new(), left_out: 0 });
+            let colours = leading_channels(scratch, features, COLOUR_CHANNELS as u32)?;
+            return Ok(Sampled { picture: colours.values, levels: Vec::new(), left_out: 0 });
         }
         sample(device, plan, count, start, progress, |noisy, level, denoised| {
             Ok(self.denoise(device, scratch, noisy, features, level, denoised)?)

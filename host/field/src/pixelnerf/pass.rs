@@ -3,10 +3,11 @@
 use super::network::{Network, Views, Workspace};
 use super::options::{LEAST_OPACITY, LEAST_SHARE, Omissions, Sampling};
 use crate::FieldError;
+use viewfuse_core::compact::RUN;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock};
-use viewfuse_core::rays::CastBlock;
-use viewfuse_core::wanted::WantedBlock;
+use viewfuse_core::rays::{CastBlock, PlaceBlock};
+use viewfuse_core::wanted::{RaysBlock, WantedBlock};
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_job::progress::Progress;
 
@@ -68,6 +69,20 @@ pub(super) struct Samples<D: Device> {
     count: u32,
 }
 
+impl<D: Device> Samples<D> {
+    /// These rays among others, whose first results are those of ray `first_ray`.
+    pub(super) fn block(&self, first_ray: u32) -> RaysBlock {
+        RaysBlock { sample_count: self.count, first_ray }
+    }
+}
+
+/// Some samples of some rays, flat in `[ray][sample]`.
+struct List<D: Device> {
+    /// In order; longer than the count says. `None`: all samples.
+    samples: Option<D::Buffer<u32>>,
+    count: u32,
+}
+
 impl<D: Device> Renderer<'_, D> {
     /// The colours and depths (along the rays) of some pixels.
     pub(super) fn render(
@@ -88,7 +103,7 @@ impl<D: Device> Renderer<'_, D> {
         }
         let (ray_count, fine_count) = (pixels.len(), block.fine_count() as usize);
         let mut parts = self.zeros(ray_count * coarse.count as usize)?;
-        device.weigh_samples(&coarse.count, rays.count, &coarse.values, &mut parts)?;
+        device.weigh_samples(&coarse.block(0), rays.count, &coarse.values, &mut parts)?;
         let mut chances = self.zeros(ray_count * fine_count)?;
         device.draw_chances(&block, rays.count, &rays.pixels, &mut chances)?;
         let mut added = self.zeros(ray_count * fine_count)?;
@@ -144,20 +159,26 @@ impl<D: Device> Renderer<'_, D> {
         Ok(samples)
     }
 
-    /// The samples that are wanted: the only numbers that a render brings to the host before it is done, because they
-    /// decide how much work there is.
+    /// The samples that are wanted, as a list that stays on the device. How many they are comes to the host: it decides how
+    /// much work there is.
     fn list(
         &self,
         rays: &Rays<D>,
         samples: &Samples<D>,
         wanted: Option<(&WantedBlock, &D::Buffer<[f32; 2]>)>,
-    ) -> Result<Vec<u32>, FieldError> {
-        let all = 0..rays.count * samples.count;
-        let Some((block, seen)) = wanted else { return Ok(all.collect()) };
-        let mut marks = self.zeros(all.len())?;
-        self.device.wanted_samples(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut marks)?;
-        let marks = self.device.download(&marks)?;
-        Ok(all.filter(|sample| marks[*sample as usize] != 0).collect())
+    ) -> Result<List<D>, FieldError> {
+        let (device, all) = (self.device, rays.count * samples.count);
+        let Some((block, seen)) = wanted else { return Ok(List { samples: None, count: all }) };
+        let mut mask = self.zeros(all as usize)?;
+        device.wanted_samples(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut mask)?;
+        let run_count = all.div_ceil(RUN);
+        let (mut counts, mut offsets) = (self.zeros(run_count as usize)?, self.zeros(run_count as usize + 1)?);
+        let (mut total, mut list) = (self.zeros(1)?, self.zeros(all as usize)?);
+        device.count_marked(&all, &mask, &mut counts)?;
+        device.sum_counts(&run_count, &counts, &mut offsets, &mut total)?;
+        device.list_marked(&all, &mask, &offsets, &mut list)?;
+        let count = device.download(&total)?.first().copied().unwrap_or(0);
+        Ok(List { samples: Some(list), count })
     }
 
     /// Asks a network about samples, as many at a time as the workspace holds. The others stay empty.
@@ -167,17 +188,18 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         rays: &Rays<D>,
         samples: &mut Samples<D>,
-        list: &[u32],
+        list: &List<D>,
         asked: &mut Asked,
     ) -> Result<(), FieldError> {
         let device = self.device;
         asked.samples += u64::from(rays.count * samples.count);
-        asked.asked += list.len() as u64;
-        for some in list.chunks(workspace.point_count as usize) {
+        asked.asked += u64::from(list.count);
+        for first in (0..list.count).step_by(workspace.point_count as usize) {
             self.progress.check()?;
-            let count = some.len() as u32;
-            let some = device.upload(some)?;
-            device.place_points(&samples.count, count, &some, &rays.rays, &samples.depths, &mut workspace.points)?;
+            let count = workspace.point_count.min(list.count - first);
+            let block = PlaceBlock { sample_count: samples.count, first, ..PlaceBlock::default() };
+            let all = list.samples.as_ref();
+            device.place_points(&block, count, all, &rays.rays, &samples.depths, &mut workspace.points)?;
             network.ask(workspace, self.views, count)?;
             device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values)?;
         }

@@ -25,33 +25,23 @@ impl<D: Device> Renderer<'_, D> {
         let pixels: Vec<u32> =
             (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
         let count = self.sampling.coarse_count;
-        let mut parts = Vec::new();
+        let mut values = self.zeros(pixels.len() * count as usize)?;
+        let mut first_ray = 0;
         let mut changes = [0.0; SHARES.len()];
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
             let samples = self.first_pass(workspace, &rays, None, asked)?;
-            let mut part = self.zeros(some.len() * count as usize)?;
-            self.device.weigh_samples(&count, rays.count, &samples.values, &mut part)?;
-            parts.push(part);
+            self.device.weigh_samples(&samples.block(first_ray), rays.count, &samples.values, &mut values)?;
+            first_ray += rays.count;
             if self.omissions.probe_error > 0.0 {
-                let values = self.device.download(&samples.values)?;
-                for ray in values.chunks(count as usize) {
+                // The one choice that is made from whole samples on the host, in f64: once a picture, of few rays.
+                let samples = self.device.download(&samples.values)?;
+                for ray in samples.chunks(count as usize) {
                     let own = SHARES.map(|share| change(ray, share, &self.background));
                     changes.iter_mut().zip(own).for_each(|(sum, own)| *sum += own);
                 }
             }
         }
-        // Large pictures: the pieces are put together on the host.
-        let values = match <[_; 1]>::try_from(parts) {
-            Ok([all]) => all,
-            Err(parts) => {
-                let mut all = Vec::with_capacity(pixels.len() * count as usize);
-                for part in &parts {
-                    all.extend(self.device.download(part)?);
-                }
-                self.device.upload(&all)?
-            }
-        };
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
         let harmless = changes.iter().position(|change| *change < most);
         Ok(Seen { values, columns, rows, least_share: harmless.map_or(LEAST_SHARE, |index| SHARES[index]) })

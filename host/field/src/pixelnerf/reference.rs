@@ -6,7 +6,8 @@ use super::{Architecture, Pass, PixelNerf, Views};
 use crate::FieldError;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::FineBlock;
-use viewfuse_core::rays::{RayPoint, TargetRay};
+use viewfuse_core::rays::{PlaceBlock, RayPoint, TargetRay};
+use viewfuse_core::wanted::RaysBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_scene::photographs::SourceImages;
@@ -101,10 +102,10 @@ impl<'a, D: Device> Reference<'a, D> {
         let sample_count = (depths.len() / rays.len()) as u32;
         let rays = self.load(rays)?;
         let depths = device.upload(depths)?;
-        let list: Vec<u32> = (0..rays.count * sample_count).collect();
-        let mut points = device.zeros(list.len())?;
-        let point_count = list.len() as u32;
-        device.place_points(&sample_count, point_count, &device.upload(&list)?, &rays.rays, &depths, &mut points)?;
+        let point_count = rays.count * sample_count;
+        let mut points = device.zeros(point_count as usize)?;
+        let block = PlaceBlock { sample_count, ..PlaceBlock::default() };
+        device.place_points(&block, point_count, None, &rays.rays, &depths, &mut points)?;
         let points: Vec<RayPoint> = device.download(&points)?;
         // The density first, because that is what comes out of a length of 1.
         let unit: Vec<RayPoint> = points.iter().map(|point| RayPoint { length: 1.0, ..*point }).collect();
@@ -113,8 +114,8 @@ impl<'a, D: Device> Reference<'a, D> {
             sample[3] *= point.length;
         }
         let samples = device.upload(&samples)?;
-        let mut seen = device.zeros(list.len())?;
-        device.weigh_samples(&sample_count, rays.count, &samples, &mut seen)?;
+        let mut seen = device.zeros(point_count as usize)?;
+        device.weigh_samples(&RaysBlock { sample_count, first_ray: 0 }, rays.count, &samples, &mut seen)?;
         let mut pixels: Pixels<D> =
             Pixels { colours: device.zeros(rays.count as usize)?, depths: device.zeros(rays.count as usize)? };
         let block = CompositeBlock { background: [1.0; 3], empty_depth: 0.0, sample_count };
