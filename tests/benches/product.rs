@@ -105,7 +105,8 @@ impl Product {
         };
         let [inner, columns] = [inner_count, column_count].map(|count| count as usize);
         let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
-        let Ok(layer) = Layer::new(&Cpu, &shape, &numbers(inner_count * column_count), &numbers(column_count));
+        let layer = Layer::new(&Cpu, &shape, &numbers(inner_count * column_count), &numbers(column_count))
+            .expect("the CPU cannot fail");
         Product {
             name: format!("{row_count}x{inner_count}x{column_count}{what}"),
             block,
@@ -125,7 +126,8 @@ impl Product {
         let repeats = (3.0e9 / operations).clamp(1.0, 200.0) as u32;
         let time = timed(|| {
             for _ in 0..repeats {
-                let Ok(()) = Cpu.product(block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs);
+                Cpu.product(block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
+                    .expect("the CPU cannot fail");
             }
             black_box(&outputs[..]);
         });

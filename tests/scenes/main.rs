@@ -3,6 +3,5 @@
 mod datasets;
 mod errors;
 mod layouts;
-mod outside;
 mod photographs;
 mod synthetic;

@@ -290,9 +290,9 @@ impl<'a> Stage<'a> {
         let omission = weights.without_least(self.options.leave_out);
         let camera = self.at_working_size(&target.camera)?;
         let mut encode = Duration::ZERO;
-        timed(&mut encode, || self.session.encode(&omission.weights, progress))?;
+        timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
         let settled = self.options.settled;
-        let rendered = self.session.render(&camera, &omission.weights, settled, progress)?;
+        let rendered = self.session.render(&camera, &omission.weights, settled, progress).map_err(failed)?;
         let time = start.elapsed();
         let Rendered { colours, depths, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);

@@ -1,0 +1,55 @@
+//! A layout of scenes.
+
+use std::path::{Path, PathBuf};
+use viewfuse::scene::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader, number_lines, read_text};
+use viewfuse::scene::{Place, SceneError};
+
+/// `cameras.list`: of `photograph_0.png` and so on a line each, the focal length, then the pose's upper three rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Lines;
+
+/// Name of the file.
+pub const LIST: &str = "cameras.list";
+
+impl Reader for Lines {
+    fn name(&self) -> &'static str {
+        "lines"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with cameras.list"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        let list = path.join(LIST);
+        Ok(list.is_file().then_some(list))
+    }
+
+    fn read(&self, list: &Path) -> Result<Vec<RawView>, SceneError> {
+        let lines = number_lines(list, &read_text(list)?)?;
+        lines.iter().enumerate().map(|(index, (line, numbers))| view(list, index, *line, numbers)).collect()
+    }
+}
+
+fn view(list: &Path, index: usize, line: usize, numbers: &[f64]) -> Result<RawView, SceneError> {
+    let (path, place) = (list.to_path_buf(), Place::Line(line));
+    let Ok([focal, pose @ ..]) = <[f64; 13]>::try_from(numbers) else {
+        return Err(SceneError::WrongCount { path, place, of: "numbers", expected: 13, found: numbers.len() });
+    };
+    let mut matrix = [0.0; 16];
+    matrix[..12].copy_from_slice(&pose);
+    matrix[15] = 1.0;
+    let name = format!("photograph_{index}");
+    let image = ImageFile::open(&list.with_file_name(format!("{name}.png")))?;
+    let size = image.size();
+    let intrinsics = RawIntrinsics {
+        focal: [focal; 2],
+        principal: size.map(|side| f64::from(side) / 2.0),
+        size,
+        path: path.clone(),
+        place: place.clone(),
+        size_place: place.clone(),
+    };
+    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
+    Ok(RawView { name, image: Some(image), pose, intrinsics: Some(intrinsics) })
+}

@@ -1,0 +1,177 @@
+//! A field, a layout and a weighting of one's own, by the public interface alone: what they give is checked as everything
+//! else is, and the render loop takes them.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::PathBuf;
+use tempfile::TempDir;
+use viewfuse::device::choice::AnyDevice;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, render};
+use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::{AnyField, On, Renderer, Session};
+use viewfuse::job::progress::Silent;
+use viewfuse::output::run::{Circumstances, RunWriter};
+use viewfuse::scene::few_shot::{FewShot, Selection};
+use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse::scene::{Place, READERS, Scene, SceneError};
+use viewfuse::weighting::Weighting;
+use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse_outside::{LIST, Lines, Nearest, Plane};
+
+/// The sample's cameras are as far from its object.
+const PLANE: Plane = Plane { depth: 1.3 };
+
+/// The sample scene.
+fn sample() -> Scene {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../data/toy");
+    Scene::open(folder).expect("the sample")
+}
+
+/// The sample scene in a layout of one's own, with every third of its views.
+fn in_lines() -> (Scene, TempDir) {
+    let (sample, folder) = (sample(), tempfile::tempdir().expect("a folder"));
+    let mut list = String::new();
+    for (index, view) in sample.views.iter().filter(|view| view.image.is_some()).step_by(3).enumerate() {
+        let camera = view.camera;
+        let numbers = camera.pose.to_opencv().into_iter().take(3).flatten();
+        let words: Vec<String> =
+            [camera.pinhole.focal()[0]].into_iter().chain(numbers).map(|n| n.to_string()).collect();
+        writeln!(list, "{}", words.join(" ")).expect("a line");
+        let photograph = view.image.as_deref().expect("a photograph");
+        fs::copy(photograph, folder.path().join(format!("photograph_{index}.png"))).expect("a copy");
+    }
+    fs::write(folder.path().join(LIST), list).expect("a list");
+    (sample, folder)
+}
+
+fn open(folder: &TempDir) -> Result<Scene, SceneError> {
+    Scene::open_with(folder.path(), &[READERS.as_slice(), &[&Lines]].concat())
+}
+
+/// The third view from the others.
+fn third(scene: &Scene) -> FewShot {
+    let targets = Some(scene.views[2].name.clone());
+    Selection { targets, ..Selection::default() }.resolve(scene, 2).expect("a job")
+}
+
+fn small() -> RenderOptions {
+    RenderOptions { size: Some([32, 32]), ..RenderOptions::default() }
+}
+
+/// The third view from the others, at 32x32.
+fn frame(renderer: &dyn Renderer, scene: &Scene, weighting: &Weighting) -> (Frame, Finished) {
+    let mut frames = Vec::new();
+    let finished = render(scene, &third(scene), weighting, renderer, &small(), &Silent, |_, frame| {
+        frames.push(frame);
+        Ok::<_, RenderError>(())
+    })
+    .expect("a picture");
+    (frames.remove(0), finished)
+}
+
+/// With the training-free field on the CPU.
+fn training_free(scene: &Scene, weighting: &Weighting) -> Frame {
+    frame(&On { device: &Cpu, field: &TrainingFree::default() }, scene, weighting).0
+}
+
+#[test]
+fn field_layout_and_weighting_of_ones_own_render_together() {
+    let (_, folder) = in_lines();
+    let scene = open(&folder).expect("a scene");
+    let device = AnyDevice::Cpu(Cpu);
+    let field = AnyField::new(PLANE);
+    let renderer = field.on(&device);
+    let nearest = Weighting::custom(Nearest);
+    let (frame, finished) = frame(renderer.as_ref(), &scene, &nearest);
+    let psnr = frame.truth.as_ref().expect("a truth").psnr;
+    println!("a plane from the nearest of seven views: {psnr:.1} dB");
+    assert!(psnr > 10.0);
+    assert!(frame.depths.contains(&PLANE.depth) && frame.depths.contains(&0.0));
+    let line = finished.record.left_out.first().expect("a line about views");
+    assert_eq!((line.what, line.left_out, line.of), ("encoded views", 6, 7), "only the nearest one is used");
+
+    // What a run writes.
+    let output = tempfile::tempdir().expect("a folder");
+    let mut writer = RunWriter::new(output.path(), &scene, "lines".to_owned(), &third(&scene), &nearest);
+    let options = small();
+    let finished = render(&scene, &third(&scene), &nearest, renderer.as_ref(), &options, &Silent, |sources, frame| {
+        writer.write(sources, &frame).map_err(Box::<dyn std::error::Error>::from)
+    })
+    .expect("a picture");
+    let record = writer.finish(renderer.as_ref(), &options, finished, Circumstances::default()).expect("a record");
+    assert_eq!((record.field, record.weighting.as_str(), record.frames.len()), ("plane", "nearest", 1));
+    let mut names: Vec<_> =
+        fs::read_dir(output.path()).expect("a folder").map(|file| file.expect("a file").file_name()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["photograph_2.png", "photograph_2_depth.png", "photograph_2_sheet.png", "run.json"]);
+}
+
+#[test]
+fn a_plane_seen_from_a_source_is_its_photograph() {
+    let scene = sample();
+    let sources: Vec<usize> = (0..4).collect();
+    let album = Album::open(&scene, sources.iter().copied(), &Silent).expect("photographs");
+    let images = album.sources(&sources, 32, BackgroundChoice::Auto, &Silent).expect("sources");
+    let renderer = On { device: &Cpu, field: &PLANE };
+    let mut session = Session::open(&renderer, &images, &Silent).expect("a session");
+    for (view, image) in images.images.iter().enumerate() {
+        let mut scores = [0.0; MOST_SOURCES];
+        scores[view] = 1.0;
+        let weights = SourceWeights::from_scores(&scores, 4);
+        let picture = session.render(&image.camera, &weights, 0.0, &Silent).expect("a picture");
+        let opacities = picture.colours.iter().zip(&image.texels).filter(|(colour, texel)| colour[3] == texel[3]);
+        // Rounding may take a point on a border into the next texel.
+        let same = opacities.count() as f64 / image.texels.len() as f64;
+        assert!(same > 0.99, "view {view}: {same} of the pixels");
+    }
+}
+
+#[test]
+fn a_layout_of_ones_own_is_opened_and_rendered() {
+    let (sample, folder) = in_lines();
+    let scene = open(&folder).expect("a scene");
+    assert_eq!((scene.layout, scene.views.len()), ("lines", 8));
+    for (view, original) in scene.views.iter().zip(sample.views.iter().step_by(3)) {
+        assert_eq!(view.camera, original.camera, "{}", view.name);
+    }
+    let frame = training_free(&scene, &Weighting::default_scheme());
+    assert!(frame.truth.is_some_and(|truth| truth.psnr > 15.0));
+    // The readers of the crate know nothing of it, and say what they look for.
+    let error = Scene::open(folder.path()).expect_err("an unknown layout").to_string();
+    assert!(error.contains("no scene here; looked for a folder with transforms.json"), "{error}");
+}
+
+#[test]
+fn what_a_reader_gives_is_checked() {
+    let (_, folder) = in_lines();
+    let path = folder.path().join(LIST);
+    let list = fs::read_to_string(&path).expect("the list");
+    let refused = |changed: String| {
+        fs::write(&path, changed).expect("a list");
+        open(&folder).expect_err("no scene")
+    };
+    let first = list.lines().next().expect("a line");
+    let words: Vec<&str> = first.split(' ').collect();
+    let with = |index: usize, word: &str| {
+        let mut words = words.clone();
+        words[index] = word;
+        list.replacen(first, &words.join(" "), 1)
+    };
+    assert!(matches!(refused(with(1, "5")), SceneError::Pose { place: Place::Line(1), .. }));
+    assert!(matches!(refused(with(0, "-1")), SceneError::Intrinsics { place: Place::Line(1), .. }));
+    assert!(matches!(refused(with(4, "NaN")), SceneError::NotFinite { place: Place::Line(1), .. }));
+    assert!(matches!(refused(String::new()), SceneError::NoViews { .. }));
+}
+
+#[test]
+fn a_weighting_of_ones_own_is_rendered_with() {
+    let scene = sample();
+    let nearest = Weighting::custom(Nearest);
+    assert_eq!(nearest.to_string(), "nearest");
+    let frame = training_free(&scene, &nearest);
+    let weights = frame.weights.values();
+    assert_eq!(weights.iter().filter(|weight| **weight > 0.0).count(), 1);
+    assert!(weights.contains(&1.0));
+    assert_ne!(frame.picture, training_free(&scene, &Weighting::default_scheme()).picture);
+}
