@@ -1,5 +1,5 @@
-//! The network's parts on a device, and what each makes of its inputs. What a part makes is looked at before the next one
-//! gets it: numbers that are none are found where they arise.
+//! The network's parts on a device, and what each makes of its inputs. NaN and infinity are reported at the part that produced
+//! them.
 
 use super::architecture::{Architecture, COLOUR_CHANNELS};
 use super::denoiser::Denoiser;
@@ -75,7 +75,7 @@ impl<D: Device> Parts<D> {
             return Ok(0);
         }
         let Some(image) = volume.image() else { return Ok(new_rows) };
-        // A mean is no number where one of its summands is none: a small download tells whether to look at all of them.
+        // A mean is NaN or infinite where one of its summands is: a small download tells whether to look at all of them.
         let means = global_average_pool(&mut Scratch::new(device), image)?;
         let means = device.download(&means.values)?;
         if means.iter().any(|mean| !mean.is_finite()) {
