@@ -61,7 +61,7 @@ pub enum MetricError {
         /// Width and height of the truth.
         truth: [u32; 2],
     },
-    /// A number that is none came up inside.
+    /// A network produced a value that is NaN or infinite.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
     /// The device failed.

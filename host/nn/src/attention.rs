@@ -3,8 +3,7 @@
 use super::image::{Image, Size};
 use super::scratch::Scratch;
 use viewfuse_core::network::attend::MatrixBlock;
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError};
 
 /// Scaled dot-product attention with one head: of `qkv[pixel][query, key, value][channel]`, an image that fills its buffer,
 /// each pixel's mean of all values, weighted by the softmax of `query . key / sqrt(channels)`.
@@ -54,14 +53,15 @@ mod tests {
     use viewfuse_device::cpu::Cpu;
 
     #[test]
-    fn equal_keys_give_means_and_a_strong_one_its_value() {
+    fn equal_keys_give_means_and_a_strong_one_its_value() -> Result<(), DeviceError> {
         let mut scratch = Scratch::new(&Cpu);
         let size = Size { height: 2, width: 1, channels: 3 };
-        let Ok(qkv) = Image::upload(&Cpu, size, &[1.0, 0.0, 2.0, 5.0, 0.0, 4.0]);
-        let Ok(means) = self_attention(&mut scratch, &qkv);
+        let qkv = Image::upload(&Cpu, size, &[1.0, 0.0, 2.0, 5.0, 0.0, 4.0])?;
+        let means = self_attention(&mut scratch, &qkv)?;
         assert_eq!((means.size.channels, &means.values[..2]), (1, &[3.0, 3.0][..]));
-        let Ok(qkv) = Image::upload(&Cpu, size, &[0.0, -50.0, 2.0, 1.0, 50.0, 4.0]);
-        let Ok(attended) = self_attention(&mut scratch, &qkv);
+        let qkv = Image::upload(&Cpu, size, &[0.0, -50.0, 2.0, 1.0, 50.0, 4.0])?;
+        let attended = self_attention(&mut scratch, &qkv)?;
         assert_eq!(attended.values[..2], [3.0, 4.0]);
+        Ok(())
     }
 }

@@ -7,8 +7,7 @@ use std::ops::Range;
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_core::network::transpose::TransposedBlock;
-use viewfuse_device::DeviceError;
-use viewfuse_device::{Device, Layer};
+use viewfuse_device::{Device, DeviceError, Layer};
 
 /// A convolution with bias on a device.
 pub struct Convolution<D: Device> {
@@ -299,28 +298,28 @@ mod tests {
 
     const SIZE: Size = Size { height: 3, width: 3, channels: 1 };
 
-    fn sum_of_window() -> Convolution<Cpu> {
-        let Ok(layer) = ConvolutionWeights::new([1, 1, 3, 3], &[1.0; 9], vec![-20.0]).load(&Cpu, 0);
-        layer
+    fn sum_of_window() -> Result<Convolution<Cpu>, DeviceError> {
+        ConvolutionWeights::new([1, 1, 3, 3], &[1.0; 9], vec![-20.0]).load(&Cpu, 0)
     }
 
     #[test]
-    fn residuals_scale_and_rectification_come_in_this_order() {
+    fn residuals_scale_and_rectification_come_in_this_order() -> Result<(), DeviceError> {
         let mut scratch = Scratch::new(&Cpu);
-        let Ok(image) = Image::upload(&Cpu, SIZE, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]);
+        let image = Image::upload(&Cpu, SIZE, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0])?;
         let options = ConvolutionOptions { scale: 0.5, ..ConvolutionOptions::RELU };
-        let layer = sum_of_window();
-        let Ok(plain) = layer.run(&mut scratch, options, &image, Residual::None);
+        let layer = sum_of_window()?;
+        let plain = layer.run(&mut scratch, options, &image, Residual::None)?;
         assert_eq!(plain.values, [0.0, 0.5, 0.0, 3.5, 12.5, 6.5, 2.0, 9.5, 4.0]);
-        let Ok(with_image) = layer.run(&mut scratch, options, &image, Residual::Image(&image));
+        let with_image = layer.run(&mut scratch, options, &image, Residual::Image(&image))?;
         assert_eq!(with_image.values, [0.0, 1.5, 0.0, 5.5, 15.0, 9.5, 5.5, 13.5, 8.5]);
-        let Ok(with_channel) = layer.run(&mut scratch, options, &image, Residual::Channels(&vec![9.0, 10.0], 1));
+        let with_channel = layer.run(&mut scratch, options, &image, Residual::Channels(&vec![9.0, 10.0], 1))?;
         assert_eq!(with_channel.values, [1.0, 5.5, 3.0, 8.5, 17.5, 11.5, 7.0, 14.5, 9.0]);
+        Ok(())
     }
 
     #[test]
-    fn sizes_follow_the_options() {
-        let layer = sum_of_window();
+    fn sizes_follow_the_options() -> Result<(), DeviceError> {
+        let layer = sum_of_window()?;
         let size = |options| layer.out_size(options, SIZE).map(|size| [size.height, size.width]);
         let plain = ConvolutionOptions::PLAIN;
         assert_eq!(size(plain), Some([3, 3]));
@@ -329,16 +328,18 @@ mod tests {
         assert_eq!(size(ConvolutionOptions { padding: Some(0), ..plain }), Some([1, 1]));
         assert_eq!(size(ConvolutionOptions { padding: Some(0), dilation: 2, ..plain }), None);
         assert_eq!(size(ConvolutionOptions { padding: Some(0), upsampling: 2, ..plain }), Some([4, 4]));
+        Ok(())
     }
 
     #[test]
-    fn an_average_pool_is_a_depthwise_convolution() {
+    fn an_average_pool_is_a_depthwise_convolution() -> Result<(), DeviceError> {
         let mut scratch = Scratch::new(&Cpu);
         let size = Size { height: 2, width: 2, channels: 2 };
-        let Ok(image) = Image::upload(&Cpu, size, &[1.0, 10.0, 2.0, 20.0, 3.0, 30.0, 6.0, 60.0]);
-        let Ok(pool) = DepthwiseConvolution::average_pool(&Cpu);
+        let image = Image::upload(&Cpu, size, &[1.0, 10.0, 2.0, 20.0, 3.0, 30.0, 6.0, 60.0])?;
+        let pool = DepthwiseConvolution::average_pool(&Cpu)?;
         let options = ConvolutionOptions { stride: 2, padding: Some(0), ..ConvolutionOptions::PLAIN };
-        let Ok(output) = pool.run(&mut scratch, options, &image);
+        let output = pool.run(&mut scratch, options, &image)?;
         assert_eq!((output.size, output.values), (size.halved(), vec![3.0, 30.0]));
+        Ok(())
     }
 }

@@ -1,7 +1,6 @@
 //! Images in a device's memory, which may be some of the channels of wider ones, and on the host.
 
-use viewfuse_device::DeviceError;
-use viewfuse_device::Memory;
+use viewfuse_device::{DeviceError, Memory};
 
 /// Height, width and channels of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

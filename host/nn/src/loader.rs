@@ -133,7 +133,7 @@ impl<'a, D: Device> Loader<'a, D> {
         least_side: u32,
         change: impl FnOnce(ConvolutionWeights) -> ConvolutionWeights,
     ) -> Result<Convolution<D>, LoadError> {
-        change(self.tensors.convolution(name)?).load(self.device, least_side).map_err(LoadError::Device)
+        Ok(change(self.tensors.convolution(name)?).load(self.device, least_side)?)
     }
 
     /// A depthwise convolution, from `weight[channel][1][row][column]`. A bias is not read.
@@ -159,7 +159,7 @@ impl<'a, D: Device> Loader<'a, D> {
             given.chunks_exact(column_count).flat_map(|weights| transposed(weights, out_channels)).collect();
         let shape = LayerShape { inner_count: in_channels, column_count, has_wide_images: false };
         let bias = self.tensors.bias(name, out_channels)?;
-        let layer = Layer::new(self.device, &shape, &weights, &bias).map_err(LoadError::Device)?;
+        let layer = Layer::new(self.device, &shape, &weights, &bias)?;
         Ok(TransposedConvolution { layer, size: size as u32, channels: out_channels as u32 })
     }
 
@@ -168,7 +168,7 @@ impl<'a, D: Device> Loader<'a, D> {
     /// # Errors
     /// [`LoadError`].
     pub fn linear(&self, name: &str) -> Result<Linear<D>, LoadError> {
-        self.tensors.linear(name)?.load(self.device).map_err(LoadError::Device)
+        Ok(self.tensors.linear(name)?.load(self.device)?)
     }
 
     /// A group norm, from `weight[channel]` and `bias[channel]`: `group_count(channels)` groups, `epsilon` added to variances.
@@ -187,7 +187,7 @@ impl<'a, D: Device> Loader<'a, D> {
         Ok(GroupNorm { weights: self.upload(&weights)?, bias: self.upload(&bias)?, channels, group_count, epsilon })
     }
 
-    fn upload(&self, values: &[f32]) -> Result<D::Buffer<f32>, LoadError> {
-        self.device.upload(values).map_err(LoadError::Device)
+    fn upload(&self, values: &[f32]) -> Result<D::Buffer<f32>, DeviceError> {
+        self.device.upload(values)
     }
 }

@@ -7,8 +7,7 @@ use super::window::Windows;
 use rayon::prelude::*;
 use viewfuse_core::network::normalise::MeanBlock;
 use viewfuse_core::network::resample::PoolBlock;
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError};
 
 /// The largest number of square windows, channel by channel; what lies outside of the image does not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,15 +164,16 @@ mod tests {
     }
 
     #[test]
-    fn largest_numbers_and_means_on_a_device() {
+    fn largest_numbers_and_means_on_a_device() -> Result<(), DeviceError> {
         let mut scratch = Scratch::new(&Cpu);
-        let Ok(image) = image().upload(&Cpu);
+        let image = image().upload(&Cpu)?;
         let pool = MaxPool { size: 2, stride: 2, padding: 0, ceil_mode: true };
         assert_eq!(pool.out_size(image.size), Some(Size { height: 1, width: 2, channels: 2 }));
-        let Ok(Ok(pooled)) = pool.run(&mut scratch, &image).map(|image| image.download(&Cpu));
+        let pooled = pool.run(&mut scratch, &image)?.download(&Cpu)?;
         assert_eq!(pooled.values, [5.0, 50.0, 6.0, 60.0]);
         assert_eq!(MaxPool { size: 3, ..pool }.out_size(image.size), None);
-        let Ok(Ok(mean)) = global_average_pool(&mut scratch, &image).map(|image| image.download(&Cpu));
+        let mean = global_average_pool(&mut scratch, &image)?.download(&Cpu)?;
         assert_eq!((mean.width, mean.values), (1, vec![3.5, 35.0]));
+        Ok(())
     }
 }

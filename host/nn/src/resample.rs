@@ -3,8 +3,7 @@
 use super::image::Image;
 use super::scratch::Scratch;
 use viewfuse_core::network::resample::UpsampleBlock;
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError};
 
 /// Upsamples an image that fills its buffer to the size of another, bilinear with aligned corners, into the channels of that
 /// one's buffer from `first_channel` on. To an image of its own size, the values are copied.
@@ -55,14 +54,15 @@ mod tests {
     use viewfuse_device::cpu::Cpu;
 
     #[test]
-    fn channels_follow_one_another() {
+    fn channels_follow_one_another() -> Result<(), DeviceError> {
         let mut scratch = Scratch::new(&Cpu);
         let size = Size { height: 1, width: 3, channels: 1 };
-        let Ok(first) = Image::upload(&Cpu, size, &[1.0, 2.0, 3.0]);
-        let Ok(second) = Image::upload(&Cpu, Size { width: 2, channels: 2, ..size }, &[0.0, 10.0, 1.0, 30.0]);
-        let Ok(wide) = concatenate(&mut scratch, &[&first, &second]);
+        let first = Image::upload(&Cpu, size, &[1.0, 2.0, 3.0])?;
+        let second = Image::upload(&Cpu, Size { width: 2, channels: 2, ..size }, &[0.0, 10.0, 1.0, 30.0])?;
+        let wide = concatenate(&mut scratch, &[&first, &second])?;
         assert_eq!(wide.size, Size { channels: 3, ..size });
         // The second's middle column lies between its two.
         assert_eq!(wide.values, [1.0, 0.0, 10.0, 2.0, 0.5, 20.0, 3.0, 1.0, 30.0]);
+        Ok(())
     }
 }

@@ -7,8 +7,7 @@ use super::convolution::{Convolution, ConvolutionOptions, Residual};
 use super::image::Image;
 use super::pool::MaxPool;
 use super::scratch::Scratch;
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError};
 
 /// What its batch norms add to variances.
 pub const BATCH_NORM_EPSILON: f64 = 1.0e-5;
@@ -203,7 +202,6 @@ mod tests {
     use crate::image::Size;
     use crate::initialisation;
     use crate::weights::ConvolutionWeights;
-    use std::convert::Infallible;
     use viewfuse_device::cpu::Cpu;
 
     fn levels(channels: [usize; 3]) -> Vec<Level> {
@@ -223,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_halve_or_dilate() -> Result<(), Infallible> {
+    fn levels_halve_or_dilate() -> Result<(), DeviceError> {
         let weights = |layer: &ResNetLayer| {
             let values = initialisation::tensor(&layer.name, &layer.shape);
             ConvolutionWeights::new(layer.shape, &values, vec![0.0; layer.shape[0]]).load(&Cpu, 0)

@@ -1,8 +1,7 @@
 //! Scratch buffers: memory for the images between layers, used again and again.
 
 use super::image::{Image, Size};
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
+use viewfuse_device::{Device, DeviceError};
 
 /// A device and the buffers on it that are free. Every kernel writes all of its output: what a buffer held before is never
 /// read. Dropping it frees them.
@@ -58,17 +57,18 @@ mod tests {
     use viewfuse_device::cpu::Cpu;
 
     #[test]
-    fn buffers_are_used_again_if_they_are_not_much_too_large() {
+    fn buffers_are_used_again_if_they_are_not_much_too_large() -> Result<(), DeviceError> {
         let mut scratch = Scratch::new(&Cpu);
         let size = Size { height: 2, width: 3, channels: 4 };
-        let Ok(image) = scratch.image(size);
+        let image = scratch.image(size)?;
         assert_eq!((image.values.len(), image.pitch, image.first), (24, 4, 0));
         scratch.recycle(image);
-        let Ok(small) = scratch.image(size.with_channels(1));
+        let small = scratch.image(size.with_channels(1))?;
         assert_eq!(small.values.len(), 6, "24 numbers are too many for 6");
-        let Ok(half) = scratch.channel_slice(size.with_channels(1), 2, 1);
+        let half = scratch.channel_slice(size.with_channels(1), 2, 1)?;
         assert_eq!((half.values.len(), half.pitch, half.first), (24, 2, 1));
-        let Ok(another) = scratch.image(size);
+        let another = scratch.image(size)?;
         assert_eq!(another.values.len(), 24, "the first is in use");
+        Ok(())
     }
 }

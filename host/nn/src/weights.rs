@@ -2,8 +2,7 @@
 
 use super::convolution::Convolution;
 use super::linear::Linear;
-use viewfuse_device::DeviceError;
-use viewfuse_device::{Device, Layer, LayerShape};
+use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
 
 /// Rows and columns from which on a device may convolve images in its way for large ones.
 const LARGE_IMAGE: u32 = 32;

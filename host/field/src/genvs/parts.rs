@@ -1,5 +1,5 @@
-//! The network's parts on a device, and what each makes of its inputs. What a part makes is looked at before the next one
-//! gets it: numbers that are none are found where they arise.
+//! The network's parts on a device, and what each makes of its inputs. NaN and infinity are reported at the part that produced
+//! them.
 
 use super::architecture::{Architecture, COLOUR_CHANNELS};
 use super::denoiser::Denoiser;

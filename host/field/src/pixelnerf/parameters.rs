@@ -49,7 +49,7 @@ impl HostParameters {
 
     /// Takes them to a device.
     pub(super) fn load<D: Device>(&self, device: &D) -> Result<DeviceParameters<D>, DeviceError> {
-        // Images of the trunk are too small for another way of convolving them.
+        // No other way for large images: a view is encoded once, and rounding stays the same for all sizes.
         let trunk = self.trunk.try_map(|convolution| convolution.load(device, 0))?;
         let network = |network: &PointNetwork<LinearWeights>| {
             let block = |[fc_0, fc_1]: &[LinearWeights; 2]| Ok([fc_0.load(device)?, fc_1.load(device)?]);

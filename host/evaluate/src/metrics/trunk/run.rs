@@ -52,7 +52,7 @@ impl<D: Device> Trunk<D> {
     /// [`MetricError::Device`].
     pub fn taps(&self, device: &D, input: &HostImage) -> Result<Vec<HostImage>, MetricError> {
         let mut run = Run { scratch: Scratch::new(device), input, taps: Vec::new() };
-        let image = input.upload(device).map_err(MetricError::Device)?;
+        let image = input.upload(device)?;
         run.steps(&self.steps, Rc::new(image))?;
         Ok(run.taps)
     }
@@ -94,7 +94,7 @@ impl<D: Device> LoadedConvolution<D> {
         let (stride, padding) = (convolution.stride as u32, Some(padding as u32));
         let options = ConvolutionOptions { stride, padding, ..ConvolutionOptions::RELU };
         // Scores are to be exact: no device may take another way for large images.
-        let layer = weights.load(device, 0).map_err(MetricError::Device)?;
+        let layer = weights.load(device, 0)?;
         Ok(LoadedConvolution { layer, options })
     }
 }
@@ -127,12 +127,11 @@ impl<D: Device> Run<'_, D> {
             image = match step {
                 Step::Convolve(LoadedConvolution { layer, options }) => {
                     layer.out_size(*options, image.size).ok_or_else(|| self.small())?;
-                    let output = layer.run(&mut self.scratch, *options, &image, Residual::None);
-                    Rc::new(output.map_err(MetricError::Device)?)
+                    Rc::new(layer.run(&mut self.scratch, *options, &image, Residual::None)?)
                 }
                 Step::MaxPool(pool) => {
                     pool.out_size(image.size).ok_or_else(|| self.small())?;
-                    Rc::new(pool.run(&mut self.scratch, &image).map_err(MetricError::Device)?)
+                    Rc::new(pool.run(&mut self.scratch, &image)?)
                 }
                 Step::AveragePool { count_include_pad } => {
                     self.on_host(&image, |image| average_pool(image, *count_include_pad))?
@@ -142,7 +141,7 @@ impl<D: Device> Run<'_, D> {
                     let outputs = branches.iter().map(|branch| self.steps(branch, image.clone()));
                     let outputs: Vec<Rc<Image<D>>> = outputs.collect::<Result<_, _>>()?;
                     let outputs: Vec<&Image<D>> = outputs.iter().map(AsRef::as_ref).collect();
-                    Rc::new(concatenate(&mut self.scratch, &outputs).map_err(MetricError::Device)?)
+                    Rc::new(concatenate(&mut self.scratch, &outputs)?)
                 }
                 Step::Tap => {
                     let tapped = self.download(&image)?;
@@ -162,11 +161,11 @@ impl<D: Device> Run<'_, D> {
         step: impl FnOnce(&HostImage) -> HostImage,
     ) -> Result<Rc<Image<D>>, MetricError> {
         let output = step(&self.download(image)?);
-        Ok(Rc::new(output.upload(self.scratch.device()).map_err(MetricError::Device)?))
+        Ok(Rc::new(output.upload(self.scratch.device())?))
     }
 
     fn download(&self, image: &Image<D>) -> Result<HostImage, MetricError> {
-        image.download(self.scratch.device()).map_err(MetricError::Device)
+        Ok(image.download(self.scratch.device())?)
     }
 
     fn small(&self) -> MetricError {
