@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use viewfuse::field::genvs::{
-    Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Level, Resampling, group_count, made,
+    Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Level, Resampling, group_count, test_networks,
 };
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
