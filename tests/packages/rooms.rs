@@ -32,6 +32,14 @@ fn hidden(source: &Source, has_harness: bool) -> Vec<usize> {
     source.lines().filter(|(_, line)| !has_harness && line.contains("#[test]")).map(|(line, _)| line).collect()
 }
 
+/// Whether the module that a file is in declares it: otherwise it is not compiled.
+fn is_declared(path: &Path, room: &Path) -> bool {
+    let folder = path.parent().expect("a folder");
+    let above = if Some(folder) == room.parent() { room.to_path_buf() } else { folder.with_extension("rs") };
+    let name = path.file_stem().expect("a name").to_string_lossy();
+    Source::read(&above).code.lines().any(|line| line == format!("mod {name};"))
+}
+
 #[test]
 fn there_are_few_rooms_and_nothing_is_hidden_in_them() {
     let rooms = rooms();
@@ -48,6 +56,7 @@ fn there_are_few_rooms_and_nothing_is_hidden_in_them() {
             let source = Source::read(&path);
             assert_eq!(hidden(&source, *has_harness), [0; 0], "{}", path.display());
             assert!(!source.code.contains("#[path"), "{}", path.display());
+            assert!(path == *file || is_declared(&path, file), "{} is not compiled", path.display());
             files_in_rooms.insert(path);
         }
     }
@@ -55,6 +64,17 @@ fn there_are_few_rooms_and_nothing_is_hidden_in_them() {
     for path in files(&repository().join("tests"), "rs").into_iter().filter(|path| !files_in_rooms.contains(path)) {
         assert!(!Source::read(&path).code.contains("#[test]"), "{} is in no room", path.display());
     }
+}
+
+#[test]
+fn a_file_that_is_not_compiled_is_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("a file");
+    std::fs::create_dir(folder.path().join("a")).expect("a folder");
+    write("main.rs", "mod a;\n// mod c;\n");
+    write("a.rs", "mod b;\n");
+    let found = |name: &str| is_declared(&folder.path().join(name), &folder.path().join("main.rs"));
+    assert_eq!(["a.rs", "a/b.rs", "c.rs", "a/c.rs"].map(found), [true, true, false, false]);
 }
 
 #[test]
