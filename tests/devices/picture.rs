@@ -14,9 +14,10 @@ use viewfuse::field::training_free::TrainingFree;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
+use viewfuse::weighting::Weighting;
 use viewfuse_tests::places::data;
+use viewfuse_vulkan::Tally;
 use viewfuse_vulkan::kernel::Kernel;
-use viewfuse_vulkan::{Tally, VulkanError};
 
 pub(crate) const TESTS: &[Test] = &[Test::new("the_picture_is_the_cpus", the_picture_is_the_cpus)];
 
@@ -47,7 +48,7 @@ impl Rendering {
         let (targets, view_count) = (Some("20,22".to_owned()), Some(SOURCE_COUNT));
         let job = Selection { targets, view_count, ..Selection::default() }.resolve(&scene, 2).expect("views of it");
         let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
-        let weighting = "error:alpha=1".parse().expect("a scheme");
+        let weighting = Weighting::open("error:alpha=1").expect("a scheme");
         let mut rendering = Rendering { pictures: Vec::new(), depths: Vec::new(), tallies: Vec::new() };
         let keep = |_: &_, frame: Frame| -> Result<(), RenderError> {
             rendering.pictures.push(frame.picture);

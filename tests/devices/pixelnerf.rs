@@ -11,6 +11,7 @@ use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
+use viewfuse::weighting::Weighting;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
@@ -48,7 +49,7 @@ fn picture<D: Device + Sync>(device: &D, omissions: Omissions) -> Result<Vec<[f3
         colours = frame.colours;
         Ok(())
     };
-    let weighting = "error:alpha=1".parse().expect("a scheme");
+    let weighting = Weighting::open("error:alpha=1").expect("a scheme");
     render(&scene, &job, &weighting, &On { device, field: &field }, &options, &Silent, keep)?;
     Ok(colours)
 }

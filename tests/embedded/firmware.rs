@@ -66,7 +66,7 @@ impl Firmware {
 type OnDevice = Box<dyn FnOnce(&Firmware) -> Result<(), Failed> + Send>;
 
 pub(crate) fn trials() -> Vec<Trial> {
-    let emulator = Emulator::find(&repository(), Path::new(env!("CARGO_TARGET_TMPDIR")));
+    let emulator = Emulator::find(Path::new(env!("CARGO_TARGET_TMPDIR")));
     let missing = emulator.as_ref().err().cloned();
     let firmware = Arc::new(Firmware { emulator, built: Mutex::default() });
     let on_device = |name: String, test: OnDevice| {

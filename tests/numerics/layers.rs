@@ -221,9 +221,9 @@ fn convolution_errors(
     .packed();
     [false, true].map(|has_wide_images| {
         let shape = LayerShape { inner_count: 9 * channels, column_count: columns, has_wide_images };
-        let layer = Layer::new(&Cpu, &shape, &weights, &vec![0.0; columns]).expect("the CPU cannot fail");
-        let mut outputs = Cpu.zeros(expected.len()).expect("the CPU cannot fail");
-        Cpu.convolve(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs).expect("the CPU cannot fail");
+        let layer = Layer::new(&Cpu, &shape, &weights, &vec![0.0; columns]).expect("the CPU computes");
+        let mut outputs = Cpu.zeros(expected.len()).expect("the CPU computes");
+        Cpu.convolve(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs).expect("the CPU computes");
         let unit = magnitudes.iter().copied().fold(0.0, f64::max) / 16_777_216.0;
         let errors =
             outputs.iter().zip(&expected).map(|(output, expected)| (f64::from(*output) - expected).abs() / unit);

@@ -23,9 +23,9 @@ fn normalised(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBl
     let [inputs, weights, bias] = [inputs, weights, bias].map(<[f32]>::to_vec);
     let (mut parts, mut moments) = (vec![[0.0; 2]; parts.len()], vec![[0.0; 2]; groups]);
     let mut outputs = vec![0.0; count];
-    Cpu.part_moments(block, &inputs, &mut parts).expect("the CPU cannot fail");
-    Cpu.merge_moments(block, &parts, &mut moments).expect("the CPU cannot fail");
-    Cpu.normalise(block, &inputs, &moments, &weights, &bias, &mut outputs).expect("the CPU cannot fail");
+    Cpu.part_moments(block, &inputs, &mut parts).expect("the CPU computes");
+    Cpu.merge_moments(block, &parts, &mut moments).expect("the CPU computes");
+    Cpu.normalise(block, &inputs, &moments, &weights, &bias, &mut outputs).expect("the CPU computes");
     [by_bodies, outputs]
 }
 
@@ -159,7 +159,7 @@ fn means_are_means() {
             sums.iter_mut().zip(pixel).for_each(|(sum, value)| *sum += f64::from(*value));
         }
         let mut means = vec![0.0; sums.len()];
-        Cpu.channel_means(&block, &inputs, &mut means).expect("the CPU cannot fail");
+        Cpu.channel_means(&block, &inputs, &mut means).expect("the CPU computes");
         for (channel, sum) in sums.into_iter().enumerate() {
             let expected = sum / f64::from(block.pixel_count);
             for actual in [channel_mean(&inputs[..], &block, channel), means[channel]] {
@@ -196,7 +196,7 @@ fn softmax(scores: &[f32]) -> [Vec<f32>; 2] {
     let scale = softmax_scale(&rows[..], scores.len(), scores.len() as u32);
     let by_body = scores.iter().map(|score| softmax_value(*score, scale)).collect();
     let mut weights = vec![0.0; rows.len()];
-    Cpu.softmax_rows(&(scores.len() as u32), 3, &rows, &mut weights).expect("the CPU cannot fail");
+    Cpu.softmax_rows(&(scores.len() as u32), 3, &rows, &mut weights).expect("the CPU computes");
     [by_body, weights[scores.len()..2 * scores.len()].to_vec()]
 }
 

@@ -5,7 +5,7 @@ use viewfuse::check::oracle::{Arithmetic, Matrix, WidePose, evaluate, minus, nor
 use viewfuse::check::poses::{Random, looking_at_origin, pose_of, ring, rotation_about};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{AngleKind, Formula, Scheme, SchemeError, weigh};
+use viewfuse_core::weighting::{AngleKind, Formula, ROWS, Scheme, SchemeError, weigh};
 
 /// Weights below this may be cut off: `exp` knows no subnormals.
 const NEGLIGIBLE: f64 = 4.0e-38;
@@ -44,6 +44,13 @@ fn check_all(what: &str, scenes: &[(Vec<Pose>, Pose)]) {
     for scheme in schemes() {
         let worst = scenes.iter().map(|(sources, target)| check(scheme, sources, target)).fold(0.0, f64::max);
         println!("{what}: {scheme}: {worst:.1} units of 2^-24");
+    }
+}
+
+#[test]
+fn every_formula_is_checked() {
+    for row in ROWS {
+        assert!(schemes().iter().any(|scheme| scheme.formula() == row.formula), "{} is in no check", row.name);
     }
 }
 

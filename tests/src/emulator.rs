@@ -14,10 +14,10 @@ use trace::Call;
 
 const EMULATOR: &str = "qemu-system-arm";
 const TARGET: &str = "thumbv7em-none-eabihf";
-/// Where the library's sources may be instead of at the compiler's own place for them.
+/// Where the library's sources are if not at the compiler's own place for them: their folder, or an archive of it.
 const SOURCES: &str = "VIEWFUSE_RUST_LIBRARY";
-/// A program takes a second; a hard fault would otherwise wait for ever.
-const TIME_LIMIT: Duration = Duration::from_secs(120);
+/// A program takes a second, more on a busy machine; a hard fault would otherwise wait for ever.
+const TIME_LIMIT: Duration = Duration::from_secs(900);
 
 /// What was found that the firmware needs.
 pub struct Emulator {
@@ -43,12 +43,12 @@ impl Emulator {
     ///
     /// # Errors
     /// What is missing, in a few words.
-    pub fn find(repository: &Path, folder: &Path) -> Result<Emulator, String> {
+    pub fn find(folder: &Path) -> Result<Emulator, String> {
         let there = Command::new(EMULATOR).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
         if !there.is_ok_and(|status| status.success()) {
             return Err(format!("no {EMULATOR}"));
         }
-        let library = Library::find(repository)?;
+        let library = Library::find()?;
         Ok(Emulator { library, folder: folder.join("firmware") })
     }
 
@@ -136,7 +136,7 @@ impl Emulator {
 }
 
 impl Library {
-    fn find(repository: &Path) -> Result<Library, String> {
+    fn find() -> Result<Library, String> {
         let libraries = PathBuf::from(asked("rustc", &["--print", "target-libdir", "--target", TARGET])?);
         if libraries.is_dir() {
             return Ok(Library::Installed);
@@ -145,15 +145,12 @@ impl Library {
         if root.join("lib/rustlib/src/rust/library/core").is_dir() {
             return Ok(Library::Component);
         }
-        if let Some(folder) = std::env::var_os(SOURCES).map(PathBuf::from) {
-            let found = folder.join("core").is_dir();
-            return if found { Ok(Library::Sources(folder)) } else { Err(format!("no core in {}", folder.display())) };
+        match std::env::var_os(SOURCES).map(PathBuf::from) {
+            Some(folder) if folder.join("core").is_dir() => Ok(Library::Sources(folder)),
+            Some(archive) if archive.is_file() => Ok(Library::Archive(archive)),
+            Some(other) => Err(format!("{SOURCES}: no sources in {}", other.display())),
+            None => Err(format!("no Rust library for {TARGET}")),
         }
-        // "rustc 1.95.0 (hash date)": the library fits its own compiler only.
-        let version = asked("rustc", &["--version"])?;
-        let version = version.split_whitespace().nth(1).unwrap_or_default();
-        let archive = repository.join(format!("../shared/rust-src/library-{version}.tar.xz"));
-        if archive.is_file() { Ok(Library::Archive(archive)) } else { Err(format!("no Rust library for {TARGET}")) }
     }
 }
 

@@ -14,6 +14,7 @@ pub mod mixture;
 pub mod module;
 pub mod places;
 pub mod scenes;
+pub mod source;
 pub mod trials;
 
 /// The examples of the main README and of core's, compiled and run. Core's sources are what the compiled kernels were made

@@ -5,8 +5,8 @@
 //!
 //! ```text
 //! error                          what can go wrong, with numbers
-//! messages, instance, adapter    the loader, its drivers, their devices and what those lack
 //! kernel                         the list of kernels: names, arrays, parameters
+//! messages, instance, adapter    the loader, its drivers, their devices and what those lack
 //! handle, buffer                 an opened device, memory in it
 //! pipelines, submissions         kernels made ready, commands on their way
 //! gpu                            dispatches, cut into pieces that fit the device

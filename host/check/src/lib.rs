@@ -7,17 +7,18 @@
 //!
 //! ```text
 //! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
-//! poses, world, sights           inputs for a seed
 //! oracle, attention_oracle,     what must come out
 //!   camera_oracle, photo_oracle,
 //!   ray_oracle, light_oracle,
-//!   network_oracle, point_oracle,
 //!   winograd_oracle,
+//!   network_oracle, point_oracle,
 //!   normalise_oracle,
 //!   matrix_oracle, volume_oracle
+//! poses, sights, world          inputs for a seed
 //! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
 //! report, measure               a device's kernels, checked
 //! picture                       a whole picture against the CPU's
+//! verify                        this build against files of reference values
 //! ```
 #![forbid(unsafe_code)]
 

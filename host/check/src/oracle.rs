@@ -259,16 +259,3 @@ fn gaussian(distances: &[f64], beta: f64, arithmetic: Arithmetic) -> (Vec<f64>, 
     let bounds = units.iter().map(|u| u + mean_units + distances.len() as f64 + 3.0 + 3.0 * division).collect();
     (weights, bounds)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::schemes;
-    use viewfuse_core::weighting::ROWS;
-
-    #[test]
-    fn every_formula_is_checked() {
-        for row in ROWS {
-            assert!(schemes().iter().any(|scheme| scheme.formula() == row.formula), "{} is in no check", row.name);
-        }
-    }
-}

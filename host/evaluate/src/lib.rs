@@ -1,4 +1,18 @@
 //! How good pictures are, and at what cost.
+//!
+//! The modules stand in the order of the data; a module uses only modules listed above it:
+//!
+//! ```text
+//! inspect      what a scene holds and what looks wrong with it
+//! metrics      how good is a picture
+//! evaluator    each weighting scheme on views that are left out      Evaluator
+//! protocol     which views are sources, which are targets
+//! pareto       error against run time
+//! run_folder   an evaluation that goes on after a kill, in shards
+//! summary      its tables: means with intervals
+//! gallery      its pictures
+//! report       all of it on one page
+//! ```
 #![forbid(unsafe_code)]
 
 mod evaluator;

@@ -1,11 +1,24 @@
 //! Why a field could not make a picture.
 
-use super::finite::NotFinite;
 use std::error::Error;
 use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Interrupted;
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::loader::LoadError;
+
+/// A tensor has an element that is infinite or not a number.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{stage}: element {index} of the {tensor} is {value}, not a finite number")]
+pub struct NotFinite {
+    /// What was being done.
+    pub stage: String,
+    /// What came out of it.
+    pub tensor: String,
+    /// The first such element, flat.
+    pub index: usize,
+    /// What it is.
+    pub value: f32,
+}
 
 /// Why a field could not make a picture.
 #[derive(Debug, thiserror::Error)]

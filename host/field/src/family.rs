@@ -1,13 +1,11 @@
 //! Learned fields: one row each. Which one a checkpoint is of, the names of its tensors tell.
 
 use super::any::AnyField;
+pub use super::options::Computable;
 use super::options::{FieldOptions, OpenError};
 use super::{genvs, pixelnerf};
 use std::fmt;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
-
-/// What a family may leave out and a person may ask to compute nevertheless: name and help.
-pub type Computable = (&'static str, &'static str);
 
 /// The views that no target uses: what every family may leave out.
 pub const VIEWS: Computable = ("views", "Encode views that no target uses");

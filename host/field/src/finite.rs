@@ -1,22 +1,9 @@
 //! Numbers that are none are found where they arise, and not in the picture at the end.
 
-use super::FieldError;
+use super::error::FieldError;
+pub use super::error::NotFinite;
 use viewfuse_core::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_device::Device;
-
-/// A tensor has an element that is infinite or not a number.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{stage}: element {index} of the {tensor} is {value}, not a finite number")]
-pub struct NotFinite {
-    /// What was being done.
-    pub stage: String,
-    /// What came out of it.
-    pub tensor: String,
-    /// The first such element, flat.
-    pub index: usize,
-    /// What it is.
-    pub value: f32,
-}
 
 /// Looks at all values of a tensor that a stage made.
 ///

@@ -7,12 +7,12 @@
 //! renderer          a field on a device, without types
 //! session           when views are encoded
 //! training_free     visual hull and plane sweep
+//! any               a field of any kind
+//! options           what a person can say about a learned field
 //! learned           what learned fields share
 //! pixelnerf, genvs  learned fields, a folder each
-//! enlarged          small pictures, enlarged
-//! options           what a person can say about a learned field
 //! family            one row a learned field
-//! any               a field of any kind
+//! enlarged          small pictures, enlarged
 //! render            the way of the data, from a scene to pictures
 //! ```
 //!

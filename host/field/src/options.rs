@@ -4,6 +4,9 @@ use viewfuse_core::sampler::Sampler;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_nn::checkpoint::CheckpointError;
 
+/// What a family may leave out and a person may ask to compute nevertheless: name and help.
+pub type Computable = (&'static str, &'static str);
+
 /// What a person said about a learned field. Names of options in errors are those of the members, with dashes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldOptions {

@@ -1,20 +1,15 @@
 //! Neural networks on any device: their parameters from checkpoints, and the layers that all networks of viewfuse share.
 //!
 //! ```text
-//! checkpoint      files of named tensors, and which of them an architecture must have
-//! initialisation  tensors computed from their names, for test networks
-//! image           images in a device's memory, and on the host
-//! scratch         their buffers, used again and again
-//! window          how many windows of a convolution or a pool lie on an image
-//! convolution     of all channels, of each by itself, transposed
-//! linear          linear layers
-//! norm            group norm
-//! pool            max pool, average pools, L2 pool
-//! resample        upsampling and concatenation
-//! attention       self-attention of an image's pixels
-//! weights         parameters in the order of kernels, batch norms folded in
-//! loader          layers from a checkpoint's tensors, to a device
-//! resnet          the trunk of both published networks
+//! checkpoint             files of named tensors, and which of them an architecture must have
+//! initialisation         tensors computed from their names, for test networks
+//! image, scratch         images in a device's memory, and their buffers, used again and again
+//! window                 where a window lies on an image
+//! linear, convolution    one layer or operation each
+//! norm, pool, resample
+//! attention
+//! weights, loader        tensors in the order of kernels, batch norms folded in; to the device
+//! resnet                 the trunk of both published networks
 //! ```
 //!
 //! Images are `[row][column][channel]`, matrices `[row][column]`. A layer is loaded once and run with options on images of

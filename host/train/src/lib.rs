@@ -10,12 +10,14 @@
 //! draw         random numbers of a step                  Draw
 //! batch        sources and target rays of a step         Batch
 //! operations   gradients of our own kernels              Convolution, PointNetwork, Look
+//! parameters   what is learned                           Parameters
 //! images, compositing     parts of the graphs
 //! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
 //! attention    weighting of views as a graph             Attention
-//! parameters, adam, average     what is learned, and how
-//! pixelnerf_learner, genvs_learner, weighting_learner      losses
+//! adam, average           how it is learned
+//! state, curve            what a run needs to go on, and how it went
 //! run          steps, validation, continuing             run, Settings
+//! pixelnerf_learner, genvs_learner, weighting_learner      losses
 //! ```
 #![forbid(unsafe_code)]
 

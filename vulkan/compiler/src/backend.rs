@@ -3,9 +3,7 @@
 //! The first of these that is there:
 //! 1. the folder that [`HOME_VARIABLE`] names;
 //! 2. a folder `rust-gpu-0.10.0-*` in the user's cache;
-//! 3. what the script `../shared/rust-gpu/install`, relative to the repository, unpacks: a copy for machines without a
-//!    network;
-//! 4. rustup's toolchain [`NIGHTLY`], for which the code generator is built once, from its published sources.
+//! 3. rustup's toolchain [`NIGHTLY`], for which the code generator is built once, from its published sources.
 //!
 //! A folder holds `bin/cargo`, `bin/rustc` and the code generator in `lib`.
 
@@ -89,21 +87,16 @@ impl Backend {
         }
     }
 
-    /// The compiler of this machine, for the repository in `root`.
+    /// The compiler of this machine.
     ///
     /// # Errors
     /// [`BackendError`], which says what to install.
-    pub fn find(root: &Path) -> Result<Backend, BackendError> {
+    pub fn find() -> Result<Backend, BackendError> {
         if let Some(home) = env::var_os(HOME_VARIABLE).filter(|home| !home.is_empty()).map(PathBuf::from) {
             return Backend::in_folder(&home).map_err(|missing| BackendError::Incomplete { home, missing });
         }
         if let Some(backend) = cached() {
             return Ok(backend);
-        }
-        let install = root.join("..").join("shared").join("rust-gpu").join("install");
-        if install.is_file() {
-            let home = PathBuf::from(output_of(&mut Command::new(&install))?.trim());
-            return Backend::in_folder(&home).map_err(|missing| BackendError::Incomplete { home, missing });
         }
         let installed = output_of(Command::new("rustup").args(["toolchain", "list"])).unwrap_or_default();
         if installed.lines().any(|line| line.starts_with(NIGHTLY)) {

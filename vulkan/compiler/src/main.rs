@@ -46,7 +46,7 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     let package =
         env::var_os("CARGO_MANIFEST_DIR").ok_or("CARGO_MANIFEST_DIR is not set: run this as `cargo shaders`")?;
     let root = fs::canonicalize(Path::new(&package).join("..").join(".."))?;
-    let backend = match Backend::find(&root) {
+    let backend = match Backend::find() {
         Err(error @ BackendError::None) => {
             eprintln!("{error}");
             return Ok(ExitCode::from(NO_COMPILER));

@@ -3,8 +3,7 @@
 use super::sampling::{Plan, Steps};
 use super::{Genvs, GenvsOptions, Omissions, Rays};
 use crate::AnyField;
-use crate::family::Computable;
-use crate::options::{FieldOptions, OpenError};
+use crate::options::{Computable, FieldOptions, OpenError};
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_nn::checkpoint::Checkpoint;

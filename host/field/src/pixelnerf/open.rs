@@ -2,8 +2,7 @@
 
 use super::{Omissions, PixelNerf, PixelNerfOptions, Sampling};
 use crate::AnyField;
-use crate::family::Computable;
-use crate::options::{FieldOptions, OpenError};
+use crate::options::{Computable, FieldOptions, OpenError};
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// What may be left out and computed nevertheless.

@@ -1,0 +1,108 @@
+//! What a library leaves to whoever calls it: printing, ending the process, environment variables, and the names of the
+//! command's options.
+
+use std::path::Path;
+use viewfuse_tests::places::repository;
+use viewfuse_tests::source::{Source, files};
+
+/// What no library has in its code.
+const NOT_IN_CODE: [&str; 7] = ["println!", "eprintln!", "print!", "eprint!", "dbg!", "process::exit", "env::"];
+
+/// Where something of it remains: the end of the file's path, what, and why.
+const ALLOWED: [(&str, &str, &str); 1] = [(
+    "vulkan/src/instance.rs",
+    "env::",
+    "Vulkan's own loader reads VK_DRIVER_FILES; the error of a driver that is not found says what it was told",
+)];
+
+/// What a file has that a library must not have, with its line.
+fn faults(path: &str, source: &Source) -> Vec<String> {
+    let mut faults = Vec::new();
+    for (line, code) in source.lines() {
+        for found in NOT_IN_CODE.into_iter().filter(|found| has_word(code, found)) {
+            if !ALLOWED.iter().any(|(end, what, _)| path.ends_with(end) && *what == found) {
+                faults.push(format!("{path}:{line}: {found}"));
+            }
+        }
+    }
+    for (line, text) in &source.strings {
+        // An option of the command, by name.
+        let is_option = |(place, _): (usize, &str)| {
+            let before = text[..place].chars().next_back();
+            let after = text[place + 2..].chars().next();
+            after.is_some_and(|after| after.is_ascii_lowercase())
+                && before.is_none_or(|before| !before.is_alphanumeric() && before != '-')
+        };
+        if text.match_indices("--").any(is_option) {
+            faults.push(format!("{path}:{line}: the option in {text:?}"));
+        }
+    }
+    faults
+}
+
+/// Whether it stands in the code, and not as the end of a longer word.
+fn has_word(code: &str, word: &str) -> bool {
+    let is_start = |(place, _): (usize, &str)| {
+        code[..place].chars().next_back().is_none_or(|before| !before.is_alphanumeric() && before != '_')
+    };
+    code.match_indices(word).any(is_start)
+}
+
+/// The sources of all libraries: everything but the command.
+fn sources() -> Vec<(String, Source)> {
+    let root = repository();
+    let is_library = |path: &Path| {
+        let path = path.strip_prefix(&root).expect("inside").to_string_lossy().into_owned();
+        let is_source = path.contains("/src/");
+        (is_source && !path.starts_with("host/cli/") && !path.starts_with("vulkan/compiler/")).then_some(path)
+    };
+    ["core", "vulkan", "host"]
+        .iter()
+        .flat_map(|folder| files(&root.join(folder), "rs"))
+        .filter_map(|path| Some((is_library(&path)?, Source::read(&path))))
+        .collect()
+}
+
+#[test]
+fn libraries_leave_the_terminal_to_the_command() {
+    let sources = sources();
+    assert!(sources.len() > 200, "{} files", sources.len());
+    let faults: Vec<String> = sources.iter().flat_map(|(path, source)| faults(path, source)).collect();
+    assert!(faults.is_empty(), "{faults:#?}");
+    for (end, what, reason) in ALLOWED {
+        let is_used = |(path, source): &(String, Source)| path.ends_with(end) && has_word(&source.code, what);
+        assert!(sources.iter().any(is_used), "{end} has no {what} any more: {reason}");
+    }
+}
+
+#[test]
+fn faults_are_found() {
+    let of = |text: &str| faults("host/x/src/a.rs", &Source::new(text)).len();
+    for text in [
+        "fn a() { println!(\"x\"); }",
+        "fn a() { std::eprintln!() }",
+        "fn a() { std::process::exit(1) }",
+        "fn a() { std::env::var(\"X\"); }",
+        "const A: &str = \"use --size\";",
+        "const A: &str = r#\"a \" --size\"#;",
+        "#[error(\"{0}: give '--model FILE'\")]",
+    ] {
+        assert_eq!(of(text), 1, "{text}");
+    }
+    for text in [
+        "// println!() and --size",
+        "/* /* --size */ eprintln!() */",
+        "fn a<'a>(x: &'a str) { let y = '\"'; } // --size",
+        "const A: &str = \"a -- b, --- and -- \\\" --\";",
+        "const A: &str = \"println!\";",
+        "fn a() { sprintln!(); my_env::x() }",
+        "write!(f, \"{}\")",
+        "fn a() {}\n#[cfg(testing)]\nmod tests {}",
+    ] {
+        assert_eq!(of(text), 0, "{text}");
+    }
+    // Lines keep their numbers.
+    let found =
+        faults("host/x/src/a.rs", &Source::new("/* \n */\nconst A: &str = \"\n\"; const B: &str = \"--size\";"));
+    assert_eq!(found, ["host/x/src/a.rs:4: the option in \"--size\""]);
+}
