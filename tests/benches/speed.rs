@@ -30,6 +30,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
+use viewfuse_core::weights::Weights;
 use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_vulkan::GpuOptions;
 
