@@ -289,6 +289,7 @@ impl<'a> Stage<'a> {
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
         let camera = self.at_working_size(&target.camera)?;
+        let failed = |error| RenderError::of(error, self.scene);
         let mut encode = Duration::ZERO;
         timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
         let settled = self.options.settled;
