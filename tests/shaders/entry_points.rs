@@ -186,7 +186,9 @@ fn rays_are_core_s() {
     let samples: Vec<u32> = (0..350).filter(|sample| sample % 3 != 1).collect();
     let mut placed = vec![RayPoint::default(); samples.len()];
     let block = PlaceBlock { sample_count: 5, first: 0, has_samples: 1 };
-    dispatch(block, samples.len() as u32, |id, push| rays::place_points(id, push, &samples, &cast, &depths, &mut placed));
+    dispatch(block, samples.len() as u32, |id, push| {
+        rays::place_points(id, push, &samples, &cast, &depths, &mut placed)
+    });
     let expected: Vec<RayPoint> =
         samples.iter().map(|sample| place_point(&cast[..], &depths[..], 5, *sample)).collect();
     assert_eq!(placed, expected);

@@ -67,7 +67,14 @@ fn features_are_core_s() {
         numbers(34, 70 * 6).iter().map(|length| RayPoint { length: length.abs(), ..RayPoint::default() }).collect();
     let (raw, fused) = (numbers(30, 70 * 6 * 4), numbers(31, 70 * 6 * 3));
     for inclusive in [0, 1] {
-        let block = FeatureBlock { sample_count: 6, feature_count: 3, length_scale: 0.8, last_length: 2.0, inclusive, first_ray: 0 };
+        let block = FeatureBlock {
+            sample_count: 6,
+            feature_count: 3,
+            length_scale: 0.8,
+            last_length: 2.0,
+            inclusive,
+            first_ray: 0,
+        };
         let mut weights = vec![UNTOUCHED; 420];
         dispatch(block, 70, |id, push| volumes::weigh_features(id, push, &raw, &there, &mut weights));
         let mut expected = vec![UNTOUCHED; 420];
