@@ -67,7 +67,7 @@ fn do_work(work: &str, instance: &std::sync::Arc<Instance>, adapter: &Adapter) -
         LEFT_ALONE => {
             let times = times_that_take(&Gpu::open(instance, adapter, &usual)?, Duration::from_millis(500))?;
             let limit = Duration::from_millis(1);
-            let gpu = Gpu::open(instance, adapter, &GpuOptions { time_limit: limit, closing: limit, ..usual })?;
+            let gpu = Gpu::open(instance, adapter, &GpuOptions { time_limit: Some(limit), closing: limit, ..usual })?;
             match add_again(&gpu, times).and_then(|()| gpu.wait()) {
                 Err(VulkanError::TimeLimit { .. }) => {}
                 outcome => return Err(format!("it was in time: {outcome:?}").into()),

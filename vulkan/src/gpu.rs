@@ -1,6 +1,6 @@
 //! A device that runs kernels.
 
-use crate::adapter::{Adapter, Limits};
+use crate::adapter::{Adapter, AdapterKind, Limits};
 use crate::buffer::{Array, Bound, ranges};
 use crate::error::VulkanError;
 use crate::handle::{Handle, Memory};
@@ -20,8 +20,8 @@ const WIDEST_PAGED: u64 = 16;
 /// How to use a device.
 #[derive(Clone, Copy, Debug)]
 pub struct GpuOptions {
-    /// How long a submission may run.
-    pub time_limit: Duration,
+    /// How long a submission may run; `None` for what is right for the device: see [`GpuOptions::time_limit_on`].
+    pub time_limit: Option<Duration>,
     /// Whether what depends on one another is kept apart. Without barriers results are wrong; it is how one shows that the
     /// validation layers would have said so.
     pub barriers: bool,
@@ -33,11 +33,26 @@ pub struct GpuOptions {
 }
 
 impl Default for GpuOptions {
-    /// Two minutes, ten seconds, and the device's own limits.
+    /// The device's own time limit, ten seconds, and the device's own limits.
     fn default() -> GpuOptions {
         let limits =
             Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
-        GpuOptions { time_limit: Duration::from_secs(120), barriers: true, closing: Duration::from_secs(10), limits }
+        GpuOptions { time_limit: None, barriers: true, closing: Duration::from_secs(10), limits }
+    }
+}
+
+impl GpuOptions {
+    /// How long a submission may run on a device of this kind; `None` if it may run as long as it takes.
+    ///
+    /// Without a limit of its own, a graphics processor has two minutes: it does nothing else meanwhile. A software driver
+    /// has none: its kernels share the processor with everything else that runs on the machine, and a busy machine is no
+    /// failure.
+    pub fn time_limit_on(&self, kind: AdapterKind) -> Option<Duration> {
+        let of_kind = match kind {
+            AdapterKind::Software => None,
+            _ => Some(Duration::from_secs(120)),
+        };
+        self.time_limit.or(of_kind)
     }
 }
 
@@ -97,8 +112,8 @@ impl Gpu {
         };
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
-        let submissions =
-            Submissions::new(&handle, adapter.queue_family, timestamps, options.time_limit, options.closing)?;
+        let time_limit = options.time_limit_on(adapter.kind);
+        let submissions = Submissions::new(&handle, adapter.queue_family, timestamps, time_limit, options.closing)?;
         let pipelines = Pipelines::new(&handle)?;
         // The longest page that is within the limits in every array, but long enough to start at allowed offsets.
         let page_len =

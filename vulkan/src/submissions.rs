@@ -38,7 +38,8 @@ pub(crate) struct Submissions {
     pool: vk::CommandPool,
     free: Vec<Submission>,
     running: VecDeque<Submission>,
-    time_limit: Duration,
+    /// How long the oldest may run; `None` for as long as it takes.
+    time_limit: Option<Duration>,
     /// How long, at the least, what is on its way is waited for when the device is closed.
     closing: Duration,
     /// One did not end in time.
@@ -55,7 +56,7 @@ impl Submissions {
         handle: &Arc<Handle>,
         queue_family: u32,
         timestamps: Option<(f32, u32)>,
-        time_limit: Duration,
+        time_limit: Option<Duration>,
         closing: Duration,
     ) -> Result<Submissions, VulkanError> {
         let info = vk::CommandPoolCreateInfo::default()
@@ -144,7 +145,8 @@ impl Submissions {
     /// time is its own.
     fn wait_for_oldest(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
         let Some(oldest) = self.running.front() else { return Ok(()) };
-        let nanoseconds = u64::try_from(self.time_limit.as_nanos()).unwrap_or(u64::MAX);
+        let nanoseconds = |limit: Duration| u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
+        let nanoseconds = self.time_limit.map_or(u64::MAX, nanoseconds);
         let Handle { device, .. } = &*self.handle;
         // SAFETY: the fence belongs to a submission that is on its way.
         let waited = unsafe { device.wait_for_fences(&[oldest.fence], true, nanoseconds) };
@@ -153,7 +155,7 @@ impl Submissions {
             vk::Result::TIMEOUT => VulkanError::TimeLimit {
                 device: self.handle.name.clone(),
                 work: oldest.kernel.map_or("a transfer".to_owned(), |kernel| format!("kernel {}", kernel.name())),
-                limit: self.time_limit,
+                limit: self.time_limit.unwrap_or_default(),
             },
             result => self.handle.failure("vkWaitForFences", result),
         })?;
@@ -272,10 +274,11 @@ impl Submissions {
 impl Drop for Submissions {
     fn drop(&mut self) {
         // One that ran out of time may still run: it gets a little longer, then it is left alone with all that it uses.
-        let patience = if self.is_late { self.closing } else { self.time_limit.max(self.closing) };
-        let deadline = Instant::now() + patience;
+        let patience =
+            if self.is_late { Some(self.closing) } else { self.time_limit.map(|limit| limit.max(self.closing)) };
+        let deadline = patience.map(|patience| Instant::now() + patience);
         while !self.running.is_empty() {
-            self.time_limit = deadline.saturating_duration_since(Instant::now());
+            self.time_limit = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
             match self.wait_for_oldest(&mut |_| ()) {
                 Ok(()) | Err(VulkanError::Validation { .. }) => {}
                 Err(_) => {

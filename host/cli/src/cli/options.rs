@@ -52,9 +52,10 @@ pub(crate) struct DeviceOptions {
     /// Device: auto (a graphics processor if there is one, otherwise the CPU), cpu, vulkan, vulkan:NUMBER or vulkan:NAME
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: DeviceChoice,
-    /// Longest time that a submission to a Vulkan device may run
-    #[arg(long, value_name = "SECONDS", default_value = "120", value_parser = parse_seconds)]
-    time_limit: Duration,
+    /// Longest time that a submission to a Vulkan device may run [default: 120 on a graphics processor, none on a software
+    /// driver]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
+    time_limit: Option<Duration>,
 }
 
 impl DeviceOptions {
