@@ -1,6 +1,6 @@
 //! Linear layers.
 
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Layer};
 
@@ -43,16 +43,16 @@ impl<D: Device> Linear<D> {
         residual: Option<&D::Buffer<f32>>,
         outputs: &mut D::Buffer<f32>,
     ) -> Result<(), DeviceError> {
-        let block = ProductBlock {
+        let block = LinearBlock {
             row_count,
             inner_count: self.in_count,
             column_count: self.out_count,
             relu_inputs: u32::from(options.relu_inputs),
             relu_outputs: u32::from(options.relu_outputs),
-            ..ProductBlock::default()
+            ..LinearBlock::default()
         };
         let Layer { weights, bias } = &self.layer;
-        device.product(&block, inputs, weights, bias, residual, outputs)
+        device.linear(&block, inputs, weights, bias, residual, outputs)
     }
 }
 
