@@ -116,7 +116,7 @@ impl<const C: usize> Compositor<C> {
     /// Whether the ray may end here: nothing behind can change a channel whose values span `range` by more than
     /// `threshold * range`, because all that is behind together has the weight `transmittance <= threshold`.
     #[inline]
-    pub fn is_settled(&self, threshold: f32) -> bool {
+    pub fn is_terminated(&self, threshold: f32) -> bool {
         self.transmittance <= threshold
     }
 

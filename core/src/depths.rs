@@ -79,7 +79,7 @@ pub fn coarse_depth(ray: &TargetRay, pixel: u32, sample: u32, block: &CoarseBloc
     stratified_depth(ray.near, ray.far, sample, block.sample_count, inside)
 }
 
-/// A dispatch of [`draw_chance`] or [`fine_depth`], as plain data.
+/// A dispatch of [`random_draw`] or [`fine_depth`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct FineBlock {
@@ -110,7 +110,7 @@ impl FineBlock {
 /// (one in each of as many equal parts as there are samples, in `[0, 1]`: the sum may round up) and where in the part that
 /// it hits, in `[0, 1)`; for depth samples a normal number and 0.
 #[inline]
-pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
+pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
     let counter = block.coarse_count + index;
     if index < block.importance_count {
         let [first, second] = uniform_pair(block.seed, pixel, counter);
@@ -130,16 +130,16 @@ pub fn fine_depth(
     ray: &TargetRay,
     depth: f32,
     opacity: f32,
-    chance: [f32; 2],
+    draw: [f32; 2],
     index: u32,
     block: &FineBlock,
 ) -> f32 {
     if index < block.importance_count {
-        let (part, _) = part_at(&FirstOf(seen), block.coarse_count as usize, chance[0]);
-        return stratified_depth(ray.near, ray.far, part as u32, block.coarse_count, chance[1]);
+        let (part, _) = part_at(&FirstOf(seen), block.coarse_count as usize, draw[0]);
+        return stratified_depth(ray.near, ray.far, part as u32, block.coarse_count, draw[1]);
     }
     let centre = if block.depth_times_opacity != 0 { depth * opacity } else { depth };
-    clamp(centre + chance[0] * block.depth_deviation, ray.near, ray.far)
+    clamp(centre + draw[0] * block.depth_deviation, ray.near, ray.far)
 }
 
 /// The first numbers of pairs.

@@ -5,14 +5,14 @@
 //! to `far` along its principal axis; depth node 0 is the *farthest* (published convention).
 
 use crate::camera::CameraBlock;
-use crate::half::fetch_half;
+use crate::half_precision::fetch_f16;
 use crate::math::{exp, floor_to_i32, max};
 use crate::pages::Fetch;
 use crate::rays::RayPoint;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// A dispatch of [`volume_value`] or [`volume_value_of_halves`], as plain data.
+/// A dispatch of [`volume_value`] or [`volume_value_f16`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct VolumeBlock {
@@ -134,9 +134,9 @@ pub fn volume_value(
     VolumePlace::of(&camera, &points.fetch(point as usize), block).value(|at| volume.fetch(at), block, feature)
 }
 
-/// As [`volume_value`], from a volume in numbers of 16 bits, two in a word.
+/// As [`volume_value`], from a volume in numbers in half precision, two in a word.
 #[inline]
-pub fn volume_value_of_halves(
+pub fn volume_value_f16(
     views: &(impl Fetch<CameraBlock> + ?Sized),
     points: &(impl Fetch<RayPoint> + ?Sized),
     volume: &(impl Fetch<u32> + ?Sized),
@@ -145,7 +145,7 @@ pub fn volume_value_of_halves(
 ) -> f32 {
     let (point, feature) = (element as u32 / block.feature_count, element as u32 % block.feature_count);
     let camera = views.fetch(block.view as usize);
-    VolumePlace::of(&camera, &points.fetch(point as usize), block).value(|at| fetch_half(volume, at), block, feature)
+    VolumePlace::of(&camera, &points.fetch(point as usize), block).value(|at| fetch_f16(volume, at), block, feature)
 }
 
 /// A dispatch of [`weigh_features`] or [`summed_feature`], as plain data. The yes-or-no field is 0 or 1.

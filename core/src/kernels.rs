@@ -45,22 +45,22 @@ pub use crate::depths::{CoarseBlock, FineBlock};
 pub use crate::finite::FINITE_RUN;
 pub use crate::fuse::FuseBlock;
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
-pub use crate::half::word_count;
+pub use crate::half_precision::word_count;
 pub use crate::network::attend::MatrixBlock;
 pub use crate::network::convolve::ConvolveBlock;
 pub use crate::network::depthwise::DepthwiseBlock;
-pub use crate::network::normalise::{MeanBlock, NormaliseBlock};
-pub use crate::network::product::ProductBlock;
+pub use crate::network::group_norm::{GroupNormBlock, MeanBlock};
+pub use crate::network::linear::LinearBlock;
 pub use crate::network::resample::{PoolBlock, UpsampleBlock};
 pub use crate::network::transpose::TransposedBlock;
 pub use crate::photo::ObjectBlock;
-pub use crate::photo::march::MarchBlock;
+pub use crate::photo::ray_marching::MarchBlock;
 pub use crate::photo::sweep::SweepBlock;
 pub use crate::pixelnerf::{EmbedBlock, GatherBlock};
 pub use crate::pose::PoseBlock;
 pub use crate::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};
+pub use crate::sample_mask::{RaysBlock, SampleMaskBlock};
 pub use crate::sampler::{Mix, NoiseBlock};
-pub use crate::wanted::{RaysBlock, WantedBlock};
 pub use crate::weighting::{MOST_WEIGHED, WeighBlock};
 
 /// Calls `$callback!` with the rows of all kernels, in the order of the data; see [`kernels`](crate::kernels). What the
@@ -132,7 +132,7 @@ macro_rules! for_each_kernel {
                 read views: CameraBlock,
                 read points: RayPoint,
                 read grid: f32,
-                optional addend: f32 = grid if !block.has_addend,
+                optional residual: f32 = grid if !block.has_residual,
                 write gathered: f32,
             }
             /// Features where points lie in a view's volume: its part of `gathered[view][point][feature]`, from the view's
@@ -145,13 +145,13 @@ macro_rules! for_each_kernel {
                 write gathered: f32,
             }
             /// Numbers in half precision (f16), two in a word, the first in the lower half. An element is a word.
-            PackHalves pack_halves(number_count: u32) [0..word_count(*number_count)] by half::packed_halves {
+            PackF16 pack_f16(number_count: u32) [0..word_count(*number_count)] by half_precision::packed_f16 {
                 read numbers: f32,
                 write words: u32,
             }
             /// As `gather_volume`, from the words of a volume in half precision. An element is a feature of a point.
-            GatherHalves gather_halves(block: VolumeBlock) [0..block.point_count * block.feature_count]
-            by genvs::volume_value_of_halves, twin {
+            GatherVolumeF16 gather_volume_f16(block: VolumeBlock) [0..block.point_count * block.feature_count]
+            by genvs::volume_value_f16, twin {
                 read views: CameraBlock,
                 read points: RayPoint,
                 read volume: u32,
@@ -164,7 +164,7 @@ macro_rules! for_each_kernel {
                 filled inputs: f32,
                 layer weights: f32,
                 filled bias: f32,
-                optional addend: f32 = bias if !block.has_addend,
+                optional residual: f32 = bias if !block.has_residual,
                 write outputs: f32,
             }
             /// Convolutions of every channel by itself, with `weights[place of the window][channel]`. An element is a
@@ -198,47 +198,49 @@ macro_rules! for_each_kernel {
                 filled inputs: f32,
                 write outputs: f32,
             }
-            /// Matrix products, summed in an order of the device's choice. An element is an 8x8 part of a tile of
-            /// [`TILE`](viewfuse_core::network::tile::TILE) rows and columns.
-            Product product(block: ProductBlock) [0..tile_elements(block.row_count, block.column_count)]
-            by network::product::product_element, twin, tiled {
+            /// Linear layers (a matrix product with bias, residual and rectification), summed in an order of the device's
+            /// choice. An element is an 8x8 part of a tile of [`TILE`](viewfuse_core::network::tile::TILE) rows and columns.
+            Linear linear(block: LinearBlock) [0..tile_elements(block.row_count, block.column_count)]
+            by network::linear::linear_element, twin, tiled {
                 filled inputs: f32,
                 layer weights: f32,
                 filled bias: f32,
-                optional addend: f32 = bias if !block.has_addend,
+                optional residual: f32 = bias if !block.has_residual,
                 write outputs: f32,
             }
             /// Means of an image's channels, from `inputs[pixel][channel]`. An element is a channel.
             ChannelMeans channel_means(block: MeanBlock) [0..block.channels]
-            by network::normalise::channel_mean, twin {
+            by network::group_norm::channel_mean, twin {
                 filled inputs: f32,
                 write means: f32,
             }
-            /// Moments of parts of an image: `parts[part][group]`. An element is a group of channels in a part.
-            PartMoments part_moments(block: NormaliseBlock) [0..block.part_count() * block.group_count]
-            by network::normalise::part_moments, twin {
+            /// Group-norm statistics of parts of an image, mean and squared deviations: `partials[part][group]`. An element
+            /// is a group of channels in a part.
+            GroupNormPartials group_norm_partials(block: GroupNormBlock) [0..block.part_count() * block.group_count]
+            by network::group_norm::group_norm_partials, twin {
                 filled inputs: f32,
-                write parts: [f32; 2],
+                write partials: [f32; 2],
             }
-            /// Moments of an image from those of its parts: `moments[group]`. An element is a group of channels.
-            MergeMoments merge_moments(block: NormaliseBlock) [0..block.group_count]
-            by network::normalise::merged_moments {
-                read parts: [f32; 2],
-                write moments: [f32; 2],
+            /// Group-norm statistics of an image from those of its parts, mean and factor: `statistics[group]`. An element
+            /// is a group of channels.
+            GroupNormStatistics group_norm_statistics(block: GroupNormBlock) [0..block.group_count]
+            by network::group_norm::group_norm_statistics {
+                read partials: [f32; 2],
+                write statistics: [f32; 2],
             }
-            /// Normalised images: `outputs[pixel][channel]`, with `weights[channel]` and `bias[channel]`. An element is a
+            /// Group norm: `outputs[pixel][channel]`, with `weights[channel]` and `bias[channel]`. An element is a
             /// channel of a pixel.
-            Normalise normalise(block: NormaliseBlock) [0..block.pixel_count * block.channels]
-            by network::normalise::normalised_element, twin {
+            GroupNorm group_norm(block: GroupNormBlock) [0..block.pixel_count * block.channels]
+            by network::group_norm::group_norm_element, twin {
                 filled inputs: f32,
-                read moments: [f32; 2],
+                read statistics: [f32; 2],
                 filled weights: f32,
                 filled bias: f32,
                 write outputs: f32,
             }
             /// Products of two computed matrices, which may lie in one buffer, summed in an order of the device's choice.
             /// An element is an 8x8 part of a tile of [`TILE`](viewfuse_core::network::tile::TILE) rows and columns.
-            MultiplyMatrices multiply_matrices(block: MatrixBlock) [0..tile_elements(block.row_count, block.column_count)]
+            MatrixProduct matrix_product(block: MatrixBlock) [0..tile_elements(block.row_count, block.column_count)]
             by network::attend::matrix_element, twin, tiled {
                 filled left: f32,
                 filled right: f32,
@@ -274,15 +276,15 @@ macro_rules! for_each_kernel {
             }
             /// Weights of samples on rays: `seen[first ray + ray][sample]` is weight and transmittance in front, from
             /// `samples[ray][sample]` (red, green, blue, optical depth). An element is a ray.
-            WeighSamples weigh_samples(block: RaysBlock; ray_count) [0..ray_count] by wanted::weigh_sample {
+            WeighSamples weigh_samples(block: RaysBlock; ray_count) [0..ray_count] by sample_mask::weigh_sample {
                 read samples: [f32; 4],
                 write seen: [f32; 2],
             }
-            /// Random numbers for fine samples: `chances[ray][sample]`. An element is a fine sample.
-            DrawChances draw_chances(block: FineBlock; ray_count) [0..ray_count * block.fine_count()]
-            by depths::draw_chance {
+            /// Random numbers for fine samples: `draws[ray][sample]`. An element is a fine sample.
+            RandomDraws random_draws(block: FineBlock; ray_count) [0..ray_count * block.fine_count()]
+            by depths::random_draw {
                 read pixels: u32,
-                write chances: [f32; 2],
+                write draws: [f32; 2],
             }
             /// Depths where a first pass saw something: `depths[ray][sample]`, from `seen[ray][part]` and the pixels of
             /// these rays. An element is a fine sample.
@@ -292,7 +294,7 @@ macro_rules! for_each_kernel {
                 read rays: TargetRay,
                 read colours: [f32; 4],
                 read pixel_depths: f32,
-                read chances: [f32; 2],
+                read draws: [f32; 2],
                 write depths: f32,
             }
             /// Depths of two passes in order: `merged[ray][sample]` increase, from `coarse[ray][sample]` and
@@ -304,15 +306,15 @@ macro_rules! for_each_kernel {
                 read fine: f32,
                 write merged: f32,
             }
-            /// Which samples to look at: `wanted[ray][sample]` is 1 or 0, by `seen[seen ray][part]`. An element is a
-            /// sample.
-            WantedSamples wanted_samples(block: WantedBlock; ray_count) [0..ray_count * block.sample_count]
-            by wanted::is_wanted {
+            /// The sample mask, which samples are computed: `mask[ray][sample]` is 1 or 0, by `seen[seen ray][part]`. An
+            /// element is a sample.
+            SampleMask sample_mask(block: SampleMaskBlock; ray_count) [0..ray_count * block.sample_count]
+            by sample_mask::is_sampled {
                 read seen: [f32; 2],
                 read rays: TargetRay,
                 read pixels: u32,
                 read depths: f32,
-                write wanted: u32,
+                write mask: u32,
             }
             /// How many elements of each run of [`RUN`](crate::compact::RUN) a mask marks: `counts[run]` of
             /// `mask[element]`. An element is a run.
@@ -409,9 +411,9 @@ macro_rules! for_each_kernel {
             }
             /// Rays through the solid, for some rows of a target: `colours[row][column]` (red, green, blue, opacity) and
             /// `pixel_depths[row][column]`. An element is a pixel of the target.
-            March march(block: MarchBlock; first_row, row_count)
+            MarchRays march_rays(block: MarchBlock; first_row, row_count)
             [first_row * block.target.width..(first_row + row_count) * block.target.width]
-            by photo::march::march {
+            by photo::ray_marching::march_ray {
                 one object: ObjectBlock,
                 read views: CameraBlock,
                 read footprints: f32,

@@ -7,7 +7,7 @@
 //! ```text
 //! math              one result on every target                    sqrt, exp, sin_cos, angles, norms
 //! pages             reading elements wherever they lie             Fetch, Pages
-//! half              two numbers in a word                          half_bits, half_value, packed_halves
+//! half_precision    two numbers in a word (f16)                    f16_bits, f16_value, packed_f16
 //! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
 //! sources           the poses of the source views                 Sources<S>
 //! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
@@ -18,8 +18,8 @@
 //! lookup            what a view shows there                       bilinear, trilinear
 //! fuse              the views' latents become one                 fuse_views, fuse_visible
 //! composite         samples along a ray become a pixel            Compositor<C>
-//! wanted            which samples can be left out                 is_wanted
-//! network           layers                                        product, convolve, normalise, attend, resample
+//! sample_mask       which samples can be left out                 is_sampled
+//! network           layers                                        linear, convolve, group_norm, attend, resample
 //! pixelnerf         a point in, radiance out                      embedded_value, gathered_value, radiance
 //! genvs             volumes of features become a feature image    VolumePlace, weigh_features, denoiser_input
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
@@ -42,7 +42,7 @@ pub mod depths;
 pub mod finite;
 pub mod fuse;
 pub mod genvs;
-pub mod half;
+pub mod half_precision;
 pub mod kernels;
 pub mod lookup;
 pub mod math;
@@ -54,10 +54,10 @@ pub mod pixelnerf;
 pub mod pose;
 pub mod random;
 pub mod rays;
+pub mod sample_mask;
 pub mod sampler;
 pub mod schedule;
 pub mod sources;
-pub mod wanted;
 pub mod weighting;
 pub mod weights;
 

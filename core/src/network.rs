@@ -4,13 +4,13 @@
 //! definitions: sums run in the order of the inner index. Devices have faster ways (blocked products), which sum in
 //! another order and are held to these within the rounding of the sum.
 //!
-//! Arrays that a layer may do without (`addend`) can be anything where the block says that there is none.
+//! Arrays that a layer may do without (`residual`) can be anything where the block says that there is none.
 
 pub mod attend;
 pub mod convolve;
 pub mod depthwise;
-pub mod normalise;
-pub mod product;
+pub mod group_norm;
+pub mod linear;
 pub mod resample;
 pub mod tile;
 pub mod transpose;

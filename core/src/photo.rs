@@ -1,14 +1,14 @@
-//! The field that needs no weights file: a solid carved by silhouettes and by photo-consistency, coloured by weighted
+//! The training-free field: a solid carved by silhouettes and by photo-consistency, coloured by weighted
 //! fusion of what the views see.
 //!
 //! Four stages, each a few data-parallel kernels; a kernel is a function of one output element.
 //!
 //! ```text
-//! hull     where the silhouettes of all views allow matter      hull_alpha, hull_entry
-//! sweep    how deep each source pixel is: planes are swept      match_cost, sum_row, mean_column, pick_depth
-//!          through the hull, colours compared across views
-//! shade    a point in, occupancy and colour out                 sample
-//! march    a target pixel's ray through the solid               march
+//! hull          where the silhouettes of all views allow matter     hull_alpha, hull_entry
+//! sweep         how deep each source pixel is: planes are swept     match_cost, sum_row, mean_column, pick_depth
+//!               through the hull, colours compared across views
+//! shade         a point in, occupancy and colour out                sample
+//! ray_marching  a target pixel's ray through the solid              march_ray
 //! ```
 //!
 //! Published ideas: image-based visual hulls (Matusik et al. 2000), plane sweeping with a window (Collins 1996),
@@ -22,7 +22,7 @@
 //! a pixel of a view at the middle of the object.
 
 pub mod hull;
-pub mod march;
+pub mod ray_marching;
 pub mod shade;
 pub mod sweep;
 

@@ -121,8 +121,8 @@ pub struct GatherBlock {
     pub height: u32,
     /// Columns of the grid.
     pub width: u32,
-    /// 1 if there is an addend, 0 if not.
-    pub has_addend: u32,
+    /// 1 if there is a residual, 0 if not.
+    pub has_residual: u32,
     /// Where in a pixel its centre is, as in [`crate::rays::CastBlock`].
     pub pixel_centre: f32,
 }
@@ -179,13 +179,13 @@ impl GridPlace {
 }
 
 /// Value number `element` of a view's `[point][channel]`: its grid `[row][column][channel]` where the point appears,
-/// plus `addend[element]`.
+/// plus `residual[element]`.
 #[inline]
 pub fn gathered_value(
     views: &(impl Fetch<CameraBlock> + ?Sized),
     points: &(impl Fetch<RayPoint> + ?Sized),
     grid: &(impl Fetch<f32> + ?Sized),
-    addend: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
     block: &GatherBlock,
     element: usize,
 ) -> f32 {
@@ -193,7 +193,7 @@ pub fn gathered_value(
     let (point, channel) = (element / channels, element % channels);
     let camera = views.fetch(block.view as usize);
     let value = GridPlace::of(&camera, &points.fetch(point), block).value(grid, channel);
-    if block.has_addend != 0 { addend.fetch(element) + value } else { value }
+    if block.has_residual != 0 { residual.fetch(element) + value } else { value }
 }
 
 /// What the network's four outputs `raw[channel]` say of a point: red, green, blue in `[0, 1]` (logistic function, 1 for

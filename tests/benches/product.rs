@@ -6,13 +6,13 @@
 //! columns compare the fastest of all rounds, which on a busy machine is nearer to the truth.
 //!
 //! Sizes are `rows x inner x columns`: first the one to compare libraries at, then those of a render of the published
-//! PixelNeRF from 3 sources, as they come (rectified inputs, addend).
+//! PixelNeRF from 3 sources, as they come (rectified inputs, residual).
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Layer, LayerShape};
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 
 const ROUNDS: usize = 40;
 /// Sums that are computed side by side: enough that none waits for its own last step (latency 4, two a cycle).
@@ -86,22 +86,22 @@ mod arm {
 /// A product and what it works on.
 struct Product {
     name: String,
-    block: ProductBlock,
+    block: LinearBlock,
     inputs: Vec<f32>,
     layer: Layer<Cpu>,
-    addend: Option<Vec<f32>>,
+    residual: Option<Vec<f32>>,
     outputs: Vec<f32>,
 }
 
 impl Product {
-    fn new(row_count: u32, inner_count: u32, column_count: u32, relu_inputs: u32, has_addend: bool) -> Product {
+    fn new(row_count: u32, inner_count: u32, column_count: u32, relu_inputs: u32, has_residual: bool) -> Product {
         let numbers = |count: u32| (0..count).map(|i| (i * 7919 % 1000) as f32 / 1000.0 - 0.5).collect::<Vec<f32>>();
-        let block = ProductBlock { row_count, inner_count, column_count, relu_inputs, ..ProductBlock::default() };
-        let what = match (relu_inputs, has_addend) {
+        let block = LinearBlock { row_count, inner_count, column_count, relu_inputs, ..LinearBlock::default() };
+        let what = match (relu_inputs, has_residual) {
             (0, false) => "",
-            (0, true) => ", addend",
+            (0, true) => ", residual",
             (_, false) => ", rectified inputs",
-            (_, true) => ", rectified inputs, addend",
+            (_, true) => ", rectified inputs, residual",
         };
         let [inner, columns] = [inner_count, column_count].map(|count| count as usize);
         let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
@@ -112,21 +112,21 @@ impl Product {
             block,
             inputs: numbers(row_count * inner_count),
             layer,
-            addend: has_addend.then(|| numbers(row_count * column_count)),
+            residual: has_residual.then(|| numbers(row_count * column_count)),
             outputs: numbers(row_count * column_count),
         }
     }
 
     /// Billions of operations a second.
     fn rate(&mut self) -> f64 {
-        let Product { block, inputs, layer, addend, outputs, .. } = self;
+        let Product { block, inputs, layer, residual, outputs, .. } = self;
         let operations =
             2.0 * f64::from(block.row_count) * f64::from(block.inner_count) * f64::from(block.column_count);
         // About as long as the peak is measured.
         let repeats = (3.0e9 / operations).clamp(1.0, 200.0) as u32;
         let time = timed(|| {
             for _ in 0..repeats {
-                Cpu.product(block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
+                Cpu.linear(block, inputs, &layer.weights, &layer.bias, residual.as_ref(), outputs)
                     .expect("the CPU cannot fail");
             }
             black_box(&outputs[..]);

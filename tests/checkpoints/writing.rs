@@ -44,7 +44,7 @@ fn in_half_precision() {
     let tensor = |name: &str, values: &[f32]| {
         (TensorShape { name: name.to_owned(), shape: vec![values.len()] }, values.to_vec())
     };
-    // Halfway between 1 and its neighbour 1 + 2^-10, and a third of the smallest number of 16 bits.
+    // Halfway between 1 and its neighbour 1 + 2^-10, and a third of the smallest number in half precision.
     let tensors = [tensor("a", &[1.0 + 0.5f32.powi(11), 65504.0]), tensor("b", &[0.5f32.powi(24) / 3.0, 0.0])];
     let checkpoint = Checkpoint::in_memory("it", tensors, BTreeMap::new());
     let written = checkpoint.write_safetensors(&path, Precision::Half, &Silent).expect("written");

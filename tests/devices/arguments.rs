@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, Test, assert_works};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Limits, Missing, VulkanError};
 
@@ -70,11 +70,11 @@ fn arrays_of_other_elements_are_refused(candidate: &Candidate) -> Result<(), Fai
     let outcome = gpu.dispatch(Kernel::HullEntry, &[0; 4], 0..1, &arrays);
     assert_eq!(detail(outcome)?, "object has 4 bytes instead of 48");
     // A number that is read if there is nothing else to read.
-    let (block, [one, none, half]) = (ProductBlock::default(), [4_usize, 0, 2].map(|bytes| gpu.zeros::<u8>(bytes)));
+    let (block, [one, none, half]) = (LinearBlock::default(), [4_usize, 0, 2].map(|bytes| gpu.zeros::<u8>(bytes)));
     let (one, none, half) = (one?, none?, half?);
     for (short, bytes) in [(&none, 0), (&half, 2)] {
         let arrays = [one.bind(), short.bind(), one.bind(), one.bind(), one.bind()];
-        let outcome = gpu.dispatch(Kernel::Product, bytes_of(&block), 0..64, &arrays);
+        let outcome = gpu.dispatch(Kernel::Linear, bytes_of(&block), 0..64, &arrays);
         assert_eq!(detail(outcome)?, format!("weights has {bytes} bytes instead of 4"));
     }
     Ok(())

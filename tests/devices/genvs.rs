@@ -29,7 +29,7 @@ pub(crate) const TESTS: &[Test] = &[
 const LARGEST_DIFFERENCE: f32 = 1.0e-3;
 
 /// What only the denoiser needs.
-const DENOISERS: [Kernel; 4] = [Kernel::DenoiserInput, Kernel::Normalise, Kernel::MixPictures, Kernel::AddNoise];
+const DENOISERS: [Kernel; 4] = [Kernel::DenoiserInput, Kernel::GroupNorm, Kernel::MixPictures, Kernel::AddNoise];
 
 fn genvs_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;

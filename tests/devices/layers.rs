@@ -9,7 +9,7 @@ use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape};
 use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_vulkan::{GpuOptions, Limits};
@@ -34,19 +34,19 @@ const TRANSPOSED: [[u32; 5]; 4] = [[3, 5, 20, 7, 2], [1, 1, 1, 1, 1], [9, 8, 64,
 /// What `outputs` hold before anything is written, and must still hold where nothing is.
 const UNTOUCHED: f32 = -77.0;
 
-/// Numbers of a layer: inputs, weights, bias and addend; and how many outputs there are.
+/// Numbers of a layer: inputs, weights, bias and residual; and how many outputs there are.
 struct Numbered {
     shape: LayerShape,
     inputs: Vec<f32>,
     weights: Vec<f32>,
     bias: Vec<f32>,
-    addend: Vec<f32>,
+    residual: Vec<f32>,
     output_count: usize,
 }
 
 impl Numbered {
-    /// `addend` may be the shortest of all: `[column]`.
-    fn new(input_count: u32, [inner, columns]: [u32; 2], output_count: u32, addend_count: u32) -> Numbered {
+    /// `residual` may be the shortest of all: `[column]`.
+    fn new(input_count: u32, [inner, columns]: [u32; 2], output_count: u32, residual_count: u32) -> Numbered {
         let numbers = &mut Numbers::new(u64::from(input_count + columns));
         let mut some = |count: u32| (0..count).map(|_| numbers.between(-1.0, 1.0)).collect::<Vec<f32>>();
         Numbered {
@@ -54,7 +54,7 @@ impl Numbered {
             inputs: some(input_count),
             weights: some(inner * columns),
             bias: some(columns),
-            addend: some(addend_count),
+            residual: some(residual_count),
             output_count: output_count as usize,
         }
     }
@@ -67,14 +67,14 @@ impl Numbered {
     ) -> Result<Vec<f32>, DeviceError> {
         let layer = Layer::new(device, &self.shape, &self.weights, &self.bias)?;
         let mut outputs = device.upload(&vec![UNTOUCHED; self.output_count + 1])?;
-        run(&device.upload(&self.inputs)?, &layer, &device.upload(&self.addend)?, &mut outputs)?;
+        run(&device.upload(&self.inputs)?, &layer, &device.upload(&self.residual)?, &mut outputs)?;
         device.download(&outputs)
     }
 }
 
 /// Two orders of a sum of `length` products of numbers up to 1 differ by no more than this.
 fn tolerance(length: u32) -> f32 {
-    // Either is off by half an epsilon of the sum of magnitudes with each addition; bias and addend are terms as well.
+    // Either is off by half an epsilon of the sum of magnitudes with each addition; bias and residual are terms as well.
     let terms = length as f32 + 2.0;
     terms * terms * f32::EPSILON
 }
@@ -105,18 +105,25 @@ fn products_of_any_size_are_the_cpus(candidate: &Candidate) -> Result<(), Failed
     for [row_count, inner_count, column_count] in PRODUCTS {
         let output_count = row_count * column_count;
         let numbers = Numbered::new(row_count * inner_count, [inner_count, column_count], output_count, output_count);
-        for [has_addend, relu_inputs, relu_outputs] in variants() {
+        for [has_residual, relu_inputs, relu_outputs] in variants() {
             let (relu_inputs, relu_outputs) = (relu_inputs.into(), relu_outputs.into());
             let block =
-                ProductBlock { row_count, inner_count, column_count, relu_inputs, relu_outputs, ..Default::default() };
-            let expected = numbers.on(&Cpu, |inputs, layer, addend, outputs| {
-                Cpu.product(&block, inputs, &layer.weights, &layer.bias, has_addend.then_some(addend), outputs)
+                LinearBlock { row_count, inner_count, column_count, relu_inputs, relu_outputs, ..Default::default() };
+            let expected = numbers.on(&Cpu, |inputs, layer, residual, outputs| {
+                Cpu.linear(&block, inputs, &layer.weights, &layer.bias, has_residual.then_some(residual), outputs)
             })?;
             for device in &devices {
-                let actual = numbers.on(device, |inputs, layer, addend, outputs| {
-                    device.product(&block, inputs, &layer.weights, &layer.bias, has_addend.then_some(addend), outputs)
+                let actual = numbers.on(device, |inputs, layer, residual, outputs| {
+                    device.linear(
+                        &block,
+                        inputs,
+                        &layer.weights,
+                        &layer.bias,
+                        has_residual.then_some(residual),
+                        outputs,
+                    )
                 })?;
-                assert_equal(&actual, &expected, inner_count, &format!("{block:?}, addend {has_addend}"))?;
+                assert_equal(&actual, &expected, inner_count, &format!("{block:?}, residual {has_residual}"))?;
             }
         }
     }
@@ -130,7 +137,7 @@ fn fitted(block: ConvolveBlock) -> ConvolveBlock {
     ConvolveBlock { out_height: out(block.in_height), out_width: out(block.in_width), ..block }
 }
 
-/// The same convolution, and what else it may be: between channels of wider images, scaled, with one addend for all
+/// The same convolution, and what else it may be: between channels of wider images, scaled, with one residual for all
 /// pixels, with gaps in its windows, of an enlarged image, and all at once.
 fn extended(block: ConvolveBlock) -> [ConvolveBlock; 6] {
     let packed = fitted(block.packed());
@@ -139,16 +146,16 @@ fn extended(block: ConvolveBlock) -> [ConvolveBlock; 6] {
         in_first: 2,
         out_pitch: block.out_channels + 5,
         out_first: 4,
-        addend_pitch: block.out_channels + 1,
-        addend_first: 3,
+        residual_pitch: block.out_channels + 1,
+        residual_first: 3,
         scale: 0.7,
         ..block
     };
-    let broadcast = ConvolveBlock { addend_pitch: 0, ..packed };
+    let broadcast = ConvolveBlock { residual_pitch: 0, ..packed };
     let dilated = fitted(ConvolveBlock { dilation: 2, padding: 2 * block.padding, ..packed });
     let enlarged = fitted(ConvolveBlock { enlarge: 2, ..packed });
     let all = fitted(ConvolveBlock { enlarge: 3, ..dilated });
-    [packed, within(packed), broadcast, dilated, enlarged, ConvolveBlock { addend_pitch: 0, ..within(all) }]
+    [packed, within(packed), broadcast, dilated, enlarged, ConvolveBlock { residual_pitch: 0, ..within(all) }]
 }
 
 fn convolutions_of_any_shape_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {
@@ -167,25 +174,30 @@ fn convolutions_of_any_shape_are_the_cpus(candidate: &Candidate) -> Result<(), F
         for block in extended(shape) {
             let input_count = block.in_first + in_height * in_width * block.in_pitch;
             let output_count = block.out_first + block.pixel_count() * block.out_pitch;
-            let addend_count = block.addend_first + out_channels + (block.pixel_count() - 1) * block.addend_pitch;
-            let numbers = Numbered::new(input_count, [block.patch_len(), out_channels], output_count, addend_count);
-            for [has_addend, relu_outputs, _] in variants().take(4) {
+            let residual_count = block.residual_first + out_channels + (block.pixel_count() - 1) * block.residual_pitch;
+            let numbers = Numbered::new(input_count, [block.patch_len(), out_channels], output_count, residual_count);
+            for [has_residual, relu_outputs, _] in variants().take(4) {
                 let block = ConvolveBlock { relu_outputs: relu_outputs.into(), ..block };
-                let expected = numbers.on(&Cpu, |inputs, layer, addend, outputs| {
-                    Cpu.convolve(&block, inputs, &layer.weights, &layer.bias, has_addend.then_some(addend), outputs)
+                let expected = numbers.on(&Cpu, |inputs, layer, residual, outputs| {
+                    Cpu.convolve(&block, inputs, &layer.weights, &layer.bias, has_residual.then_some(residual), outputs)
                 })?;
                 for device in &devices {
-                    let actual = numbers.on(device, |inputs, layer, addend, outputs| {
+                    let actual = numbers.on(device, |inputs, layer, residual, outputs| {
                         device.convolve(
                             &block,
                             inputs,
                             &layer.weights,
                             &layer.bias,
-                            has_addend.then_some(addend),
+                            has_residual.then_some(residual),
                             outputs,
                         )
                     })?;
-                    assert_equal(&actual, &expected, block.patch_len(), &format!("{block:?}, addend {has_addend}"))?;
+                    assert_equal(
+                        &actual,
+                        &expected,
+                        block.patch_len(),
+                        &format!("{block:?}, residual {has_residual}"),
+                    )?;
                 }
             }
         }
@@ -247,12 +259,11 @@ fn products_of_computed_matrices_are_the_cpus(candidate: &Candidate) -> Result<(
             };
             let input_count = block.right_first + right_rows * right_row_pitch.max(right_column_pitch);
             let numbers = Numbered::new(input_count, [1, 1], row_count * column_count, 1);
-            let expected = numbers
-                .on(&Cpu, |matrices, _, _, outputs| Cpu.multiply_matrices(&block, matrices, matrices, outputs))?;
+            let expected =
+                numbers.on(&Cpu, |matrices, _, _, outputs| Cpu.matrix_product(&block, matrices, matrices, outputs))?;
             for device in &devices {
-                let actual = numbers.on(device, |matrices, _, _, outputs| {
-                    device.multiply_matrices(&block, matrices, matrices, outputs)
-                })?;
+                let actual = numbers
+                    .on(device, |matrices, _, _, outputs| device.matrix_product(&block, matrices, matrices, outputs))?;
                 assert_equal(&actual, &expected, inner_count, &format!("{block:?}"))?;
             }
         }

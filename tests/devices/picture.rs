@@ -27,7 +27,7 @@ pub(crate) const SIDE: u32 = 48;
 pub(crate) const SOURCE_COUNT: usize = 6;
 /// Kernels that a picture takes.
 pub(crate) const KERNELS: [Kernel; 6] =
-    [Kernel::HullEntry, Kernel::MatchCost, Kernel::SumRow, Kernel::MeanColumn, Kernel::PickDepth, Kernel::March];
+    [Kernel::HullEntry, Kernel::MatchCost, Kernel::SumRow, Kernel::MeanColumn, Kernel::PickDepth, Kernel::MarchRays];
 
 /// A picture with its depths, and what the device did for it.
 pub(crate) struct Rendering {

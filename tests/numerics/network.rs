@@ -3,7 +3,7 @@
 use viewfuse::check::compare::Comparator;
 use viewfuse::check::poses::Random;
 use viewfuse_core::network::convolve::{ConvolveBlock, convolve_element};
-use viewfuse_core::network::product::{ProductBlock, product_element, rectified};
+use viewfuse_core::network::linear::{LinearBlock, linear_element, rectified};
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, aligned, pooled_element, upsampled_element};
 
 fn numbers(random: &mut Random, count: usize) -> Vec<f32> {
@@ -27,23 +27,23 @@ fn products_are_sums_of_products() {
     let mut random = Random::new(41);
     for case in 0..200 {
         let [rows, inner, columns] = [1 + random.below(9), 1 + random.below(200), 1 + random.below(9)];
-        let [relu_inputs, relu_outputs, has_addend] = [case & 1, case >> 1 & 1, case >> 2 & 1];
-        let block = ProductBlock {
+        let [relu_inputs, relu_outputs, has_residual] = [case & 1, case >> 1 & 1, case >> 2 & 1];
+        let block = LinearBlock {
             row_count: rows as u32,
             inner_count: inner as u32,
             column_count: columns as u32,
             relu_inputs,
             relu_outputs,
-            has_addend,
+            has_residual,
         };
         let inputs = numbers(&mut random, rows * inner);
         let weights = numbers(&mut random, inner * columns);
         let bias = numbers(&mut random, columns);
-        // Without an addend nothing of it may be read.
-        let addend = if has_addend == 1 { numbers(&mut random, rows * columns) } else { Vec::new() };
+        // Without a residual nothing of it may be read.
+        let residual = if has_residual == 1 { numbers(&mut random, rows * columns) } else { Vec::new() };
         for element in 0..rows * columns {
             let (row, column) = (element / columns, element % columns);
-            let mut sum = f64::from(bias[column]) + addend.get(element).map_or(0.0, |addend| f64::from(*addend));
+            let mut sum = f64::from(bias[column]) + residual.get(element).map_or(0.0, |residual| f64::from(*residual));
             let mut size = sum.abs() + 8.0;
             for index in 0..inner {
                 let input = f64::from(inputs[row * inner + index]);
@@ -53,7 +53,7 @@ fn products_are_sums_of_products() {
             }
             let expected = if relu_outputs == 1 { sum.max(0.0) } else { sum };
             let absolute = (inner + 2) as f64 * size / 16_777_216.0;
-            let actual = product_element(&inputs[..], &weights[..], &bias[..], &addend[..], &block, element);
+            let actual = linear_element(&inputs[..], &weights[..], &bias[..], &residual[..], &block, element);
             Comparator { absolute, relative: 0.0 }.compare(&[actual], &[expected]).unwrap_or_else(|e| panic!("{e}"));
         }
     }
@@ -82,8 +82,8 @@ fn convolutions_are_direct_loops() {
         let room = height.min(width) * enlarge + 2 * padding;
         let side = 1 + random.below(3.min((room - 1) / dilation + 1));
         let out = |inner: usize| (inner * enlarge + 2 * padding - (side - 1) * dilation - 1) / stride + 1;
-        let (relu, has_addend, is_shared) = (case & 1, case >> 1 & 1, case >> 2 & 1);
-        let [in_gap, out_gap, addend_gap] = [0, 1, 2].map(|_| random.below(3));
+        let (relu, has_residual, is_shared) = (case & 1, case >> 1 & 1, case >> 2 & 1);
+        let [in_gap, out_gap, residual_gap] = [0, 1, 2].map(|_| random.below(3));
         let block = ConvolveBlock {
             in_height: height as u32,
             in_width: width as u32,
@@ -102,23 +102,23 @@ fn convolutions_are_direct_loops() {
             padding: padding as u32,
             scale: random.range(0.5, 1.5) as f32,
             relu_outputs: relu,
-            has_addend,
-            addend_pitch: if is_shared == 1 { 0 } else { (out_channels + 2 * addend_gap) as u32 },
-            addend_first: addend_gap as u32,
+            has_residual,
+            residual_pitch: if is_shared == 1 { 0 } else { (out_channels + 2 * residual_gap) as u32 },
+            residual_first: residual_gap as u32,
         };
         let image = numbers(&mut random, height * width * channels);
         let inputs = widened(&image, channels, in_gap);
         let weights = numbers(&mut random, side * side * channels * out_channels);
         let bias = numbers(&mut random, out_channels);
-        let addends = numbers(&mut random, if is_shared == 1 { 1 } else { out(height) * out(width) } * out_channels);
-        // Without an addend nothing of it may be read.
-        let addend = if has_addend == 1 { widened(&addends, out_channels, addend_gap) } else { Vec::new() };
+        let residuals = numbers(&mut random, if is_shared == 1 { 1 } else { out(height) * out(width) } * out_channels);
+        // Without a residual nothing of it may be read.
+        let residual = if has_residual == 1 { widened(&residuals, out_channels, residual_gap) } else { Vec::new() };
         for out_row in 0..out(height) {
             for out_column in 0..out(width) {
                 for column in 0..out_channels {
                     let pixel = out_row * out(width) + out_column;
                     let own = if is_shared == 1 { column } else { pixel * out_channels + column };
-                    let mut sum = f64::from(bias[column]) + f64::from(has_addend) * f64::from(addends[own]);
+                    let mut sum = f64::from(bias[column]) + f64::from(has_residual) * f64::from(residuals[own]);
                     for window_row in 0..side {
                         for window_column in 0..side {
                             let row = (out_row * stride + window_row * dilation) as i64 - padding as i64;
@@ -135,7 +135,7 @@ fn convolutions_are_direct_loops() {
                     let expected = f64::from(block.scale) * if relu == 1 { sum.max(0.0) } else { sum };
                     let (pixel, channel) = (pixel as u32, column as u32);
                     let actual =
-                        convolve_element(&inputs[..], &weights[..], &bias[..], &addend[..], &block, pixel, channel);
+                        convolve_element(&inputs[..], &weights[..], &bias[..], &residual[..], &block, pixel, channel);
                     // At most 47 summands of at most 16 each, most of them far smaller.
                     assert!((f64::from(actual) - expected).abs() <= 3.0e-5, "{block:?} {pixel}: {actual} {expected}");
                     let place = out_gap + pixel as usize * block.out_pitch as usize + column;
@@ -150,9 +150,9 @@ fn convolutions_are_direct_loops() {
 fn packed_images_lie_side_by_side() {
     let block = ConvolveBlock { in_channels: 5, out_channels: 7, size: 3, padding: 1, ..ConvolveBlock::default() };
     let packed = block.packed();
-    let whole = [packed.in_pitch, packed.out_pitch, packed.addend_pitch, packed.enlarge, packed.dilation];
+    let whole = [packed.in_pitch, packed.out_pitch, packed.residual_pitch, packed.enlarge, packed.dilation];
     assert_eq!((whole, packed.scale), ([5, 7, 7, 1, 1], 1.0));
-    assert_eq!([packed.in_first, packed.out_first, packed.addend_first], [0; 3]);
+    assert_eq!([packed.in_first, packed.out_first, packed.residual_first], [0; 3]);
     assert_eq!((packed.size, packed.padding, packed.place(3, 2)), (3, 1, 23));
 }
 

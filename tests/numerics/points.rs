@@ -140,7 +140,7 @@ fn gathering_is_a_look_up_where_the_point_appears() {
                 assert_eq!(gathered_value(&views, &[point], grid, &[0.0; 0], &block, channel), expected);
             }
         }
-        let added = GatherBlock { has_addend: 1, ..block };
+        let added = GatherBlock { has_residual: 1, ..block };
         let point = sights::point(&mut random, &views);
         let plain = gathered_value(&views, &[point], grid, &[0.0; 0], &block, 2);
         assert_eq!(gathered_value(&views, &[point], grid, &[0.0, 0.0, 3.0], &added, 2), 3.0 + plain);

@@ -5,12 +5,12 @@ use viewfuse::check::poses::Random;
 use viewfuse::check::sights;
 use viewfuse_core::composite::Compositor;
 use viewfuse_core::depths::{
-    CoarseBlock, FineBlock, coarse_depth, draw_chance, fine_depth, inverse_cdf, merged_depth, stratified_depth,
+    CoarseBlock, FineBlock, coarse_depth, fine_depth, inverse_cdf, merged_depth, random_draw, stratified_depth,
 };
 use viewfuse_core::math;
 use viewfuse_core::random::{normal, uniform_from, uniform_pair};
 use viewfuse_core::rays::{CastBlock, TargetRay, cast_ray, place_point};
-use viewfuse_core::wanted::{WantedBlock, is_wanted, weigh_sample};
+use viewfuse_core::sample_mask::{SampleMaskBlock, is_sampled, weigh_sample};
 
 /// As [`normal`], in `f64`.
 fn normal_oracle(seed: [u32; 2], pixel: u32, sample: u32) -> f64 {
@@ -52,16 +52,16 @@ fn normal_numbers_are_normal() {
 fn random_numbers_know_no_order() {
     let block =
         FineBlock { seed: [3, 4], coarse_count: 64, importance_count: 16, depth_count: 16, ..FineBlock::default() };
-    let forwards: Vec<_> = (0..40).flat_map(|pixel| (0..32).map(move |i| draw_chance(pixel, i, &block))).collect();
+    let forwards: Vec<_> = (0..40).flat_map(|pixel| (0..32).map(move |i| random_draw(pixel, i, &block))).collect();
     let mut backwards: Vec<_> =
-        (0..40).rev().flat_map(|pixel| (0..32).rev().map(move |i| draw_chance(pixel, i, &block))).collect();
+        (0..40).rev().flat_map(|pixel| (0..32).rev().map(move |i| random_draw(pixel, i, &block))).collect();
     backwards.reverse();
     assert_eq!(forwards, backwards);
     // Neither are they those of the first pass, nor of another pixel or seed.
     let coarse: Vec<f32> = (0..64).map(|sample| uniform_from(block.seed, 5, sample)).collect();
-    assert!((16..32).all(|index| !coarse.contains(&draw_chance(5, index, &block)[0])));
-    assert_ne!(draw_chance(5, 3, &block), draw_chance(6, 3, &block));
-    assert_ne!(draw_chance(5, 3, &block), draw_chance(5, 3, &FineBlock { seed: [4, 3], ..block }));
+    assert!((16..32).all(|index| !coarse.contains(&random_draw(5, index, &block)[0])));
+    assert_ne!(random_draw(5, 3, &block), random_draw(6, 3, &block));
+    assert_ne!(random_draw(5, 3, &block), random_draw(5, 3, &FineBlock { seed: [4, 3], ..block }));
 }
 
 #[test]
@@ -70,7 +70,7 @@ fn chances_are_one_in_each_part() {
         let block = FineBlock { seed: [9, 0], coarse_count: 64, importance_count, ..FineBlock::default() };
         for pixel in 0..2_000 {
             for index in 0..importance_count {
-                let [place, inside] = draw_chance(pixel, index, &block);
+                let [place, inside] = random_draw(pixel, index, &block);
                 let part = f64::from(place) * f64::from(importance_count) - f64::from(index);
                 assert!((0.0..=1.0).contains(&place) && (-1.0e-5..=1.0 + 1.0e-5).contains(&part), "{place}");
                 assert!((0.0..1.0).contains(&inside));
@@ -142,9 +142,9 @@ fn fine_depths_stay_within_the_ray() {
         let depth = [1.0, 0.0, -7.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1.0e30][random.below(7)];
         let opacity = [0.0, 0.5, 1.0, f32::NAN][random.below(4)];
         for index in 0..block.fine_count() {
-            let chances = [draw_chance(7, index, &block), [0.0; 2], [1.0; 2], [f32::NAN; 2], [2.0, -1.0]];
-            for chance in chances {
-                let depth = fine_depth(&seen[..], &ray, depth, opacity, chance, index, &block);
+            let draws = [random_draw(7, index, &block), [0.0; 2], [1.0; 2], [f32::NAN; 2], [2.0, -1.0]];
+            for draw in draws {
+                let depth = fine_depth(&seen[..], &ray, depth, opacity, draw, index, &block);
                 assert!((ray.near..=ray.far).contains(&depth), "{depth} not in {ray:?}");
             }
         }
@@ -159,7 +159,7 @@ fn importance_samples_lie_in_the_parts_that_were_seen() {
     for part in 0..8_usize {
         let seen: Vec<[f32; 2]> = (0..8).map(|other| [f32::from(u8::from(other == part)), 1.0]).collect();
         let inside = (0..64).filter(|index| {
-            let depth = fine_depth(&seen[..], &ray, 2.0, 1.0, draw_chance(3, *index, &block), *index, &block);
+            let depth = fine_depth(&seen[..], &ray, 2.0, 1.0, random_draw(3, *index, &block), *index, &block);
             let from = 1.0 + part as f32 * width;
             (from..=from + width).contains(&depth)
         });
@@ -169,10 +169,10 @@ fn importance_samples_lie_in_the_parts_that_were_seen() {
     // Where nothing was seen, they are spread evenly; the same part as that of the inverted distribution.
     let nothing = [[0.0, 1.0]; 8];
     for index in 0..64 {
-        let chance = draw_chance(3, index, &block);
-        let depth = fine_depth(&nothing, &ray, 2.0, 0.0, chance, index, &block);
-        let part = ((inverse_cdf(1.0, 3.0, &[0.0; 8], chance[0]) - 1.0) / width) as u32;
-        assert_eq!(depth, stratified_depth(1.0, 3.0, part.min(7), 8, chance[1]));
+        let draw = random_draw(3, index, &block);
+        let depth = fine_depth(&nothing, &ray, 2.0, 0.0, draw, index, &block);
+        let part = ((inverse_cdf(1.0, 3.0, &[0.0; 8], draw[0]) - 1.0) / width) as u32;
+        assert_eq!(depth, stratified_depth(1.0, 3.0, part.min(7), 8, draw[1]));
     }
 }
 
@@ -180,16 +180,15 @@ fn importance_samples_lie_in_the_parts_that_were_seen() {
 fn depth_samples_lie_around_the_depth() {
     let ray = TargetRay { near: 1.0, far: 3.0, ..TargetRay::default() };
     let block = FineBlock { coarse_count: 1, depth_count: 4, depth_deviation: 0.01, ..FineBlock::default() };
-    let at =
-        |depth, opacity, chance, block: &FineBlock| fine_depth(&[[0.0; 2]], &ray, depth, opacity, chance, 0, block);
+    let at = |depth, opacity, draw, block: &FineBlock| fine_depth(&[[0.0; 2]], &ray, depth, opacity, draw, 0, block);
     assert_eq!(at(2.0, 0.5, [1.0, 0.0], &block), 2.0 + 0.01);
     let published = FineBlock { depth_times_opacity: 1, ..block };
     // Too near, as published: the sum of weights times depths.
     assert_eq!(at(2.4, 0.5, [-2.0, 0.0], &published), 1.2 - 2.0 * 0.01);
     // A ray that met nothing looks at its beginning, or wherever nothing was said to be.
-    for chance in [[0.0, 0.0], [-5.0, 0.0]] {
-        assert_eq!(at(0.0, 0.0, chance, &block), 1.0);
-        assert_eq!(at(9.0, 0.0, chance, &published), 1.0);
+    for draw in [[0.0, 0.0], [-5.0, 0.0]] {
+        assert_eq!(at(0.0, 0.0, draw, &block), 1.0);
+        assert_eq!(at(9.0, 0.0, draw, &published), 1.0);
     }
     assert_eq!(at(9.0, 0.0, [0.0, 0.0], &block), 3.0);
 }
@@ -267,11 +266,11 @@ fn weighed(optical_depths: impl IntoIterator<Item = f32>) -> Vec<[f32; 2]> {
     optical_depths.into_iter().map(weigh).collect()
 }
 
-const EVERYTHING: WantedBlock = WantedBlock {
+const EVERYTHING: SampleMaskBlock = SampleMaskBlock {
     sample_count: 1,
     part_count: 8,
     least_share: 0.0,
-    settled: -1.0,
+    termination: -1.0,
     least_opacity: 0.0,
     step: 0,
     seen_columns: 0,
@@ -282,13 +281,13 @@ const EVERYTHING: WantedBlock = WantedBlock {
 const RAY: TargetRay = TargetRay { origin: [0.0; 3], near: 1.0, direction: [0.0, 0.0, 1.0], far: 3.0 };
 
 /// Whether the middles of the parts are wanted.
-fn wanted_parts(seen: &[[f32; 2]], block: &WantedBlock) -> Vec<bool> {
+fn wanted_parts(seen: &[[f32; 2]], block: &SampleMaskBlock) -> Vec<bool> {
     let middle = |part| stratified_depth(RAY.near, RAY.far, part, block.part_count, 0.5);
-    (0..block.part_count).map(|part| is_wanted(seen, &RAY, middle(part), 0, 0, block)).collect()
+    (0..block.part_count).map(|part| is_sampled(seen, &RAY, middle(part), 0, 0, block)).collect()
 }
 
 #[test]
-fn without_thresholds_everything_is_wanted() {
+fn without_thresholds_everything_is_sampled() {
     let mut random = Random::new(66);
     for case in 0..200_000 {
         // Also where neighbouring optical depths differ by less than the exponential can tell.
@@ -308,14 +307,14 @@ fn without_thresholds_everything_is_wanted() {
     // Wherever the sample is said to be.
     let seen = weighed([0.1; 8]);
     for depth in [-9.0, 1.0, 3.0, 9.0, f32::NAN, f32::INFINITY] {
-        assert!(is_wanted(&seen[..], &RAY, depth, 0, 0, &EVERYTHING));
-        assert!(is_wanted(&seen[..], &TargetRay { far: 1.0, ..RAY }, depth, 0, 0, &EVERYTHING));
+        assert!(is_sampled(&seen[..], &RAY, depth, 0, 0, &EVERYTHING));
+        assert!(is_sampled(&seen[..], &TargetRay { far: 1.0, ..RAY }, depth, 0, 0, &EVERYTHING));
     }
 }
 
 #[test]
 fn neighbours_of_what_was_seen_are_wanted() {
-    let block = WantedBlock { least_share: 0.5, settled: 0.01, ..EVERYTHING };
+    let block = SampleMaskBlock { least_share: 0.5, termination: 0.01, ..EVERYTHING };
     let occupied = |part: usize| weighed((0..8).map(|other| if other == part { 1.0 } else { 0.0 }));
     for part in 0..8_usize {
         let expected: Vec<bool> = (0..8_usize).map(|other| other.abs_diff(part) <= 1).collect();
@@ -326,9 +325,9 @@ fn neighbours_of_what_was_seen_are_wanted() {
     assert_eq!(wanted_parts(&wall, &block), [false, true, true, true, false, false, false, false]);
     // A ray that hardly meets anything is left out where so much is asked for.
     let thin = weighed([0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let opaque = WantedBlock { least_share: 1.0e-3, least_opacity: 0.1, ..block };
+    let opaque = SampleMaskBlock { least_share: 1.0e-3, least_opacity: 0.1, ..block };
     assert_eq!(wanted_parts(&thin, &opaque), [false; 8]);
-    assert!(wanted_parts(&thin, &WantedBlock { least_opacity: 1.0e-3, ..opaque })[2]);
+    assert!(wanted_parts(&thin, &SampleMaskBlock { least_opacity: 1.0e-3, ..opaque })[2]);
 }
 
 #[test]
@@ -339,10 +338,11 @@ fn higher_thresholds_want_less() {
         let seen =
             weighed((0..8).map(|_| if random.below(2) == 0 { 0.0 } else { random.log_range(1.0e-3, 3.0) as f32 }));
         let mut unit = |high| random.range(0.0, high) as f32;
-        let low = WantedBlock { least_share: unit(0.5), settled: unit(0.5), least_opacity: unit(1.0), ..EVERYTHING };
-        let high = WantedBlock {
+        let low =
+            SampleMaskBlock { least_share: unit(0.5), termination: unit(0.5), least_opacity: unit(1.0), ..EVERYTHING };
+        let high = SampleMaskBlock {
             least_share: low.least_share + unit(0.3),
-            settled: low.settled + unit(0.3),
+            termination: low.termination + unit(0.3),
             least_opacity: low.least_opacity + unit(0.3),
             ..low
         };
@@ -357,8 +357,15 @@ fn higher_thresholds_want_less() {
 #[test]
 fn rays_around_speak_for_a_pixel() {
     // A picture of 7 times 5 pixels, seen at every third column and row: 3 times 2 rays, one of which met something.
-    let block =
-        WantedBlock { least_share: 0.5, settled: 0.0, step: 3, seen_columns: 3, seen_rows: 2, width: 7, ..EVERYTHING };
+    let block = SampleMaskBlock {
+        least_share: 0.5,
+        termination: 0.0,
+        step: 3,
+        seen_columns: 3,
+        seen_rows: 2,
+        width: 7,
+        ..EVERYTHING
+    };
     let full = weighed([1.0; 8]);
     let empty = weighed([0.0; 8]);
     for node in 0..6_u32 {
@@ -368,7 +375,7 @@ fn rays_around_speak_for_a_pixel() {
             let (column, row) = (pixel % 7, pixel / 7);
             let near = |at: u32, node: u32, last: u32| at / 3 == node || (at / 3 + 1).min(last) == node;
             let expected = near(column, node % 3, 2) && near(row, node / 3, 1);
-            assert_eq!(is_wanted(&seen[..], &RAY, 2.0, 0, pixel, &block), expected, "node {node}, pixel {pixel}");
+            assert_eq!(is_sampled(&seen[..], &RAY, 2.0, 0, pixel, &block), expected, "node {node}, pixel {pixel}");
         }
     }
 }

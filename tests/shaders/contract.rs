@@ -67,10 +67,10 @@ fn a_wrong_workgroup_size_is_seen() {
         assert_one(&said, "sum_row: a workgroup");
     }
     let said = breaches_with(|module| {
-        let entry = entry(module, Kernel::March);
+        let entry = entry(module, Kernel::MarchRays);
         module.execution_modes.retain(|mode| mode.operands[0] != Operand::IdRef(entry));
     });
-    assert_one(&said, "march: a workgroup");
+    assert_one(&said, "march_rays: a workgroup");
     let said = breaches_with(|module| {
         module.execution_modes[0].operands[1] = Operand::ExecutionMode(ExecutionMode::LocalSizeHint);
     });
@@ -92,11 +92,11 @@ fn a_missing_entry_point_is_seen() {
 fn an_entry_point_by_another_name_is_seen() {
     let said = breaches_with(|module| {
         let renamed = Operand::LiteralString("march_on".to_owned());
-        let entry = entry(module, Kernel::March);
+        let entry = entry(module, Kernel::MarchRays);
         let point = module.entry_points.iter_mut().find(|point| point.operands[1] == Operand::IdRef(entry));
         point.expect("the entry point").operands[2] = renamed;
     });
-    assert_eq!(said, ["march_on: not a kernel", "march: no entry point"]);
+    assert_eq!(said, ["march_on: not a kernel", "march_rays: no entry point"]);
 }
 
 #[test]
@@ -149,7 +149,7 @@ fn an_array_that_could_be_written_is_seen() {
 #[test]
 fn other_push_constants_are_seen() {
     let said = breaches_with(|module| {
-        // Pieces of all kernels begin where their parameters end: 96 is that of cast_rays, and of march.
+        // Pieces of all kernels begin where their parameters end: 96 is that of cast_rays, and of march_rays.
         let behind = [Operand::Decoration(Decoration::Offset), Operand::LiteralBit32(96)];
         let offset = module.annotations.iter_mut().find(|annotation| annotation.operands[2..] == behind);
         offset.expect("the piece of rays").operands[3] = Operand::LiteralBit32(100);

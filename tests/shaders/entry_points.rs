@@ -11,17 +11,17 @@ use viewfuse::check::poses::Random;
 use viewfuse::check::world::{Numbers, World};
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding};
 use viewfuse_core::composite::{CompositeBlock, composite_samples};
-use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, draw_chance, fine_depth, merged_depth};
+use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, fine_depth, merged_depth, random_draw};
 use viewfuse_core::fuse::{FuseBlock, fuse_element};
 use viewfuse_core::pages::StartingAt;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, embedded_value, gathered_value, radiance, visible_weight};
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
+use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
 use viewfuse_core::sampler::{Mix, NoiseBlock, noisy_element};
 use viewfuse_core::sources::Sources;
-use viewfuse_core::wanted::{RaysBlock, WantedBlock, is_wanted, weigh_sample};
 use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock, weigh};
-use viewfuse_shaders::{Piece, Push, light, points, rays, sampler, weighting};
+use viewfuse_shaders::{Piece, Push, compositing, points, rays, sampler, weighting};
 
 /// What an element holds before anything is written.
 const UNTOUCHED: f32 = -77.0;
@@ -91,14 +91,14 @@ fn light_is_core_s() {
     let (weights, latents) = (numbers(6, 5), numbers(7, 5 * 90));
     let block = FuseBlock { view_count: 5, stride: 90, ..FuseBlock::default() };
     let mut fused = vec![UNTOUCHED; 90];
-    dispatch(block, 90, |id, push| light::fuse_views(id, push, &weights, &latents, &mut fused));
+    dispatch(block, 90, |id, push| compositing::fuse_views(id, push, &weights, &latents, &mut fused));
     let expected: Vec<f32> = (0..90).map(|at| fuse_element(&weights[..], &latents[at..], &block)).collect();
     assert_eq!(fused, expected);
 
     // Fifteen points of six channels, each with its own weights.
     let weights = numbers(6, 15 * 5);
     let block = FuseBlock { channel_count: 6, weight_stride: 5, ..block };
-    dispatch(block, 90, |id, push| light::fuse_views(id, push, &weights, &latents, &mut fused));
+    dispatch(block, 90, |id, push| compositing::fuse_views(id, push, &weights, &latents, &mut fused));
     let expected: Vec<f32> = (0..90).map(|at| fuse_element(&weights[at / 6 * 5..], &latents[at..], &block)).collect();
     assert_eq!(fused, expected);
 
@@ -107,7 +107,7 @@ fn light_is_core_s() {
     let block = CompositeBlock { background: [0.1, 0.2, 0.3], empty_depth: 9.0, sample_count: 6 };
     let (mut colours, mut depths) = (vec![[UNTOUCHED; 4]; 80], vec![UNTOUCHED; 80]);
     dispatch(block, 80, |id, push| {
-        light::composite(id, push, &samples, &sample_depths, &mut colours, &mut depths);
+        compositing::composite(id, push, &samples, &sample_depths, &mut colours, &mut depths);
     });
     for (ray, (colour, depth)) in colours.iter().zip(&depths).enumerate() {
         let seen = composite_samples(&samples[ray * 6..], &sample_depths[ray * 6..], &block);
@@ -210,22 +210,22 @@ fn what_was_seen_is_core_s() {
 
     let (pixels, cast, _) = rays_of(&World::new(1));
     let depths: Vec<f32> = numbers(13, 70 * 4).iter().map(|depth| 2.2 + 1.7 * depth).collect();
-    let block = WantedBlock {
+    let block = SampleMaskBlock {
         sample_count: 4,
         part_count: 6,
         least_share: 0.3,
-        settled: 0.2,
+        termination: 0.2,
         least_opacity: 0.3,
-        ..WantedBlock::default()
+        ..SampleMaskBlock::default()
     };
-    let nearby = WantedBlock { step: 8, seen_columns: 7, seen_rows: 10, width: 48, ..block };
+    let nearby = SampleMaskBlock { step: 8, seen_columns: 7, seen_rows: 10, width: 48, ..block };
     for block in [block, nearby] {
         let mut wanted = vec![77; 280];
-        dispatch(block, 280, |id, push| rays::wanted_samples(id, push, &seen, &cast, &pixels, &depths, &mut wanted));
+        dispatch(block, 280, |id, push| rays::sample_mask(id, push, &seen, &cast, &pixels, &depths, &mut wanted));
         let expected: Vec<u32> = (0..280)
             .map(|at| {
                 let ray = at / 4;
-                is_wanted(&seen[..], &cast[ray], depths[at], ray as u32, pixels[ray], &block).into()
+                is_sampled(&seen[..], &cast[ray], depths[at], ray as u32, pixels[ray], &block).into()
             })
             .collect();
         assert_eq!(wanted, expected);
@@ -244,23 +244,23 @@ fn fine_depths_are_core_s() {
         depth_deviation: 0.1,
         depth_times_opacity: 1,
     };
-    let mut chances = vec![[UNTOUCHED; 2]; 490];
-    dispatch(block, 490, |id, push| rays::draw_chances(id, push, &pixels, &mut chances));
+    let mut draws = vec![[UNTOUCHED; 2]; 490];
+    dispatch(block, 490, |id, push| rays::random_draws(id, push, &pixels, &mut draws));
     let place = |at: usize| (at / 7, at as u32 % 7);
-    let drawn = |(ray, sample): (usize, u32)| draw_chance(pixels[ray], sample, &block);
-    assert_eq!(chances, (0..490).map(place).map(drawn).collect::<Vec<[f32; 2]>>());
+    let drawn = |(ray, sample): (usize, u32)| random_draw(pixels[ray], sample, &block);
+    assert_eq!(draws, (0..490).map(place).map(drawn).collect::<Vec<[f32; 2]>>());
 
     let (seen, pixel_depths) = (seen_by(70, 6), numbers(14, 70));
     let colours: Vec<[f32; 4]> = numbers(15, 70).iter().map(|opacity| [9.0, 9.0, 9.0, *opacity]).collect();
     let mut fine = vec![UNTOUCHED; 490];
     dispatch(block, 490, |id, push| {
-        rays::fine_depths(id, push, &seen, &cast, &colours, &pixel_depths, &chances, &mut fine);
+        rays::fine_depths(id, push, &seen, &cast, &colours, &pixel_depths, &draws, &mut fine);
     });
     let expected: Vec<f32> = (0..490)
         .map(|at| {
             let (ray, sample) = place(at);
             let (depth, opacity) = (pixel_depths[ray], colours[ray][3]);
-            fine_depth(&seen[ray * 6..], &cast[ray], depth, opacity, chances[at], sample, &block)
+            fine_depth(&seen[ray * 6..], &cast[ray], depth, opacity, draws[at], sample, &block)
         })
         .collect();
     assert_eq!(fine, expected);
@@ -320,22 +320,22 @@ fn points_are_core_s() {
 fn gather_latents_is_core_s() {
     let world = World::new(1);
     let (views, there, grid) = (&world.views, points_of(&world, 40), numbers(20, 5 * 6 * 3));
-    let addend = numbers(21, views.len() * 120);
-    for has_addend in [0, 1] {
+    let residual = numbers(21, views.len() * 120);
+    for has_residual in [0, 1] {
         let block = GatherBlock {
             view: 1,
             point_count: 40,
             channel_count: 3,
             height: 5,
             width: 6,
-            has_addend,
+            has_residual,
             pixel_centre: 0.0,
         };
         let mut gathered = vec![UNTOUCHED; views.len() * 120];
         dispatch(block, 120, |id, push| {
-            points::gather_latents(id, push, views, &there, &grid, &addend, &mut gathered);
+            points::gather_latents(id, push, views, &there, &grid, &residual, &mut gathered);
         });
-        let own = StartingAt { all: &addend[..], first: 120 };
+        let own = StartingAt { all: &residual[..], first: 120 };
         let expected: Vec<f32> =
             (0..120).map(|at| gathered_value(&views[..], &there[..], &grid[..], &own, &block, at)).collect();
         assert_eq!(gathered[120..240], expected);

@@ -57,7 +57,7 @@ fn the_stamp_is_written_as_it_is_read() {
 
 #[test]
 fn a_changed_source_is_noticed() {
-    for file in ["core/src/photo/sweep.rs", "vulkan/shaders/src/march.rs", "vulkan/compiler/src/refine.rs"] {
+    for file in ["core/src/photo/sweep.rs", "vulkan/shaders/src/ray_marching.rs", "vulkan/compiler/src/refine.rs"] {
         let folder = copy();
         assert_eq!(stale(folder.path()), Vec::<String>::new());
         change(folder.path(), file, |text| text + " ");
@@ -69,14 +69,17 @@ fn a_changed_source_is_noticed() {
 fn a_new_and_a_lost_source_are_noticed() {
     let folder = copy();
     fs::write(folder.path().join("core/src/photo/new.rs"), "").expect("a file");
-    fs::remove_file(folder.path().join("core/src/photo/march.rs")).expect("a file");
-    assert_eq!(stale(folder.path()), ["source core/src/photo/march.rs is gone", "source core/src/photo/new.rs is new"]);
+    fs::remove_file(folder.path().join("core/src/photo/ray_marching.rs")).expect("a file");
+    assert_eq!(
+        stale(folder.path()),
+        ["source core/src/photo/ray_marching.rs is gone", "source core/src/photo/new.rs is new"]
+    );
 }
 
 #[test]
 fn line_ends_of_another_system_are_no_change() {
     let folder = copy();
-    change(folder.path(), "core/src/photo/march.rs", |text| text.replace('\n', "\r\n"));
+    change(folder.path(), "core/src/photo/ray_marching.rs", |text| text.replace('\n', "\r\n"));
     assert_eq!(stale(folder.path()), Vec::<String>::new());
 }
 

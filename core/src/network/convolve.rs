@@ -1,12 +1,12 @@
-//! Convolution of an image with bias, addend, scaled and rectified output. (Networks' "convolution": a correlation.)
+//! Convolution of an image with bias, residual, scaled and rectified output. (Networks' "convolution": a correlation.)
 //!
-//! Input, output and addend may be some of the channels of wider images, so that images are put side by side without
+//! Input, output and residual may be some of the channels of wider images, so that images are put side by side without
 //! copies.
 //!
 //! It is the matrix product of the image's patches, `[output pixel][row of the window][column of the window][channel]`,
 //! with the weights; [`patch_value`] is that matrix, which devices read without storing it.
 
-use super::product::{first_of_sum, rectified};
+use super::linear::{first_of_sum, rectified};
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
@@ -48,12 +48,12 @@ pub struct ConvolveBlock {
     pub scale: f32,
     /// Negative outputs become 0.
     pub relu_outputs: u32,
-    /// Whether there is an addend.
-    pub has_addend: u32,
-    /// Numbers from a pixel of the addend to the next; 0: all pixels have the same.
-    pub addend_pitch: u32,
-    /// Where the addend's first pixel's first channel lies.
-    pub addend_first: u32,
+    /// Whether there is a residual.
+    pub has_residual: u32,
+    /// Numbers from a pixel of the residual to the next; 0: all pixels have the same.
+    pub residual_pitch: u32,
+    /// Where the residual's first pixel's first channel lies.
+    pub residual_first: u32,
 }
 
 impl ConvolveBlock {
@@ -69,8 +69,8 @@ impl ConvolveBlock {
             out_first: 0,
             dilation: 1,
             scale: 1.0,
-            addend_pitch: self.out_channels,
-            addend_first: 0,
+            residual_pitch: self.out_channels,
+            residual_first: 0,
             ..self
         }
     }
@@ -121,18 +121,18 @@ pub fn patch_value(inputs: &(impl Fetch<f32> + ?Sized), block: &ConvolveBlock, p
 }
 
 /// The output for channel `channel` of pixel `pixel` from the sum of the products: `bias[channel]` plus
-/// `addend[pixel][channel]` comes first, then `sum`; the result is scaled and rectified.
+/// `residual[pixel][channel]` comes first, then `sum`; the result is scaled and rectified.
 #[inline]
 pub fn convolved(
     bias: &(impl Fetch<f32> + ?Sized),
-    addend: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
     block: &ConvolveBlock,
     pixel: u32,
     channel: u32,
     sum: f32,
 ) -> f32 {
-    let element = (block.addend_first + pixel * block.addend_pitch + channel) as usize;
-    let first = first_of_sum(bias, addend, block.has_addend, element, channel as usize);
+    let element = (block.residual_first + pixel * block.residual_pitch + channel) as usize;
+    let first = first_of_sum(bias, residual, block.has_residual, element, channel as usize);
     rectified((first + sum) * block.scale, block.relu_outputs)
 }
 
@@ -144,7 +144,7 @@ pub fn convolve_element(
     inputs: &(impl Fetch<f32> + ?Sized),
     weights: &(impl Fetch<f32> + ?Sized),
     bias: &(impl Fetch<f32> + ?Sized),
-    addend: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
     block: &ConvolveBlock,
     pixel: u32,
     channel: u32,
@@ -156,5 +156,5 @@ pub fn convolve_element(
         sum += patch_value(inputs, block, pixel, inner) * weight;
         inner += 1;
     }
-    convolved(bias, addend, block, pixel, channel, sum)
+    convolved(bias, residual, block, pixel, channel, sum)
 }

@@ -3,7 +3,7 @@
 //! It is the matrix product of the input's pixels with `weights[input channel][place in the square][output channel]`,
 //! whose results are put where they belong.
 
-use super::product::rectified;
+use super::linear::rectified;
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 

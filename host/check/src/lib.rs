@@ -9,10 +9,10 @@
 //! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
 //! oracle, attention_oracle,     what must come out
 //!   camera_oracle, photo_oracle,
-//!   ray_oracle, light_oracle,
+//!   ray_oracle, compositing_oracle,
 //!   winograd_oracle,
 //!   network_oracle, point_oracle,
-//!   normalise_oracle,
+//!   group_norm_oracle,
 //!   matrix_oracle, volume_oracle
 //! poses, sights, world          inputs for a seed
 //! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
@@ -29,11 +29,11 @@ pub mod camera_oracle;
 pub mod case;
 pub mod cases;
 pub mod compare;
-pub mod light_oracle;
+pub mod compositing_oracle;
+pub mod group_norm_oracle;
 pub mod matrix_oracle;
 pub mod measure;
 pub mod network_oracle;
-pub mod normalise_oracle;
 pub mod oracle;
 pub mod photo_oracle;
 pub mod picture;

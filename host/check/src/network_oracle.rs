@@ -5,7 +5,7 @@ use super::camera_oracle::{bilinear, tents};
 use super::winograd_oracle::{SIDE, Tile};
 use viewfuse_core::network::convolve::ConvolveBlock;
 use viewfuse_core::network::depthwise::DepthwiseBlock;
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
 use viewfuse_core::network::transpose::TransposedBlock;
 
@@ -19,11 +19,11 @@ pub struct LayerInputs<'a> {
     /// `[column]`.
     pub bias: &'a [f32],
     /// As the outputs, if there is one.
-    pub addend: Option<&'a [f32]>,
+    pub residual: Option<&'a [f32]>,
 }
 
 impl LayerInputs<'_> {
-    /// A sum in any order: bias, addend, and products of `input(inner)` with a column's weights.
+    /// A sum in any order: bias, residual, and products of `input(inner)` with a column's weights.
     fn sum(
         &self,
         element: usize,
@@ -33,8 +33,8 @@ impl LayerInputs<'_> {
     ) -> Bounded {
         let products =
             (0..inner_count).map(|inner| f64::from(input(inner)) * f64::from(self.weights[inner * columns + column]));
-        let addend = self.addend.map_or(0.0, |addend| f64::from(addend[element]));
-        Bounded::sum(products.chain([f64::from(self.bias[column]), addend]))
+        let residual = self.residual.map_or(0.0, |residual| f64::from(residual[element]));
+        Bounded::sum(products.chain([f64::from(self.bias[column]), residual]))
     }
 }
 
@@ -43,8 +43,8 @@ fn relu(value: Bounded, relu: u32) -> Bounded {
     if relu == 0 { value } else { value.greater(Bounded::ZERO) }
 }
 
-/// Output number `element` of a matrix product.
-pub fn product(layer: &LayerInputs, block: &ProductBlock, element: usize) -> Bounded {
+/// Output number `element` of a linear layer.
+pub fn linear(layer: &LayerInputs, block: &LinearBlock, element: usize) -> Bounded {
     let (columns, inner_count) = (block.column_count as usize, block.inner_count as usize);
     let row = &layer.inputs[element / columns * inner_count..][..inner_count];
     let least = if block.relu_inputs == 0 { f32::MIN } else { 0.0 };
@@ -107,7 +107,7 @@ pub fn convolve_wide(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, c
     ended(block, Bounded { error: sum.error + tile.error(), ..sum })
 }
 
-/// Bias, addend and products.
+/// Bias, residual and products.
 fn convolve_sum(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channel: usize) -> Bounded {
     let (columns, channels, side) = (block.out_channels as usize, block.in_channels as usize, block.size as usize);
     let out = [pixel / block.out_width as usize, pixel % block.out_width as usize];
@@ -115,8 +115,8 @@ fn convolve_sum(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channe
         let place = [inner / channels / side, inner / channels % side];
         seen(layer, block, out, place, inner % channels)
     };
-    let addend = block.addend_first as usize + pixel * block.addend_pitch as usize + channel;
-    layer.sum(addend, [side * side * channels, columns], channel, input)
+    let residual = block.residual_first as usize + pixel * block.residual_pitch as usize + channel;
+    layer.sum(residual, [side * side * channels, columns], channel, input)
 }
 
 /// Scaled and rectified.

@@ -6,7 +6,7 @@
 mod shade;
 mod sweep;
 
-pub use shade::{Colour, Pixel, depth_at, march, sample};
+pub use shade::{Colour, Pixel, depth_at, march_ray, sample};
 pub use sweep::{match_cost, mean_column, pick_depth, sum_row};
 
 use crate::bounded::{Bounded, ROUNDING};

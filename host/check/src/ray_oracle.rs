@@ -1,4 +1,4 @@
-//! Rays, samples on them, and what is wanted of them, in `f64` with bounds on what `f32` may make of them.
+//! Rays, samples on them, and the sample mask, in `f64` with bounds on what `f32` may make of them.
 //!
 //! Random numbers are whole numbers until they are scaled, and are taken from the code under test: known answers are held
 //! against them elsewhere.
@@ -10,7 +10,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock, PROBABILITY_FLOOR};
 use viewfuse_core::random::uniform_pair;
 use viewfuse_core::rays::{CastBlock, TargetRay};
-use viewfuse_core::wanted::WantedBlock;
+use viewfuse_core::sample_mask::SampleMaskBlock;
 
 /// Products below it may be flushed to 0.
 const NEGLIGIBLE: f64 = f32::MIN_POSITIVE as f64;
@@ -43,7 +43,7 @@ pub fn coarse_depth(ray: &TargetRay, pixel: u32, sample: u32, block: &CoarseBloc
 }
 
 /// The random numbers of a fine sample.
-pub fn draw_chance(pixel: u32, index: u32, block: &FineBlock) -> [Bounded; 2] {
+pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [Bounded; 2] {
     if index < block.importance_count {
         let [first, second] = uniform_pair(block.seed, pixel, block.coarse_count + index);
         let place = (Bounded::from(index) + first.into()) / Bounded::from(block.importance_count);
@@ -66,15 +66,15 @@ pub fn fine_depth(
     seen: &[[f32; 2]],
     ray: &TargetRay,
     [depth, opacity]: [f32; 2],
-    chance: [f32; 2],
+    draw: [f32; 2],
     index: u32,
     block: &FineBlock,
 ) -> Option<Bounded> {
-    let chance = chance.map(Bounded::from);
+    let draw = draw.map(Bounded::from);
     if index >= block.importance_count {
         let times_opacity = if block.depth_times_opacity == 0 { 1.0 } else { opacity };
         let centre = Bounded::from(depth) * Bounded::from(times_opacity);
-        return Some((centre + chance[0] * Bounded::from(block.depth_deviation)).clamped(ray.near, ray.far));
+        return Some((centre + draw[0] * Bounded::from(block.depth_deviation)).clamped(ray.near, ray.far));
     }
     let masses = seen.iter().map(|[weight, _]| Bounded::from(*weight) + Bounded::from(PROBABILITY_FLOOR));
     let reached: Vec<Bounded> = masses
@@ -83,13 +83,13 @@ pub fn fine_depth(
             Some(*sum)
         })
         .collect();
-    let wanted = chance[0] * reached[reached.len() - 1];
+    let wanted = draw[0] * reached[reached.len() - 1];
     // In front of it are the parts that end at or below the wanted sum; the last part is never.
     let mut part = 0_u32;
     for end in &reached[..reached.len() - 1] {
         part += u32::from(!wanted.below(*end)?);
     }
-    Some(depth_at(ray, (Bounded::from(part) + chance[1]) / Bounded::from(block.coarse_count)))
+    Some(depth_at(ray, (Bounded::from(part) + draw[1]) / Bounded::from(block.coarse_count)))
 }
 
 /// A ray's depths in order.
@@ -131,14 +131,14 @@ fn passing(optical_depth: Bounded) -> Bounded {
     if optical_depth == Bounded::ZERO { Bounded::ONE } else { (-optical_depth).exp() }
 }
 
-/// Whether a sample is wanted; `None` where rounding decides. `seen[ray][part]` is weight and transmittance.
-pub fn is_wanted(
+/// Whether a sample is in the mask; `None` where rounding decides. `seen[ray][part]` is weight and transmittance.
+pub fn is_sampled(
     seen: &[[f32; 2]],
     ray: &TargetRay,
     depth: f32,
     index: u32,
     pixel: u32,
-    block: &WantedBlock,
+    block: &SampleMaskBlock,
 ) -> Option<bool> {
     let share = (Bounded::from(depth) - ray.near.into()) / (Bounded::from(ray.far) - ray.near.into());
     let part = share * Bounded::from(block.part_count);
@@ -177,14 +177,14 @@ fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
     }
 }
 
-/// Whether what was seen of a ray makes samples in a part wanted.
-fn says_so(seen: &[[f32; 2]], part: u32, block: &WantedBlock) -> Option<bool> {
+/// Whether what was seen of a ray puts samples in a part into the mask.
+fn says_so(seen: &[[f32; 2]], part: u32, block: &SampleMaskBlock) -> Option<bool> {
     let part = part as usize;
     let around = &seen[part.saturating_sub(1)..seen.len().min(part + 2)];
     let [end_weight, end_transmittance] = seen[seen.len() - 1].map(Bounded::from);
     let opacity = Bounded::ONE - (end_transmittance - end_weight);
     let sees_too_little = opacity.below(block.least_opacity.into());
-    let ends_before = !(around[0][1] > block.settled);
+    let ends_before = !(around[0][1] > block.termination);
     let occupied = |[weight, transmittance]: &[f32; 2]| {
         let least = Bounded::from(block.least_share) * Bounded::from(*transmittance);
         let flushed = if least.value > 0.0 { NEGLIGIBLE } else { 0.0 };

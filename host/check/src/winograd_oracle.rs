@@ -57,7 +57,7 @@ pub struct Tile<I, W> {
 }
 
 impl<I: Fn([usize; 2], usize) -> f64, W: Fn([usize; 2], usize) -> f64> Tile<I, W> {
-    /// How far the output may be off, beside what bias and addend bring.
+    /// How far the output may be off, beside what bias and residual bring.
     pub fn error(&self) -> f64 {
         let mut magnitudes = 0.0;
         for channel in 0..self.channels {

@@ -4,12 +4,12 @@
 //! row says `twin`, the form has its own, faster order of work, and the body in `viewfuse-core` is the definition that it
 //! is tested against.
 
-mod light;
+mod compositing;
+mod group_norm;
 mod linear;
 mod lists;
 mod matrices;
 mod network;
-mod normalise;
 mod photo;
 mod points;
 mod rays;
@@ -22,11 +22,11 @@ mod winograd;
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
-use light::*;
+use compositing::*;
+use group_norm::*;
 use lists::*;
 use matrices::*;
 use network::*;
-use normalise::*;
 use photo::*;
 use points::*;
 use rays::*;

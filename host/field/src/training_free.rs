@@ -6,7 +6,7 @@ mod bounds;
 use super::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, SourceSide};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::photo::march::MarchBlock;
+use viewfuse_core::photo::ray_marching::MarchBlock;
 use viewfuse_core::photo::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
 use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
 use viewfuse_device::{Device, PhotoScene, Pixels};
@@ -207,7 +207,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let count = (width * height) as usize;
         let weights = device.upload(&request.view_weights())?;
-        let target = MarchBlock { target: target.block(0), background: *background, settled };
+        let target = MarchBlock { target: target.block(0), background: *background, termination: settled };
         let mut pixels: Pixels<D> = Pixels { colours: device.zeros(count)?, depths: device.zeros(count)? };
         let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
         progress.expect(height.div_ceil(band_rows) as usize);
@@ -216,7 +216,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             let row_count = band_rows.min(height - first_row);
             let PhotoScene { object_buffer: object, views, footprints, texels, .. } = &*scene;
             let Pixels { colours, depths: pixel_depths } = &mut pixels;
-            device.march(
+            device.march_rays(
                 &target,
                 first_row,
                 row_count,

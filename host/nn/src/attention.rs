@@ -27,7 +27,7 @@ pub fn self_attention<D: Device>(scratch: &mut Scratch<'_, D>, qkv: &Image<D>) -
         right_first: channels,
         scale: 1.0 / (channels as f32).sqrt(),
     };
-    device.multiply_matrices(&block, &qkv.values, &qkv.values, &mut scores.values)?;
+    device.matrix_product(&block, &qkv.values, &qkv.values, &mut scores.values)?;
     device.softmax_rows(&pixels, pixels, &scores.values, &mut weights.values)?;
     let block = MatrixBlock {
         row_count: pixels,
@@ -41,7 +41,7 @@ pub fn self_attention<D: Device>(scratch: &mut Scratch<'_, D>, qkv: &Image<D>) -
         scale: 1.0,
     };
     let mut attended = scratch.image(qkv.size.with_channels(channels))?;
-    device.multiply_matrices(&block, &weights.values, &qkv.values, &mut attended.values)?;
+    device.matrix_product(&block, &weights.values, &qkv.values, &mut attended.values)?;
     scratch.recycle(scores);
     scratch.recycle(weights);
     Ok(attended)

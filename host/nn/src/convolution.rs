@@ -107,12 +107,12 @@ impl<D: Device> Convolution<D> {
     ) -> Result<(), DeviceError> {
         let block = self.block(options, image, output);
         debug_assert_eq!([block.out_height, block.out_width], [output.size.height, output.size.width]);
-        let (residual, addend_pitch, addend_first) = match residual {
+        let (residual, residual_pitch, residual_first) = match residual {
             Residual::None => (None, 0, 0),
             Residual::Image(image) => (Some(&image.values), image.pitch, image.first),
             Residual::Channels(values, first) => (Some(values), 0, first),
         };
-        let block = ConvolveBlock { addend_pitch, addend_first, ..block };
+        let block = ConvolveBlock { residual_pitch, residual_first, ..block };
         self.dispatch(device, &block, image, residual, output)
     }
 

@@ -1,6 +1,6 @@
 //! Linear layers.
 
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_device::{Device, DeviceError, Layer};
 
 /// A linear layer on a device: `outputs[row][output] = bias[output] + sum over inputs of inputs[row][input] *
@@ -42,16 +42,16 @@ impl<D: Device> Linear<D> {
         residual: Option<&D::Buffer<f32>>,
         outputs: &mut D::Buffer<f32>,
     ) -> Result<(), DeviceError> {
-        let block = ProductBlock {
+        let block = LinearBlock {
             row_count,
             inner_count: self.in_count,
             column_count: self.out_count,
             relu_inputs: u32::from(options.relu_inputs),
             relu_outputs: u32::from(options.relu_outputs),
-            ..ProductBlock::default()
+            ..LinearBlock::default()
         };
         let Layer { weights, bias } = &self.layer;
-        device.product(&block, inputs, weights, bias, residual, outputs)
+        device.linear(&block, inputs, weights, bias, residual, outputs)
     }
 }
 

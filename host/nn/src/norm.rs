@@ -2,7 +2,7 @@
 
 use super::image::Image;
 use super::scratch::Scratch;
-use viewfuse_core::network::normalise::NormaliseBlock;
+use viewfuse_core::network::group_norm::GroupNormBlock;
 use viewfuse_device::{Device, DeviceError};
 
 /// A group norm on a device.
@@ -25,7 +25,7 @@ impl<D: Device> GroupNorm<D> {
     /// If the device is lost or has no memory left.
     pub fn run(&self, scratch: &mut Scratch<'_, D>, image: &Image<D>, silu: bool) -> Result<Image<D>, DeviceError> {
         let device = scratch.device();
-        let block = NormaliseBlock {
+        let block = GroupNormBlock {
             pixel_count: image.size.pixel_count(),
             channels: image.size.channels,
             in_pitch: image.pitch,
@@ -36,10 +36,10 @@ impl<D: Device> GroupNorm<D> {
         };
         let mut parts = device.zeros((block.part_count() * block.group_count) as usize)?;
         let mut statistics = device.zeros(block.group_count as usize)?;
-        device.part_moments(&block, &image.values, &mut parts)?;
-        device.merge_moments(&block, &parts, &mut statistics)?;
+        device.group_norm_partials(&block, &image.values, &mut parts)?;
+        device.group_norm_statistics(&block, &parts, &mut statistics)?;
         let mut output = scratch.image(image.size)?;
-        device.normalise(&block, &image.values, &statistics, &self.weights, &self.bias, &mut output.values)?;
+        device.group_norm(&block, &image.values, &statistics, &self.weights, &self.bias, &mut output.values)?;
         Ok(output)
     }
 }

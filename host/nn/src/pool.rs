@@ -5,7 +5,7 @@ use super::image::{HostImage, Image, Size};
 use super::scratch::Scratch;
 use super::window::Windows;
 use rayon::prelude::*;
-use viewfuse_core::network::normalise::MeanBlock;
+use viewfuse_core::network::group_norm::MeanBlock;
 use viewfuse_core::network::resample::PoolBlock;
 use viewfuse_device::{Device, DeviceError};
 

@@ -3,11 +3,11 @@
 use super::{UNTOUCHED, dispatch, numbers};
 use viewfuse_core::network::attend::{softmax_scale, softmax_value};
 use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
-use viewfuse_core::network::normalise::{
-    MeanBlock, NormaliseBlock, channel_mean, merged_moments, normalised_element, part_moments,
+use viewfuse_core::network::group_norm::{
+    GroupNormBlock, MeanBlock, channel_mean, group_norm_element, group_norm_partials, group_norm_statistics,
 };
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
-use viewfuse_shaders::{matrices, network, normalise};
+use viewfuse_shaders::{group_norm, matrices, network};
 
 #[test]
 fn other_sizes_are_core_s() {
@@ -65,7 +65,7 @@ fn convolve_depthwise_is_core_s() {
 
 #[test]
 fn normalise_is_core_s() {
-    let block = NormaliseBlock {
+    let block = GroupNormBlock {
         pixel_count: 150,
         channels: 12,
         in_pitch: 14,
@@ -75,25 +75,28 @@ fn normalise_is_core_s() {
         silu_outputs: 1,
     };
     let inputs = numbers(25, 150 * 14);
-    let mut parts = vec![[UNTOUCHED; 2]; 12];
-    dispatch(block, 12, |id, push| normalise::part_moments(id, push, &inputs, &mut parts));
-    assert_eq!(parts, (0..12).map(|at| part_moments(&inputs[..], &block, at)).collect::<Vec<[f32; 2]>>());
+    let mut partials = vec![[UNTOUCHED; 2]; 12];
+    dispatch(block, 12, |id, push| group_norm::group_norm_partials(id, push, &inputs, &mut partials));
+    assert_eq!(partials, (0..12).map(|at| group_norm_partials(&inputs[..], &block, at)).collect::<Vec<[f32; 2]>>());
 
-    let mut moments = vec![[UNTOUCHED; 2]; 4];
-    dispatch(block, 4, |id, push| normalise::merge_moments(id, push, &parts, &mut moments));
-    assert_eq!(moments, (0..4).map(|group| merged_moments(&parts[..], &block, group)).collect::<Vec<[f32; 2]>>());
+    let mut statistics = vec![[UNTOUCHED; 2]; 4];
+    dispatch(block, 4, |id, push| group_norm::group_norm_statistics(id, push, &partials, &mut statistics));
+    assert_eq!(
+        statistics,
+        (0..4).map(|group| group_norm_statistics(&partials[..], &block, group)).collect::<Vec<[f32; 2]>>()
+    );
 
     let (weights, bias) = (numbers(26, 12), numbers(27, 12));
     let mut outputs = vec![UNTOUCHED; 1800];
     dispatch(block, 1800, |id, push| {
-        normalise::normalise(id, push, &inputs, &moments, &weights, &bias, &mut outputs);
+        group_norm::group_norm(id, push, &inputs, &statistics, &weights, &bias, &mut outputs);
     });
-    let normalised = |at| normalised_element(&inputs[..], &moments[..], &weights[..], &bias[..], &block, at);
+    let normalised = |at| group_norm_element(&inputs[..], &statistics[..], &weights[..], &bias[..], &block, at);
     assert_eq!(outputs, (0..1800).map(normalised).collect::<Vec<f32>>());
 
     let block = MeanBlock { pixel_count: 21, channels: 100 };
     let mut means = vec![UNTOUCHED; 100];
-    dispatch(block, 100, |id, push| normalise::channel_means(id, push, &inputs, &mut means));
+    dispatch(block, 100, |id, push| group_norm::channel_means(id, push, &inputs, &mut means));
     assert_eq!(means, (0..100).map(|channel| channel_mean(&inputs[..], &block, channel)).collect::<Vec<f32>>());
 }
 

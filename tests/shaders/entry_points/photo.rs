@@ -3,9 +3,9 @@
 use super::{UNTOUCHED, dispatch, numbers};
 use viewfuse::check::world::World;
 use viewfuse_core::photo::hull::hull_entry;
-use viewfuse_core::photo::march::{MarchBlock, march};
+use viewfuse_core::photo::ray_marching::{MarchBlock, march_ray};
 use viewfuse_core::photo::sweep::{SweepBlock, match_cost, mean_column, pick_depth, sum_row};
-use viewfuse_shaders::{march as march_entry, sweep};
+use viewfuse_shaders::{ray_marching, sweep};
 
 /// Binary logarithm of the pages' length by which a map of this length takes all four.
 fn page_shift(length: usize) -> u32 {
@@ -124,13 +124,13 @@ fn windows_and_depths_are_core_s() {
 #[test]
 fn march_is_core_s() {
     let world = World::new(1);
-    let block = MarchBlock { target: world.target, background: [0.2, 0.4, 0.6], settled: 0.01 };
+    let block = MarchBlock { target: world.target, background: [0.2, 0.4, 0.6], termination: 0.01 };
     let count = block.target.width * block.target.height;
     let World { object, views, footprints, texels, depths, weights, .. } = &world;
     let expected: Vec<([f32; 4], f32)> = (0..count)
         .map(|pixel| {
             let at = [pixel % block.target.width, pixel / block.target.width].map(|side| side as f32 + 0.5);
-            let seen = march(object, views, footprints, &texels[..], &depths[..], weights, &block, at);
+            let seen = march_ray(object, views, footprints, &texels[..], &depths[..], weights, &block, at);
             ([seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity], seen.depth)
         })
         .collect();
@@ -142,7 +142,7 @@ fn march_is_core_s() {
             let [da, db, dc, dd] = pages(depths, shift);
             let [ca, cb, cc, cd] = pages_mut(&mut colours, shift);
             let [pa, pb, pc, pd] = pages_mut(&mut seen_depths, shift);
-            march_entry::march(
+            ray_marching::march_rays(
                 id, push, object, views, footprints, ta, tb, tc, td, da, db, dc, dd, weights, ca, cb, cc, cd, pa, pb,
                 pc, pd, shift,
             );

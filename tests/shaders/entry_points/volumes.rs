@@ -3,10 +3,10 @@
 use super::{UNTOUCHED, dispatch, numbers, points_of};
 use viewfuse::check::world::World;
 use viewfuse_core::genvs::{
-    DenoiserInputBlock, FeatureBlock, VolumeBlock, denoiser_input, summed_feature, volume_value,
-    volume_value_of_halves, weigh_features,
+    DenoiserInputBlock, FeatureBlock, VolumeBlock, denoiser_input, summed_feature, volume_value, volume_value_f16,
+    weigh_features,
 };
-use viewfuse_core::half::packed_halves;
+use viewfuse_core::half_precision::packed_f16;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_shaders::volumes;
 
@@ -37,8 +37,8 @@ fn halves_are_core_s() {
     let world = World::new(1);
     let (views, there, numbers) = (&world.views, points_of(&world, 40), numbers(35, 5 * 7 * 3 * 3));
     let mut volume = vec![0xabab_abab; 160];
-    dispatch(315, 158, |id, push| volumes::pack_halves(id, push, &numbers, &mut volume));
-    let expected: Vec<u32> = (0..158).map(|word| packed_halves(&numbers[..], 315, word)).collect();
+    dispatch(315, 158, |id, push| volumes::pack_f16(id, push, &numbers, &mut volume));
+    let expected: Vec<u32> = (0..158).map(|word| packed_f16(&numbers[..], 315, word)).collect();
     assert_eq!(volume[..158], expected);
     assert_eq!(volume[158..], [0xabab_abab; 2]);
 
@@ -53,8 +53,8 @@ fn halves_are_core_s() {
         far: 9.0,
     };
     let mut gathered = vec![UNTOUCHED; views.len() * 120];
-    dispatch(block, 120, |id, push| volumes::gather_halves(id, push, views, &there, &volume, &mut gathered));
-    let value = |at| volume_value_of_halves(&views[..], &there[..], &volume[..], &block, at);
+    dispatch(block, 120, |id, push| volumes::gather_volume_f16(id, push, views, &there, &volume, &mut gathered));
+    let value = |at| volume_value_f16(&views[..], &there[..], &volume[..], &block, at);
     let expected: Vec<f32> = (0..120).map(value).collect();
     assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));
     assert_eq!(gathered[120..240], expected);

@@ -10,13 +10,13 @@
 //! On the host the same entry points are plain functions, which tests call.
 #![cfg_attr(target_arch = "spirv", no_std)]
 
-pub mod light;
+pub mod compositing;
+pub mod group_norm;
 pub mod lists;
-pub mod march;
 pub mod matrices;
 pub mod network;
-pub mod normalise;
 pub mod points;
+pub mod ray_marching;
 pub mod rays;
 pub mod sampler;
 pub mod sweep;

@@ -8,9 +8,9 @@ use spirv_std::spirv;
 use viewfuse_core::network::attend::{MatrixBlock, softmax_scale, softmax_value};
 
 /// A part of a tile of rows and columns: invocation `first + id.x`.
-#[spirv(compute(threads(64), entry_point_name = "multiply_matrices"))]
+#[spirv(compute(threads(64), entry_point_name = "matrix_product"))]
 #[allow(clippy::too_many_arguments)]
-pub fn multiply_matrices(
+pub fn matrix_product(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<MatrixBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[f32],

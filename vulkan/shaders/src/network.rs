@@ -7,7 +7,7 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::network::convolve::{ConvolveBlock, convolved, patch_value};
 use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
-use viewfuse_core::network::product::{ProductBlock, first_of_sum, input_value, rectified};
+use viewfuse_core::network::linear::{LinearBlock, first_of_sum, input_value, rectified};
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_core::pages::Fetch;
@@ -21,14 +21,14 @@ pub fn convolve(
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
     #[spirv(workgroup)] rows: &mut Shared,
     #[spirv(workgroup)] columns: &mut Shared,
 ) {
     let block = &push.parameters;
     let channels = block.out_channels;
-    let (inputs, weights, bias, addend) = (Endless(inputs), Endless(weights), Endless(bias), Endless(addend));
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
     multiply(
         push.piece.first + id.x,
         Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
@@ -37,7 +37,7 @@ pub fn convolve(
         move |pixel, inner| patch_value(&inputs, block, pixel, inner),
         move |inner, channel| weights.fetch((inner * channels + channel) as usize),
         move |pixel, channel, sum| {
-            let value = convolved(&bias, &addend, block, pixel, channel, sum);
+            let value = convolved(&bias, &residual, block, pixel, channel, sum);
             store(outputs, block.place(pixel, channel), value);
         },
     );
@@ -118,22 +118,22 @@ pub fn upsample(
 }
 
 /// A part of a tile of rows and columns: invocation `first + id.x`.
-#[spirv(compute(threads(64), entry_point_name = "product"))]
+#[spirv(compute(threads(64), entry_point_name = "linear"))]
 #[allow(clippy::too_many_arguments)]
-pub fn product(
+pub fn linear(
     #[spirv(global_invocation_id)] id: UVec3,
-    #[spirv(push_constant)] push: &Push<ProductBlock>,
+    #[spirv(push_constant)] push: &Push<LinearBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
     #[spirv(workgroup)] rows: &mut Shared,
     #[spirv(workgroup)] columns: &mut Shared,
 ) {
     let block = &push.parameters;
     let column_count = block.column_count;
-    let (inputs, weights, bias, addend) = (Endless(inputs), Endless(weights), Endless(bias), Endless(addend));
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
     multiply(
         push.piece.first + id.x,
         Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
@@ -143,7 +143,7 @@ pub fn product(
         move |inner, column| weights.fetch((inner * column_count + column) as usize),
         move |row, column, sum| {
             let element = (row * column_count + column) as usize;
-            let first = first_of_sum(&bias, &addend, block.has_addend, element, column as usize);
+            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
             store(outputs, element, rectified(first + sum, block.relu_outputs));
         },
     );

@@ -52,7 +52,7 @@ pub fn gather_latents(
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] grid: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] addend: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] gathered: &mut [f32],
 ) {
     if id.x >= push.piece.count {
@@ -60,8 +60,8 @@ pub fn gather_latents(
     }
     let block = &push.parameters;
     let element = (push.piece.first + id.x) as usize;
-    let addend = StartingAt { all: addend, first: block.first() };
-    gathered[block.first() + element] = pixelnerf::gathered_value(views, points, grid, &addend, block, element);
+    let residual = StartingAt { all: residual, first: block.first() };
+    gathered[block.first() + element] = pixelnerf::gathered_value(views, points, grid, &residual, block, element);
 }
 
 /// What the network says of point number `first + id.x`, stored as the sample that the point is.

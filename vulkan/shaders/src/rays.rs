@@ -6,7 +6,7 @@ use spirv_std::spirv;
 use viewfuse_core::depths::{self, CoarseBlock, FineBlock};
 use viewfuse_core::pages::StartingAt;
 use viewfuse_core::rays::{self, CastBlock, PlaceBlock, RayPoint, TargetRay};
-use viewfuse_core::wanted::{self, RaysBlock, WantedBlock};
+use viewfuse_core::sample_mask::{self, RaysBlock, SampleMaskBlock};
 
 /// Ray number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "cast_rays"))]
@@ -75,7 +75,7 @@ pub fn weigh_samples(
     let mut sample = 0;
     while sample < sample_count {
         let at = (ray * sample_count + sample) as usize;
-        let (weighed, sum) = wanted::weigh_sample(optical_depth, samples[at][3]);
+        let (weighed, sum) = sample_mask::weigh_sample(optical_depth, samples[at][3]);
         seen[at + (first_ray * sample_count) as usize] = weighed;
         optical_depth = sum;
         sample += 1;
@@ -83,12 +83,12 @@ pub fn weigh_samples(
 }
 
 /// Random numbers of fine sample number `first + id.x`, flat in `[ray][sample]`.
-#[spirv(compute(threads(64), entry_point_name = "draw_chances"))]
-pub fn draw_chances(
+#[spirv(compute(threads(64), entry_point_name = "random_draws"))]
+pub fn random_draws(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<FineBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] pixels: &[u32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] chances: &mut [[f32; 2]],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] draws: &mut [[f32; 2]],
 ) {
     if id.x >= push.piece.count {
         return;
@@ -96,7 +96,7 @@ pub fn draw_chances(
     let block = &push.parameters;
     let element = push.piece.first + id.x;
     let pixel = pixels[(element / block.fine_count()) as usize];
-    chances[element as usize] = depths::draw_chance(pixel, element % block.fine_count(), block);
+    draws[element as usize] = depths::random_draw(pixel, element % block.fine_count(), block);
 }
 
 /// Depth of fine sample number `first + id.x`, flat in `[ray][sample]`.
@@ -109,7 +109,7 @@ pub fn fine_depths(
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] rays: &[TargetRay],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] colours: &[[f32; 4]],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] pixel_depths: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] chances: &[[f32; 2]],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] draws: &[[f32; 2]],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] depths: &mut [f32],
 ) {
     if id.x >= push.piece.count {
@@ -120,8 +120,8 @@ pub fn fine_depths(
     let (ray, sample) = ((element / block.fine_count()) as usize, element % block.fine_count());
     let (centre, opacity) = (pixel_depths[ray], colours[ray][3]);
     let seen = StartingAt { all: seen, first: ray * block.coarse_count as usize };
-    let chance = chances[element as usize];
-    depths[element as usize] = depths::fine_depth(&seen, &rays[ray], centre, opacity, chance, sample, block);
+    let draw = draws[element as usize];
+    depths[element as usize] = depths::fine_depth(&seen, &rays[ray], centre, opacity, draw, sample, block);
 }
 
 /// The place of sample number `first + id.x` among the coarse and fine ones of its ray.
@@ -146,17 +146,17 @@ pub fn merge_depths(
     merged[(ray * count + place) as usize] = depth;
 }
 
-/// Whether sample number `first + id.x`, flat in `[ray][sample]`, is wanted: 1 or 0.
-#[spirv(compute(threads(64), entry_point_name = "wanted_samples"))]
+/// Whether sample number `first + id.x`, flat in `[ray][sample]`, is in the mask: 1 or 0.
+#[spirv(compute(threads(64), entry_point_name = "sample_mask"))]
 #[allow(clippy::too_many_arguments)]
-pub fn wanted_samples(
+pub fn sample_mask(
     #[spirv(global_invocation_id)] id: UVec3,
-    #[spirv(push_constant)] push: &Push<WantedBlock>,
+    #[spirv(push_constant)] push: &Push<SampleMaskBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] seen: &[[f32; 2]],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] rays: &[TargetRay],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] pixels: &[u32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] depths: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] wanted: &mut [u32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] mask: &mut [u32],
 ) {
     if id.x >= push.piece.count {
         return;
@@ -165,6 +165,6 @@ pub fn wanted_samples(
     let element = push.piece.first + id.x;
     let ray = element / block.sample_count;
     let (at, depth) = (ray as usize, depths[element as usize]);
-    let is_wanted = wanted::is_wanted(seen, &rays[at], depth, ray, pixels[at], block);
-    wanted[element as usize] = is_wanted as u32;
+    let is_sampled = sample_mask::is_sampled(seen, &rays[at], depth, ray, pixels[at], block);
+    mask[element as usize] = is_sampled as u32;
 }

@@ -5,7 +5,7 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock};
-use viewfuse_core::half;
+use viewfuse_core::half_precision;
 use viewfuse_core::rays::RayPoint;
 
 /// Feature number `first + id.x` of a view's part of the latents, flat in `[point][feature]`.
@@ -26,9 +26,9 @@ pub fn gather_volume(
     gathered[block.first() + element] = genvs::volume_value(views, points, volume, block, element);
 }
 
-/// Word number `first + id.x`: two numbers of 16 bits.
-#[spirv(compute(threads(64), entry_point_name = "pack_halves"))]
-pub fn pack_halves(
+/// Word number `first + id.x`: two numbers in half precision.
+#[spirv(compute(threads(64), entry_point_name = "pack_f16"))]
+pub fn pack_f16(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<u32>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] numbers: &[f32],
@@ -38,12 +38,12 @@ pub fn pack_halves(
         return;
     }
     let element = (push.piece.first + id.x) as usize;
-    words[element] = half::packed_halves(numbers, push.parameters, element);
+    words[element] = half_precision::packed_f16(numbers, push.parameters, element);
 }
 
 /// Feature number `first + id.x` of a view's part of the latents, flat in `[point][feature]`.
-#[spirv(compute(threads(64), entry_point_name = "gather_halves"))]
-pub fn gather_halves(
+#[spirv(compute(threads(64), entry_point_name = "gather_volume_f16"))]
+pub fn gather_volume_f16(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<VolumeBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
@@ -56,7 +56,7 @@ pub fn gather_halves(
     }
     let block = &push.parameters;
     let element = (push.piece.first + id.x) as usize;
-    gathered[block.first() + element] = genvs::volume_value_of_halves(views, points, volume, block, element);
+    gathered[block.first() + element] = genvs::volume_value_f16(views, points, volume, block, element);
 }
 
 /// Weights of the samples on ray number `first + id.x`.

@@ -3,7 +3,7 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::light_oracle::composite;
+use crate::compositing_oracle::composite;
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
 use viewfuse_core::composite::CompositeBlock;

@@ -1,8 +1,8 @@
-//! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, addends and outputs that are
+//! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, residuals and outputs that are
 //! some of the channels of wider images, all that a convolution can be told. Behind what is read lies NaN, beside what is
 //! written nothing may change.
 
-use super::layers::{Counts, Job, LoadedJob, Product, read, spoil};
+use super::linear::{Counts, Job, Linear, LoadedJob, read, spoil};
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
@@ -76,7 +76,7 @@ pub enum Convolve {}
 
 impl Case for Convolve {
     const KERNEL: Kernel = Kernel::Convolve;
-    // As many as give every shape every combination of addend and rectification.
+    // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-2 };
@@ -86,7 +86,7 @@ impl Case for Convolve {
         ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
         ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
         ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
-        ("addend", |jobs| spoil(jobs, |job| job.addend.as_deref_mut().unwrap_or_default())),
+        ("residual", |jobs| spoil(jobs, |job| job.residual.as_deref_mut().unwrap_or_default())),
         ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.scale *= 1.01)),
     ];
 
@@ -106,8 +106,8 @@ impl Case for Convolve {
             let in_height = ((pixel_count / f64::from(in_width)) as u32 + random.below(3) as u32).max(least);
             let out = |inner: u32| (inner * enlarge + 2 * padding - reach) / stride + 1;
             let flags = index as u64 + seed;
-            let [in_gap, out_gap, addend_gap] = [0, 1, 2].map(|_| gap(random, is_part));
-            // Of some layers all pixels have the same addend.
+            let [in_gap, out_gap, residual_gap] = [0, 1, 2].map(|_| gap(random, is_part));
+            // Of some layers all pixels have the same residual.
             let is_shared = flags.is_multiple_of(3);
             let block = ConvolveBlock {
                 in_height,
@@ -128,18 +128,18 @@ impl Case for Convolve {
                 scale: if flags.is_multiple_of(5) { 0.7 } else { 1.0 },
                 relu_outputs: flags as u32 & 1,
                 // Whether there is one a device sees for itself.
-                has_addend: 0,
-                addend_pitch: if is_shared { 0 } else { out_channels + 2 * addend_gap },
-                addend_first: addend_gap,
+                has_residual: 0,
+                residual_pitch: if is_shared { 0 } else { out_channels + 2 * residual_gap },
+                residual_first: residual_gap,
             };
             let addend_pixels = if is_shared { 0 } else { block.pixel_count() - 1 };
-            let addend_count = addend_gap + addend_pixels * block.addend_pitch + out_channels;
+            let addend_count = residual_gap + addend_pixels * block.residual_pitch + out_channels;
             let counts = Counts {
                 inputs: (in_height * in_width * block.in_pitch) as usize,
                 inner: block.patch_len() as usize,
                 columns: out_channels as usize,
                 bias: out_channels as usize,
-                addend: (flags >> 1 & 1 == 1).then_some(addend_count as usize),
+                residual: (flags >> 1 & 1 == 1).then_some(addend_count as usize),
                 outputs: (block.pixel_count() * block.out_pitch) as usize,
             };
             Job { has_wide_images: is_wide, ..Job::new(random, block, counts) }
@@ -156,8 +156,8 @@ impl Case for Convolve {
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
-            device.convolve(&job.block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, residual, outputs })| {
+            device.convolve(&job.block, inputs, &layer.weights, &layer.bias, residual.as_ref(), outputs)
         })
     }
 
@@ -185,11 +185,11 @@ pub enum ConvolveTransposed {}
 
 impl Case for ConvolveTransposed {
     const KERNEL: Kernel = Kernel::ConvolveTransposed;
-    // As many as give every shape every combination of addend and rectification.
+    // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
-    const REASON: &'static str = Product::REASON;
+    const REASON: &'static str = Linear::REASON;
     const SPOILERS: &'static [Spoiler<Vec<Job<TransposedBlock>>>] = &[
         ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
         ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
@@ -224,7 +224,7 @@ impl Case for ConvolveTransposed {
                 inner: in_channels as usize,
                 columns: block.column_count() as usize,
                 bias: out_channels as usize,
-                addend: None,
+                residual: None,
                 outputs: (out_pixels * block.out_pitch) as usize,
             };
             Job::new(random, block, counts)

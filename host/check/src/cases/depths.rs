@@ -1,4 +1,4 @@
-//! [`Kernel::CoarseDepths`] and [`Kernel::DrawChances`]: what only seeds, pixels and rays decide.
+//! [`Kernel::CoarseDepths`] and [`Kernel::RandomDraws`]: what only seeds, pixels and rays decide.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -92,10 +92,10 @@ impl Case for CoarseDepths {
 }
 
 /// See the module.
-pub enum DrawChances {}
+pub enum RandomDraws {}
 
-impl Case for DrawChances {
-    const KERNEL: Kernel = Kernel::DrawChances;
+impl Case for RandomDraws {
+    const KERNEL: Kernel = Kernel::RandomDraws;
     const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 1.0e-5, least: 1.0e-2 };
@@ -124,36 +124,36 @@ impl Case for DrawChances {
 
     fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job<FineBlock>| {
-            let chances = device.zeros(job.rays.len() * job.block.fine_count() as usize)?;
-            Ok((load_rays(device, &job.pixels, &job.rays)?, chances))
+            let draws = device.zeros(job.rays.len() * job.block.fine_count() as usize)?;
+            Ok((load_rays(device, &job.pixels, &job.rays)?, draws))
         };
         jobs.iter().map(load).collect()
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, (Rays { count, pixels, .. }, chances))| {
-            device.draw_chances(&job.block, *count, pixels, chances)
+        jobs.iter().zip(loaded).try_for_each(|(job, (Rays { count, pixels, .. }, draws))| {
+            device.random_draws(&job.block, *count, pixels, draws)
         })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
-        for (_, chances) in loaded {
-            values.extend(device.download(chances)?.into_flattened());
+        for (_, draws) in loaded {
+            values.extend(device.download(draws)?.into_flattened());
         }
         Ok(values)
     }
 
     fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
-        let chances = |job: &Job<FineBlock>| {
+        let draws = |job: &Job<FineBlock>| {
             let block = job.block;
             let indices =
                 job.pixels.iter().flat_map(move |pixel| (0..block.fine_count()).map(move |index| (*pixel, index)));
             indices
-                .flat_map(move |(pixel, index)| ray_oracle::draw_chance(pixel, index, &block))
+                .flat_map(move |(pixel, index)| ray_oracle::random_draw(pixel, index, &block))
                 .map(Some)
                 .collect::<Vec<_>>()
         };
-        jobs.iter().flat_map(chances).collect()
+        jobs.iter().flat_map(draws).collect()
     }
 }

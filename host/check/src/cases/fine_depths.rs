@@ -23,7 +23,7 @@ pub struct Job {
     /// `[ray]`: opacity and depth.
     pixels: Vec<[f32; 2]>,
     /// `[ray][sample]`.
-    chances: Vec<[f32; 2]>,
+    draws: Vec<[f32; 2]>,
 }
 
 /// The same in a device's memory, and the depths.
@@ -31,7 +31,7 @@ pub struct LoadedJob<D: Device> {
     rays: Rays<D>,
     seen: D::Buffer<[f32; 2]>,
     pixels: Pixels<D>,
-    chances: D::Buffer<[f32; 2]>,
+    draws: D::Buffer<[f32; 2]>,
     depths: D::Buffer<f32>,
 }
 
@@ -74,7 +74,7 @@ fn job(random: &mut Random, size: u32, index: usize, counts: [u32; 3]) -> Job {
         let depth = random.range(f64::from(ray.near), f64::from(ray.far)) as f32;
         if random.below(6) == 0 { [0.0, -7.0] } else { [random.unit() as f32, depth] }
     };
-    let chance = |random: &mut Random, sample: u32| {
+    let draw = |random: &mut Random, sample: u32| {
         if sample >= importance_count {
             return [random.normal() as f32, 0.0];
         }
@@ -85,7 +85,7 @@ fn job(random: &mut Random, size: u32, index: usize, counts: [u32; 3]) -> Job {
         block,
         seen: rays.iter().flat_map(|_| seen(random, coarse_count)).collect(),
         pixels: rays.iter().map(|ray| pixel(random, ray)).collect(),
-        chances: rays.iter().flat_map(|_| 0..fine_count).map(|sample| chance(random, sample)).collect(),
+        draws: rays.iter().flat_map(|_| 0..fine_count).map(|sample| draw(random, sample)).collect(),
         rays,
     }
 }
@@ -109,7 +109,7 @@ impl Case for FineDepths {
         ("pixel_depths", |jobs| {
             jobs.iter_mut().for_each(|job| job.pixels.iter_mut().for_each(|pixel| pixel[1] *= 1.01))
         }),
-        ("chances", |jobs| jobs.iter_mut().for_each(|job| job.chances.iter_mut().for_each(|chance| chance[0] *= 1.01))),
+        ("draws", |jobs| jobs.iter_mut().for_each(|job| job.draws.iter_mut().for_each(|draw| draw[0] *= 1.01))),
         ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.depth_deviation *= 1.01)),
     ];
 
@@ -123,7 +123,7 @@ impl Case for FineDepths {
     }
 
     fn element_count(jobs: &Vec<Job>) -> usize {
-        jobs.iter().map(|job| job.chances.len()).sum()
+        jobs.iter().map(|job| job.draws.len()).sum()
     }
 
     fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
@@ -134,17 +134,17 @@ impl Case for FineDepths {
                 rays: load_rays(device, &vec![0; job.rays.len()], &job.rays)?,
                 seen: device.upload(&job.seen)?,
                 pixels: Pixels { colours: device.upload(&colours)?, depths: device.upload(&depths)? },
-                chances: device.upload(&job.chances)?,
-                depths: device.zeros(job.chances.len())?,
+                draws: device.upload(&job.draws)?,
+                depths: device.zeros(job.draws.len())?,
             })
         };
         jobs.iter().map(load).collect()
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { rays, seen, pixels, chances, depths })| {
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { rays, seen, pixels, draws, depths })| {
             let Pixels { colours, depths: pixel_depths } = pixels;
-            device.fine_depths(&job.block, rays.count, seen, &rays.rays, colours, pixel_depths, chances, depths)
+            device.fine_depths(&job.block, rays.count, seen, &rays.rays, colours, pixel_depths, draws, depths)
         })
     }
 
@@ -155,15 +155,15 @@ impl Case for FineDepths {
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
         let mut expected = Vec::new();
-        for Job { block, rays, seen, pixels, chances } in jobs {
+        for Job { block, rays, seen, pixels, draws } in jobs {
             let fine_count = block.fine_count() as usize;
-            let depth = |(index, chance): (usize, &[f32; 2])| {
+            let depth = |(index, draw): (usize, &[f32; 2])| {
                 let (ray, sample) = (index / fine_count, index % fine_count);
                 let seen = &seen[ray * block.coarse_count as usize..][..block.coarse_count as usize];
                 let [opacity, depth] = pixels[ray];
-                ray_oracle::fine_depth(seen, &rays[ray], [depth, opacity], *chance, sample as u32, block)
+                ray_oracle::fine_depth(seen, &rays[ray], [depth, opacity], *draw, sample as u32, block)
             };
-            expected.par_extend(chances.par_iter().enumerate().map(depth));
+            expected.par_extend(draws.par_iter().enumerate().map(depth));
         }
         expected
     }

@@ -4,7 +4,7 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::light_oracle::fuse_element;
+use crate::compositing_oracle::fuse_element;
 use crate::poses::{numbers, random};
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_device::Device;

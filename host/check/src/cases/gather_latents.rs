@@ -24,7 +24,7 @@ pub struct Job {
     /// `[view]`: `[row][column][channel]`.
     grids: Vec<Vec<f32>>,
     /// `[view][point][channel]`, or nothing.
-    addend: Vec<f32>,
+    residual: Vec<f32>,
 }
 
 impl Job {
@@ -38,7 +38,7 @@ pub struct LoadedJob<D: Device> {
     views: D::Buffer<CameraBlock>,
     points: D::Buffer<RayPoint>,
     grids: Vec<D::Buffer<f32>>,
-    addend: Option<<D as Memory>::Buffer<f32>>,
+    residual: Option<<D as Memory>::Buffer<f32>>,
     gathered: D::Buffer<f32>,
 }
 
@@ -57,9 +57,9 @@ fn job(random: &mut Random, size: u32, index: usize, [view_count, channel_count]
     };
     let node_count = (height * width * channel_count) as usize;
     let grids = views.iter().map(|_| numbers(node_count, || random.normal())).collect();
-    let mut job = Job { block, views, points, grids, addend: Vec::new() };
+    let mut job = Job { block, views, points, grids, residual: Vec::new() };
     if index % 4 < 2 {
-        job.addend = numbers(job.len(), || random.normal());
+        job.residual = numbers(job.len(), || random.normal());
     }
     job
 }
@@ -80,7 +80,9 @@ impl Case for GatherLatents {
             jobs.iter_mut().flat_map(|job| &mut job.points).for_each(|point| point.position[1] *= 1.01);
         }),
         ("grid", |jobs| jobs.iter_mut().for_each(|job| job.grids[0].iter_mut().for_each(|node| *node *= 1.01))),
-        ("addend", |jobs| jobs.iter_mut().for_each(|job| job.addend.iter_mut().for_each(|addend| *addend *= 1.01))),
+        ("residual", |jobs| {
+            jobs.iter_mut().for_each(|job| job.residual.iter_mut().for_each(|residual| *residual *= 1.01))
+        }),
         ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.pixel_centre *= 1.01)),
     ];
 
@@ -103,7 +105,7 @@ impl Case for GatherLatents {
                 views: device.upload(&job.views)?,
                 points: device.upload(&job.points)?,
                 grids: job.grids.iter().map(|grid| device.upload(grid)).collect::<Result<_, _>>()?,
-                addend: if job.addend.is_empty() { None } else { Some(device.upload(&job.addend)?) },
+                residual: if job.residual.is_empty() { None } else { Some(device.upload(&job.residual)?) },
                 gathered: device.zeros(job.len())?,
             })
         };
@@ -111,10 +113,10 @@ impl Case for GatherLatents {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        for (job, LoadedJob { views, points, grids, addend, gathered }) in jobs.iter().zip(loaded) {
+        for (job, LoadedJob { views, points, grids, residual, gathered }) in jobs.iter().zip(loaded) {
             for (grid, view) in grids.iter().zip(0..) {
                 let block = GatherBlock { view, ..job.block };
-                device.gather_latents(&block, views, points, grid, addend.as_ref(), gathered)?;
+                device.gather_latents(&block, views, points, grid, residual.as_ref(), gathered)?;
             }
         }
         Ok(())
@@ -128,7 +130,7 @@ impl Case for GatherLatents {
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
         let mut expected = Vec::new();
-        for Job { block, views, points, grids, addend } in jobs {
+        for Job { block, views, points, grids, residual } in jobs {
             let mut gathered = Vec::new();
             for (view, grid) in views.iter().zip(grids) {
                 let row = |point| match point_oracle::gather(view, grid, point, block) {
@@ -137,8 +139,8 @@ impl Case for GatherLatents {
                 };
                 gathered.par_extend(points.par_iter().flat_map_iter(row));
             }
-            for (value, addend) in gathered.iter_mut().zip(addend) {
-                *value = value.map(|value| value + Bounded::from(*addend));
+            for (value, residual) in gathered.iter_mut().zip(residual) {
+                *value = value.map(|value| value + Bounded::from(*residual));
             }
             expected.extend(gathered);
         }

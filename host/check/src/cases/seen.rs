@@ -1,4 +1,4 @@
-//! [`Kernel::WeighSamples`] and [`Kernel::WantedSamples`]: rays through nothing, mist, smoke and walls, and where it is
+//! [`Kernel::WeighSamples`] and [`Kernel::SampleMask`]: rays through nothing, mist, smoke and walls, and where it is
 //! worth looking again, by what the ray itself saw and by what others around it saw.
 
 use super::fine_depths::seen;
@@ -10,7 +10,7 @@ use crate::ray_oracle;
 use crate::sights::{load_rays, ray};
 use rayon::prelude::*;
 use viewfuse_core::rays::TargetRay;
-use viewfuse_core::wanted::{RaysBlock, WantedBlock};
+use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
@@ -109,7 +109,7 @@ impl Case for WeighSamples {
 /// Rays with samples, and what was seen before.
 #[derive(Clone, Debug)]
 pub struct Looks {
-    block: WantedBlock,
+    block: SampleMaskBlock,
     pixels: Vec<u32>,
     rays: Vec<TargetRay>,
     depths: Vec<f32>,
@@ -121,18 +121,18 @@ pub struct LoadedLooks<D: Device> {
     rays: Rays<D>,
     depths: D::Buffer<f32>,
     seen: D::Buffer<[f32; 2]>,
-    wanted: D::Buffer<u32>,
+    mask: D::Buffer<u32>,
 }
 
 fn looks(random: &mut Random, size: u32, (step, sample_count, part_count): (u32, u32, u32)) -> Looks {
     let ray_count = size.div_ceil(sample_count);
     let (width, height) = (9 + random.below(20) as u32, 9 + random.below(20) as u32);
     let nodes = |side: u32| if step == 0 { 0 } else { side.div_ceil(step) };
-    let block = WantedBlock {
+    let block = SampleMaskBlock {
         sample_count,
         part_count,
         least_share: random.log_range(1.0e-3, 0.5) as f32,
-        settled: [-1.0, 0.0, random.log_range(1.0e-3, 0.5)][random.below(3)] as f32,
+        termination: [-1.0, 0.0, random.log_range(1.0e-3, 0.5)][random.below(3)] as f32,
         least_opacity: [0.0, random.range(0.0, 0.5)][random.below(2)] as f32,
         step,
         seen_columns: nodes(width),
@@ -157,10 +157,10 @@ fn looks(random: &mut Random, size: u32, (step, sample_count, part_count): (u32,
 }
 
 /// See the module.
-pub enum WantedSamples {}
+pub enum SampleMask {}
 
-impl Case for WantedSamples {
-    const KERNEL: Kernel = Kernel::WantedSamples;
+impl Case for SampleMask {
+    const KERNEL: Kernel = Kernel::SampleMask;
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 0.5 };
@@ -196,22 +196,22 @@ impl Case for WantedSamples {
                 rays: load_rays(device, &job.pixels, &job.rays)?,
                 depths: device.upload(&job.depths)?,
                 seen: device.upload(&job.seen)?,
-                wanted: device.zeros(job.depths.len())?,
+                mask: device.zeros(job.depths.len())?,
             })
         };
         jobs.iter().map(load).collect()
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Looks>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedLooks { rays, depths, seen, wanted })| {
-            device.wanted_samples(&job.block, rays.count, seen, &rays.rays, &rays.pixels, depths, wanted)
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedLooks { rays, depths, seen, mask })| {
+            device.sample_mask(&job.block, rays.count, seen, &rays.rays, &rays.pixels, depths, mask)
         })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
         let mut values = Vec::new();
-        for LoadedLooks { wanted, .. } in loaded {
-            values.extend(device.download(wanted)?.into_iter().map(|wanted| wanted as f32));
+        for LoadedLooks { mask, .. } in loaded {
+            values.extend(device.download(mask)?.into_iter().map(|mask| mask as f32));
         }
         Ok(values)
     }
@@ -219,12 +219,12 @@ impl Case for WantedSamples {
     fn expected(jobs: &Vec<Looks>) -> Vec<Option<Bounded>> {
         let mut expected = Vec::new();
         for Looks { block, pixels, rays, depths, seen } in jobs {
-            let wanted = |(index, depth): (usize, &f32)| {
+            let mask = |(index, depth): (usize, &f32)| {
                 let ray = index / block.sample_count as usize;
-                let wanted = ray_oracle::is_wanted(seen, &rays[ray], *depth, ray as u32, pixels[ray], block);
-                wanted.map(|wanted| Bounded::from(u32::from(wanted)))
+                let mask = ray_oracle::is_sampled(seen, &rays[ray], *depth, ray as u32, pixels[ray], block);
+                mask.map(|mask| Bounded::from(u32::from(mask)))
             };
-            expected.par_extend(depths.par_iter().enumerate().map(wanted));
+            expected.par_extend(depths.par_iter().enumerate().map(mask));
         }
         expected
     }

@@ -4,7 +4,7 @@ use super::{NOWHERE, Scene, Seen, Vector, along, centre, interval, look_up, proj
 use crate::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::NO_SURFACE;
-use viewfuse_core::photo::march::{MOST_STEPS, STEP};
+use viewfuse_core::photo::ray_marching::{MOST_STEPS, STEP};
 use viewfuse_core::photo::shade::{
     DEEPEST, EMPTY_ALPHA, FULL_ALPHA, HIDDEN_SHARE, JUMP, SEEN_BEHIND, SURFACE_OFFSET, SURFACE_WIDTH, TRUNCATION,
 };
@@ -150,9 +150,9 @@ pub struct Pixel {
 /// Where rounding decides whether a ray ends, it ends if no more than this passes, and its error grows by what passes.
 const DARK: f64 = 1.0e-3;
 
-/// A target's ray: in equal steps of at most a footprint through the box, until no more than `settled` passes.
+/// A target's ray: in equal steps of at most a footprint through the box, until no more than `termination` passes.
 #[allow(clippy::too_many_arguments)]
-pub fn march(
+pub fn march_ray(
     scene: &Scene,
     footprints: &[f32],
     depths: &[f32],
@@ -160,7 +160,7 @@ pub fn march(
     target: &CameraBlock,
     at: [f32; 2],
     background: [f32; 3],
-    settled: f32,
+    termination: f32,
 ) -> Option<Pixel> {
     let (origin, direction) = (centre(target), towards(target, at));
     let (enter, leave) = interval(scene.object, origin, direction);
@@ -178,7 +178,7 @@ pub fn march(
         let count = floor as u32 + 1;
         let step = (leave - enter) / Bounded::from(count);
         for index in 0..count {
-            match Bounded::from(settled).below(passes) {
+            match Bounded::from(termination).below(passes) {
                 Some(true) => {}
                 Some(false) => break,
                 None if passes.value + passes.error <= DARK => {

@@ -204,13 +204,13 @@ impl Comparison<'_> {
         let normal = file.many("normal_depth", z_depth.len())?;
         let ray_count = rays.len();
         let (importance_count, depth_count) = (z_fine.len() / ray_count, z_depth.len() / ray_count);
-        let chance = |ray: usize, index: usize| match index.checked_sub(importance_count) {
+        let draw = |ray: usize, index: usize| match index.checked_sub(importance_count) {
             None => [u[ray * importance_count + index], jitter[ray * importance_count + index]],
             Some(index) => [normal[ray * depth_count + index], 0.0],
         };
         let fine_count = importance_count + depth_count;
-        let chances: Vec<[f32; 2]> =
-            (0..ray_count * fine_count).map(|at| chance(at / fine_count, at % fine_count)).collect();
+        let draws: Vec<[f32; 2]> =
+            (0..ray_count * fine_count).map(|at| draw(at / fine_count, at % fine_count)).collect();
         let block = FineBlock {
             coarse_count: (z_coarse.len() / ray_count) as u32,
             importance_count: importance_count as u32,
@@ -221,7 +221,7 @@ impl Comparison<'_> {
         let coarse_weights = file.many("coarse_weights", z_coarse.len())?;
         let coarse_depth = file.many("coarse_depth", ray_count)?;
         let [fine, merged] = reference
-            .fine_depths(&block, &rays, &z_coarse, &coarse_weights, &coarse_depth, &chances)
+            .fine_depths(&block, &rays, &z_coarse, &coarse_weights, &coarse_depth, &draws)
             .map_err(|error| self.failed(error))?;
         let expected: Vec<f32> = (0..ray_count)
             .flat_map(|ray| {

@@ -3,7 +3,7 @@
 //! With 32 vector registers a tile is 12 rows of two vectors (24 sums, two vectors of weights, one input in every lane),
 //! with 16 it is 6 rows: per step of the inner index the arithmetic takes longer than the loads. Rows are copied into a
 //! small array first, so that their places are constants and they stay in the first-level cache; weights are put in order
-//! once and for all ([`Panels`]): a panel is read from front to back. Bias, addend and rectification are part of
+//! once and for all ([`Panels`]): a panel is read from front to back. Bias, residual and rectification are part of
 //! writing a tile. Sums run along the inner index, [`DEPTH`] products at a time; a multiplication is fused with its
 //! addition where the core can.
 //!
@@ -12,7 +12,7 @@
 use crate::parallel::for_each_part;
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_core::network::product::rectified;
+use viewfuse_core::network::linear::rectified;
 
 /// Products that are summed before outputs are written: most of the layers in one go.
 const DEPTH: usize = 512;
@@ -92,8 +92,8 @@ pub(super) struct Ending<'a> {
     /// `[column]`.
     pub(super) bias: &'a [f32],
     /// `[row][column]`, and how far it is from a row to the next: 0 if all have the same.
-    pub(super) addend: Option<(&'a [f32], usize)>,
-    /// Factor of the sums with bias and addend.
+    pub(super) residual: Option<(&'a [f32], usize)>,
+    /// Factor of the sums with bias and residual.
     pub(super) scale: f32,
     /// Whether negative outputs become 0.
     pub(super) relu: u32,
@@ -102,7 +102,7 @@ pub(super) struct Ending<'a> {
 impl<'a> Ending<'a> {
     /// The ending of the rows from `row` on.
     pub(super) fn rows_from(self, row: usize) -> Ending<'a> {
-        Ending { addend: self.addend.map(|(addend, pitch)| (&addend[row * pitch..], pitch)), ..self }
+        Ending { residual: self.residual.map(|(residual, pitch)| (&residual[row * pitch..], pitch)), ..self }
     }
 
     /// What is written for columns `start..end` of a row, from their sums.
@@ -114,8 +114,10 @@ impl<'a> Ending<'a> {
     #[inline(always)]
     fn open<S: Simd>(&self, simd: S, sum: S::f32s, row: usize, start: usize, end: usize) -> S::f32s {
         let value = simd.add_f32s(load(simd, &self.bias[start..end]), sum);
-        match self.addend {
-            Some((addend, pitch)) => simd.add_f32s(load(simd, &addend[row * pitch + start..row * pitch + end]), value),
+        match self.residual {
+            Some((residual, pitch)) => {
+                simd.add_f32s(load(simd, &residual[row * pitch + start..row * pitch + end]), value)
+            }
             None => value,
         }
     }
@@ -225,7 +227,7 @@ struct Place {
     inner: usize,
 }
 
-/// Adds a tile's sums to bias and addend, or to what the outputs hold already; ends them with the last sums.
+/// Adds a tile's sums to bias and residual, or to what the outputs hold already; ends them with the last sums.
 #[inline(always)]
 fn write<S: Simd, const R: usize>(simd: S, sums: &[[S::f32s; 2]; R], rows: &mut Rows<'_>, place: &Place) {
     let Place { first_row, first_column, columns, first, inner } = *place;

@@ -9,7 +9,7 @@ use crate::parallel::{for_each, for_each_part, for_each_row};
 use pulp::Arch;
 use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
 use viewfuse_core::network::depthwise::DepthwiseBlock;
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_core::network::transpose::TransposedBlock;
 
@@ -22,7 +22,7 @@ const ROW_STEP: usize = 12;
 /// A layer's weights in the order in which they are needed.
 pub enum Weights {
     /// For products of matrices.
-    Product(Panels),
+    Panels(Panels),
     /// For convolutions of large images.
     Winograd(Winograd),
 }
@@ -33,13 +33,13 @@ impl Weights {
         let LayerShape { inner_count, column_count, has_wide_images } = *shape;
         match has_wide_images {
             true => Weights::Winograd(Winograd::new(weights, inner_count / 9, column_count)),
-            false => Weights::Product(Panels::new(weights, inner_count, column_count)),
+            false => Weights::Panels(Panels::new(weights, inner_count, column_count)),
         }
     }
 
     fn panels(&self, inner: usize, columns: usize) -> &Panels {
         match self {
-            Weights::Product(panels) => {
+            Weights::Panels(panels) => {
                 assert_eq!(panels.size(), [inner, columns], "a layer has one size");
                 panels
             }
@@ -53,13 +53,13 @@ pub(super) fn convolve(
     inputs: &[f32],
     weights: &Weights,
     bias: &[f32],
-    addend: Option<&[f32]>,
+    residual: Option<&[f32]>,
     outputs: &mut [f32],
 ) {
     let (pixel_count, columns) = (block.pixel_count() as usize, block.out_channels as usize);
     let ending = Ending {
         bias: &bias[..columns],
-        addend: addend.map(|addend| (&addend[block.addend_first as usize..], block.addend_pitch as usize)),
+        residual: residual.map(|residual| (&residual[block.residual_first as usize..], block.residual_pitch as usize)),
         scale: block.scale,
         relu: block.relu_outputs,
     };
@@ -117,7 +117,7 @@ pub(super) fn convolve_transposed(
     let (size, channels, pitch) = (block.size as usize, block.out_channels as usize, block.out_pitch as usize);
     let pixels = block.pixel_count() as usize * size * size;
     let bias = bias[..channels].repeat(size * size);
-    let ending = Ending { bias: &bias, addend: None, scale: 1.0, relu: block.relu_outputs };
+    let ending = Ending { bias: &bias, residual: None, scale: 1.0, relu: block.relu_outputs };
     // A row of the input becomes some whole rows of the output.
     let outputs = window(outputs, block.out_first, pixels, pitch, channels);
     let run = |results: &mut [f32], row: usize, outputs: &mut [f32]| {
@@ -154,18 +154,19 @@ pub(super) fn upsample(block: &UpsampleBlock, inputs: &[f32], outputs: &mut [f32
     });
 }
 
-pub(super) fn product(
-    block: &ProductBlock,
+pub(super) fn linear(
+    block: &LinearBlock,
     inputs: &[f32],
     weights: &Weights,
     bias: &[f32],
-    addend: Option<&[f32]>,
+    residual: Option<&[f32]>,
     outputs: &mut [f32],
 ) {
     let inner = block.inner_count as usize;
     let (row_count, columns) = (block.row_count as usize, block.column_count as usize);
     let panels = weights.panels(inner, columns);
-    let ending = Ending { bias, addend: addend.map(|addend| (addend, columns)), scale: 1.0, relu: block.relu_outputs };
+    let ending =
+        Ending { bias, residual: residual.map(|residual| (residual, columns)), scale: 1.0, relu: block.relu_outputs };
     multiply(panels, inputs, inner, block.relu_inputs, ending, &mut outputs[..row_count * columns]);
 }
 

@@ -4,7 +4,7 @@ use crate::parallel::{for_each_row, for_each_row_of_two};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::ObjectBlock;
 use viewfuse_core::photo::hull;
-use viewfuse_core::photo::march::{self, MarchBlock};
+use viewfuse_core::photo::ray_marching::{self, MarchBlock};
 use viewfuse_core::photo::sweep::{self, OUTSIDE, SweepBlock, SweptPixel};
 
 pub(super) fn hull_entry(
@@ -84,7 +84,7 @@ pub(super) fn pick_depth(
 }
 
 #[allow(clippy::too_many_arguments)]
-pub(super) fn march(
+pub(super) fn march_rays(
     target: &MarchBlock,
     first_row: u32,
     row_count: u32,
@@ -103,7 +103,7 @@ pub(super) fn march(
     for_each_row_of_two(colours, pixel_depths, width, 16, |row, colours, pixel_depths| {
         for (column, (colour, depth)) in colours.iter_mut().zip(pixel_depths).enumerate() {
             let at = [column as f32 + 0.5, (first_row as usize + row) as f32 + 0.5];
-            let seen = march::march(&object[0], views, footprints, texels, depths, weights, target, at);
+            let seen = ray_marching::march_ray(&object[0], views, footprints, texels, depths, weights, target, at);
             *colour = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
             *depth = seen.depth;
         }

@@ -50,7 +50,7 @@ pub(super) fn gather_latents(
     views: &[CameraBlock],
     points: &[RayPoint],
     grid: &[f32],
-    addend: Option<&[f32]>,
+    residual: Option<&[f32]>,
     gathered: &mut [f32],
 ) {
     let (first, channels, point_count) = (block.first(), block.channel_count as usize, block.point_count as usize);
@@ -60,9 +60,9 @@ pub(super) fn gather_latents(
         // As wide as the machine can.
         Arch::new().dispatch(|| {
             look_up(&place, nodes, gathered);
-            if let Some(addend) = addend {
-                let addend = &addend[first + point * channels..];
-                gathered.iter_mut().zip(addend).for_each(|(value, addend)| *value += addend);
+            if let Some(residual) = residual {
+                let residual = &residual[first + point * channels..];
+                gathered.iter_mut().zip(residual).for_each(|(value, residual)| *value += residual);
             }
         });
     });

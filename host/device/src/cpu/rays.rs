@@ -1,9 +1,9 @@
 //! Where along which rays to look, and what was seen there.
 
 use crate::parallel::{for_each, for_each_row};
-use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, draw_chance, fine_depth, merged_depth};
+use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, fine_depth, merged_depth, random_draw};
 use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
-use viewfuse_core::wanted::{RaysBlock, WantedBlock, is_wanted, weigh_sample};
+use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
 
 /// Runs a kernel for every sample of every ray, rays in parallel; it gets ray, sample and where to write.
 fn for_each_sample<T: Send>(
@@ -37,9 +37,9 @@ pub(super) fn coarse_depths(
     });
 }
 
-pub(super) fn draw_chances(block: &FineBlock, ray_count: u32, pixels: &[u32], chances: &mut [[f32; 2]]) {
-    for_each_sample(ray_count, block.fine_count(), chances, |ray, sample, chance| {
-        *chance = draw_chance(pixels[ray as usize], sample, block);
+pub(super) fn random_draws(block: &FineBlock, ray_count: u32, pixels: &[u32], draws: &mut [[f32; 2]]) {
+    for_each_sample(ray_count, block.fine_count(), draws, |ray, sample, draw| {
+        *draw = random_draw(pixels[ray as usize], sample, block);
     });
 }
 
@@ -51,15 +51,15 @@ pub(super) fn fine_depths(
     rays: &[TargetRay],
     colours: &[[f32; 4]],
     pixel_depths: &[f32],
-    chances: &[[f32; 2]],
+    draws: &[[f32; 2]],
     depths: &mut [f32],
 ) {
     for_each_sample(ray_count, block.fine_count(), depths, |ray, sample, depth| {
         let index = ray as usize;
-        let chance = chances[index * block.fine_count() as usize + sample as usize];
+        let draw = draws[index * block.fine_count() as usize + sample as usize];
         let seen = &seen[index * block.coarse_count as usize..];
         let (centre, opacity) = (pixel_depths[index], colours[index][3]);
-        *depth = fine_depth(seen, &rays[index], centre, opacity, chance, sample, block);
+        *depth = fine_depth(seen, &rays[index], centre, opacity, draw, sample, block);
     });
 }
 
@@ -75,19 +75,19 @@ pub(super) fn merge_depths(block: &FineBlock, ray_count: u32, coarse: &[f32], fi
     });
 }
 
-pub(super) fn wanted_samples(
-    block: &WantedBlock,
+pub(super) fn sample_mask(
+    block: &SampleMaskBlock,
     ray_count: u32,
     seen: &[[f32; 2]],
     rays: &[TargetRay],
     pixels: &[u32],
     depths: &[f32],
-    wanted: &mut [u32],
+    mask: &mut [u32],
 ) {
-    for_each_sample(ray_count, block.sample_count, wanted, |ray, sample, wanted| {
+    for_each_sample(ray_count, block.sample_count, mask, |ray, sample, mask| {
         let index = ray as usize;
         let depth = depths[index * block.sample_count as usize + sample as usize];
-        *wanted = u32::from(is_wanted(seen, &rays[index], depth, ray, pixels[index], block));
+        *mask = u32::from(is_sampled(seen, &rays[index], depth, ray, pixels[index], block));
     });
 }
 

@@ -4,7 +4,7 @@ use crate::parallel::{for_each, for_each_row};
 use pulp::Arch;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace};
-use viewfuse_core::half::{fetch_half, packed_halves, word_count};
+use viewfuse_core::half_precision::{fetch_f16, packed_f16, word_count};
 use viewfuse_core::rays::RayPoint;
 
 /// Adds up what the eight nodes around each point have: `add(first, weight, gathered)` adds the features of the node whose
@@ -47,13 +47,13 @@ pub(super) fn gather_volume(
     });
 }
 
-pub(super) fn pack_halves(number_count: &u32, numbers: &[f32], words: &mut [u32]) {
+pub(super) fn pack_f16(number_count: &u32, numbers: &[f32], words: &mut [u32]) {
     for_each(&mut words[..word_count(*number_count) as usize], 4096, |element, word| {
-        *word = packed_halves(numbers, *number_count, element);
+        *word = packed_f16(numbers, *number_count, element);
     });
 }
 
-pub(super) fn gather_halves(
+pub(super) fn gather_volume_f16(
     block: &VolumeBlock,
     views: &[CameraBlock],
     points: &[RayPoint],
@@ -63,7 +63,7 @@ pub(super) fn gather_halves(
     gather_nodes(block, views, points, gathered, |first, weight, gathered| {
         let words = &volume[first / 2..(first + gathered.len()).div_ceil(2)];
         for (index, sum) in gathered.iter_mut().enumerate() {
-            *sum += fetch_half(words, first % 2 + index) * weight;
+            *sum += fetch_f16(words, first % 2 + index) * weight;
         }
     });
 }

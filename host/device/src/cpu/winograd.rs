@@ -87,7 +87,7 @@ impl Winograd {
                     inputs: &seen[own * self.channels..],
                     in_pitch: self.channels,
                     relu_inputs: 0,
-                    ending: Ending { bias: &zeros, addend: None, scale: 1.0, relu: 0 },
+                    ending: Ending { bias: &zeros, residual: None, scale: 1.0, relu: 0 },
                     outputs: &mut products[own * self.columns..][..count * self.columns],
                     out_pitch: self.columns,
                 });

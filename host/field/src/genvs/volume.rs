@@ -7,7 +7,7 @@ use std::ops::Range;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::VolumeBlock;
-use viewfuse_core::half::{fetch_half, word_count};
+use viewfuse_core::half_precision::{fetch_f16, word_count};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
@@ -32,7 +32,7 @@ enum Nodes<D: Device> {
         image: Image<D>,
     },
     /// All of them, in 16 bits each, two in a word.
-    Halves(D::Buffer<u32>),
+    F16(D::Buffer<u32>),
 }
 
 impl<D: Device> Volume<D> {
@@ -68,7 +68,7 @@ impl<D: Device> Volume<D> {
     /// Bytes that its features take.
     pub(super) fn byte_count(&self) -> u64 {
         let numbers = self.number_count();
-        u64::from(if matches!(self.nodes, Nodes::Halves(_)) { word_count(numbers) } else { numbers }) * 4
+        u64::from(if matches!(self.nodes, Nodes::F16(_)) { word_count(numbers) } else { numbers }) * 4
     }
 
     /// Computes rows that are not there yet. Returns how many.
@@ -100,7 +100,7 @@ impl<D: Device> Volume<D> {
     pub(super) fn image(&self) -> Option<&Image<D>> {
         match &self.nodes {
             Nodes::Whole { image, .. } => Some(image),
-            Nodes::Halves(_) => None,
+            Nodes::F16(_) => None,
         }
     }
 
@@ -112,8 +112,8 @@ impl<D: Device> Volume<D> {
         let Nodes::Whole { image, .. } = &self.nodes else { return Ok(()) };
         let number_count = self.number_count();
         let mut words = device.zeros(word_count(number_count) as usize)?;
-        device.pack_halves(&number_count, &image.values, &mut words)?;
-        self.nodes = Nodes::Halves(words);
+        device.pack_f16(&number_count, &image.values, &mut words)?;
+        self.nodes = Nodes::F16(words);
         Ok(())
     }
 
@@ -131,7 +131,7 @@ impl<D: Device> Volume<D> {
     ) -> Result<(), DeviceError> {
         match &self.nodes {
             Nodes::Whole { image, .. } => device.gather_volume(block, views, points, &image.values, gathered),
-            Nodes::Halves(words) => device.gather_halves(block, views, points, words, gathered),
+            Nodes::F16(words) => device.gather_volume_f16(block, views, points, words, gathered),
         }
     }
 
@@ -142,10 +142,10 @@ impl<D: Device> Volume<D> {
     pub(super) fn values(&self, device: &D) -> Result<Vec<f32>, DeviceError> {
         match &self.nodes {
             Nodes::Whole { image, .. } => device.download(&image.values),
-            Nodes::Halves(words) => {
+            Nodes::F16(words) => {
                 let words = device.download(words)?;
                 let number_count = self.number_count();
-                Ok((0..number_count as usize).map(|index| fetch_half(&words[..], index)).collect())
+                Ok((0..number_count as usize).map(|index| fetch_f16(&words[..], index)).collect())
             }
         }
     }

@@ -195,7 +195,7 @@ impl<D: Device> Network<'_, D> {
     fn gather(&self, known: &ViewLatents<D>, view: u32, point_count: u32, channel_count: u32) -> GatherBlock {
         let [height, width] = known.grid_size;
         let pixel_centre = self.architecture.pixel_centre;
-        GatherBlock { view, point_count, channel_count, height, width, has_addend: 0, pixel_centre }
+        GatherBlock { view, point_count, channel_count, height, width, has_residual: 0, pixel_centre }
     }
 
     /// A residual block: `flow + fc_1(relu(fc_0(relu(flow))))`.

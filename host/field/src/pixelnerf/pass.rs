@@ -7,7 +7,7 @@ use viewfuse_core::compact::RUN;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::rays::{CastBlock, PlaceBlock};
-use viewfuse_core::wanted::{RaysBlock, WantedBlock};
+use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_job::progress::Progress;
 
@@ -104,23 +104,23 @@ impl<D: Device> Renderer<'_, D> {
         let (ray_count, fine_count) = (pixels.len(), block.fine_count() as usize);
         let mut parts = self.zeros(ray_count * coarse.count as usize)?;
         device.weigh_samples(&coarse.block(0), rays.count, &coarse.values, &mut parts)?;
-        let mut chances = self.zeros(ray_count * fine_count)?;
-        device.draw_chances(&block, rays.count, &rays.pixels, &mut chances)?;
+        let mut draws = self.zeros(ray_count * fine_count)?;
+        device.random_draws(&block, rays.count, &rays.pixels, &mut draws)?;
         let mut added = self.zeros(ray_count * fine_count)?;
         let Pixels { colours, depths } = &found;
-        device.fine_depths(&block, rays.count, &parts, &rays.rays, colours, depths, &chances, &mut added)?;
+        device.fine_depths(&block, rays.count, &parts, &rays.rays, colours, depths, &draws, &mut added)?;
         let count = coarse.count + block.fine_count();
         let mut fine = self.samples(ray_count, count)?;
         device.merge_depths(&block, rays.count, &coarse.depths, &added, &mut fine.depths)?;
         let Omissions { empty_rays, empty_parts, hidden_samples, .. } = self.omissions;
-        let wanted = (empty_rays || empty_parts || hidden_samples).then_some(WantedBlock {
+        let wanted = (empty_rays || empty_parts || hidden_samples).then_some(SampleMaskBlock {
             sample_count: count,
             part_count: coarse.count,
             least_share: if empty_parts { seen.map_or(LEAST_SHARE, |seen| seen.least_share) } else { 0.0 },
-            settled: if hidden_samples { self.settled } else { -1.0 },
+            termination: if hidden_samples { self.settled } else { -1.0 },
             least_opacity: if empty_rays { LEAST_OPACITY } else { 0.0 },
             width: self.cast.camera.width,
-            ..WantedBlock::default()
+            ..SampleMaskBlock::default()
         });
         let list = self.list(&rays, &fine, wanted.as_ref().map(|block| (block, &parts)))?;
         self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut asked[1])?;
@@ -140,12 +140,12 @@ impl<D: Device> Renderer<'_, D> {
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
         self.device.coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)?;
         let wanted = seen.map(|seen| {
-            let block = WantedBlock {
+            let block = SampleMaskBlock {
                 sample_count: block.sample_count,
                 part_count: block.sample_count,
                 least_share: seen.least_share,
                 // What is hidden on the probes' rays is not on a ray that passes beside their surfaces.
-                settled: -1.0,
+                termination: -1.0,
                 least_opacity: 0.0,
                 step: self.omissions.empty_space,
                 seen_columns: seen.columns,
@@ -165,12 +165,12 @@ impl<D: Device> Renderer<'_, D> {
         &self,
         rays: &Rays<D>,
         samples: &Samples<D>,
-        wanted: Option<(&WantedBlock, &D::Buffer<[f32; 2]>)>,
+        wanted: Option<(&SampleMaskBlock, &D::Buffer<[f32; 2]>)>,
     ) -> Result<List<D>, FieldError> {
         let (device, all) = (self.device, rays.count * samples.count);
         let Some((block, seen)) = wanted else { return Ok(List { samples: None, count: all }) };
         let mut mask = self.zeros(all as usize)?;
-        device.wanted_samples(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut mask)?;
+        device.sample_mask(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut mask)?;
         let run_count = all.div_ceil(RUN);
         let (mut counts, mut offsets) = (self.zeros(run_count as usize)?, self.zeros(run_count as usize + 1)?);
         let (mut total, mut list) = (self.zeros(1)?, self.zeros(all as usize)?);

@@ -7,7 +7,7 @@ use crate::FieldError;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{PlaceBlock, RayPoint, TargetRay};
-use viewfuse_core::wanted::RaysBlock;
+use viewfuse_core::sample_mask::RaysBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_scene::photographs::SourceImages;
@@ -131,7 +131,7 @@ impl<'a, D: Device> Reference<'a, D> {
 
     /// Depths of fine samples `[ray][sample]` and all depths in order `[ray][sample]`, from the first pass's
     /// `coarse_depths[ray][sample]`, `coarse_weights[ray][sample]` and `depths[ray]` (not divided by the weights' sum) and
-    /// the random numbers `chances[ray][fine sample]`.
+    /// the random numbers `draws[ray][fine sample]`.
     ///
     /// # Errors
     /// If the device fails.
@@ -143,7 +143,7 @@ impl<'a, D: Device> Reference<'a, D> {
         coarse_depths: &[f32],
         coarse_weights: &[f32],
         depths: &[f32],
-        chances: &[[f32; 2]],
+        draws: &[[f32; 2]],
     ) -> Result<[Vec<f32>; 2], DeviceError> {
         let device = self.views.device;
         let block = FineBlock { depth_times_opacity: 1, ..*block };
@@ -152,10 +152,10 @@ impl<'a, D: Device> Reference<'a, D> {
         let pixels: Pixels<D> =
             Pixels { colours: device.upload(&vec![[1.0; 4]; depths.len()])?, depths: device.upload(depths)? };
         let seen: Vec<[f32; 2]> = coarse_weights.iter().map(|weight| [*weight, 1.0]).collect();
-        let (seen, chances) = (device.upload(&seen)?, device.upload(chances)?);
+        let (seen, draws) = (device.upload(&seen)?, device.upload(draws)?);
         let mut fine = device.zeros(rays.count as usize * block.fine_count() as usize)?;
         let Pixels { colours, depths } = &pixels;
-        device.fine_depths(&block, rays.count, &seen, &rays.rays, colours, depths, &chances, &mut fine)?;
+        device.fine_depths(&block, rays.count, &seen, &rays.rays, colours, depths, &draws, &mut fine)?;
         let mut merged = device.zeros(rays.count as usize * (block.coarse_count + block.fine_count()) as usize)?;
         device.merge_depths(&block, rays.count, &device.upload(coarse_depths)?, &fine, &mut merged)?;
         Ok([device.download(&fine)?, device.download(&merged)?])

@@ -1,4 +1,4 @@
-//! Group normalisation with SiLU behind it, as [`viewfuse_core::network::normalise`] has it.
+//! Group normalisation with SiLU behind it, as [`viewfuse_core::network::group_norm`] has it.
 
 use super::{Operation, Real};
 use rayon::prelude::*;

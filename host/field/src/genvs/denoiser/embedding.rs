@@ -5,7 +5,7 @@
 
 use crate::FieldError;
 use viewfuse_core::math::{exp, ln, sin_cos};
-use viewfuse_core::network::normalise::silu;
+use viewfuse_core::network::group_norm::silu;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_nn::checkpoint::CheckpointError;

@@ -1,4 +1,4 @@
-//! [`Kernel::March`]: every pixel of a target, in two bands; every other seed's rays end early.
+//! [`Kernel::MarchRays`]: every pixel of a target, in two bands; every other seed's rays end early.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -6,7 +6,7 @@ use crate::case::{Case, Spoiler};
 use crate::photo_oracle;
 use crate::world::World;
 use rayon::prelude::*;
-use viewfuse_core::photo::march::MarchBlock;
+use viewfuse_core::photo::ray_marching::MarchBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, PhotoScene, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
@@ -27,10 +27,10 @@ pub struct Loaded<D: Device> {
 }
 
 /// See the module.
-pub enum March {}
+pub enum MarchRays {}
 
-impl Case for March {
-    const KERNEL: Kernel = Kernel::March;
+impl Case for MarchRays {
+    const KERNEL: Kernel = Kernel::MarchRays;
     const SEED_COUNT: u64 = 3;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 4.0e-3, least: 1.0e-2 };
@@ -51,8 +51,8 @@ impl Case for March {
 
     fn inputs(seed: u64, size: u32) -> Inputs {
         let world = World::of_size(seed, size);
-        let settled = if seed.is_multiple_of(2) { 0.1 } else { 0.0 };
-        let block = MarchBlock { target: world.target, background: [1.0, 0.5, 0.25], settled };
+        let termination = if seed.is_multiple_of(2) { 0.1 } else { 0.0 };
+        let block = MarchBlock { target: world.target, background: [1.0, 0.5, 0.25], termination };
         Inputs { world, block }
     }
 
@@ -77,7 +77,7 @@ impl Case for March {
         for (first_row, row_count) in [(0, middle), (middle, height - middle)] {
             if row_count > 0 {
                 let PhotoScene { object_buffer, views, footprints, texels, .. } = &*scene;
-                device.march(
+                device.march_rays(
                     &inputs.block,
                     first_row,
                     row_count,
@@ -102,11 +102,11 @@ impl Case for March {
     }
 
     fn expected(inputs: &Inputs) -> Vec<Option<Bounded>> {
-        let Inputs { world, block: MarchBlock { target, background, settled } } = inputs;
+        let Inputs { world, block: MarchBlock { target, background, termination } } = inputs;
         let World { footprints, depths, weights, .. } = world;
         let pixel = |pixel: u32| {
             let at = [(pixel % target.width) as f32 + 0.5, (pixel / target.width) as f32 + 0.5];
-            photo_oracle::march(&world.scene(), footprints, depths, weights, target, at, *background, *settled)
+            photo_oracle::march_ray(&world.scene(), footprints, depths, weights, target, at, *background, *termination)
         };
         let pixels: Vec<_> = (0..target.width * target.height).into_par_iter().map(pixel).collect();
         let mut expected = Vec::new();

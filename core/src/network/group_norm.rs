@@ -1,7 +1,7 @@
-//! Group normalisation: the channels of an image in groups, each brought to mean 0 and variance 1, then scaled and shifted
+//! Group norm: the channels of an image in groups, each brought to mean 0 and variance 1, then scaled and shifted
 //! channel by channel; and the mean of every channel.
 //!
-//! Moments are found in two steps, so that a device has enough to do at once: first of parts of the image, each in two
+//! Statistics are found in two steps, so that a device has enough to do at once: first of parts of the image, each in two
 //! passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). Means are sums of
 //! differences from one of the values, and no difference of large sums is taken: of a group whose values are 1e4 times
 //! its deviation only the mean's own rounding is lost, and a constant group has deviations of exactly 0.
@@ -10,14 +10,14 @@ use crate::math::{exp, max, sqrt};
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
-/// Pixels whose moments are taken together.
+/// Pixels whose statistics are taken together.
 pub const PART: u32 = 64;
 
-/// A dispatch of [`part_moments`], [`merged_moments`] or [`normalised_element`], as plain data. The yes-or-no field is 0
-/// or 1.
+/// A dispatch of [`group_norm_partials`], [`group_norm_statistics`] or [`group_norm_element`], as plain data. The
+/// yes-or-no field is 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct NormaliseBlock {
+pub struct GroupNormBlock {
     /// Pixels of the image, at least 1.
     pub pixel_count: u32,
     /// Channels of the image, a multiple of the groups.
@@ -34,7 +34,7 @@ pub struct NormaliseBlock {
     pub silu_outputs: u32,
 }
 
-impl NormaliseBlock {
+impl GroupNormBlock {
     /// Parts of the image.
     #[inline]
     pub fn part_count(&self) -> u32 {
@@ -56,7 +56,7 @@ impl NormaliseBlock {
 /// Mean, and sum of the squared deviations from it, of a group in a part of the image: number `element` of
 /// `[part][group]`. Sums run pixel by pixel; the mean's is of differences from the group's first value in the part.
 #[inline]
-pub fn part_moments(inputs: &(impl Fetch<f32> + ?Sized), block: &NormaliseBlock, element: usize) -> [f32; 2] {
+pub fn group_norm_partials(inputs: &(impl Fetch<f32> + ?Sized), block: &GroupNormBlock, element: usize) -> [f32; 2] {
     let (part, group) = (element as u32 / block.group_count, element as u32 % block.group_count);
     let (pixels, channels) = (block.pixels_of(part), block.group_channels());
     let first = block.in_first + part * PART * block.in_pitch + group * channels;
@@ -86,17 +86,21 @@ pub fn part_moments(inputs: &(impl Fetch<f32> + ?Sized), block: &NormaliseBlock,
     [mean, deviations]
 }
 
-/// Mean of a group, and what its deviations are multiplied by: `1 / sqrt(variance + variance_floor)`, from the moments
-/// `parts[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives 0 for the factor; one
-/// whose squares overflow, or that holds a number that is none, NaN, so that it is found and not hidden.
+/// Mean of a group, and what its deviations are multiplied by: `1 / sqrt(variance + variance_floor)`, from the statistics
+/// `partials[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives 0 for the
+/// factor; one whose squares overflow, or that holds NaN or infinity, gives NaN, so that it is found and not hidden.
 #[inline]
-pub fn merged_moments(parts: &(impl Fetch<[f32; 2]> + ?Sized), block: &NormaliseBlock, group: usize) -> [f32; 2] {
+pub fn group_norm_statistics(
+    partials: &(impl Fetch<[f32; 2]> + ?Sized),
+    block: &GroupNormBlock,
+    group: usize,
+) -> [f32; 2] {
     // The first part changes nothing of the mean, however a device divides.
-    let [mut mean, _] = parts.fetch(group);
+    let [mut mean, _] = partials.fetch(group);
     let (mut count, mut deviations) = (0.0, 0.0);
     let mut part = 0;
     while part < block.part_count() {
-        let [own_mean, own_deviations] = parts.fetch(part as usize * block.group_count as usize + group);
+        let [own_mean, own_deviations] = partials.fetch(part as usize * block.group_count as usize + group);
         let own = (block.pixels_of(part) * block.group_channels()) as f32;
         let all = count + own;
         let difference = own_mean - mean;
@@ -116,16 +120,16 @@ pub fn merged_moments(parts: &(impl Fetch<[f32; 2]> + ?Sized), block: &Normalise
 /// Output number `element` of `[pixel][channel]`: the input less its group's mean, times its group's factor, times
 /// `weights[channel]`, plus `bias[channel]`.
 #[inline]
-pub fn normalised_element(
+pub fn group_norm_element(
     inputs: &(impl Fetch<f32> + ?Sized),
-    moments: &(impl Fetch<[f32; 2]> + ?Sized),
+    statistics: &(impl Fetch<[f32; 2]> + ?Sized),
     weights: &(impl Fetch<f32> + ?Sized),
     bias: &(impl Fetch<f32> + ?Sized),
-    block: &NormaliseBlock,
+    block: &GroupNormBlock,
     element: usize,
 ) -> f32 {
     let (pixel, channel) = (element as u32 / block.channels, element as u32 % block.channels);
-    let [mean, factor] = moments.fetch((channel / block.group_channels()) as usize);
+    let [mean, factor] = statistics.fetch((channel / block.group_channels()) as usize);
     let input = inputs.fetch((block.in_first + pixel * block.in_pitch + channel) as usize);
     let value = (input - mean) * (factor * weights.fetch(channel as usize)) + bias.fetch(channel as usize);
     if block.silu_outputs != 0 { silu(value) } else { value }

@@ -1,4 +1,4 @@
-//! [`Kernel::PackHalves`] and [`Kernel::GatherHalves`]: numbers from far below to far above those that have 16 bits, odd and
+//! [`Kernel::PackF16`] and [`Kernel::GatherVolumeF16`]: numbers from far below to far above those that have 16 bits, odd and
 //! even counts of them; volumes as in [`super::volumes`], of odd and even numbers of features. Halves are packed and read here
 //! by another hand than the kernels'.
 
@@ -15,7 +15,7 @@ use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
-/// The nearest number of 16 bits, none larger than the largest.
+/// The nearest number in half precision, none larger than the largest.
 fn nearest(number: f32) -> f16 {
     f16::from_f32(number.clamp(-f16::MAX.to_f32(), f16::MAX.to_f32()))
 }
@@ -27,7 +27,7 @@ fn packed(numbers: &[f32]) -> Vec<u32> {
 }
 
 /// Buffers of numbers, a dispatch each.
-pub enum PackHalves {}
+pub enum PackF16 {}
 
 /// The same in a device's memory, and words with one behind them.
 pub struct LoadedNumbers<D: Device> {
@@ -35,12 +35,12 @@ pub struct LoadedNumbers<D: Device> {
     words: D::Buffer<u32>,
 }
 
-impl Case for PackHalves {
-    const KERNEL: Kernel = Kernel::PackHalves;
+impl Case for PackF16 {
+    const KERNEL: Kernel = Kernel::PackF16;
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 0.0, least: 1.0e-4 };
-    const REASON: &'static str = "the nearest number of 16 bits, of two the even one: exact";
+    const REASON: &'static str = "the nearest number in half precision, of two the even one: exact";
     const SPOILERS: &'static [Spoiler<Vec<Vec<f32>>>] =
         &[("numbers", |jobs| jobs.iter_mut().flatten().for_each(|number| *number *= 1.01))];
 
@@ -53,7 +53,7 @@ impl Case for PackHalves {
             numbers(count as usize, || {
                 let power = random.range(-30.0, 18.0).exp2();
                 match random.below(4) {
-                    // Between two numbers of 16 bits, as near to one as to the other.
+                    // Between two numbers in half precision, as near to one as to the other.
                     0 => f64::from(f16::from_f64(power).to_f32()) * (1.0 + 0.5_f64.powi(11)),
                     _ => random.normal() * power,
                 }
@@ -77,7 +77,7 @@ impl Case for PackHalves {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Vec<f32>>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         for (job, LoadedNumbers { numbers, words }) in jobs.iter().zip(loaded) {
-            device.pack_halves(&(job.len() as u32), numbers, words)?;
+            device.pack_f16(&(job.len() as u32), numbers, words)?;
         }
         Ok(())
     }
@@ -103,8 +103,8 @@ impl Case for PackHalves {
     }
 }
 
-/// See the module. The nodes are numbers of 16 bits already, until one is spoilt.
-pub enum GatherHalves {}
+/// See the module. The nodes are numbers in half precision already, until one is spoilt.
+pub enum GatherVolumeF16 {}
 
 /// Jobs in a device's memory, and what is gathered.
 pub struct LoadedJob<D: Device> {
@@ -114,12 +114,12 @@ pub struct LoadedJob<D: Device> {
     gathered: D::Buffer<f32>,
 }
 
-impl Case for GatherHalves {
-    const KERNEL: Kernel = Kernel::GatherHalves;
+impl Case for GatherVolumeF16 {
+    const KERNEL: Kernel = Kernel::GatherVolumeF16;
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = volumes::LIMITS;
-    const REASON: &'static str = "as gather_volume: numbers of 16 bits are read exactly";
+    const REASON: &'static str = "as gather_volume: numbers in half precision are read exactly";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = volumes::SPOILERS;
 
     type Inputs = Vec<Job>;
@@ -151,7 +151,7 @@ impl Case for GatherHalves {
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         for (job, LoadedJob { views, points, volumes, gathered }) in jobs.iter().zip(loaded) {
             for (volume, view) in volumes.iter().zip(0..) {
-                device.gather_halves(&VolumeBlock { view, ..job.block }, views, points, volume, gathered)?;
+                device.gather_volume_f16(&VolumeBlock { view, ..job.block }, views, points, volume, gathered)?;
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Means of images and normalisation by them in `f64`, with bounds on what `f32` may make of them.
 
 use super::bounded::{Bounded, DIVISION, ROUNDING, roundings};
-use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock, PART};
+use viewfuse_core::network::group_norm::{GroupNormBlock, MeanBlock, PART};
 
 /// Mean of a channel, summed in any order.
 pub fn channel_mean(inputs: &[f32], block: &MeanBlock, channel: usize) -> Bounded {
@@ -10,7 +10,7 @@ pub fn channel_mean(inputs: &[f32], block: &MeanBlock, channel: usize) -> Bounde
 }
 
 /// The values of a group in a part of the image, pixel by pixel.
-fn values(inputs: &[f32], block: &NormaliseBlock, part: usize, group: usize) -> Vec<f64> {
+fn values(inputs: &[f32], block: &GroupNormBlock, part: usize, group: usize) -> Vec<f64> {
     let channels = (block.channels / block.group_count) as usize;
     let pixels = (0..block.pixel_count as usize).skip(part * PART as usize).take(PART as usize);
     let first = block.in_first as usize + group * channels;
@@ -23,7 +23,7 @@ fn values(inputs: &[f32], block: &NormaliseBlock, part: usize, group: usize) -> 
 /// The mean is the first value and a mean of differences from it, in any order: its error is that of a sum of those
 /// differences, not of the values, and a rounding of itself. With `e` for it the deviations' sum is larger by `n e^2`
 /// (what is linear in `e` cancels); each square is rounded three times, and as often as there are summands.
-pub fn part_moments(inputs: &[f32], block: &NormaliseBlock, part: usize, group: usize) -> [Bounded; 2] {
+pub fn group_norm_partials(inputs: &[f32], block: &GroupNormBlock, part: usize, group: usize) -> [Bounded; 2] {
     let values = values(inputs, block, part, group);
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -38,15 +38,15 @@ pub fn part_moments(inputs: &[f32], block: &NormaliseBlock, part: usize, group: 
     [Bounded { value: mean, error }, Bounded { value: deviations, error: deviations_error }]
 }
 
-/// Mean of a group from those of its parts, and the factor of deviations from it.
+/// Mean of a group from those of its partials, and the factor of deviations from it.
 ///
 /// The values are those of the whole group; the errors are those of merging part by part.
-pub fn merged_moments(parts: &[[f32; 2]], block: &NormaliseBlock, group: usize) -> [Bounded; 2] {
+pub fn group_norm_statistics(partials: &[[f32; 2]], block: &GroupNormBlock, group: usize) -> [Bounded; 2] {
     let channels = f64::from(block.channels / block.group_count);
     let part_count = (block.pixel_count as usize).div_ceil(PART as usize);
     let sizes = (0..part_count).map(|part| (block.pixel_count as usize - part * PART as usize).min(PART as usize));
     let sizes: Vec<f64> = sizes.map(|pixels| pixels as f64 * channels).collect();
-    let own: Vec<[f32; 2]> = parts.iter().skip(group).step_by(block.group_count as usize).copied().collect();
+    let own: Vec<[f32; 2]> = partials.iter().skip(group).step_by(block.group_count as usize).copied().collect();
     let all: f64 = sizes.iter().sum();
     let exactly = |moment: f32| f64::from(moment);
     let mean = sizes.iter().zip(&own).map(|(size, own)| size * exactly(own[0])).sum::<f64>() / all;
@@ -63,7 +63,7 @@ pub fn merged_moments(parts: &[[f32; 2]], block: &NormaliseBlock, group: usize) 
     }
     let running = deviations / Bounded { value: all, error: 0.0 };
     // Parts that are all the same constant leave nothing to round.
-    let is_constant = own.iter().all(|moments| *moments == [own[0][0], 0.0]);
+    let is_constant = own.iter().all(|statistics| *statistics == [own[0][0], 0.0]);
     let [mean_error, variance_error] = if is_constant { [0.0; 2] } else { [running_mean.error, running.error] };
     let spread = Bounded { value: variance, error: variance_error } + block.variance_floor.into();
     let factor = if spread.value > 0.0 { Bounded::ONE / spread.square_root() } else { Bounded::ZERO };
@@ -73,13 +73,13 @@ pub fn merged_moments(parts: &[[f32; 2]], block: &NormaliseBlock, group: usize) 
 /// Channel `channel` of pixel `pixel`, normalised.
 pub fn normalised(
     inputs: &[f32],
-    moments: &[[f32; 2]],
+    statistics: &[[f32; 2]],
     [weights, bias]: [&[f32]; 2],
-    block: &NormaliseBlock,
+    block: &GroupNormBlock,
     [pixel, channel]: [usize; 2],
 ) -> Bounded {
     let input = inputs[block.in_first as usize + pixel * block.in_pitch as usize + channel];
-    let [mean, factor] = moments[channel * block.group_count as usize / block.channels as usize];
+    let [mean, factor] = statistics[channel * block.group_count as usize / block.channels as usize];
     let factor = Bounded::from(factor) * weights[channel].into();
     let value = (Bounded::from(input) - mean.into()) * factor + bias[channel].into();
     if block.silu_outputs == 0 { value } else { silu(value) }

@@ -152,7 +152,7 @@ fn a_settled_ray_changes_by_less_than_its_threshold() {
         let mut ray = Compositor::<3>::START;
         let mut ended = None;
         for (channels, optical_depth, at) in &samples {
-            if ended.is_none() && ray.is_settled(threshold) {
+            if ended.is_none() && ray.is_terminated(threshold) {
                 ended = Some(ray);
             }
             ray.add(channels, *optical_depth, *at);

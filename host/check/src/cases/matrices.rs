@@ -1,4 +1,4 @@
-//! [`Kernel::MultiplyMatrices`] and [`Kernel::SoftmaxRows`]: matrices of awkward sizes, some of them columns of one wider
+//! [`Kernel::MatrixProduct`] and [`Kernel::SoftmaxRows`]: matrices of awkward sizes, some of them columns of one wider
 //! matrix, on the right as they are or transposed; rows of scores from nearly equal ones to such that one has all.
 
 use crate::agreement::Limits;
@@ -35,10 +35,10 @@ pub struct LoadedJob<D: Device> {
 }
 
 /// See the module.
-pub enum MultiplyMatrices {}
+pub enum MatrixProduct {}
 
-impl Case for MultiplyMatrices {
-    const KERNEL: Kernel = Kernel::MultiplyMatrices;
+impl Case for MatrixProduct {
+    const KERNEL: Kernel = Kernel::MatrixProduct;
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
@@ -120,7 +120,7 @@ impl Case for MultiplyMatrices {
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { left, right, outputs })| {
-            device.multiply_matrices(&job.block, left, right.as_ref().unwrap_or(left), outputs)
+            device.matrix_product(&job.block, left, right.as_ref().unwrap_or(left), outputs)
         })
     }
 

@@ -1,4 +1,4 @@
-//! Which samples of a ray are worth asking a network about, by what was seen before: on the same ray by a coarser pass,
+//! The sample mask: which samples of a ray are worth asking a network about, by what was seen before: on the same ray by a coarser pass,
 //! or on rays nearby.
 //!
 //! What was seen of a ray is a row `[part]` of weight and transmittance in front of it, over equal parts of the ray.
@@ -30,20 +30,20 @@ pub struct RaysBlock {
     pub first_ray: u32,
 }
 
-/// A dispatch of [`is_wanted`], as plain data.
+/// A dispatch of [`is_sampled`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct WantedBlock {
+pub struct SampleMaskBlock {
     /// Samples on each ray.
     pub sample_count: u32,
     /// Parts of each ray that was seen before, at least 1.
     pub part_count: u32,
-    /// Samples are wanted where a sample in the same part or a neighbouring one stopped at least this share of the light
+    /// Samples are in the mask where a sample in the same part or a neighbouring one stopped at least this share of the light
     /// that reached it. 0: everywhere.
     pub least_share: f32,
-    /// Samples are wanted up to one part behind where the transmittance falls to this. Negative: everywhere.
-    pub settled: f32,
-    /// Samples are wanted on rays of at least this opacity. 0: on all.
+    /// Samples are in the mask up to one part behind where the transmittance falls to this. Negative: everywhere.
+    pub termination: f32,
+    /// Samples are in the mask on rays of at least this opacity. 0: on all.
     pub least_opacity: f32,
     /// Pixels from one ray that was seen before to the next, in both directions; 0 if every ray was seen itself.
     pub step: u32,
@@ -56,16 +56,16 @@ pub struct WantedBlock {
 }
 
 /// Whether a sample at `depth` on `ray`, which is number `index` of the rays at hand and belongs to pixel `pixel`, is
-/// wanted: if the ray itself (`step` 0), or one of the four seen before around it, says so by `seen[ray][part]`. A depth
-/// outside the ray's part counts as the nearer end, NaN as `near`.
+/// in the mask: if the ray itself (`step` 0), or one of the four seen before around it, says so by `seen[ray][part]`. A
+/// depth outside the ray's part counts as the nearer end, NaN as `near`.
 #[inline]
-pub fn is_wanted(
+pub fn is_sampled(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),
     ray: &TargetRay,
     depth: f32,
     index: u32,
     pixel: u32,
-    block: &WantedBlock,
+    block: &SampleMaskBlock,
 ) -> bool {
     let last_part = block.part_count - 1;
     let share = (depth - ray.near) / (ray.far - ray.near);
@@ -88,12 +88,12 @@ pub fn is_wanted(
 }
 
 #[inline]
-fn says_so(seen: &(impl Fetch<[f32; 2]> + ?Sized), ray: u32, first: u32, last: u32, block: &WantedBlock) -> bool {
+fn says_so(seen: &(impl Fetch<[f32; 2]> + ?Sized), ray: u32, first: u32, last: u32, block: &SampleMaskBlock) -> bool {
     let row = (ray * block.part_count) as usize;
     let [end_weight, end_transmittance] = seen.fetch(row + block.part_count as usize - 1);
     // What rounding leaves below 0 counts as 0 here and below, or a threshold of 0 would leave something out.
     let opacity = max(1.0 - (end_transmittance - end_weight), 0.0);
-    let reaches = seen.fetch(row + first as usize)[1] > block.settled;
+    let reaches = seen.fetch(row + first as usize)[1] > block.termination;
     if !(opacity >= block.least_opacity) || !reaches {
         return false;
     }

@@ -1,14 +1,14 @@
-//! [`Kernel::ChannelMeans`], [`Kernel::PartMoments`], [`Kernel::MergeMoments`] and [`Kernel::Normalise`]: groups of one channel
-//! and of many, images from one pixel on that fill parts or do not, values far from 0, constant groups, images that are some
+//! [`Kernel::ChannelMeans`], [`Kernel::GroupNormPartials`], [`Kernel::GroupNormStatistics`] and [`Kernel::GroupNorm`]: groups of one channel
+//! and of many, images from one pixel on that fill partials or do not, values far from 0, constant groups, images that are some
 //! of the channels of wider ones.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::normalise_oracle;
+use crate::group_norm_oracle;
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
-use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock};
+use viewfuse_core::network::group_norm::{GroupNormBlock, MeanBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
@@ -19,10 +19,10 @@ type Buffer<D, T> = <D as Memory>::Buffer<T>;
 const GROUPS: [[u32; 4]; 6] =
     [[1, 1, 0, 0], [32, 4, 1, 0], [3, 5, 100, 2], [8, 1, 1000, 0], [1, 33, 0, 3], [2, 16, 10, 1]];
 
-fn blocks(random: &mut Random, size: u32) -> Vec<(NormaliseBlock, f64)> {
+fn blocks(random: &mut Random, size: u32) -> Vec<(GroupNormBlock, f64)> {
     let mut block = |(index, [group_count, group_channels, distance, gap]): (usize, [u32; 4])| {
         let channels = group_count * group_channels;
-        let block = NormaliseBlock {
+        let block = GroupNormBlock {
             // Also more than one part, and as many as fill them.
             pixel_count: [1 + size.div_ceil(channels), 64 + size / 8, 128][(index + size as usize) % 3],
             channels,
@@ -38,7 +38,7 @@ fn blocks(random: &mut Random, size: u32) -> Vec<(NormaliseBlock, f64)> {
 }
 
 /// An image whose groups are so many deviations of 1 from 0; now and then a group is constant.
-fn image(random: &mut Random, block: &NormaliseBlock, distance: f64) -> Vec<f32> {
+fn image(random: &mut Random, block: &GroupNormBlock, distance: f64) -> Vec<f32> {
     let groups: Vec<[f64; 2]> = (0..block.group_count)
         .map(|_| [distance * random.range(-1.0, 1.0), if random.below(8) == 0 { 0.0 } else { random.range(0.5, 2.0) }])
         .collect();
@@ -56,9 +56,9 @@ fn image(random: &mut Random, block: &NormaliseBlock, distance: f64) -> Vec<f32>
     (0..(block.in_first + block.pixel_count * block.in_pitch) as usize).map(value).collect()
 }
 
-fn moments_expected(moments: impl Iterator<Item = [Bounded; 2]>) -> Vec<Option<Bounded>> {
+fn statistics_expected(statistics: impl Iterator<Item = [Bounded; 2]>) -> Vec<Option<Bounded>> {
     // One more than is asked for.
-    moments.chain([[Bounded::ZERO; 2]]).flatten().map(Some).collect()
+    statistics.chain([[Bounded::ZERO; 2]]).flatten().map(Some).collect()
 }
 
 /// See the module.
@@ -109,7 +109,7 @@ impl Case for ChannelMeans {
 
     fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
         let means = |(block, inputs): &(MeanBlock, Vec<f32>)| {
-            let mean = |channel| normalise_oracle::channel_mean(inputs, block, channel);
+            let mean = |channel| group_norm_oracle::channel_mean(inputs, block, channel);
             (0..block.channels as usize).map(mean).chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(means).collect()
@@ -117,10 +117,10 @@ impl Case for ChannelMeans {
 }
 
 /// See the module.
-pub enum PartMoments {}
+pub enum GroupNormPartials {}
 
-impl Case for PartMoments {
-    const KERNEL: Kernel = Kernel::PartMoments;
+impl Case for GroupNormPartials {
+    const KERNEL: Kernel = Kernel::GroupNormPartials;
     // As many as give every shape floors, offsets and distances of all kinds.
     const SEED_COUNT: u64 = 8;
     // A floor of variances and a length are there for another kernel.
@@ -128,10 +128,10 @@ impl Case for PartMoments {
     const LIMITS: Limits = Limits { tolerance: 2.0, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of n differences from one of the values, a rounding of the \
         mean; n + 3 units of the sum of squares, which is up to 10^4";
-    const SPOILERS: &'static [Spoiler<Vec<(NormaliseBlock, Vec<f32>)>>] =
+    const SPOILERS: &'static [Spoiler<Vec<(GroupNormBlock, Vec<f32>)>>] =
         &[("inputs", |jobs| jobs.iter_mut().flat_map(|(_, inputs)| inputs).for_each(|input| *input *= 1.01))];
 
-    type Inputs = Vec<(NormaliseBlock, Vec<f32>)>;
+    type Inputs = Vec<(GroupNormBlock, Vec<f32>)>;
     type Loaded<D: Device> = Vec<(Buffer<D, f32>, Buffer<D, [f32; 2]>)>;
 
     fn inputs(seed: u64, size: u32) -> Self::Inputs {
@@ -145,58 +145,65 @@ impl Case for PartMoments {
     }
 
     fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
-        let load = |(block, inputs): &(NormaliseBlock, Vec<f32>)| {
-            let parts = device.zeros((block.part_count() * block.group_count) as usize + 1)?;
-            Ok((device.upload(inputs)?, parts))
+        let load = |(block, inputs): &(GroupNormBlock, Vec<f32>)| {
+            let partials = device.zeros((block.part_count() * block.group_count) as usize + 1)?;
+            Ok((device.upload(inputs)?, partials))
         };
         jobs.iter().map(load).collect()
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|((block, _), (inputs, parts))| device.part_moments(block, inputs, parts))
+        jobs.iter()
+            .zip(loaded)
+            .try_for_each(|((block, _), (inputs, partials))| device.group_norm_partials(block, inputs, partials))
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
-        let parts: Vec<_> = loaded.iter().map(|(_, parts)| device.download(parts)).collect::<Result<_, _>>()?;
-        Ok(parts.concat().into_flattened())
+        let partials: Vec<_> =
+            loaded.iter().map(|(_, partials)| device.download(partials)).collect::<Result<_, _>>()?;
+        Ok(partials.concat().into_flattened())
     }
 
     fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
-        let parts = |(block, inputs): &(NormaliseBlock, Vec<f32>)| {
-            let [parts, groups] = [block.part_count(), block.group_count].map(|count| count as usize);
-            let places = (0..parts * groups).map(|index| (index / groups, index % groups));
-            moments_expected(places.map(|(part, group)| normalise_oracle::part_moments(inputs, block, part, group)))
+        let partials = |(block, inputs): &(GroupNormBlock, Vec<f32>)| {
+            let [partials, groups] = [block.part_count(), block.group_count].map(|count| count as usize);
+            let places = (0..partials * groups).map(|index| (index / groups, index % groups));
+            statistics_expected(
+                places.map(|(part, group)| group_norm_oracle::group_norm_partials(inputs, block, part, group)),
+            )
         };
-        jobs.iter().flat_map(parts).collect()
+        jobs.iter().flat_map(partials).collect()
     }
 }
 
 /// See the module.
-pub enum MergeMoments {}
+pub enum GroupNormStatistics {}
 
-impl Case for MergeMoments {
-    const KERNEL: Kernel = Kernel::MergeMoments;
+impl Case for GroupNormStatistics {
+    const KERNEL: Kernel = Kernel::GroupNormStatistics;
     // As many as give every shape floors, offsets and distances of all kinds.
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 5.0e-2, least: 1.0e-2 };
     const REASON: &'static str = "running error analysis of one part after the other: a rounding of the mean each, which is \
-        up to 10^3 deviations, and what that makes of the squares between the parts; the reciprocal of a square root";
+        up to 10^3 deviations, and what that makes of the squares between the partials; the reciprocal of a square root";
     const SPOILERS: &'static [Spoiler<Self::Inputs>] = &[
-        ("parts", |jobs| jobs.iter_mut().flat_map(|(_, parts)| parts).for_each(|moments| moments[1] *= 1.01)),
+        ("partials", |jobs| {
+            jobs.iter_mut().flat_map(|(_, partials)| partials).for_each(|statistics| statistics[1] *= 1.01)
+        }),
         ("parameters", |jobs| {
             jobs.iter_mut().for_each(|(block, _)| block.variance_floor = 1.01 * (block.variance_floor + 1.0e-3))
         }),
     ];
 
-    type Inputs = Vec<(NormaliseBlock, Vec<[f32; 2]>)>;
+    type Inputs = Vec<(GroupNormBlock, Vec<[f32; 2]>)>;
     type Loaded<D: Device> = Vec<[Buffer<D, [f32; 2]>; 2]>;
 
     fn inputs(seed: u64, size: u32) -> Self::Inputs {
         let random = &mut random(25, seed, size);
         let job = |[group_count, group_channels, part_count, distance]: [u32; 4]| {
             let channels = group_count * group_channels;
-            let block = NormaliseBlock {
+            let block = GroupNormBlock {
                 // The last part is shorter, or not.
                 pixel_count: 64 * part_count - random.below(2) as u32 * random.below(64) as u32,
                 channels,
@@ -212,15 +219,15 @@ impl Case for MergeMoments {
                     [f64::from(distance) * random.range(-1.0, 1.0), if is_constant { 0.0 } else { 1.0 }]
                 })
                 .collect();
-            let mut parts = Vec::new();
+            let mut partials = Vec::new();
             for _ in 0..part_count {
                 for [mean, deviation] in &groups {
                     let count = f64::from(64 * group_channels);
                     let own = mean + deviation * random.normal() / 8.0;
-                    parts.push([own as f32, (deviation * count * random.range(0.5, 1.5)) as f32]);
+                    partials.push([own as f32, (deviation * count * random.range(0.5, 1.5)) as f32]);
                 }
             }
-            (block, parts)
+            (block, partials)
         };
         [[size, 1, 1, 1], [size.div_ceil(4), 4, 5, 10], [32, 16, 16, 1], [3, 8, 64, 1000], [1, 1, 33, 100]]
             .map(job)
@@ -232,37 +239,40 @@ impl Case for MergeMoments {
     }
 
     fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
-        let load = |(block, parts): &(NormaliseBlock, Vec<[f32; 2]>)| {
-            Ok([device.upload(parts)?, device.zeros(block.group_count as usize + 1)?])
+        let load = |(block, partials): &(GroupNormBlock, Vec<[f32; 2]>)| {
+            Ok([device.upload(partials)?, device.zeros(block.group_count as usize + 1)?])
         };
         jobs.iter().map(load).collect()
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let mut jobs = jobs.iter().zip(loaded);
-        jobs.try_for_each(|((block, _), [parts, moments])| device.merge_moments(block, parts, moments))
+        jobs.try_for_each(|((block, _), [partials, statistics])| {
+            device.group_norm_statistics(block, partials, statistics)
+        })
     }
 
     fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
-        let moments: Vec<_> = loaded.iter().map(|[_, moments]| device.download(moments)).collect::<Result<_, _>>()?;
-        Ok(moments.concat().into_flattened())
+        let statistics: Vec<_> =
+            loaded.iter().map(|[_, statistics]| device.download(statistics)).collect::<Result<_, _>>()?;
+        Ok(statistics.concat().into_flattened())
     }
 
     fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
-        let moments = |(block, parts): &(NormaliseBlock, Vec<[f32; 2]>)| {
+        let statistics = |(block, partials): &(GroupNormBlock, Vec<[f32; 2]>)| {
             let groups = 0..block.group_count as usize;
-            moments_expected(groups.map(|group| normalise_oracle::merged_moments(parts, block, group)))
+            statistics_expected(groups.map(|group| group_norm_oracle::group_norm_statistics(partials, block, group)))
         };
-        jobs.iter().flat_map(moments).collect()
+        jobs.iter().flat_map(statistics).collect()
     }
 }
 
 /// An image and what it is normalised with.
 #[derive(Clone, Debug)]
 pub struct Job {
-    block: NormaliseBlock,
+    block: GroupNormBlock,
     inputs: Vec<f32>,
-    moments: Vec<[f32; 2]>,
+    statistics: Vec<[f32; 2]>,
     weights: Vec<f32>,
     bias: Vec<f32>,
 }
@@ -276,17 +286,17 @@ impl Job {
 /// The same in a device's memory, and the outputs.
 pub struct LoadedJob<D: Device> {
     inputs: D::Buffer<f32>,
-    moments: D::Buffer<[f32; 2]>,
+    statistics: D::Buffer<[f32; 2]>,
     weights: D::Buffer<f32>,
     bias: D::Buffer<f32>,
     outputs: D::Buffer<f32>,
 }
 
 /// See the module.
-pub enum Normalise {}
+pub enum GroupNorm {}
 
-impl Case for Normalise {
-    const KERNEL: Kernel = Kernel::Normalise;
+impl Case for GroupNorm {
+    const KERNEL: Kernel = Kernel::GroupNorm;
     // As many as give every shape floors, offsets and distances of all kinds.
     const SEED_COUNT: u64 = 8;
     // A floor of variances and a length are there for another kernel.
@@ -296,7 +306,7 @@ impl Case for Normalise {
         exponential, a sum and a division";
     const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
         ("inputs", |jobs| jobs.iter_mut().flat_map(|job| &mut job.inputs).for_each(|input| *input *= 1.01)),
-        ("moments", |jobs| jobs.iter_mut().flat_map(|job| &mut job.moments).for_each(|own| own[1] *= 1.01)),
+        ("statistics", |jobs| jobs.iter_mut().flat_map(|job| &mut job.statistics).for_each(|own| own[1] *= 1.01)),
         ("weights", |jobs| jobs.iter_mut().flat_map(|job| &mut job.weights).for_each(|weight| *weight *= 1.01)),
         ("bias", |jobs| jobs.iter_mut().flat_map(|job| &mut job.bias).for_each(|bias| *bias *= 1.01)),
     ];
@@ -307,16 +317,16 @@ impl Case for Normalise {
     fn inputs(seed: u64, size: u32) -> Vec<Job> {
         let random = &mut random(26, seed, size);
         let blocks = blocks(random, size);
-        let job = |(block, distance): (NormaliseBlock, f64)| {
+        let job = |(block, distance): (GroupNormBlock, f64)| {
             let inputs = image(random, &block, distance);
             // About what normalises it; some outputs become large.
-            let moments = (0..block.group_count).map(|group| {
+            let statistics = (0..block.group_count).map(|group| {
                 let first = block.in_first + group * block.group_channels();
                 [inputs[first as usize] + random.normal() as f32, random.log_range(0.1, 10.0) as f32]
             });
-            let moments = moments.collect();
+            let statistics = statistics.collect();
             let [weights, bias] = [0, 1].map(|_| numbers(block.channels as usize, || random.normal()));
-            Job { block, inputs, moments, weights, bias }
+            Job { block, inputs, statistics, weights, bias }
         };
         blocks.into_iter().map(job).collect()
     }
@@ -329,7 +339,7 @@ impl Case for Normalise {
         let load = |job: &Job| {
             Ok(LoadedJob {
                 inputs: device.upload(&job.inputs)?,
-                moments: device.upload(&job.moments)?,
+                statistics: device.upload(&job.statistics)?,
                 weights: device.upload(&job.weights)?,
                 bias: device.upload(&job.bias)?,
                 outputs: device.zeros(job.len() + 1)?,
@@ -339,8 +349,8 @@ impl Case for Normalise {
     }
 
     fn run<D: Device>(device: &D, jobs: &Vec<Job>, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, moments, weights, bias, outputs })| {
-            device.normalise(&job.block, inputs, moments, weights, bias, outputs)
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, statistics, weights, bias, outputs })| {
+            device.group_norm(&job.block, inputs, statistics, weights, bias, outputs)
         })
     }
 
@@ -352,11 +362,11 @@ impl Case for Normalise {
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
         let outputs = |job: &Job| {
-            let Job { block, inputs, moments, weights, bias } = job;
+            let Job { block, inputs, statistics, weights, bias } = job;
             let channels = block.channels as usize;
             let output = |index: usize| {
                 let at = [index / channels, index % channels];
-                normalise_oracle::normalised(inputs, moments, [weights, bias], block, at)
+                group_norm_oracle::normalised(inputs, statistics, [weights, bias], block, at)
             };
             let outputs = (0..job.len()).into_par_iter().map(output);
             outputs.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()

@@ -13,7 +13,7 @@ pub const STEP: f32 = 1.0;
 /// Most steps of a ray.
 pub const MOST_STEPS: u32 = 1024;
 
-/// A target to march to, as plain data.
+/// A target whose rays are marched, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct MarchBlock {
@@ -21,8 +21,8 @@ pub struct MarchBlock {
     pub target: CameraBlock,
     /// What is behind everything, red green blue in `[0, 1]`.
     pub background: [f32; 3],
-    /// Transmittance at which a ray may end.
-    pub settled: f32,
+    /// Transmittance at which a ray may end early.
+    pub termination: f32,
 }
 
 const _: () = assert!(size_of::<MarchBlock>() == 96);
@@ -30,11 +30,11 @@ const _: () = assert!(size_of::<MarchBlock>() == 96);
 /// Colour, depth along the principal axis and opacity of the target's ray through the image coordinate `(x, y)`.
 ///
 /// The ray is marched through the object's box in equal steps of at most a footprint; it ends where the transmittance
-/// is at most `block.settled`, which changes no channel by more than that. The depth of a ray that is less than half hidden
-/// is 0: that of what little it meets means nothing.
+/// is at most `block.termination` (early termination), which changes no channel by more than that. The depth of a ray that
+/// is less than half hidden is 0: that of what little it meets means nothing.
 #[inline]
 #[allow(clippy::too_many_arguments)]
-pub fn march(
+pub fn march_ray(
     object: &ObjectBlock,
     views: &[CameraBlock],
     footprints: &[f32],
@@ -55,7 +55,7 @@ pub fn march(
         let step_count = floor_to_i32(wanted) as u32 + 1;
         let step = (leave - enter) / step_count as f32;
         let mut index = 0;
-        while index < step_count && !ray.is_settled(block.settled) {
+        while index < step_count && !ray.is_terminated(block.termination) {
             let depth = enter + (index as f32 + 0.5) * step;
             let here = sample(object, views, footprints, texels, depths, weights, origin + direction * depth);
             ray.add_solid(&here.colour, here.occupancy, depth);

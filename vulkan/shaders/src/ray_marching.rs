@@ -6,12 +6,12 @@ use spirv_std::spirv;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pages::{Pages, PagesMut};
 use viewfuse_core::photo::ObjectBlock;
-use viewfuse_core::photo::march::MarchBlock;
+use viewfuse_core::photo::ray_marching::MarchBlock;
 
 /// The ray of pixel number `first + id.x` of the target through the solid.
-#[spirv(compute(threads(64), entry_point_name = "march"))]
+#[spirv(compute(threads(64), entry_point_name = "march_rays"))]
 #[allow(clippy::too_many_arguments)]
-pub fn march(
+pub fn march_rays(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<MarchBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] object: &ObjectBlock,
@@ -48,7 +48,8 @@ pub fn march(
     let mut colours = PagesMut { a: colours_a, b: colours_b, c: colours_c, d: colours_d, shift: page_shift };
     let mut pixel_depths =
         PagesMut { a: pixel_depths_a, b: pixel_depths_b, c: pixel_depths_c, d: pixel_depths_d, shift: page_shift };
-    let seen = viewfuse_core::photo::march::march(object, views, footprints, &texels, &depths, weights, block, at);
+    let seen =
+        viewfuse_core::photo::ray_marching::march_ray(object, views, footprints, &texels, &depths, weights, block, at);
     colours.store(pixel as usize, [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity]);
     pixel_depths.store(pixel as usize, seen.depth);
 }

@@ -1,12 +1,12 @@
-//! Matrix product with bias, addend and rectified input or output: a layer of a network for many points at once.
+//! Linear layer: a matrix product with bias, residual and rectified input or output, for many points at once.
 
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
-/// A dispatch of [`product_element`], as plain data. The yes-or-no fields are 0 or 1.
+/// A dispatch of [`linear_element`], as plain data. The yes-or-no fields are 0 or 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
-pub struct ProductBlock {
+pub struct LinearBlock {
     /// Rows of inputs and outputs.
     pub row_count: u32,
     /// Columns of the inputs, rows of the weights.
@@ -17,24 +17,24 @@ pub struct ProductBlock {
     pub relu_inputs: u32,
     /// Negative outputs become 0.
     pub relu_outputs: u32,
-    /// Whether there is an addend.
-    pub has_addend: u32,
+    /// Whether there is a residual.
+    pub has_residual: u32,
 }
 
 /// Output number `element` of `inputs[row][inner]` times `weights[inner][column]` plus `bias[column]` plus
-/// `addend[row][column]`: bias and addend first, then the products in the order of the inner index.
+/// `residual[row][column]`: bias and residual first, then the products in the order of the inner index.
 #[inline]
-pub fn product_element(
+pub fn linear_element(
     inputs: &(impl Fetch<f32> + ?Sized),
     weights: &(impl Fetch<f32> + ?Sized),
     bias: &(impl Fetch<f32> + ?Sized),
-    addend: &(impl Fetch<f32> + ?Sized),
-    block: &ProductBlock,
+    residual: &(impl Fetch<f32> + ?Sized),
+    block: &LinearBlock,
     element: usize,
 ) -> f32 {
     let (inner_count, column_count) = (block.inner_count as usize, block.column_count as usize);
     let (row, column) = (element / column_count, element % column_count);
-    let mut sum = first_of_sum(bias, addend, block.has_addend, element, column);
+    let mut sum = first_of_sum(bias, residual, block.has_residual, element, column);
     let mut inner = 0;
     while inner < inner_count {
         sum += input_value(inputs, block, row, inner) * weights.fetch(inner * column_count + column);
@@ -45,21 +45,21 @@ pub fn product_element(
 
 /// Number `inner` of a row of the inputs, as it counts.
 #[inline]
-pub fn input_value(inputs: &(impl Fetch<f32> + ?Sized), block: &ProductBlock, row: usize, inner: usize) -> f32 {
+pub fn input_value(inputs: &(impl Fetch<f32> + ?Sized), block: &LinearBlock, row: usize, inner: usize) -> f32 {
     rectified(inputs.fetch(row * block.inner_count as usize + inner), block.relu_inputs)
 }
 
-/// What the sum for output number `element` begins with: `bias[column]` plus `addend[element]`, if there is an addend.
+/// What the sum for output number `element` begins with: `bias[column]` plus `residual[element]`, if there is a residual.
 #[inline]
 pub fn first_of_sum(
     bias: &(impl Fetch<f32> + ?Sized),
-    addend: &(impl Fetch<f32> + ?Sized),
-    has_addend: u32,
+    residual: &(impl Fetch<f32> + ?Sized),
+    has_residual: u32,
     element: usize,
     column: usize,
 ) -> f32 {
     let first = bias.fetch(column);
-    if has_addend != 0 { first + addend.fetch(element) } else { first }
+    if has_residual != 0 { first + residual.fetch(element) } else { first }
 }
 
 /// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays: what overflowed in one layer is found behind the last.

@@ -1,4 +1,4 @@
-//! Numbers of 16 bits: all of them, what becomes of others, and volumes of GeNVS that are kept in them.
+//! Half precision: all of them, what becomes of others, and volumes of GeNVS that are kept in them.
 
 use half::f16;
 use viewfuse::check::poses::Random;
@@ -10,23 +10,23 @@ use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::half::{LARGEST, fetch_half, half_bits, half_value, packed_halves, word_count};
+use viewfuse_core::half_precision::{LARGEST, f16_bits, f16_value, fetch_f16, packed_f16, word_count};
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::fields::{self, line};
 
 #[test]
 fn all_there_are() {
     for bits in 0..=u16::MAX {
-        let (ours, theirs) = (half_value(u32::from(bits)), f16::from_bits(bits));
+        let (ours, theirs) = (f16_value(u32::from(bits)), f16::from_bits(bits));
         if theirs.is_nan() {
-            assert!(ours.is_nan() && f16::from_bits(half_bits(ours) as u16).is_nan(), "{bits:#06x}");
+            assert!(ours.is_nan() && f16::from_bits(f16_bits(ours) as u16).is_nan(), "{bits:#06x}");
             continue;
         }
         assert_eq!(ours.to_bits(), theirs.to_f32().to_bits(), "{bits:#06x}");
         let back = if theirs.is_infinite() { bits - 1 } else { bits };
-        assert_eq!(half_bits(ours), u32::from(back), "{bits:#06x}");
+        assert_eq!(f16_bits(ours), u32::from(back), "{bits:#06x}");
         // What else stands in the word does not matter.
-        assert_eq!(half_value(0xabcd_0000 | u32::from(bits)).to_bits(), ours.to_bits());
+        assert_eq!(f16_value(0xabcd_0000 | u32::from(bits)).to_bits(), ours.to_bits());
     }
 }
 
@@ -42,11 +42,11 @@ fn halfway_between_two_and_beside_it() {
         let (lower, upper) = (f16::from_bits(bits).to_f32(), f16::from_bits(bits + 1).to_f32());
         let middle = 0.5 * (lower + upper);
         for number in [middle, middle.next_down(), middle.next_up(), lower.next_up(), upper.next_down()] {
-            assert_eq!(half_bits(number), expected(number), "{number:e}");
-            assert_eq!(half_bits(-number), 0x8000 | expected(number), "{number:e}");
+            assert_eq!(f16_bits(number), expected(number), "{number:e}");
+            assert_eq!(f16_bits(-number), 0x8000 | expected(number), "{number:e}");
         }
         let even = u32::from(if bits % 2 == 0 { bits } else { bits + 1 });
-        assert_eq!(half_bits(middle), even, "{middle:e}");
+        assert_eq!(f16_bits(middle), even, "{middle:e}");
     }
 }
 
@@ -56,16 +56,16 @@ fn numbers_at_random() {
     for _ in 0..2_000_000 {
         let number = f32::from_bits((random.below(1 << 16) as u32) << 16 | random.below(1 << 16) as u32);
         if number.is_nan() {
-            assert!(half_value(half_bits(number)).is_nan());
+            assert!(f16_value(f16_bits(number)).is_nan());
             continue;
         }
-        assert_eq!(half_bits(number), expected(number), "{number:e}");
-        let error = (f64::from(half_value(half_bits(number))) - f64::from(number.clamp(-LARGEST, LARGEST))).abs();
+        assert_eq!(f16_bits(number), expected(number), "{number:e}");
+        let error = (f64::from(f16_value(f16_bits(number))) - f64::from(number.clamp(-LARGEST, LARGEST))).abs();
         let bound = f64::from(number).abs() * 0.5_f64.powi(11);
         assert!(error <= bound.max(0.5_f64.powi(25)), "{number:e} is off by {error:e}");
     }
     for (number, whole) in [(65519.9, LARGEST), (65520.0, LARGEST), (f32::MAX, LARGEST), (f32::INFINITY, LARGEST)] {
-        assert_eq!([half_value(half_bits(number)), half_value(half_bits(-number))], [whole, -whole]);
+        assert_eq!([f16_value(f16_bits(number)), f16_value(f16_bits(-number))], [whole, -whole]);
     }
 }
 
@@ -73,13 +73,13 @@ fn numbers_at_random() {
 fn two_in_a_word() {
     for numbers in [&[1.0, -2.0, 0.5][..], &[1.0, -2.0, 0.5, 3.0]] {
         let count = numbers.len() as u32;
-        let words: Vec<u32> = (0..word_count(count) as usize).map(|word| packed_halves(numbers, count, word)).collect();
+        let words: Vec<u32> = (0..word_count(count) as usize).map(|word| packed_f16(numbers, count, word)).collect();
         assert_eq!((words.len(), words[0]), (2, 0xc000_3c00));
-        let read: Vec<f32> = (0..numbers.len()).map(|index| fetch_half(&words[..], index)).collect();
+        let read: Vec<f32> = (0..numbers.len()).map(|index| fetch_f16(&words[..], index)).collect();
         assert_eq!(read, numbers);
     }
     // A number that is there and does not count is left out.
-    assert_eq!(packed_halves(&[1.0_f32, 1.0], 1, 0), 0x3c00);
+    assert_eq!(packed_f16(&[1.0_f32, 1.0], 1, 0), 0x3c00);
 }
 
 const SIDE: u32 = 64;

@@ -6,31 +6,32 @@ use viewfuse::check::poses::Random;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
 use viewfuse_core::network::attend::{softmax_scale, softmax_value};
-use viewfuse_core::network::normalise::{
-    MeanBlock, NormaliseBlock, channel_mean, merged_moments, normalised_element, part_moments, silu,
+use viewfuse_core::network::group_norm::{
+    GroupNormBlock, MeanBlock, channel_mean, group_norm_element, group_norm_partials, group_norm_statistics, silu,
 };
 
 /// An image through all three kernels: by their bodies, and by the CPU's own way.
-fn normalised(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBlock) -> [Vec<f32>; 2] {
+fn normalised(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBlock) -> [Vec<f32>; 2] {
     let groups = block.group_count as usize;
     let part_count = block.part_count() as usize;
     let count = (block.pixel_count * block.channels) as usize;
-    let parts: Vec<[f32; 2]> = (0..part_count * groups).map(|element| part_moments(inputs, block, element)).collect();
-    let moments: Vec<[f32; 2]> = (0..groups).map(|group| merged_moments(&parts[..], block, group)).collect();
-    let output = |element| normalised_element(inputs, &moments[..], weights, bias, block, element);
+    let parts: Vec<[f32; 2]> =
+        (0..part_count * groups).map(|element| group_norm_partials(inputs, block, element)).collect();
+    let statistics: Vec<[f32; 2]> = (0..groups).map(|group| group_norm_statistics(&parts[..], block, group)).collect();
+    let output = |element| group_norm_element(inputs, &statistics[..], weights, bias, block, element);
     let by_bodies = (0..count).map(output).collect();
 
     let [inputs, weights, bias] = [inputs, weights, bias].map(<[f32]>::to_vec);
-    let (mut parts, mut moments) = (vec![[0.0; 2]; parts.len()], vec![[0.0; 2]; groups]);
+    let (mut parts, mut statistics) = (vec![[0.0; 2]; parts.len()], vec![[0.0; 2]; groups]);
     let mut outputs = vec![0.0; count];
-    Cpu.part_moments(block, &inputs, &mut parts).expect("the CPU computes");
-    Cpu.merge_moments(block, &parts, &mut moments).expect("the CPU computes");
-    Cpu.normalise(block, &inputs, &moments, &weights, &bias, &mut outputs).expect("the CPU computes");
+    Cpu.group_norm_partials(block, &inputs, &mut parts).expect("the CPU computes");
+    Cpu.group_norm_statistics(block, &parts, &mut statistics).expect("the CPU computes");
+    Cpu.group_norm(block, &inputs, &statistics, &weights, &bias, &mut outputs).expect("the CPU computes");
     [by_bodies, outputs]
 }
 
 /// The same in `f64`: the groups' values gathered, their mean, then their variance.
-fn expected(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBlock) -> Vec<f64> {
+fn expected(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBlock) -> Vec<f64> {
     let [channels, pitch, first, groups, pixels] =
         [block.channels, block.in_pitch, block.in_first, block.group_count, block.pixel_count]
             .map(|count| count as usize);
@@ -56,9 +57,9 @@ fn expected(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBloc
     expected
 }
 
-fn block(pixel_count: u32, group_count: u32, group_channels: u32) -> NormaliseBlock {
+fn block(pixel_count: u32, group_count: u32, group_channels: u32) -> GroupNormBlock {
     let channels = group_count * group_channels;
-    NormaliseBlock {
+    GroupNormBlock {
         pixel_count,
         channels,
         in_pitch: channels,
@@ -70,7 +71,7 @@ fn block(pixel_count: u32, group_count: u32, group_channels: u32) -> NormaliseBl
 }
 
 /// Largest error of both ways.
-fn error(inputs: &[f32], weights: &[f32], bias: &[f32], block: &NormaliseBlock) -> f64 {
+fn error(inputs: &[f32], weights: &[f32], bias: &[f32], block: &GroupNormBlock) -> f64 {
     let expected = expected(inputs, weights, bias, block);
     let difference = |actual: Vec<f32>| {
         assert_eq!(actual.len(), expected.len());
@@ -88,7 +89,7 @@ fn groups_have_mean_0_and_variance_1() {
         let (groups, channels) = (1 + random.below(5) as u32, 1 + random.below(9) as u32);
         let block = block(1 + random.below(300) as u32, groups, channels);
         let gap = random.below(3) as u32;
-        let block = NormaliseBlock {
+        let block = GroupNormBlock {
             in_pitch: block.channels + gap,
             in_first: gap,
             variance_floor: [1.0e-5, 0.0, 0.1][case % 3],
@@ -110,7 +111,7 @@ fn values_far_from_0_are_normalised() {
     let mut random = Random::new(62);
     for (distance, tolerance) in [(1.0e2, 5.0e-5), (1.0e3, 5.0e-4), (1.0e4, 5.0e-3)] {
         for (pixels, groups, channels) in [(64, 1, 32), (1024, 2, 16), (4096, 1, 4), (777, 3, 1)] {
-            let block = NormaliseBlock { variance_floor: 0.0, ..block(pixels, groups, channels) };
+            let block = GroupNormBlock { variance_floor: 0.0, ..block(pixels, groups, channels) };
             let count = (block.pixel_count * block.channels) as usize;
             // As many bits as the inputs have decide: what they are is given, their mean is not.
             let inputs: Vec<f32> = (0..count).map(|_| (distance + random.normal()) as f32).collect();
@@ -127,7 +128,7 @@ fn constant_groups_give_the_bias() {
     for constant in [0.0, 1.0, 0.1, -10_000.3, 1.0e6, 3.3e-5] {
         for (pixels, channels) in [(1, 1), (1, 7), (64, 32), (100, 3), (1000, 16)] {
             for variance_floor in [0.0, 1.0e-5] {
-                let block = NormaliseBlock { variance_floor, ..block(pixels, 2, channels) };
+                let block = GroupNormBlock { variance_floor, ..block(pixels, 2, channels) };
                 let inputs = vec![constant; (block.pixel_count * block.channels) as usize];
                 let bias: Vec<f32> = (0..block.channels).map(|channel| channel as f32 + 0.5).collect();
                 let expected = bias.repeat(block.pixel_count as usize);
@@ -141,7 +142,7 @@ fn constant_groups_give_the_bias() {
 
 #[test]
 fn a_pixel_alone_is_normalised_over_its_channels() {
-    let block = NormaliseBlock { variance_floor: 0.0, ..block(1, 2, 2) };
+    let block = GroupNormBlock { variance_floor: 0.0, ..block(1, 2, 2) };
     for outputs in normalised(&[1.0, 3.0, -5.0, -5.0], &[1.0, 2.0, 3.0, 4.0], &[0.0, 0.0, 0.0, 7.0], &block) {
         assert_eq!(outputs, [-1.0, 2.0, 0.0, 7.0]);
     }

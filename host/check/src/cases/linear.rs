@@ -1,5 +1,5 @@
-//! [`Kernel::Product`], and what the cases of all layers with weights share: matrices of awkward sizes, with and without
-//! addend and rectification. Behind what is read lies NaN, behind what is written nothing may change.
+//! [`Kernel::Linear`], and what the cases of all layers with weights share: matrices of awkward sizes, with and without
+//! residual and rectification. Behind what is read lies NaN, behind what is written nothing may change.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -7,7 +7,7 @@ use crate::case::{Case, Spoiler};
 use crate::network_oracle::{self, LayerInputs};
 use crate::poses::{Random, numbers, random};
 use rayon::prelude::*;
-use viewfuse_core::network::product::ProductBlock;
+use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Layer, LayerShape, Memory};
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
@@ -25,7 +25,7 @@ pub struct Job<B> {
     pub(super) inputs: Vec<f32>,
     pub(super) weights: Vec<f32>,
     pub(super) bias: Vec<f32>,
-    pub(super) addend: Option<Vec<f32>>,
+    pub(super) residual: Option<Vec<f32>>,
     pub(super) has_wide_images: bool,
     /// Numbers from the first on of which some are outputs.
     pub(super) output_count: usize,
@@ -35,7 +35,7 @@ pub struct Job<B> {
 pub struct LoadedJob<D: Device> {
     pub(super) inputs: D::Buffer<f32>,
     pub(super) layer: Layer<D>,
-    pub(super) addend: Option<<D as Memory>::Buffer<f32>>,
+    pub(super) residual: Option<<D as Memory>::Buffer<f32>>,
     pub(super) outputs: D::Buffer<f32>,
 }
 
@@ -48,8 +48,8 @@ pub(super) struct Counts {
     pub(super) columns: usize,
     /// Numbers of the bias.
     pub(super) bias: usize,
-    /// Numbers of the addend, if there is one.
-    pub(super) addend: Option<usize>,
+    /// Numbers of the residual, if there is one.
+    pub(super) residual: Option<usize>,
     pub(super) outputs: usize,
 }
 
@@ -67,7 +67,7 @@ impl<B> Job<B> {
             inputs: numbers(counts.inputs, &mut number),
             weights: numbers(counts.inner * counts.columns, || scale * number()),
             bias: numbers(counts.bias, &mut number),
-            addend: counts.addend.map(|count| numbers(count, &mut number)),
+            residual: counts.residual.map(|count| numbers(count, &mut number)),
             has_wide_images: false,
             output_count: counts.outputs,
         }
@@ -84,7 +84,7 @@ impl<B> Job<B> {
         Ok(LoadedJob {
             inputs: device.upload(&longer(&self.inputs))?,
             layer: Layer::new(device, &shape, &longer(&self.weights), &longer(&self.bias))?,
-            addend: self.addend.as_deref().map(|addend| device.upload(&longer(addend))).transpose()?,
+            residual: self.residual.as_deref().map(|residual| device.upload(&longer(residual))).transpose()?,
             outputs: device.upload(&vec![UNTOUCHED; self.output_count + SLACK])?,
         })
     }
@@ -95,8 +95,8 @@ impl<B> Job<B> {
         &self,
         output: impl Fn(&LayerInputs, usize) -> Option<Bounded> + Sync,
     ) -> Vec<Option<Bounded>> {
-        let Job { inputs, weights, bias, addend, .. } = self;
-        let layer = LayerInputs { inputs, weights, bias, addend: addend.as_deref() };
+        let Job { inputs, weights, bias, residual, .. } = self;
+        let layer = LayerInputs { inputs, weights, bias, residual: residual.as_deref() };
         let output = |index| Some(output(&layer, index).unwrap_or(UNTOUCHED.into()));
         let outputs = (0..self.output_count).into_par_iter().map(output);
         outputs.chain([Some(UNTOUCHED.into()); SLACK]).collect()
@@ -114,24 +114,24 @@ pub(super) fn read<D: Device>(device: &D, loaded: &[LoadedJob<D>]) -> Result<Vec
 }
 
 /// See the module.
-pub enum Product {}
+pub enum Linear {}
 
-impl Case for Product {
-    const KERNEL: Kernel = Kernel::Product;
-    // As many as give every shape every combination of addend and rectification.
+impl Case for Linear {
+    const KERNEL: Kernel = Kernel::Linear;
+    // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
     const REASON: &'static str =
         "n units (2^-24) of the sum of magnitudes of n summands, in whatever order they are summed";
-    const SPOILERS: &'static [Spoiler<Vec<Job<ProductBlock>>>] = &[
+    const SPOILERS: &'static [Spoiler<Vec<Job<LinearBlock>>>] = &[
         ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
         ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
         ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
-        ("addend", |jobs| spoil(jobs, |job| job.addend.as_deref_mut().unwrap_or_default())),
+        ("residual", |jobs| spoil(jobs, |job| job.residual.as_deref_mut().unwrap_or_default())),
     ];
 
-    type Inputs = Vec<Job<ProductBlock>>;
+    type Inputs = Vec<Job<LinearBlock>>;
     type Loaded<D: Device> = Vec<LoadedJob<D>>;
 
     fn inputs(seed: u64, size: u32) -> Self::Inputs {
@@ -152,12 +152,13 @@ impl Case for Product {
             let flags = index as u64 + seed;
             let flag = |bit: u32| (flags >> bit) as u32 & 1;
             let (relu_inputs, relu_outputs) = (flag(0), flag(2));
-            // Whether there is an addend a device sees for itself.
-            let block = ProductBlock { row_count, inner_count, column_count, relu_inputs, relu_outputs, has_addend: 0 };
+            // Whether there is a residual a device sees for itself.
+            let block =
+                LinearBlock { row_count, inner_count, column_count, relu_inputs, relu_outputs, has_residual: 0 };
             let [rows, inner, columns] = [row_count, inner_count, column_count].map(|count| count as usize);
             let outputs = rows * columns;
-            let addend = (flag(1) == 1).then_some(outputs);
-            let counts = Counts { inputs: rows * inner, inner, columns, bias: columns, addend, outputs };
+            let residual = (flag(1) == 1).then_some(outputs);
+            let counts = Counts { inputs: rows * inner, inner, columns, bias: columns, residual, outputs };
             Job::new(random, block, counts)
         };
         shapes.into_iter().enumerate().map(job).collect()
@@ -172,8 +173,8 @@ impl Case for Product {
     }
 
     fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, addend, outputs })| {
-            device.product(&job.block, inputs, &layer.weights, &layer.bias, addend.as_ref(), outputs)
+        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, residual, outputs })| {
+            device.linear(&job.block, inputs, &layer.weights, &layer.bias, residual.as_ref(), outputs)
         })
     }
 
@@ -182,8 +183,8 @@ impl Case for Product {
     }
 
     fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
-        let outputs = |job: &Job<ProductBlock>| {
-            job.expected(|layer, index| Some(network_oracle::product(layer, &job.block, index)))
+        let outputs = |job: &Job<LinearBlock>| {
+            job.expected(|layer, index| Some(network_oracle::linear(layer, &job.block, index)))
         };
         jobs.iter().flat_map(outputs).collect()
     }

@@ -3,7 +3,7 @@
 use super::scratch::with_scratch;
 use crate::parallel::{for_each_row, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_core::network::normalise::{MeanBlock, NormaliseBlock, PART, merged_moments, silu};
+use viewfuse_core::network::group_norm::{self, GroupNormBlock, MeanBlock, PART, silu};
 
 pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]) {
     let means = &mut means[..block.channels as usize];
@@ -15,44 +15,44 @@ pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]
     means.iter_mut().for_each(|mean| *mean /= block.pixel_count as f32);
 }
 
-pub(super) fn part_moments(block: &NormaliseBlock, inputs: &[f32], parts: &mut [[f32; 2]]) {
+pub(super) fn group_norm_partials(block: &GroupNormBlock, inputs: &[f32], partials: &mut [[f32; 2]]) {
     let groups = block.group_count as usize;
     // A part of an image is work enough for a core.
-    for_each_row(&mut parts[..block.part_count() as usize * groups], groups, 1, |part, moments| {
+    for_each_row(&mut partials[..block.part_count() as usize * groups], groups, 1, |part, statistics| {
         with_scratch(2 * block.channels as usize, |sums| {
-            Arch::new().dispatch(PartMoments { block, inputs, part, sums, moments });
+            Arch::new().dispatch(GroupNormPartials { block, inputs, part, sums, statistics });
         });
     });
 }
 
-pub(super) fn merge_moments(block: &NormaliseBlock, parts: &[[f32; 2]], moments: &mut [[f32; 2]]) {
-    for (group, moments) in moments[..block.group_count as usize].iter_mut().enumerate() {
-        *moments = merged_moments(parts, block, group);
+pub(super) fn group_norm_statistics(block: &GroupNormBlock, partials: &[[f32; 2]], statistics: &mut [[f32; 2]]) {
+    for (group, statistics) in statistics[..block.group_count as usize].iter_mut().enumerate() {
+        *statistics = group_norm::group_norm_statistics(partials, block, group);
     }
 }
 
-pub(super) fn normalise(
-    block: &NormaliseBlock,
+pub(super) fn group_norm(
+    block: &GroupNormBlock,
     inputs: &[f32],
-    moments: &[[f32; 2]],
+    statistics: &[[f32; 2]],
     weights: &[f32],
     bias: &[f32],
     outputs: &mut [f32],
 ) {
     let (channels, pixel_count) = (block.channels as usize, block.pixel_count as usize);
-    let of_channel = |channel: usize| moments[channel / block.group_channels() as usize];
+    let of_channel = |channel: usize| statistics[channel / block.group_channels() as usize];
     let mean: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[0]).collect();
     let factor: Vec<f32> = (0..channels).map(|channel| of_channel(channel)[1] * weights[channel]).collect();
     let outputs = &mut outputs[..pixel_count * channels];
     for_each_rows(outputs, channels, 4096, &|first_pixel, outputs| {
-        Arch::new().dispatch(Normalise { block, inputs, first_pixel, mean: &mean, factor: &factor, bias, outputs });
+        Arch::new().dispatch(Normalised { block, inputs, first_pixel, mean: &mean, factor: &factor, bias, outputs });
     });
 }
 
-/// Some pixels, as [`viewfuse_core::network::normalise::normalised_element`] defines them. A struct and not a closure, as
+/// Some pixels, as [`viewfuse_core::network::group_norm::group_norm_element`] defines them. A struct and not a closure, as
 /// all that must run with the machine's widest instructions: a closure becomes a function of its own, without them.
-struct Normalise<'a> {
-    block: &'a NormaliseBlock,
+struct Normalised<'a> {
+    block: &'a GroupNormBlock,
     inputs: &'a [f32],
     first_pixel: usize,
     /// `[channel]`, as all of these.
@@ -62,12 +62,12 @@ struct Normalise<'a> {
     outputs: &'a mut [f32],
 }
 
-impl WithSimd for Normalise<'_> {
+impl WithSimd for Normalised<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Normalise { block, inputs, first_pixel, mean, factor, bias, outputs } = self;
+        let Normalised { block, inputs, first_pixel, mean, factor, bias, outputs } = self;
         let channels = block.channels as usize;
         let (mean, factor, bias) = (&mean[..channels], &factor[..channels], &bias[..channels]);
         for (pixel, outputs) in (first_pixel..).zip(outputs.chunks_exact_mut(channels)) {
@@ -86,24 +86,24 @@ impl WithSimd for Normalise<'_> {
     }
 }
 
-/// [`viewfuse_core::network::normalise::part_moments`] of all groups of a part: channel by channel first, the channels of
+/// [`viewfuse_core::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the channels of
 /// a group then summed.
-struct PartMoments<'a> {
-    block: &'a NormaliseBlock,
+struct GroupNormPartials<'a> {
+    block: &'a GroupNormBlock,
     inputs: &'a [f32],
     part: usize,
     /// Scratch, two numbers a channel.
     sums: &'a mut [f32],
     /// `[group]`.
-    moments: &'a mut [[f32; 2]],
+    statistics: &'a mut [[f32; 2]],
 }
 
-impl WithSimd for PartMoments<'_> {
+impl WithSimd for GroupNormPartials<'_> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let PartMoments { block, inputs, part, sums, moments } = self;
+        let GroupNormPartials { block, inputs, part, sums, statistics } = self;
         let (channels, own) = (block.channels as usize, block.group_channels() as usize);
         let first = part * PART as usize;
         let pixels = first..block.pixel_count.min((first + PART as usize) as u32) as usize;
@@ -119,9 +119,9 @@ impl WithSimd for PartMoments<'_> {
                 *sum += input - mean;
             }
         }
-        for ((sums, means), moments) in sums.chunks(own).zip(means.chunks_mut(own)).zip(&mut *moments) {
-            *moments = [means[0] + sums.iter().sum::<f32>() / count, 0.0];
-            means.fill(moments[0]);
+        for ((sums, means), statistics) in sums.chunks(own).zip(means.chunks_mut(own)).zip(&mut *statistics) {
+            *statistics = [means[0] + sums.iter().sum::<f32>() / count, 0.0];
+            means.fill(statistics[0]);
         }
         sums.fill(0.0);
         for pixel in pixels {
@@ -129,14 +129,14 @@ impl WithSimd for PartMoments<'_> {
                 *sum += (input - mean) * (input - mean);
             }
         }
-        for (sums, moments) in sums.chunks(own).zip(moments) {
-            moments[1] = sums.iter().sum();
+        for (sums, statistics) in sums.chunks(own).zip(statistics) {
+            statistics[1] = sums.iter().sum();
         }
     }
 }
 
 /// The channels of a pixel.
 #[inline(always)]
-fn row_of<'a>(block: &NormaliseBlock, inputs: &'a [f32], pixel: usize) -> &'a [f32] {
+fn row_of<'a>(block: &GroupNormBlock, inputs: &'a [f32], pixel: usize) -> &'a [f32] {
     &inputs[block.in_first as usize + pixel * block.in_pitch as usize..][..block.channels as usize]
 }

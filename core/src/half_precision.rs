@@ -1,16 +1,17 @@
-//! Numbers of 16 bits (IEEE 754 binary16), two in a word, the lower half first: half the memory at 11 significant bits.
+//! Numbers in half precision (f16, IEEE 754 binary16), two in a word, the lower half first: half the memory at 11
+//! significant bits.
 //!
 //! Made from bits and whole numbers: devices without such a type, and those that round in another way, get the same bits.
 
 use crate::pages::Fetch;
 
-/// The largest number that has 16 bits; larger ones become this.
+/// The largest number in half precision; larger ones become this.
 pub const LARGEST: f32 = 65504.0;
 
-/// The 16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below 2^-14
+/// The f16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below 2^-14
 /// by 2^-25. What is larger than [`LARGEST`], infinity too, becomes that; NaN stays NaN.
 #[inline]
-pub fn half_bits(number: f32) -> u32 {
+pub fn f16_bits(number: f32) -> u32 {
     let bits = number.to_bits();
     let (sign, magnitude) = (bits >> 16 & 0x8000, bits & 0x7fff_ffff);
     if magnitude > 0x7f80_0000 {
@@ -37,7 +38,7 @@ fn rounded(number: u32, shift: u32) -> u32 {
 
 /// The number that the lower 16 bits stand for, exactly.
 #[inline(always)]
-pub fn half_value(bits: u32) -> f32 {
+pub fn f16_value(bits: u32) -> f32 {
     let (sign, magnitude) = ((bits & 0x8000) << 16, bits & 0x7fff);
     let whole = match magnitude >> 10 {
         // A whole number of units, of which there are fewer than 1024: a power of two times it is exact.
@@ -50,19 +51,15 @@ pub fn half_value(bits: u32) -> f32 {
 
 /// Number `index` of `words`, two in each.
 #[inline(always)]
-pub fn fetch_half(words: &(impl Fetch<u32> + ?Sized), index: usize) -> f32 {
-    half_value(words.fetch(index / 2) >> (16 * (index as u32 % 2)))
+pub fn fetch_f16(words: &(impl Fetch<u32> + ?Sized), index: usize) -> f32 {
+    f16_value(words.fetch(index / 2) >> (16 * (index as u32 % 2)))
 }
 
 /// Word `element`: numbers `2 element` and the one behind it, where there is one.
 #[inline]
-pub fn packed_halves(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, element: usize) -> u32 {
-    let lower = half_bits(numbers.fetch(2 * element));
-    if 2 * element + 1 < number_count as usize {
-        lower | half_bits(numbers.fetch(2 * element + 1)) << 16
-    } else {
-        lower
-    }
+pub fn packed_f16(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, element: usize) -> u32 {
+    let lower = f16_bits(numbers.fetch(2 * element));
+    if 2 * element + 1 < number_count as usize { lower | f16_bits(numbers.fetch(2 * element + 1)) << 16 } else { lower }
 }
 
 /// How many words so many numbers take.
