@@ -209,23 +209,56 @@ fn numbered(choice: &Choice, text: &str) -> Option<u32> {
     Some(choice.first + place as u32)
 }
 
-/// Whether a formula's texts for tables are what [`Scheme`]'s own text is.
 #[cfg(test)]
 mod tests {
-    use super::{Kind, ROWS, WeightingSpec, scheme_names};
+    use super::{Kind, ROWS, WeightingError, WeightingSpec, grammar, scheme_names};
+    use std::path::Path;
 
     #[test]
-    fn texts_of_tables_are_the_schemes_own() -> Result<(), super::WeightingError> {
+    fn texts_of_tables_are_the_schemes_own() -> Result<(), WeightingError> {
         for row in ROWS {
             assert!(!row.tables.is_empty(), "{} is in no table", row.name);
             for text in row.tables {
                 let spec: WeightingSpec = text.parse()?;
                 let Kind::Formula(scheme) = spec.kind else { panic!("{text} is no formula") };
                 assert_eq!((scheme.formula(), scheme.to_string().as_str()), (row.formula, *text));
+                assert_eq!(scheme.block().scheme(), scheme);
             }
         }
-        assert_eq!(ROWS[0].name, "mean");
         assert_eq!(scheme_names().len(), 12);
+        Ok(())
+    }
+
+    #[test]
+    fn what_can_be_typed_follows_from_the_rows() {
+        assert_eq!(
+            grammar(),
+            "mean, l1, frobenius, relative-frobenius, gaussian:beta=B, distance:power=1|2|3, \
+             error:alpha=A[,angle=axis|full], cross-attention, attention:FILE"
+        );
+    }
+
+    #[test]
+    fn defaults_and_numbers_as_a_person_writes_them() -> Result<(), WeightingError> {
+        for (text, meant) in [
+            ("gaussian", "gaussian:beta=1"),
+            ("distance:power=2.0", "distance:power=2"),
+            ("error:angle=full", "error:alpha=1,angle=full"),
+            ("error:angle=axis,alpha=5e-1", "error:alpha=0.5"),
+        ] {
+            let (spec, meant): (WeightingSpec, WeightingSpec) = (text.parse()?, meant.parse()?);
+            assert_eq!(spec.kind, meant.kind, "{text}");
+            assert_eq!(spec.to_string(), text);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn parsing_opens_no_file() -> Result<(), WeightingError> {
+        let spec: WeightingSpec = "attention:nowhere/is.safetensors".parse()?;
+        assert_eq!(spec.file(), Some(Path::new("nowhere/is.safetensors")));
+        let error = spec.open().expect_err("there is no such file").to_string();
+        assert!(error.starts_with("nowhere/is.safetensors: cannot be read"), "{error}");
         Ok(())
     }
 }
