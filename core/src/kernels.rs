@@ -31,6 +31,11 @@
 //! | `write_paged` | the same; it may be longer than a device can bind at once | a buffer |
 //!
 //! Buffers may be longer than the parameters say. [`for_each_kernel`] hands all rows to a macro.
+//!
+//! A new kernel is its body in a module here, its row, an entry point in `vulkan/shaders/src/`, a form in
+//! `host/device/src/cpu/` and a case with its `f64` evaluation in `host/check/src/cases/`: five files. What is missing of
+//! body, form and case does not compile; a missing entry point, or one that is not what the row says, fails a test, and so
+//! does a module that was not compiled again (`cargo shaders`).
 
 mod kernel;
 

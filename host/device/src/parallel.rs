@@ -94,14 +94,14 @@ pub fn for_each_row_of_two<A: Send, B: Send>(
     });
 }
 
-/// The results of `work` for `0..count`, in order. Every index is work enough for a part of its own.
-pub fn map<R: Send>(count: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+/// The results of `work` for `0..count`, in order; `least` results are enough work for a part.
+pub fn map<R: Send>(count: usize, least: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let mut results: Vec<Option<R>> = (0..count).map(|_| None).collect();
-    for_each_part(&mut results, 1, &|index, part| part[0] = Some(work(index)));
+    for_each(&mut results, least, |index, result| *result = Some(work(index)));
     results.into_iter().flatten().collect()
 }
 
-/// As [`map`], until one fails: the error is the first one's in the order of the indices among those that were tried.
+/// As [`map`] with parts of one result, until one fails: the error is the first one's in the order of the indices among those that were tried.
 ///
 /// # Errors
 /// The error of `work`.
@@ -154,7 +154,7 @@ mod tests {
 
     #[test]
     fn results_keep_their_order_and_the_first_error_is_kept() {
-        assert_eq!(map(100, |index| index * index), (0..100).map(|index| index * index).collect::<Vec<_>>());
+        assert_eq!(map(100, 7, |index| index * index), (0..100).map(|index| index * index).collect::<Vec<_>>());
         assert_eq!(
             try_map(100, |index| if index < 100 { Ok(index) } else { Err(index) }).map(|all| all.len()),
             Ok(100)
@@ -167,14 +167,14 @@ mod tests {
     fn the_installed_pool_does_the_work() {
         for count in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a pool");
-            let threads = pool.install(|| map(64, |_| rayon::current_num_threads()));
+            let threads = pool.install(|| map(64, 1, |_| rayon::current_num_threads()));
             assert_eq!(threads, vec![count; 64]);
         }
     }
 
     #[test]
     fn a_panic_comes_through() {
-        let outcome = std::panic::catch_unwind(|| map(100, |index| assert!(index != 50, "fifty")));
+        let outcome = std::panic::catch_unwind(|| map(100, 1, |index| assert!(index != 50, "fifty")));
         assert!(outcome.is_err());
     }
 }

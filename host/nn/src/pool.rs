@@ -4,9 +4,9 @@
 use super::image::{HostImage, Image, Size};
 use super::scratch::Scratch;
 use super::window::Windows;
-use rayon::prelude::*;
 use viewfuse_core::network::group_norm::MeanBlock;
 use viewfuse_core::network::resample::PoolBlock;
+use viewfuse_device::parallel::for_each_row;
 use viewfuse_device::{Device, DeviceError};
 
 /// The largest number of square windows, channel by channel; what lies outside of the image does not count.
@@ -114,7 +114,7 @@ fn pooled(
     let [height, width] = size;
     let channels = image.channels;
     let mut values = vec![0.0; height * width * channels];
-    values.par_chunks_mut(channels).enumerate().for_each(|(pixel, outputs)| {
+    for_each_row(&mut values, channels, 512, |pixel, outputs| {
         let (top, left) = (pixel / width * stride, pixel % width * stride);
         let window: Vec<WindowPixel<'_>> = (0..9)
             .map(|place| [place / 3, place % 3])

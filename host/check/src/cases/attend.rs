@@ -5,11 +5,11 @@ use crate::attention_oracle::attend;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::attention::EMBEDDING;
 use viewfuse_core::weighting::MOST_WEIGHED;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A dispatch.
@@ -84,8 +84,8 @@ impl Case for Attend {
         };
         jobs.iter()
             .flat_map(|job| {
-                let rows: Vec<_> = job.queries.par_chunks_exact(EMBEDDING).map(|query| row(job, query)).collect();
-                rows.into_iter().flatten()
+                let query = |target: usize| &job.queries[target * EMBEDDING..][..EMBEDDING];
+                map(job.queries.len() / EMBEDDING, 1, |target| row(job, query(target))).into_iter().flatten()
             })
             .collect()
     }

@@ -5,9 +5,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::compositing_oracle::composite;
 use crate::poses::{Random, numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -113,8 +113,10 @@ impl Case for Composite {
         let mut expected = Vec::new();
         for Job { block, samples, sample_depths } in jobs {
             let count = block.sample_count as usize;
-            let rays = samples.par_chunks_exact(count).zip(sample_depths.par_chunks_exact(count));
-            let pixels: Vec<_> = rays.map(|(samples, depths)| composite(samples, depths, block)).collect();
+            let pixels = map(samples.len() / count, 16, |ray| {
+                let own = ray * count..(ray + 1) * count;
+                composite(&samples[own.clone()], &sample_depths[own], block)
+            });
             expected.extend(pixels.iter().flat_map(|[red, green, blue, opacity, _]| [*red, *green, *blue, *opacity]));
             expected.extend(pixels.iter().map(|pixel| pixel[4]));
         }

@@ -132,14 +132,14 @@ impl Case for Convolve {
                 residual_pitch: if is_shared { 0 } else { out_channels + 2 * residual_gap },
                 residual_first: residual_gap,
             };
-            let addend_pixels = if is_shared { 0 } else { block.pixel_count() - 1 };
-            let addend_count = residual_gap + addend_pixels * block.residual_pitch + out_channels;
+            let residual_pixels = if is_shared { 0 } else { block.pixel_count() - 1 };
+            let residual_count = residual_gap + residual_pixels * block.residual_pitch + out_channels;
             let counts = Counts {
                 inputs: (in_height * in_width * block.in_pitch) as usize,
                 inner: block.patch_len() as usize,
                 columns: out_channels as usize,
                 bias: out_channels as usize,
-                residual: (flags >> 1 & 1 == 1).then_some(addend_count as usize),
+                residual: (flags >> 1 & 1 == 1).then_some(residual_count as usize),
                 outputs: (block.pixel_count() * block.out_pitch) as usize,
             };
             Job { has_wide_images: is_wide, ..Job::new(random, block, counts) }

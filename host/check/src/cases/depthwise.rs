@@ -6,9 +6,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::network_oracle;
 use crate::poses::{numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::network::depthwise::DepthwiseBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -121,8 +121,8 @@ impl Case for ConvolveDepthwise {
                 let (pixel, channel) = (index / channels, index % channels);
                 network_oracle::depthwise(&job.inputs, &job.weights, &job.block, pixel, channel)
             };
-            let outputs = (0..job.len()).into_par_iter().map(output);
-            outputs.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
+            let outputs = map(job.len(), 16, output);
+            outputs.into_iter().chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(outputs).collect()
     }

@@ -5,11 +5,11 @@ use crate::attention_oracle::embed;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::random;
-use rayon::prelude::*;
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, HIDDEN, POSE_FEATURES};
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_nn::initialisation;
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -71,6 +71,7 @@ impl Case for EmbedPose {
 
     fn expected(inputs: &Inputs) -> Vec<Option<Bounded>> {
         let embedding = FourierEmbedding::from_flat(&inputs.embedding);
-        inputs.poses.par_iter().flat_map_iter(|pose| embed(&embedding, pose).into_iter().map(Some)).collect()
+        let rows = map(inputs.poses.len(), 1, |pose| embed(&embedding, &inputs.poses[pose]));
+        rows.into_iter().flatten().map(Some).collect()
     }
 }

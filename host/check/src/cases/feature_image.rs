@@ -6,10 +6,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{Random, numbers, random};
 use crate::volume_oracle;
-use rayon::prelude::*;
 use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -120,10 +120,12 @@ impl Case for WeighFeatures {
     fn expected(jobs: &Vec<Weighed>) -> Vec<Option<Bounded>> {
         let weights = |Weighed { block, raw, points }: &Weighed| {
             let samples = block.sample_count as usize;
-            let rows = raw.par_chunks_exact(samples * (block.feature_count as usize + 1));
-            let rays = rows.zip(points.par_chunks_exact(samples));
-            let weights = rays.flat_map_iter(|(raw, points)| volume_oracle::weigh_features(raw, points, block));
-            weights.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
+            let row_len = samples * (block.feature_count as usize + 1);
+            let weights = map(points.len() / samples, 1, |ray| {
+                let (raw, points) = (&raw[ray * row_len..][..row_len], &points[ray * samples..][..samples]);
+                volume_oracle::weigh_features(raw, points, block)
+            });
+            weights.into_iter().flatten().chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(weights).collect()
     }
@@ -224,7 +226,7 @@ impl Case for SumFeatures {
                 volume_oracle::summed_feature(weights, fused, &raw[part(features + 1)], block, feature)
             };
             let before = vec![Bounded::ZERO; job.first()];
-            let summed: Vec<Bounded> = (0..job.len()).into_par_iter().map(own).collect();
+            let summed = map(job.len(), 16, own);
             before.into_iter().chain(summed).chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(summed).collect()

@@ -6,10 +6,10 @@ use crate::case::{Case, Spoiler};
 use crate::poses::{Random, numbers, random};
 use crate::ray_oracle;
 use crate::sights::{load_rays, ray};
-use rayon::prelude::*;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::TargetRay;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -163,7 +163,7 @@ impl Case for FineDepths {
                 let [opacity, depth] = pixels[ray];
                 ray_oracle::fine_depth(seen, &rays[ray], [depth, opacity], *draw, sample as u32, block)
             };
-            expected.par_extend(draws.par_iter().enumerate().map(depth));
+            expected.extend(map(draws.len(), 16, |index| depth((index, &draws[index]))));
         }
         expected
     }

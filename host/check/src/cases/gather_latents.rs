@@ -7,11 +7,11 @@ use crate::case::{Case, Spoiler};
 use crate::point_oracle;
 use crate::poses::{Random, numbers, random};
 use crate::sights::{camera, point};
-use rayon::prelude::*;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pixelnerf::GatherBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -133,11 +133,11 @@ impl Case for GatherLatents {
         for Job { block, views, points, grids, residual } in jobs {
             let mut gathered = Vec::new();
             for (view, grid) in views.iter().zip(grids) {
-                let row = |point| match point_oracle::gather(view, grid, point, block) {
+                let row = |point: usize| match point_oracle::gather(view, grid, &points[point], block) {
                     Some(values) => values.into_iter().map(Some).collect(),
                     None => vec![None; block.channel_count as usize],
                 };
-                gathered.par_extend(points.par_iter().flat_map_iter(row));
+                gathered.extend(map(points.len(), 1, row).into_iter().flatten());
             }
             for (value, residual) in gathered.iter_mut().zip(residual) {
                 *value = value.map(|value| value + Bounded::from(*residual));

@@ -7,9 +7,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::group_norm_oracle;
 use crate::poses::{Random, numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::network::group_norm::{GroupNormBlock, MeanBlock};
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -368,8 +368,8 @@ impl Case for GroupNorm {
                 let at = [index / channels, index % channels];
                 group_norm_oracle::normalised(inputs, statistics, [weights, bias], block, at)
             };
-            let outputs = (0..job.len()).into_par_iter().map(output);
-            outputs.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
+            let outputs = map(job.len(), 16, output);
+            outputs.into_iter().chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(outputs).collect()
     }

@@ -6,9 +6,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::network_oracle::{self, LayerInputs};
 use crate::poses::{Random, numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Layer, LayerShape, Memory};
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
@@ -98,8 +98,8 @@ impl<B> Job<B> {
         let Job { inputs, weights, bias, residual, .. } = self;
         let layer = LayerInputs { inputs, weights, bias, residual: residual.as_deref() };
         let output = |index| Some(output(&layer, index).unwrap_or(UNTOUCHED.into()));
-        let outputs = (0..self.output_count).into_par_iter().map(output);
-        outputs.chain([Some(UNTOUCHED.into()); SLACK]).collect()
+        let outputs = map(self.output_count, 16, output);
+        outputs.into_iter().chain([Some(UNTOUCHED.into()); SLACK]).collect()
     }
 }
 

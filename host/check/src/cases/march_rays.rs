@@ -5,9 +5,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::photo_oracle;
 use crate::world::World;
-use rayon::prelude::*;
 use viewfuse_core::photo::ray_marching::MarchBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, PhotoScene, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -108,7 +108,7 @@ impl Case for MarchRays {
             let at = [(pixel % target.width) as f32 + 0.5, (pixel / target.width) as f32 + 0.5];
             photo_oracle::march_ray(&world.scene(), footprints, depths, weights, target, at, *background, *termination)
         };
-        let pixels: Vec<_> = (0..target.width * target.height).into_par_iter().map(pixel).collect();
+        let pixels = map((target.width * target.height) as usize, 1, |index| pixel(index as u32));
         let mut expected = Vec::new();
         for pixel in &pixels {
             expected.extend((0..3).map(|channel| pixel.map(|pixel| pixel.colour[channel])));

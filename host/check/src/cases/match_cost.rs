@@ -5,9 +5,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::photo_oracle;
 use crate::world::World;
-use rayon::prelude::*;
 use viewfuse_core::photo::sweep::SweepBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, PhotoScene};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -85,9 +85,9 @@ impl Case for MatchCost {
         let cost = |pixel, plane| {
             photo_oracle::match_cost(&world.scene(), sweep, &world.entries, &world.pair_weights, pixel, plane)
         };
-        pixels
-            .into_par_iter()
-            .flat_map_iter(|pixel| (0..sweep.plane_count).map(move |plane| cost(pixel, plane)))
-            .collect()
+        let costs = |index: usize| -> Vec<_> {
+            (0..sweep.plane_count).map(|plane| cost(pixels.start + index as u32, plane)).collect()
+        };
+        map(pixels.len(), 1, costs).concat()
     }
 }

@@ -6,9 +6,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::matrix_oracle;
 use crate::poses::{Random, numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
@@ -136,8 +136,8 @@ impl Case for MatrixProduct {
             let columns = block.column_count as usize;
             let right = right.as_ref().unwrap_or(left);
             let output = |index| matrix_oracle::product(left, right, block, index / columns, index % columns);
-            let outputs = (0..job.len()).into_par_iter().map(output);
-            outputs.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
+            let outputs = map(job.len(), 16, output);
+            outputs.into_iter().chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(outputs).collect()
     }
@@ -213,9 +213,10 @@ impl Case for SoftmaxRows {
 
     fn expected(jobs: &Vec<Scores>) -> Vec<Option<Bounded>> {
         let weights = |job: &Scores| {
-            let rows = job.scores.par_chunks_exact(job.column_count as usize);
-            let weights: Vec<Bounded> = rows.flat_map_iter(matrix_oracle::softmax).collect();
-            weights.into_iter().chain([Bounded::ZERO]).map(Some)
+            let columns = job.column_count as usize;
+            let row = |row: usize| matrix_oracle::softmax(&job.scores[row * columns..][..columns]);
+            let weights = map(job.row_count() as usize, 1, row);
+            weights.into_iter().flatten().chain([Bounded::ZERO]).map(Some)
         };
         jobs.iter().flat_map(weights).collect()
     }

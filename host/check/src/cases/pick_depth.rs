@@ -5,11 +5,11 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::photo_oracle;
 use crate::world::{Numbers, World, costs};
-use rayon::prelude::*;
 use std::ops::Range;
 use viewfuse_core::photo::NO_SURFACE;
 use viewfuse_core::photo::sweep::SweepBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, PhotoScene};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -114,7 +114,7 @@ impl Case for PickDepth {
         let mut expected = Vec::new();
         for guess in guesses {
             // What no row covers stays as it was.
-            let mut map = vec![Some(Bounded::ZERO); world.depths.len()];
+            let mut depths = vec![Some(Bounded::ZERO); world.depths.len()];
             for (sweep, means) in bands {
                 let first = (world.views[sweep.view as usize].first_texel + sweep.first_row * sweep.width) as usize;
                 let (entries, guess) = (&world.entries[first..], &guess[first..]);
@@ -122,10 +122,10 @@ impl Case for PickDepth {
                 let pick =
                     |pixel| photo_oracle::pick_depth(&world.object, sweep, sweep.width, means, entries, guess, pixel);
                 let written = first + pixels.start as usize..first + pixels.end as usize;
-                let picked: Vec<_> = pixels.into_par_iter().map(pick).collect();
-                map[written].copy_from_slice(&picked);
+                let picked = map(pixels.len(), 1, |index| pick(pixels.start + index as u32));
+                depths[written].copy_from_slice(&picked);
             }
-            expected.extend(map);
+            expected.extend(depths);
         }
         expected
     }

@@ -7,11 +7,11 @@ use crate::case::{Case, Spoiler};
 use crate::point_oracle;
 use crate::poses::{Random, numbers, random};
 use crate::sights::{camera, point};
-use rayon::prelude::*;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -97,7 +97,7 @@ impl Case for EmbedPoints {
         let mut expected = Vec::new();
         for Embed { block, views, points } in jobs {
             for view in views {
-                let rows: Vec<_> = points.par_iter().map(|point| point_oracle::embed(view, point, block)).collect();
+                let rows: Vec<_> = map(points.len(), 1, |point| point_oracle::embed(view, &points[point], block));
                 expected.extend(rows.into_iter().flatten().map(Some));
             }
             // What is beyond the rows stays as it was.
@@ -181,8 +181,8 @@ impl Case for VisibleWeights {
     fn expected(jobs: &Vec<Visible>) -> Vec<Option<Bounded>> {
         let mut expected = Vec::new();
         for Visible { views, points, weights } in jobs {
-            let row = |point| point_oracle::visible_weights(views, weights, point);
-            expected.par_extend(points.par_iter().flat_map_iter(row));
+            let row = |point: usize| point_oracle::visible_weights(views, weights, &points[point]);
+            expected.extend(map(points.len(), 16, row).into_iter().flatten());
         }
         expected
     }

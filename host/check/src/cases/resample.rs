@@ -6,9 +6,9 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::network_oracle;
 use crate::poses::{numbers, random};
-use rayon::prelude::*;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -91,8 +91,8 @@ impl Case for MaxPool {
     fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
         let outputs = |job: &Job<PoolBlock>| {
             let output = |index| Some(network_oracle::max_pool(&job.inputs, &job.block, index));
-            let outputs = (0..job.output_count).into_par_iter().map(output);
-            outputs.chain([Some(Bounded::ZERO)]).collect::<Vec<_>>()
+            let outputs = map(job.output_count, 64, output);
+            outputs.into_iter().chain([Some(Bounded::ZERO)]).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(outputs).collect()
     }
@@ -168,8 +168,8 @@ impl Case for Upsample {
                     _ => Bounded::ZERO,
                 }
             };
-            let outputs = (0..*output_count).into_par_iter().map(output);
-            outputs.chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
+            let outputs = map(*output_count, 64, output);
+            outputs.into_iter().chain([Bounded::ZERO]).map(Some).collect::<Vec<_>>()
         };
         jobs.iter().flat_map(outputs).collect()
     }

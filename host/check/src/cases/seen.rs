@@ -8,10 +8,10 @@ use crate::case::{Case, Spoiler};
 use crate::poses::{Random, random};
 use crate::ray_oracle;
 use crate::sights::{load_rays, ray};
-use rayon::prelude::*;
 use viewfuse_core::rays::TargetRay;
 use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
@@ -224,7 +224,7 @@ impl Case for SampleMask {
                 let mask = ray_oracle::is_sampled(seen, &rays[ray], *depth, ray as u32, pixels[ray], block);
                 mask.map(|mask| Bounded::from(u32::from(mask)))
             };
-            expected.par_extend(depths.par_iter().enumerate().map(mask));
+            expected.extend(map(depths.len(), 64, |index| mask((index, &depths[index]))));
         }
         expected
     }

@@ -7,12 +7,12 @@ use crate::case::{Case, Spoiler};
 use crate::poses::{Random, numbers, random};
 use crate::sights::{camera, point};
 use crate::volume_oracle;
-use rayon::prelude::*;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Views with their volumes: a dispatch each.
@@ -71,11 +71,11 @@ pub(super) fn expected(jobs: &[Job]) -> Vec<Option<Bounded>> {
     let mut expected = Vec::new();
     for Job { block, views, points, volumes } in jobs {
         for (view, volume) in views.iter().zip(volumes) {
-            let row = |point| match volume_oracle::gather(view, volume, point, block) {
+            let row = |point: usize| match volume_oracle::gather(view, volume, &points[point], block) {
                 Some(values) => values.into_iter().map(Some).collect(),
                 None => vec![None; block.feature_count as usize],
             };
-            expected.par_extend(points.par_iter().flat_map_iter(row));
+            expected.extend(map(points.len(), 1, row).into_iter().flatten());
         }
         expected.push(Some(Bounded::ZERO));
     }

@@ -5,11 +5,11 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::oracle::{Arithmetic, evaluate, schemes};
 use crate::poses::{Random, looking_at_origin, random, ring};
-use rayon::prelude::*;
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Weights below this may be cut off: the exponential knows no subnormals, and devices may flush them.
@@ -112,7 +112,8 @@ impl Case for Weigh {
     }
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
-        jobs.par_iter().flat_map_iter(|job| job.targets.iter().flat_map(move |target| row(job, target))).collect()
+        let rows = |job: &Job| map(job.targets.len(), 1, |target| row(job, &job.targets[target]));
+        jobs.iter().flat_map(rows).flatten().collect()
     }
 }
 

@@ -5,10 +5,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::photo_oracle;
 use crate::world::{Numbers, World, costs};
-use rayon::prelude::*;
 use viewfuse_core::photo::sweep::{SweepBlock, sum_row};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_device::parallel::map;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A band's costs and their sums over rows.
@@ -77,7 +77,7 @@ impl Case for SumRow {
         let Inputs { sweep, costs, .. } = inputs;
         let sum = |(pixel, plane)| photo_oracle::sum_row(sweep, sweep.width, costs, pixel, plane);
         let elements: Vec<_> = elements(sweep).collect();
-        elements.into_par_iter().flat_map_iter(sum).collect()
+        map(elements.len(), 64, |at| sum(elements[at])).into_iter().flatten().collect()
     }
 }
 
@@ -123,6 +123,6 @@ impl Case for MeanColumn {
         let Inputs { sweep, costs, .. } = inputs;
         let mean = |(pixel, plane)| photo_oracle::mean_column(sweep, sweep.width, costs, pixel, plane);
         let elements: Vec<_> = elements(sweep).collect();
-        elements.into_par_iter().map(mean).collect()
+        map(elements.len(), 16, |at| mean(elements[at]))
     }
 }

@@ -1,10 +1,10 @@
 //! A box around the object that the silhouettes show.
 
-use rayon::prelude::*;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::photo::ObjectBlock;
 use viewfuse_core::photo::hull::hull_alpha;
+use viewfuse_device::parallel::map;
 use viewfuse_scene::rig::nearest_point_to_lines;
 
 /// Grid cells along a side of the two passes, coarse and fine.
@@ -25,10 +25,8 @@ pub(super) fn find(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<Objec
     for side in GRIDS {
         let (low, high) = corners(&object);
         let cell = (high - low) / side as f32;
-        let inside = (0..side)
-            .into_par_iter()
-            .filter_map(|slice| occupied_box(&object, cameras, texels, low, cell, side, slice))
-            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+        let boxes = map(side, 1, |slice| occupied_box(&object, cameras, texels, low, cell, side, slice));
+        let inside = boxes.into_iter().flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
         // Centres of cells were asked: matter may reach up to a cell beyond them.
         object = ObjectBlock::new(inside.0 - cell, inside.1 + cell, view_count);
     }
@@ -54,7 +52,7 @@ fn first_guess(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<(Vec3, f3
             .map(move |(pixel, _)| ((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5))
             .collect::<Vec<(f32, f32)>>()
     };
-    let silhouettes: Vec<Vec<(f32, f32)>> = cameras.par_iter().map(silhouette).collect();
+    let silhouettes = map(cameras.len(), 1, |camera| silhouette(&cameras[camera]));
     let lines: Vec<(Vec3, Vec3)> = cameras
         .iter()
         .zip(&silhouettes)
