@@ -1,7 +1,8 @@
 //! Fields: what there is at a point in space, from source views.
 //!
 //! ```text
-//! error, finite     why a field could not make a picture
+//! error             why a field could not make a picture
+//! finite            NaN and infinity are found at the stage that produced them
 //! record            what a field tells about its work
 //! field             what a field is: it prepares, encodes and renders
 //! renderer          a field on a device, without types

@@ -31,7 +31,7 @@ pub struct RunRecord {
     pub denoising: Option<Denoising>,
     /// The weighting scheme.
     pub weighting: String,
-    /// Seed of every random number. The weight-free field draws none.
+    /// Seed of every random number. The training-free field draws none.
     pub seed: u64,
     /// Width and height of the pictures.
     pub size: [u32; 2],

@@ -34,8 +34,8 @@ pub(crate) const GENVS: &str = "Options of GeNVS";
 #[derive(Args)]
 pub(crate) struct NetworkOptions {
     /// Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl); or one of the networks without training, for
-    /// measuring: formula[:WIDTH] and body[:WIDTH] are PixelNeRFs, genvs and genvs:small GeNVSs [default: the field that
-    /// needs no network]
+    /// measuring: formula[:WIDTH] and body[:WIDTH] are PixelNeRFs, genvs and genvs:small GeNVSs [default: the training-free
+    /// field]
     #[arg(long, value_name = "FILE", help_heading = NETWORK)]
     model: Option<Model>,
     /// Samples on a ray: of PixelNeRF in the first pass, in the second by weight, in the second around the depth; of GeNVS a

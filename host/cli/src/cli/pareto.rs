@@ -29,7 +29,7 @@ use viewfuse_weighting::WeightingSpec;
 #[command(after_help = "Examples:\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, all together, and fewer samples, on every device\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model genvs:small --size 32x32 --only all -o out\n      samplers are not tried, and what is left out is\n  \
-    viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the field that needs no network, on the CPU\n\n\
+    viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the training-free field, on the CPU\n\n\
     Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared \
     with its pictures before rounding. The setting `all` leaves out what --leave-out and --settled say and every omission \
     of the network. Times are medians over rounds through all settings; what else a shared machine does still shows in \
@@ -50,7 +50,7 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     network: NetworkOptions,
-    /// Seed of every random number (the field that needs no network draws none)
+    /// Seed of every random number (the training-free field draws none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Measure on this device: cpu, vulkan, vulkan:NUMBER or vulkan:NAME; may be given several times [default: all]

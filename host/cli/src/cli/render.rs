@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     reuse: Option<f32>,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Seed of every random number (the field that needs no network draws none)
+    /// Seed of every random number (the training-free field draws none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Folder for the results; made if missing
