@@ -1,9 +1,10 @@
-//! The packages as such: which depend on which, in which order their modules stand, what a library must not do, and how the
-//! tests themselves are arranged.
+//! The packages as such: which depend on which, in which order their modules stand, what a library must not do, what a
+//! crate outside can add, and how the tests themselves are arranged.
 
 mod crates;
 mod libraries;
 mod modules;
+mod outside;
 mod rooms;
 
 use serde_json::Value;
