@@ -7,6 +7,8 @@
 //! ```text
 //! math              one result on every target                    sqrt, exp, sin_cos, angles, norms
 //! pages             reading elements wherever they lie             Fetch, Pages
+//! compact           which elements a mask marks, as a list         marked_in_run, run_offsets, list_run
+//! finite            where the first NaN or infinity is             first_non_finite
 //! half_precision    two numbers in a word (f16)                    f16_bits, f16_value, packed_f16
 //! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
 //! sources           the poses of the source views                 Sources<S>

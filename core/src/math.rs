@@ -3,7 +3,7 @@
 //! `libm` and GPU instructions disagree (a driver's `acos` may be off by 4096 ULP, its `sin` by 2^-11), so the
 //! functions that decide weights and colours are our own range-reduced polynomials in plain `f32` arithmetic: the
 //! same additions and multiplications in the same order everywhere. The polynomials are those of Cephes
-//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics_math.rs` against `f64`.
+//! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics/math.rs` against `f64`.
 //!
 //! This is the only module that names `libm`, and it takes only the correctly rounded square root from it
 //! (plus `log10` in `f64` for the metrics, which never run on a device).

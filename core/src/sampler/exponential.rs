@@ -32,7 +32,7 @@ pub(super) fn second_order(levels: &Row, count: u32, next: f32) -> Mix {
 /// DPM-Solver++(3M) and UniPC's predictor: the polynomial through `count` results. To level 0 the newest result.
 ///
 /// The published DPM-Solver++(3M) halves the term of the second difference, with which it is no longer of third order
-/// (`tests/numerics_sampler.rs` measures 2); this is the third-order one.
+/// (`tests/numerics/sampler.rs` measures 2); this is the third-order one.
 pub(super) fn predictor(levels: &Row, count: u32, next: f32) -> Mix {
     if !(next > 0.0) {
         return Mix::NEWEST;
