@@ -287,7 +287,7 @@ fn without_a_denoiser() {
     assert_eq!(side(unsaid).expect("as published"), 128);
     network()
         .saying("viewfuse.image_side", "-3")
-        .refused("viewfuse.image_side = '-3', which is no number from 1 to 4096");
+        .refused("viewfuse.image_side = '-3', which is not a number from 1 to 4096");
     network()
         .saying("viewfuse.image_side", "40")
         .refused("images of 40 pixels on a side; the encoder takes multiples of 16");

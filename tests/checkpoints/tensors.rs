@@ -1,4 +1,4 @@
-//! Comparing the tensors of a file with those of an architecture, and values that are none.
+//! Comparing the tensors of a file with those of an architecture, and values that are NaN or infinite.
 
 use super::{assert_claims_refused, assert_refused, pair};
 use std::collections::BTreeMap;

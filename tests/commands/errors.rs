@@ -197,7 +197,7 @@ fn wrong_arguments_of_networks() {
     for near_far in ["0.8", "0.8,1.8,oops", "1.8,0.8", "nan,1"] {
         assert_wrong(&format!("render toy --model body:16 --near-far {near_far} -o out"), &["--near-far", "0.8,1.8"]);
     }
-    for other in ["--settled 0.1", "--leave-out 0.2", "--compute rays", "--probe-step 8"] {
+    for other in ["--early-termination 0.1", "--leave-out 0.2", "--compute rays", "--probe-step 8"] {
         let option = other.split(' ').next().unwrap_or(other);
         assert_wrong(&format!("render toy --model body:16 --exact {other} -o out"), &["--exact", option]);
     }
@@ -231,7 +231,7 @@ fn arguments_of_another_network() {
             &["--samples takes one number, at least 2,", "a GeNVS"],
         );
     }
-    wrong("--model genvs:small --settled 0.1", &["--settled cannot be used with a GeNVS"]);
+    wrong("--model genvs:small --early-termination 0.1", &["--early-termination cannot be used with a GeNVS"]);
     assert_wrong("pareto toy --targets 20 --model genvs:small --published-depth -o out", &["--published-depth cannot"]);
     assert_wrong("evaluate toy --targets 20 --model genvs:small --probe-step 8", &["--probe-step cannot"]);
 }

@@ -61,7 +61,7 @@ fn a_picture_of_any_size_a_sheet_and_a_record_without_depth() {
         serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a record")).expect("JSON");
     assert_eq!((&record["field"], &record["model"]), (&"genvs".into(), &"genvs:small".into()));
     assert_eq!((&record["seed"], &record["size"]), (&5.into(), &[21, 20][..].into()));
-    assert_eq!((&record["settled"], &record["frames"][0]["depth_step"]), (&0.0.into(), &Value::Null));
+    assert_eq!((&record["early_termination"], &record["frames"][0]["depth_step"]), (&0.0.into(), &Value::Null));
     assert!(record["memory_estimate"].as_u64().is_some_and(|bytes| bytes > 1 << 20), "{record}");
     let denoising = &record["denoising"];
     assert_eq!((&denoising["sampler"], &denoising["levels"]), (&"ipndm".into(), &3.into()));
@@ -88,8 +88,10 @@ fn options_reach_the_run() {
     assert_eq!((&chosen["sampler"], &chosen["levels"]), (&"unipc".into(), &Value::Null));
     assert!(chosen["tolerance"] == 0.5 && chosen["calls"].as_u64().is_some_and(|calls| (3..30).contains(&calls)));
     // An end when nothing changes any more is allowed, and may be forbidden.
-    assert!(denoising("--steps 3")["settled"].as_f64().is_some_and(|settled| settled > 0.0));
-    assert_eq!(denoising("--steps 3 --compute calls")["settled"], Value::Null);
+    assert!(
+        denoising("--steps 3")["early_termination"].as_f64().is_some_and(|early_termination| early_termination > 0.0)
+    );
+    assert_eq!(denoising("--steps 3 --compute calls")["early_termination"], Value::Null);
 }
 
 fn exact_leaves_nothing_out() {

@@ -150,7 +150,7 @@ fn sweeps_the_field_without_a_network() {
     let settings: Vec<&str> = rows.iter().map(|row| row["setting"].as_str()).collect();
     assert_eq!(settings.iter().filter(|setting| **setting == "exact").count(), 2, "{settings:?}");
     let row = |setting: &str| &rows[settings.iter().position(|own| *own == setting).expect("a setting")];
-    assert!(number(row("sources 1/4"), "psnr_exact_db") < number(row("settled 1/256"), "psnr_exact_db"));
+    assert!(number(row("sources 1/4"), "psnr_exact_db") < number(row("early termination 1/256"), "psnr_exact_db"));
     let record = record(folder);
     assert_eq!(record["devices"][1]["exact_versus_first"]["root_mean_square"], 0.0);
     assert_eq!((&record["model"], record["targets"].as_array().map(Vec::len)), (&Value::Null, Some(2)));

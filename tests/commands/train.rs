@@ -159,7 +159,7 @@ fn wrong_input_is_told() {
     refused("train pixelnerf learn/lorries -o out", &["lorries"]);
     refused("train weighting learn/toys.json learn/toys -o out", &["learn/toys.json"]);
     fs::write(folder.path().join("state.safetensors"), "nothing").expect("a file");
-    refused("train pixelnerf learn/toys -o .", &["./state.safetensors: is no state of a training run"]);
+    refused("train pixelnerf learn/toys -o .", &["./state.safetensors: is not the state of a training run"]);
     assert_wrong_arguments(BINARY, folder.path(), "train genvs learn/toys -o out --width 5", &["a multiple of 4"]);
     assert!(!folder.path().join("out").exists());
 }

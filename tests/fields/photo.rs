@@ -40,14 +40,19 @@ fn pictures_do_not_depend_on_the_bands() {
 #[test]
 fn a_ray_that_ends_early_changes_no_channel_by_more_than_it_may() {
     let sources = lorry_views(48);
-    let with = |settled| Run { settled, ..Run::default() }.picture(&sources, &target(48)).expect("a picture");
+    let with = |early_termination| {
+        Run { early_termination, ..Run::default() }.picture(&sources, &target(48)).expect("a picture")
+    };
     let full = with(0.0);
     assert_shows_an_object(&full);
-    for settled in [0.3, 0.05, 1.0 / 256.0] {
-        let difference = largest_difference(&with(settled), &full);
-        println!("settled {settled}: largest difference {difference}");
-        assert!(difference <= settled + 1.0e-6, "settled {settled}: a channel is off by {difference}");
-        assert!(difference > 0.01 * settled, "settled {settled}: no ray ended early");
+    for early_termination in [0.3, 0.05, 1.0 / 256.0] {
+        let difference = largest_difference(&with(early_termination), &full);
+        println!("early termination {early_termination}: largest difference {difference}");
+        assert!(
+            difference <= early_termination + 1.0e-6,
+            "early termination {early_termination}: a channel is off by {difference}"
+        );
+        assert!(difference > 0.01 * early_termination, "early termination {early_termination}: no ray ended early");
     }
 }
 

@@ -46,9 +46,9 @@ fn picture_with(
     sources: &SourceImages,
     weights: &SourceWeights,
     target: &Camera,
-    settled: f32,
+    early_termination: f32,
 ) -> Rendered {
-    recorded(field, sources, weights, target, settled).0
+    recorded(field, sources, weights, target, early_termination).0
 }
 
 /// A picture, and what the field says of it.
@@ -57,9 +57,9 @@ fn recorded(
     sources: &SourceImages,
     weights: &SourceWeights,
     target: &Camera,
-    settled: f32,
+    early_termination: f32,
 ) -> (Rendered, Record) {
-    fields::picture(&Cpu, field, sources, weights, target, settled, &Silent).expect("a picture")
+    fields::picture(&Cpu, field, sources, weights, target, early_termination, &Silent).expect("a picture")
 }
 
 fn picture(field: &PixelNerf, sources: &SourceImages, target: &Camera) -> Rendered {

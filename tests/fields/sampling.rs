@@ -1,5 +1,5 @@
-//! The driver of the samplers, on the CPU: which calls it makes, what it starts from, when it ends, and what it does with
-//! numbers that are none. That it gives what the samplers' formulas give is in `numerics/sampler.rs`, that other devices give
+//! The driver of the samplers, on the CPU: which calls it makes, what it starts from, when it ends, and what it does with NaN and
+//! infinity. That it gives what the samplers' formulas give is in `numerics/sampler.rs`, that other devices give
 //! the same in `devices/sampling.rs`.
 
 use viewfuse::device::cpu::Cpu;
@@ -128,7 +128,7 @@ fn noise_on_the_way_forgets() {
 #[test]
 fn a_run_ends_when_nothing_changes() {
     for sampler in Sampler::ALL {
-        let plan = Plan { settled: Some(HALF_A_LEVEL), ..fixed(sampler, 25) };
+        let plan = Plan { early_termination: Some(HALF_A_LEVEL), ..fixed(sampler, 25) };
         // Above a certain level nothing is decided, whatever does not change.
         let (outcome, _) = run(&plan, Start::Noise, |_, _| vec![0.3; COUNT]);
         let sampled = outcome.expect("a picture");
@@ -148,7 +148,7 @@ fn a_run_ends_when_nothing_changes() {
         assert!(*sampled.levels.last().expect("calls") < 0.01, "{}", sampler.name());
     }
     let plan = Plan { steps: Steps::Chosen { tolerance: 1.0e-3, most_calls: 99 }, ..Plan::published(9) };
-    let stopped = picture(&Plan { settled: Some(HALF_A_LEVEL), ..plan });
+    let stopped = picture(&Plan { early_termination: Some(HALF_A_LEVEL), ..plan });
     let whole = picture(&plan);
     let largest = stopped.picture.iter().zip(&whole.picture).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
     assert!(stopped.call_count() < whole.call_count() && largest <= 2.0 * HALF_A_LEVEL, "{largest}");

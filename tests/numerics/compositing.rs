@@ -143,7 +143,7 @@ fn empty_opaque_and_useless_samples() {
 }
 
 #[test]
-fn a_settled_ray_changes_by_less_than_its_threshold() {
+fn a_ray_that_ends_early_changes_by_less_than_its_threshold() {
     let mut random = Random::new(33);
     let mut reached = 0.0_f32;
     for case in 0..3_000 {

@@ -17,13 +17,13 @@ pub fn picture<D: Device + Sync, F: Field + Sync>(
     sources: &SourceImages,
     weights: &SourceWeights,
     target: &Camera,
-    settled: f32,
+    early_termination: f32,
     progress: &dyn Progress,
 ) -> Result<(Rendered, Record), FieldError> {
     let renderer = On { device, field };
     let mut session = Session::open(&renderer, sources, progress)?;
     session.weigh(&[], progress)?;
-    let picture = session.render(target, weights, settled, progress)?;
+    let picture = session.render(target, weights, early_termination, progress)?;
     Ok((picture, session.record()))
 }
 

@@ -11,9 +11,9 @@ use std::fmt;
 pub enum AdapterKind {
     /// A graphics card.
     Discrete,
-    /// A graphics processor that shares the memory of the machine.
+    /// A GPU that shares the memory of the machine.
     Integrated,
-    /// A graphics processor handed to a virtual machine.
+    /// A GPU handed to a virtual machine.
     Virtual,
     /// Something else.
     Other,
@@ -22,7 +22,7 @@ pub enum AdapterKind {
 }
 
 impl AdapterKind {
-    /// Whether there is a graphics processor behind it.
+    /// Whether there is a GPU behind it.
     pub fn is_gpu(self) -> bool {
         self <= AdapterKind::Virtual
     }

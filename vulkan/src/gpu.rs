@@ -44,7 +44,7 @@ impl Default for GpuOptions {
 impl GpuOptions {
     /// How long a submission may run on a device of this kind; `None` if it may run as long as it takes.
     ///
-    /// Without a limit of its own, a graphics processor has two minutes: it does nothing else meanwhile. A software driver
+    /// Without a limit of its own, a GPU has two minutes: it does nothing else meanwhile. A software driver
     /// has none: its kernels share the processor with everything else that runs on the machine, and a busy machine is no
     /// failure.
     pub fn time_limit_on(&self, kind: AdapterKind) -> Option<Duration> {

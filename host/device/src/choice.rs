@@ -11,7 +11,7 @@ use viewfuse_vulkan::{Adapter, GpuOptions, Instance, InstanceOptions, VulkanErro
 /// The device that a person asks for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceChoice {
-    /// A graphics processor if there is one that can do the work, otherwise the CPU.
+    /// A GPU if there is one that can do the work, otherwise the CPU.
     Auto,
     /// All cores of this machine.
     Cpu,
@@ -21,7 +21,9 @@ pub enum DeviceChoice {
 
 /// A text that names no device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no device; there are: auto, cpu, vulkan, vulkan:NUMBER, vulkan:NAME (see `viewfuse devices`)")]
+#[error(
+    "unknown device '{0}'; the choices are auto, cpu, vulkan, vulkan:NUMBER and vulkan:NAME (see `viewfuse devices`)"
+)]
 pub struct UnknownDevice(String);
 
 impl FromStr for DeviceChoice {
@@ -99,10 +101,9 @@ pub fn open(choice: &DeviceChoice, options: &DeviceOptions) -> Result<Chosen, Vu
             Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "asked for".to_owned() })
         }
         DeviceChoice::Auto => Ok(match automatic(options) {
-            Ok(device) => Chosen {
-                device: AnyDevice::Vulkan(Box::new(device)),
-                reason: "a graphics processor that can do the work".to_owned(),
-            },
+            Ok(device) => {
+                Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "a GPU that can do the work".to_owned() }
+            }
             Err(reason) => cpu(reason),
         }),
     }
@@ -146,14 +147,14 @@ pub fn open_several(asked: &[DeviceChoice], options: &DeviceOptions) -> Result<S
     Ok(several)
 }
 
-/// The first graphics processor that can do the work, or why there is none.
+/// The first GPU that can do the work, or why there is none.
 fn automatic(options: &DeviceOptions) -> Result<Vulkan, String> {
     let (instance, adapters) =
         vulkan_devices(&options.instance).map_err(|error| format!("because there is {error}"))?;
     let mut reasons = Vec::new();
     for adapter in &adapters {
         if !adapter.kind.is_gpu() {
-            reasons.push(format!("{} is no graphics processor", adapter.name));
+            reasons.push(format!("{} is not a GPU", adapter.name));
             continue;
         }
         match Vulkan::open(&instance, adapter, &options.gpu) {

@@ -15,7 +15,7 @@ pub struct Vulkan {
     transfers: Mutex<Transfers>,
 }
 
-/// Elements that keep a graphics processor busy.
+/// Elements that keep a GPU busy.
 const BUSY_ELEMENTS: usize = 1 << 16;
 
 impl Vulkan {

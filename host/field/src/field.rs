@@ -71,7 +71,7 @@ pub struct About {
     pub longest_side: u32,
     /// When a view is encoded.
     pub encoding: Encoding,
-    /// Whether its rays end where little light still passes ([`Request::settled`]); otherwise they go on to the end.
+    /// Whether its rays end where little light still passes ([`Request::early_termination`]); otherwise they go on to the end.
     pub ends_rays: bool,
 }
 
@@ -130,7 +130,7 @@ pub struct Request<'a> {
     /// The views that take part, in ascending order: under [`Encoding::WhenUsed`] those with a weight, otherwise all.
     pub views: &'a [usize],
     /// Transmittance at which a ray may end early: no channel changes by more than that.
-    pub settled: f32,
+    pub early_termination: f32,
 }
 
 impl Request<'_> {

@@ -1,4 +1,4 @@
-//! Numbers that are none are found where they arise, and not in the picture at the end.
+//! NaN and infinity are reported at the stage that produced them, not in the picture at the end.
 
 use super::error::FieldError;
 pub use super::error::NotFinite;

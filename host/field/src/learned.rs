@@ -19,7 +19,7 @@ pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
 
 /// Rays are to end where they begin or before, or one of the two is NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("rays from depth {near} to depth {far} have nothing between their ends")]
+#[error("the near bound of rays, {near}, must be below the far bound, {far}, and both must be finite")]
 pub struct NoDepths {
     /// Where they begin.
     pub near: f32,

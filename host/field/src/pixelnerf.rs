@@ -185,7 +185,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             views: &views,
             sampling: *sampling,
             omissions: *omissions,
-            settled: request.settled,
+            early_termination: request.early_termination,
             cast: CastBlock { camera, near, far, pixel_centre: architecture.pixel_centre, along_axis: 0 },
             background: self.background,
             progress,

@@ -44,7 +44,7 @@ pub struct Denoising {
     /// Noise that is added on the way, over the whole run.
     pub churn: f32,
     /// A run ends where no value will change by more than this; null where it goes to the end.
-    pub settled: Option<f32>,
+    pub early_termination: Option<f32>,
     /// The level at which a picture starts from the one before; null where each starts from noise alone.
     pub reuse: Option<f32>,
     /// Calls of the denoiser that were made, for all pictures together.

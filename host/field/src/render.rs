@@ -97,7 +97,7 @@ pub struct RenderOptions {
     /// Sources of least weight are left out while their weights together stay at or below this.
     pub leave_out: f32,
     /// Transmittance at which a ray may end.
-    pub settled: f32,
+    pub early_termination: f32,
 }
 
 /// Largest share of the weight that is left out unless a person says otherwise: it bounds the change of a fusion of all
@@ -106,7 +106,7 @@ pub struct RenderOptions {
 /// sees nothing.
 pub const DEFAULT_LEAVE_OUT: f32 = 0.01;
 /// Transmittance at which a ray may end unless a person says otherwise: 1/256 of the range of a channel.
-pub const DEFAULT_SETTLED: f32 = 1.0 / 256.0;
+pub const DEFAULT_EARLY_TERMINATION: f32 = 1.0 / 256.0;
 
 impl Default for RenderOptions {
     fn default() -> RenderOptions {
@@ -114,7 +114,7 @@ impl Default for RenderOptions {
             size: None,
             background: BackgroundChoice::Auto,
             leave_out: DEFAULT_LEAVE_OUT,
-            settled: DEFAULT_SETTLED,
+            early_termination: DEFAULT_EARLY_TERMINATION,
         }
     }
 }
@@ -292,8 +292,8 @@ impl<'a> Stage<'a> {
         let failed = |error| RenderError::of(error, self.scene);
         let mut encode = Duration::ZERO;
         timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
-        let settled = self.options.settled;
-        let rendered = self.session.render(&camera, &omission.weights, settled, progress).map_err(failed)?;
+        let early_termination = self.options.early_termination;
+        let rendered = self.session.render(&camera, &omission.weights, early_termination, progress).map_err(failed)?;
         let time = start.elapsed();
         let Rendered { colours, depths, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);

@@ -79,7 +79,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Renders a target with the sources' weights for it. `settled` is the transmittance at which a ray may end early.
+    /// Renders a target with the sources' weights for it. `early_termination` is the transmittance at which a ray may end early.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -87,12 +87,12 @@ impl<'a> Session<'a> {
         &mut self,
         camera: &Camera,
         weights: &SourceWeights,
-        settled: f32,
+        early_termination: f32,
         progress: &dyn Progress,
     ) -> Result<Rendered, FieldError> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
-        self.prepared.render(&Request { camera, weights, views, settled }, progress)
+        self.prepared.render(&Request { camera, weights, views, early_termination }, progress)
     }
 
     /// What was done and left out so far.

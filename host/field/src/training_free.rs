@@ -203,11 +203,11 @@ impl<D: Device> Prepared for Views<'_, D> {
         let Views { device, scene, background, depths, .. } = self;
         let depths = depths.as_mut().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
         depths.sweep = None;
-        let &Request { camera: target, settled, .. } = request;
+        let &Request { camera: target, early_termination, .. } = request;
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
         let count = (width * height) as usize;
         let weights = device.upload(&request.view_weights())?;
-        let target = MarchBlock { target: target.block(0), background: *background, termination: settled };
+        let target = MarchBlock { target: target.block(0), background: *background, termination: early_termination };
         let mut pixels: Pixels<D> = Pixels { colours: device.zeros(count)?, depths: device.zeros(count)? };
         let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
         progress.expect(height.div_ceil(band_rows) as usize);

@@ -40,7 +40,7 @@ pub struct RunRecord {
     /// Largest total weight of views that may be left out.
     pub leave_out: f32,
     /// Transmittance at which rays may end: no channel changes by more than this times its range.
-    pub settled: f32,
+    pub early_termination: f32,
     /// What was doubtful about the photographs.
     pub warnings: Vec<String>,
     /// Names of the source views.

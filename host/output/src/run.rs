@@ -125,7 +125,7 @@ impl RunWriter {
             size: self.size,
             background: background_record(options, self.background),
             leave_out: options.leave_out,
-            settled: options.settled,
+            early_termination: options.early_termination,
             warnings: self.warning.into_iter().collect(),
             sources: self.source_names,
             memory_estimate: record.memory_estimate,

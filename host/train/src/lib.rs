@@ -122,7 +122,7 @@ pub enum TrainError {
         difference: String,
     },
     /// The run's state cannot be used.
-    #[error("{}: is no state of a training run: {reason}", path.display())]
+    #[error("{}: is not the state of a training run: {reason}", path.display())]
     State {
         /// The file.
         path: PathBuf,

@@ -64,7 +64,9 @@ fn rays_of_no_length_are_an_error() {
     for (near, far) in [(1.0, 1.0), (1.8, 0.8), (f32::NAN, 1.0), (1.0, f32::NAN), (1.0, infinite), (-3.0e38, 3.0e38)] {
         match try_picture(&between(near, far), &sources(2), &Weights::mean(2), &target(8)) {
             Err(error) if error.is::<NoDepths>() => {
-                let expected = format!("rays from depth {near} to depth {far} have nothing between their ends");
+                let expected = format!(
+                    "the near bound of rays, {near}, must be below the far bound, {far}, and both must be finite"
+                );
                 assert_eq!(error.to_string(), expected);
             }
             other => panic!("{near} to {far}: {other:?}"),

@@ -1,4 +1,4 @@
-//! Numbers that are none are found where they arise: at the border of the stage that made them, which the error names.
+//! NaN and infinity are reported at the stage that produced them, which the error names.
 
 use super::{exact, sources, target, try_picture};
 use std::collections::BTreeMap;

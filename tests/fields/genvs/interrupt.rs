@@ -23,7 +23,7 @@ fn a_person_need_not_wait_for_the_picture() {
     let start = Instant::now();
     // As many calls as take a minute and more.
     let plan = Plan {
-        settled: None,
+        early_termination: None,
         steps: Steps::Fixed { sampler: Sampler::Euler, level_count: 100_000 },
         ..Plan::published(0)
     };

@@ -87,7 +87,7 @@ fn an_earlier_frame_saves_calls() {
     let quiet = Silent;
     let frames = |reuse| {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
-        let field = made(GenvsOptions { plan: Plan { settled: None, ..in_18_calls() }, ..options });
+        let field = made(GenvsOptions { plan: Plan { early_termination: None, ..in_18_calls() }, ..options });
         let renderer = On { device: &Cpu, field: &field };
         let mut session = Session::open(&renderer, &sources, &quiet).expect("sources on the device");
         let mut render = |camera| session.render(camera, &Weights::mean(2), 0.0, &quiet);
@@ -110,14 +110,14 @@ fn an_earlier_frame_saves_calls() {
 }
 
 #[test]
-fn a_settled_picture_ends_early() {
+fn a_picture_that_no_longer_changes_ends_early() {
     let (sources, target) = (sources(2), target(16));
-    let with = |settled| {
-        let field = made(GenvsOptions { plan: Plan { settled, ..in_18_calls() }, ..exact() });
+    let with = |early_termination| {
+        let field = made(GenvsOptions { plan: Plan { early_termination, ..in_18_calls() }, ..exact() });
         let (picture, record) = recorded(&field, &sources, &Weights::mean(2), &target);
         (picture, line(&record, "denoiser calls"))
     };
-    let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).settled));
+    let ((whole, _), (early, calls)) = (with(None), with(Plan::fast(0).early_termination));
     let difference = largest_difference(&whole, &early);
     println!("{} of {} calls left out, largest difference {difference:.1e}", calls.left_out, calls.of);
     assert!(calls.left_out > 0 && calls.of == 18);

@@ -23,12 +23,12 @@ pub(crate) const RADIUS: f32 = 0.4;
 pub(crate) struct Run {
     pub(crate) field: TrainingFree,
     pub(crate) scheme: &'static str,
-    pub(crate) settled: f32,
+    pub(crate) early_termination: f32,
 }
 
 impl Default for Run {
     fn default() -> Run {
-        Run { field: TrainingFree::default(), scheme: "error:alpha=1", settled: 1.0 / 256.0 }
+        Run { field: TrainingFree::default(), scheme: "error:alpha=1", early_termination: 1.0 / 256.0 }
     }
 }
 
@@ -43,7 +43,7 @@ impl Run {
         let all: Vec<_> = sources.images.iter().map(|image| image.camera.pose).collect();
         let all = Sources::<MOST_SOURCES>::new(&all).expect("sources");
         let weights = weighting.weigh(&all, &target.pose);
-        session.render(target, &weights, self.settled, &quiet)
+        session.render(target, &weights, self.early_termination, &quiet)
     }
 }
 

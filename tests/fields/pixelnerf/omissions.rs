@@ -9,14 +9,14 @@ use viewfuse_core::weights::Weights;
 use viewfuse_tests::fields::line;
 
 /// Transmittance at which rays end.
-const SETTLED: f32 = 1.0 / 256.0;
+const EARLY_TERMINATION: f32 = 1.0 / 256.0;
 
 /// Difference from the exact picture of the body, and the share of the samples of a pass that was left out.
 fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
     let (sources, target) = (sources(3), target(32));
     let reference = picture(&body(exact()), &sources, &target);
     let field = body(leaving_out(omissions));
-    let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, SETTLED);
+    let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
     let difference = largest_difference(&picture, &reference);
     let LeftOut { left_out, of, switch, .. } = line(&record, what);
     assert!(switch && of > 0);
@@ -27,7 +27,7 @@ fn cost_and_gain(omissions: Omissions, what: &str) -> (f32, f64) {
 
 #[test]
 fn nothing_is_left_out_where_nothing_may() {
-    let (_, record) = recorded(&body(exact()), &sources(3), &Weights::mean(3), &target(16), SETTLED);
+    let (_, record) = recorded(&body(exact()), &sources(3), &Weights::mean(3), &target(16), EARLY_TERMINATION);
     assert_eq!(record.left_out.len(), 4);
     for line in &record.left_out {
         assert!(!line.switch && line.left_out == 0 && line.of > 0, "{line:?}");
@@ -54,7 +54,7 @@ fn latent_layers_on_the_grid_are_only_rounding() {
     let (sources, target) = (sources(3), target(24));
     let reference = picture(&mist(exact()), &sources, &target);
     let field = mist(leaving_out(Omissions { latent_layers: true, ..Omissions::NONE }));
-    let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, SETTLED);
+    let (picture, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
     let difference = largest_difference(&picture, &reference);
     println!("latent layers on the grid: {difference:.1e}");
     assert!(difference > 0.0, "the same bits: the layers were not moved");
@@ -118,7 +118,7 @@ fn all_together_save_most_and_cost_little() {
     let (sources, target) = (sources(3), target(32));
     let reference = picture(&body(exact()), &sources, &target);
     let field = body(PixelNerfOptions::default());
-    let (default, record) = recorded(&field, &sources, &Weights::mean(3), &target, SETTLED);
+    let (default, record) = recorded(&field, &sources, &Weights::mean(3), &target, EARLY_TERMINATION);
     let squares =
         default.colours.iter().flatten().zip(reference.colours.iter().flatten()).map(|(a, b)| (a - b).powi(2));
     let psnr = -10.0 * (squares.map(f64::from).sum::<f64>() / (4 * default.colours.len()) as f64).log10();
@@ -131,17 +131,20 @@ fn all_together_save_most_and_cost_little() {
 }
 
 #[test]
-fn a_higher_limit_for_settled_rays_saves_more_and_costs_more() {
+fn a_higher_limit_of_early_termination_saves_more_and_costs_more() {
     let (sources, target) = (sources(3), target(24));
     let reference = picture(&body(exact()), &sources, &target);
     let weights = Weights::mean(3);
-    let with = |settled| {
+    let with = |early_termination| {
         let field = body(leaving_out(Omissions { hidden_samples: true, ..Omissions::NONE }));
-        let (picture, record) = recorded(&field, &sources, &weights, &target, settled);
+        let (picture, record) = recorded(&field, &sources, &weights, &target, early_termination);
         (largest_difference(&picture, &reference), line(&record, "second-pass samples").left_out)
     };
     let (strict, loose) = (with(1.0e-4), with(0.5));
-    println!("settled at 1e-4: {:.1e}, {} left out; at 0.5: {:.1e}, {} left out", strict.0, strict.1, loose.0, loose.1);
+    println!(
+        "early termination at 1e-4: {:.1e}, {} left out; at 0.5: {:.1e}, {} left out",
+        strict.0, strict.1, loose.0, loose.1
+    );
     assert!(strict.1 < loose.1 && strict.0 <= loose.0);
     assert!(strict.0 < 5.0e-3);
 }

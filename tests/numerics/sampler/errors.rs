@@ -104,7 +104,7 @@ fn what_the_plans_make() {
         assert!(calls == 10 && own <= 0.04 && own <= 8.0 * published && own <= 0.1 * ten, "{name}");
         for (plan, most) in [(Plan::fast(5), 0.05), (Plan::careful(5), 0.012)] {
             let (picture, sampled) = on_cpu(&plan, mixture);
-            let whole = on_cpu(&Plan { settled: None, ..plan }, mixture);
+            let whole = on_cpu(&Plan { early_termination: None, ..plan }, mixture);
             let (made, whole) = (distance(&picture, &truth), (distance(&whole.0, &truth), whole.1.call_count()));
             println!(
                 "    {:?}: {made:.1e} at {} calls, without stopping {:.1e} at {}",

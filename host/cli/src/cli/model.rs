@@ -61,7 +61,7 @@ pub(crate) struct ModelOptions {
     network: NetworkOptions,
     /// Leave nothing out: every view, layer and sample, whether the scene needs it or not; of GeNVS also every call of the
     /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance say otherwise
-    #[arg(long, conflicts_with_all = ["compute", "probe_step", "probe_error", "leave_out", "settled"], help_heading = NETWORK)]
+    #[arg(long, conflicts_with_all = ["compute", "probe_step", "probe_error", "leave_out", "early_termination"], help_heading = NETWORK)]
     pub(crate) exact: bool,
     /// Compute these although the scene does not need them
     #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(computable()), value_delimiter = ',', requires = "model", help_heading = NETWORK)]

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::About;
-use viewfuse_field::render::{DEFAULT_LEAVE_OUT, DEFAULT_SETTLED, RenderOptions};
+use viewfuse_field::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
 use viewfuse_scene::few_shot::Selection;
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
@@ -27,8 +27,8 @@ pub(crate) struct PictureOptions {
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
     leave_out: f32,
     /// A ray ends where less than this share of the light still passes; rays of a GeNVS go on to the end [default: 1/256]
-    #[arg(long, value_name = "SHARE", value_parser = parse_share)]
-    settled: Option<f32>,
+    #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share)]
+    early_termination: Option<f32>,
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
     pub(crate) threads: Option<u16>,
@@ -37,22 +37,23 @@ pub(crate) struct PictureOptions {
 impl PictureOptions {
     /// With `exact`, nothing is left out. What the field does not know must not have been given.
     pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
-        if self.settled.is_some() && !field.ends_rays {
-            return Err(wrong("--settled cannot be used with a GeNVS, whose rays go on to the end"));
+        if self.early_termination.is_some() && !field.ends_rays {
+            return Err(wrong("--early-termination cannot be used with a GeNVS, whose rays go on to the end"));
         }
-        let settled = if exact || !field.ends_rays { 0.0 } else { self.settled.unwrap_or(DEFAULT_SETTLED) };
+        let early_termination =
+            if exact || !field.ends_rays { 0.0 } else { self.early_termination.unwrap_or(DEFAULT_EARLY_TERMINATION) };
         let leave_out = if exact { 0.0 } else { self.leave_out };
-        Ok(RenderOptions { size: self.size, background: self.background, leave_out, settled })
+        Ok(RenderOptions { size: self.size, background: self.background, leave_out, early_termination })
     }
 }
 
 /// Where kernels run.
 #[derive(Args)]
 pub(crate) struct DeviceOptions {
-    /// Device: auto (a graphics processor if there is one, otherwise the CPU), cpu, vulkan, vulkan:NUMBER or vulkan:NAME
+    /// Device: auto (a GPU if there is one, otherwise the CPU), cpu, vulkan, vulkan:NUMBER or vulkan:NAME
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: DeviceChoice,
-    /// Longest time that a submission to a Vulkan device may run [default: 120 on a graphics processor, none on a software
+    /// Longest time that a submission to a Vulkan device may run [default: 120 on a GPU, none on a software
     /// driver]
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time_limit: Option<Duration>,

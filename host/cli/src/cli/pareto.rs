@@ -31,7 +31,7 @@ use viewfuse_weighting::WeightingSpec;
     viewfuse pareto car/ --targets 5 --sources all/3 --model genvs:small --size 32x32 --only all -o out\n      samplers are not tried, and what is left out is\n  \
     viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the training-free field, on the CPU\n\n\
     Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared \
-    with its pictures before rounding. The setting `all` leaves out what --leave-out and --settled say and every omission \
+    with its pictures before rounding. The setting `all` leaves out what --leave-out and --early-termination say and every omission \
     of the network. Times are medians over rounds through all settings; what else a shared machine does still shows in \
     them. A * marks settings that are the best for their time: no other is at once as fast and as near. Exit code 1 if a \
     device fails.")]

@@ -37,7 +37,7 @@ const RING: i32 = 8;
 type Failure = Box<dyn Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Draws the points of all devices. Points whose time or difference is no number are left out.
+/// Draws the points of all devices. Points whose time or difference is NaN are left out.
 ///
 /// # Errors
 /// [`PlotError`]; none is known to happen.

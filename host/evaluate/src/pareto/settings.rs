@@ -25,7 +25,7 @@ pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec
     } else if let Some(field) = field.downcast_ref::<Genvs>() {
         of_genvs(field, options, target_count)
     } else {
-        let exact = RenderOptions { leave_out: 0.0, settled: 0.0, ..options.clone() };
+        let exact = RenderOptions { leave_out: 0.0, early_termination: 0.0, ..options.clone() };
         let setting = |words: &str, options| Setting { words: words.to_owned(), field: field.clone(), options };
         vec![setting(EXACT, exact), setting(ALL, options.clone())]
     }
@@ -36,7 +36,7 @@ const VIEWS: Omissions = Omissions { unused_views: true, ..NONE };
 const PROBED: Omissions = Omissions { empty_space: 4, probe_error: 1.0 / 128.0, ..NONE };
 const HIDDEN: Omissions = Omissions { hidden_samples: true, ..NONE };
 
-/// PixelNeRF: each of these alone, with everything else as exact. Words, what is left out, `--leave-out`, `--settled`.
+/// PixelNeRF: each of these alone, with everything else as exact. Words, what is left out, `--leave-out`, `--early-termination`.
 #[rustfmt::skip]
 const ALONE: [(&str, Omissions, f32, f32); 16] = [
     ("unused views",    VIEWS,                                     0.0,  0.0),
@@ -76,22 +76,23 @@ const SAMPLES: [[u32; 2]; 8] = [[6, 6], [4, 4], [3, 3], [2, 2], [1, 1], [8, 0], 
 /// and the background; what the field itself leaves out does not matter.
 fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting> {
     let full = field.options().sampling;
-    let setting = |words: &str, sampling, omissions, leave_out, settled| Setting {
+    let setting = |words: &str, sampling, omissions, leave_out, early_termination| Setting {
         words: words.to_owned(),
         field: AnyField::new(field.with_options(PixelNerfOptions { sampling, omissions })),
-        options: RenderOptions { leave_out, settled, ..options.clone() },
+        options: RenderOptions { leave_out, early_termination, ..options.clone() },
     };
-    let all =
-        |words: &str, sampling| setting(words, sampling, Omissions::default(), options.leave_out, options.settled);
+    let all = |words: &str, sampling| {
+        setting(words, sampling, Omissions::default(), options.leave_out, options.early_termination)
+    };
     let mut settings = vec![setting(EXACT, full, NONE, 0.0, 0.0)];
-    settings.extend(
-        ALONE.map(|(words, omissions, leave_out, settled)| setting(words, full, omissions, leave_out, settled)),
-    );
+    settings.extend(ALONE.map(|(words, omissions, leave_out, early_termination)| {
+        setting(words, full, omissions, leave_out, early_termination)
+    }));
     settings.push(all(ALL, full));
     settings.extend(ALL_BUT.map(|(words, omissions)| {
         // Without `views` there is nothing to leave out of the weights either.
         let leave_out = if omissions.unused_views { options.leave_out } else { 0.0 };
-        setting(&format!("{ALL} but {words}"), full, omissions, leave_out, options.settled)
+        setting(&format!("{ALL} but {words}"), full, omissions, leave_out, options.early_termination)
     }));
     settings.extend(SAMPLES.map(|[first, second]| {
         let share = |count: u32, eighths: u32| (count * eighths).div_ceil(8);
@@ -107,16 +108,16 @@ fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting> {
     settings
 }
 
-/// The training-free field: words, `--leave-out`, `--settled`, alone.
+/// The training-free field: words, `--leave-out`, `--early-termination`, alone.
 const EARLY: [(&str, f32, f32); 8] = [
     ("leave out 0.01", 0.01, 0.0),
     ("leave out 0.05", 0.05, 0.0),
     ("leave out 0.1", 0.1, 0.0),
     ("leave out 0.2", 0.2, 0.0),
     ("leave out 0.4", 0.4, 0.0),
-    ("settled 1/256", 0.0, 1.0 / 256.0),
-    ("settled 1/64", 0.0, 1.0 / 64.0),
-    ("settled 1/16", 0.0, 1.0 / 16.0),
+    ("early termination 1/256", 0.0, 1.0 / 256.0),
+    ("early termination 1/64", 0.0, 1.0 / 64.0),
+    ("early termination 1/16", 0.0, 1.0 / 16.0),
 ];
 
 /// The training-free field: the sources' side as a share of the pictures', alone and with all.
@@ -125,17 +126,19 @@ const SOURCES: [(&str, f32); 3] = [("3/4", 0.75), ("1/2", 0.5), ("1/4", 0.25)];
 /// The settings of the training-free field. Of `options` is taken what `all` leaves out, besides the size and the
 /// background.
 fn of_training_free(field: &TrainingFree, options: &RenderOptions) -> Vec<Setting> {
-    let setting = |words: &str, source_share, leave_out, settled| Setting {
+    let setting = |words: &str, source_share, leave_out, early_termination| Setting {
         words: words.to_owned(),
         field: AnyField::new(TrainingFree { source_share, ..*field }),
-        options: RenderOptions { leave_out, settled, ..options.clone() },
+        options: RenderOptions { leave_out, early_termination, ..options.clone() },
     };
     let mut settings = vec![setting(EXACT, 1.0, 0.0, 0.0)];
-    settings.extend(EARLY.map(|(words, leave_out, settled)| setting(words, 1.0, leave_out, settled)));
-    settings.extend(SOURCES.map(|(words, share)| setting(&format!("sources {words}"), share, 0.0, 0.0)));
-    let RenderOptions { leave_out, settled, .. } = *options;
-    settings.push(setting(ALL, 1.0, leave_out, settled));
     settings
-        .extend(SOURCES.map(|(words, share)| setting(&format!("{ALL}, sources {words}"), share, leave_out, settled)));
+        .extend(EARLY.map(|(words, leave_out, early_termination)| setting(words, 1.0, leave_out, early_termination)));
+    settings.extend(SOURCES.map(|(words, share)| setting(&format!("sources {words}"), share, 0.0, 0.0)));
+    let RenderOptions { leave_out, early_termination, .. } = *options;
+    settings.push(setting(ALL, 1.0, leave_out, early_termination));
+    settings.extend(
+        SOURCES.map(|(words, share)| setting(&format!("{ALL}, sources {words}"), share, leave_out, early_termination)),
+    );
     settings
 }

@@ -177,7 +177,10 @@ fn image_side(sizes: &Sizes<'_>) -> Result<usize, CheckpointError> {
     };
     match text.parse() {
         Ok(side @ 1..=4096) => Ok(side),
-        _ => Err(sizes.refuse(format!("its metadata says {IMAGE_SIDE} = '{text}', which is no number from 1 to 4096"))),
+        _ => {
+            Err(sizes
+                .refuse(format!("its metadata says {IMAGE_SIDE} = '{text}', which is not a number from 1 to 4096")))
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 //!
 //! Source: `pixel_nerf_net.py`, with the mean over views replaced by weights.
 
-use super::looking::Looking;
+use super::ray_sampling::RaySampling;
 use super::volume::Volume;
 use crate::FieldError;
 use crate::finite::check_finite_on;
@@ -82,17 +82,17 @@ pub(super) fn render<D: Device>(
     network: &PointNetwork<D>,
     views: &Views<'_, D>,
     target: &CameraBlock,
-    looking: &Looking,
+    ray_sampling: &RaySampling,
     progress: &dyn Progress,
 ) -> Result<Image<D>, FieldError> {
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
-    let at_once = (device.busy_elements() / looking.sample_count as usize).max(LEAST_RAYS);
+    let at_once = (device.busy_elements() / ray_sampling.sample_count as usize).max(LEAST_RAYS);
     // What is looked up in all views is bound as a whole.
-    let a_ray = looking.sample_count as usize * network.features as usize * views.volumes.len();
+    let a_ray = ray_sampling.sample_count as usize * network.features as usize * views.volumes.len();
     let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);
     let pixels: Vec<u32> = (0..half.pixel_count()).collect();
-    let mut tile = Tile::new(device, network, views, looking, at_once.min(pixels.len()))?;
-    let cast = cast_block(target, looking.near_far, looking.sample_count);
+    let mut tile = Tile::new(device, network, views, ray_sampling, at_once.min(pixels.len()))?;
+    let cast = cast_block(target, ray_sampling.near_far, ray_sampling.sample_count);
     let mut half_image = scratch.image(half)?;
     for (index, pixels) in pixels.chunks(at_once).enumerate() {
         progress.check()?;
@@ -135,7 +135,7 @@ struct Tile<'a, D: Device> {
     device: &'a D,
     network: &'a PointNetwork<D>,
     views: &'a Views<'a, D>,
-    looking: &'a Looking,
+    ray_sampling: &'a RaySampling,
     depths: D::Buffer<f32>,
     points: D::Buffer<viewfuse_core::rays::RayPoint>,
     gathered: D::Buffer<f32>,
@@ -150,16 +150,16 @@ impl<'a, D: Device> Tile<'a, D> {
         device: &'a D,
         network: &'a PointNetwork<D>,
         views: &'a Views<'a, D>,
-        looking: &'a Looking,
+        ray_sampling: &'a RaySampling,
         ray_count: usize,
     ) -> Result<Tile<'a, D>, DeviceError> {
-        let count = ray_count * looking.sample_count as usize;
+        let count = ray_count * ray_sampling.sample_count as usize;
         let features = network.features as usize;
         Ok(Tile {
             device,
             network,
             views,
-            looking,
+            ray_sampling,
             depths: device.zeros(count)?,
             points: device.zeros(count)?,
             gathered: device.zeros(count * features * views.volumes.len())?,
@@ -178,8 +178,8 @@ impl<'a, D: Device> Tile<'a, D> {
         cast: &CastBlock,
         summed: &mut D::Buffer<f32>,
     ) -> Result<(), DeviceError> {
-        let Tile { device, network, views, looking, .. } = *self;
-        let Looking { near_far: [near, far], sample_count, jitter, seed, ray_length, inclusive } = *looking;
+        let Tile { device, network, views, ray_sampling, .. } = *self;
+        let RaySampling { near_far: [near, far], sample_count, jitter, seed, ray_length, inclusive } = *ray_sampling;
         let ray_count = pixels.len() as u32;
         let point_count = ray_count * sample_count;
         let (pixels, mut rays) = (device.upload(pixels)?, device.zeros(pixels.len())?);

@@ -59,7 +59,7 @@ fn plan(options: &FieldOptions) -> Plan {
         steps,
         schedule: options.noise.unwrap_or_else(NoiseSchedule::published),
         churn: Churn { amount: options.churn.unwrap_or(0.0), ..Churn::NONE },
-        settled: plan.settled.filter(|_| !options.computes("calls")),
+        early_termination: plan.early_termination.filter(|_| !options.computes("calls")),
         seed,
     }
 }

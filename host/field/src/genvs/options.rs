@@ -79,7 +79,7 @@ impl Default for GenvsOptions {
 impl GenvsOptions {
     /// What a run record says of them, with so many calls made and so many saved.
     pub(super) fn denoising(&self, calls: u64, saved_calls: u64) -> Denoising {
-        let Plan { steps, schedule, churn, settled, .. } = self.plan;
+        let Plan { steps, schedule, churn, early_termination, .. } = self.plan;
         let (sampler, levels, tolerance) = match steps {
             Steps::Fixed { sampler, level_count } => (sampler, Some(level_count), None),
             Steps::Chosen { tolerance, .. } => (Sampler::UniPc, None, Some(tolerance)),
@@ -90,7 +90,7 @@ impl GenvsOptions {
             tolerance,
             noise: [0, 1].map(|index| schedule.level(index, 2)),
             churn: churn.amount,
-            settled,
+            early_termination,
             reuse: self.omissions.reuse,
             calls,
             saved_calls,

@@ -5,7 +5,7 @@ use super::architecture::{Architecture, COLOUR_CHANNELS};
 use super::denoiser::Denoiser;
 use super::encoder::Encoder;
 use super::feature_image::{PointNetwork, Views, render};
-use super::looking::Looking;
+use super::ray_sampling::RaySampling;
 use super::sampling::{Plan, Sampled, Start, sample};
 use super::volume::Volume;
 use crate::FieldError;
@@ -87,10 +87,10 @@ impl<D: Device> Parts<D> {
         scratch: &mut Scratch<'_, D>,
         views: &Views<'_, D>,
         target: &CameraBlock,
-        looking: &Looking,
+        ray_sampling: &RaySampling,
         progress: &dyn Progress,
     ) -> Result<Image<D>, FieldError> {
-        render(device, scratch, &self.points, views, target, looking, progress)
+        render(device, scratch, &self.points, views, target, ray_sampling, progress)
     }
 
     /// The network at points.

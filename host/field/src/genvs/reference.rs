@@ -1,6 +1,6 @@
 //! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
 
-use super::looking::Looking;
+use super::ray_sampling::RaySampling;
 use super::sampling::{Plan, Start};
 use super::views::Views;
 use super::{Architecture, Genvs};
@@ -88,7 +88,7 @@ impl<'a, D: Device> Reference<'a, D> {
     ) -> Result<Vec<f32>, FieldError> {
         let field = self.views.field;
         let rays = field.options.rays;
-        let looking = Looking {
+        let ray_sampling = RaySampling {
             near_far,
             sample_count: rays.sample_count,
             jitter: rays.jitter,
@@ -100,11 +100,11 @@ impl<'a, D: Device> Reference<'a, D> {
         for view in &all {
             self.encode_rowless(*view)?;
         }
-        self.views.fill_seen(&all, target, &looking)?;
+        self.views.fill_seen(&all, target, &ray_sampling)?;
         let Views { device, parts, .. } = &self.views;
         let views = self.views.used(&all, weights)?;
         let mut scratch = Scratch::new(*device);
-        let image = parts.features(*device, &mut scratch, &views, target, &looking, &Silent)?;
+        let image = parts.features(*device, &mut scratch, &views, target, &ray_sampling, &Silent)?;
         Ok(device.download(&image.values)?)
     }
 

@@ -67,7 +67,7 @@ impl<D: Device> Sampled<D> {
 /// the run can be interrupted.
 ///
 /// # Errors
-/// [`FieldError::NotFinite`] if the denoiser gives a number that is none, [`FieldError::Interrupted`], and what `denoise`
+/// [`FieldError::NotFinite`] if the denoiser gives NaN or infinity, [`FieldError::Interrupted`], and what `denoise`
 /// gives.
 pub fn sample<D: Device>(
     device: &D,

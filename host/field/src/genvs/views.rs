@@ -2,8 +2,8 @@
 
 use super::encoder::SIDE_STEP;
 use super::feature_image;
-use super::looking::Looking;
 use super::parts::Parts;
+use super::ray_sampling::RaySampling;
 use super::sampling::Start;
 use super::volume::Volume;
 use super::{COLOUR_CHANNELS, Genvs, Omissions, Rays};
@@ -86,13 +86,13 @@ impl<D: Device> Views<'_, D> {
         &mut self,
         views: &[usize],
         target: &CameraBlock,
-        looking: &Looking,
+        ray_sampling: &RaySampling,
     ) -> Result<(), FieldError> {
         let unseen_rows = self.field.options.omissions.unseen_rows;
         for &view in views {
             let camera = self.images[view].camera;
             self.fill(view, |volume| match unseen_rows {
-                true => volume.rows_seen(&camera, target, looking),
+                true => volume.rows_seen(&camera, target, ray_sampling),
                 false => 0..volume.row_count(),
             })?;
         }
@@ -110,12 +110,12 @@ impl<D: Device> Views<'_, D> {
     }
 
     /// How rays go through volumes, for a target.
-    fn looking(&self, target: &Camera) -> Looking {
+    fn ray_sampling(&self, target: &Camera) -> RaySampling {
         let Rays { sample_count, jitter, length, inclusive, .. } = self.field.options.rays;
         let focal = 2.0 * target.pinhole.focal()[1] / target.pinhole.height() as f32;
         let ray_length = length.unwrap_or(1.0 / focal);
         let (near_far, seed) = (self.near_far, self.field.options.plan.seed);
-        Looking { near_far, sample_count, jitter, seed, ray_length, inclusive }
+        RaySampling { near_far, sample_count, jitter, seed, ray_length, inclusive }
     }
 }
 
@@ -126,7 +126,7 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         let (field, device, target) = (self.field, self.device, request.camera);
-        let looking = self.looking(target);
+        let ray_sampling = self.ray_sampling(target);
         let step = field.picture_step();
         let size = Size {
             height: target.pinhole.height().next_multiple_of(step),
@@ -134,10 +134,10 @@ impl<D: Device> Prepared for Views<'_, D> {
             channels: COLOUR_CHANNELS as u32,
         };
         let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
-        self.fill_seen(request.views, &camera, &looking)?;
+        self.fill_seen(request.views, &camera, &ray_sampling)?;
         let views = self.used(request.views, &request.view_weights())?;
         let mut scratch = Scratch::new(device);
-        let features = self.parts.features(device, &mut scratch, &views, &camera, &looking, progress)?;
+        let features = self.parts.features(device, &mut scratch, &views, &camera, &ray_sampling, progress)?;
         let start = match (&self.earlier, field.options.omissions.reuse) {
             (Some((of_size, picture)), Some(level)) if *of_size == size => Start::Picture { picture, level },
             _ => Start::Noise,
@@ -157,7 +157,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let Genvs { architecture, options, .. } = self.field;
         let Omissions { unseen_rows, reuse, half_volumes, .. } = options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
-        let ends = options.plan.settled.is_some();
+        let ends = options.plan.early_termination.is_some();
         let left_out = vec![
             line(
                 "volume rows",

@@ -2,7 +2,7 @@
 //! 16 bits.
 
 use super::encoder::Encoder;
-use super::looking::Looking;
+use super::ray_sampling::RaySampling;
 use std::ops::Range;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
@@ -152,11 +152,11 @@ impl<D: Device> Volume<D> {
 
     /// The rows that rays of a target can reach: the projections of the corners of what they go through, and a node
     /// beyond. All of them where a corner is not in front of the view.
-    pub(super) fn rows_seen(&self, view: &CameraBlock, target: &CameraBlock, looking: &Looking) -> Range<u32> {
+    pub(super) fn rows_seen(&self, view: &CameraBlock, target: &CameraBlock, ray_sampling: &RaySampling) -> Range<u32> {
         let (width, height) = (target.width as f32, target.height as f32);
         let mut seen = f32::MAX..-f32::MAX;
-        let [near, far] = looking.near_far;
-        let astray = looking.jitter * 0.5 * (far - near) / (looking.sample_count - 1) as f32;
+        let [near, far] = ray_sampling.near_far;
+        let astray = ray_sampling.jitter * 0.5 * (far - near) / (ray_sampling.sample_count - 1) as f32;
         for depth in [near - astray, far + astray] {
             for (x, y) in [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)] {
                 let point: Vec3 = target.centre_world() + target.towards(x, y) * depth;

@@ -57,7 +57,7 @@ pub struct Omissions {
     pub empty_rays: bool,
     /// Second-pass samples in parts of a ray where the first pass, one part to either side included, met nothing.
     pub empty_parts: bool,
-    /// Second-pass samples behind where the first pass's transmittance falls to the run's limit for settled rays.
+    /// Second-pass samples behind where the first pass's transmittance falls to the run's limit of early termination.
     pub hidden_samples: bool,
 }
 

@@ -55,7 +55,7 @@ pub(super) struct Renderer<'a, D: Device> {
     pub(super) sampling: Sampling,
     pub(super) omissions: Omissions,
     /// Transmittance at which a ray may end.
-    pub(super) settled: f32,
+    pub(super) early_termination: f32,
     pub(super) cast: CastBlock,
     pub(super) background: [f32; 3],
     pub(super) progress: &'a dyn Progress,
@@ -117,7 +117,7 @@ impl<D: Device> Renderer<'_, D> {
             sample_count: count,
             part_count: coarse.count,
             least_share: if empty_parts { seen.map_or(LEAST_SHARE, |seen| seen.least_share) } else { 0.0 },
-            termination: if hidden_samples { self.settled } else { -1.0 },
+            termination: if hidden_samples { self.early_termination } else { -1.0 },
             least_opacity: if empty_rays { LEAST_OPACITY } else { 0.0 },
             width: self.cast.camera.width,
             ..SampleMaskBlock::default()

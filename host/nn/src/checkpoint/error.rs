@@ -72,7 +72,7 @@ pub enum CheckpointError {
         /// The name.
         tensor: String,
     },
-    /// A value that is no number, infinite, or beyond what the type that is asked for holds.
+    /// NaN, infinity, or a value beyond what the type that is asked for holds.
     #[error("{}: tensor '{tensor}': element {index} is {value:?}, {problem}", path.display())]
     Value {
         /// The file.

@@ -67,7 +67,7 @@ impl<'a> Sizes<'a> {
         let Some(text) = self.checkpoint.metadata().get(key) else { return Ok(otherwise) };
         match text.parse::<f32>() {
             Ok(number) if number.is_finite() => Ok(number),
-            _ => Err(self.refuse(format!("its metadata says {key} = '{text}', which is no number"))),
+            _ => Err(self.refuse(format!("its metadata says {key} = '{text}', which is not a number"))),
         }
     }
 }

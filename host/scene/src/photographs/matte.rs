@@ -32,7 +32,9 @@ pub enum BackgroundChoice {
 
 /// The text is not a background.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is no background: auto, black, white, or RED,GREEN,BLUE with whole numbers from 0 to 255")]
+#[error(
+    "unknown background '{0}'; the choices are auto, black, white, and RED,GREEN,BLUE with whole numbers from 0 to 255"
+)]
 pub struct BackgroundError(String);
 
 impl FromStr for BackgroundChoice {

@@ -146,7 +146,7 @@ impl<D: Device> Run<'_, D> {
                 Step::Tap => {
                     let tapped = self.download(&image)?;
                     let tap = format!("tap {}", self.taps.len());
-                    check_finite(&tapped.values, "looking at a picture through a metric's network", &tap)?;
+                    check_finite(&tapped.values, "running a metric's network", &tap)?;
                     self.taps.push(tapped);
                     image
                 }

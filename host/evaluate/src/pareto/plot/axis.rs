@@ -33,7 +33,7 @@ impl Scale {
         Scale { times, heights: lowest..equal + 0.5 * EQUAL_ABOVE, equal }
     }
 
-    /// Where a point stands; `None` if its time or its difference is no number.
+    /// Where a point stands; `None` if its time or its difference is NaN.
     pub(super) fn place(&self, point: &PointRecord) -> Option<(f64, f64)> {
         let DifferenceRecord { root_mean_square, psnr, .. } = point.versus_exact;
         root_mean_square.filter(|_| point.seconds > 0.0).map(|_| (point.seconds.log10(), psnr.unwrap_or(self.equal)))

@@ -41,7 +41,7 @@ pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usi
     let setting = |words: &str, rays, plan, omissions, leave_out, factor| Setting {
         words: words.to_owned(),
         field: AnyField::new(Enlarged { field: field.with_options(GenvsOptions { rays, plan, omissions }), factor }),
-        options: RenderOptions { leave_out, settled: 0.0, ..options.clone() },
+        options: RenderOptions { leave_out, early_termination: 0.0, ..options.clone() },
     };
     let fewer = |divisor: u32| Rays { sample_count: rays.sample_count.div_ceil(divisor), ..rays };
 
@@ -49,7 +49,7 @@ pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usi
     let planned = |words: String, plan| setting(&words, rays, plan, NONE, 0.0, 1);
     settings.push(setting("unseen rows", rays, exact, Omissions { unseen_rows: true, ..NONE }, 0.0, 1));
     settings.push(setting("half volumes", rays, exact, Omissions { half_volumes: true, ..NONE }, 0.0, 1));
-    settings.push(planned("settled".to_owned(), Plan { settled: Some(HALF_A_LEVEL), ..exact }));
+    settings.push(planned("early termination".to_owned(), Plan { early_termination: Some(HALF_A_LEVEL), ..exact }));
     settings.extend(HEUN.map(|count| planned(format!("heun, {count}"), over(exact, Sampler::Heun, count))));
     for sampler in Sampler::ALL.into_iter().filter(|sampler| !sampler.is_single_step()) {
         settings
@@ -64,7 +64,7 @@ pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usi
     };
     settings.push(all("", rays, fast, None, 1));
     settings.extend(LEAST.map(|least| Setting {
-        options: RenderOptions { leave_out: least, settled: 0.0, ..options.clone() },
+        options: RenderOptions { leave_out: least, early_termination: 0.0, ..options.clone() },
         ..all(&format!(", leave out {least}"), rays, fast, None, 1)
     }));
     settings

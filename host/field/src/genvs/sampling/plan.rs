@@ -15,7 +15,7 @@ pub struct Plan {
     /// Noise that is added on the way. Results from before are then forgotten: multistep samplers begin anew.
     pub churn: Churn,
     /// The run ends when no value of the picture will change by more than this; `None` to go on to the last level.
-    pub settled: Option<f32>,
+    pub early_termination: Option<f32>,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -43,7 +43,7 @@ impl Plan {
     /// The published run: Heun's method over 25 levels from 80 to 0.002, 49 calls.
     pub fn published(seed: u64) -> Plan {
         let steps = Steps::Fixed { sampler: Sampler::Heun, level_count: 25 };
-        Plan { steps, schedule: NoiseSchedule::published(), churn: Churn::NONE, settled: None, seed }
+        Plan { steps, schedule: NoiseSchedule::published(), churn: Churn::NONE, early_termination: None, seed }
     }
 
     /// The default: `ipndm` with 10 calls, a fifth of the published run's, and an end when nothing visible changes any more.
@@ -52,13 +52,13 @@ impl Plan {
     /// narrower, [`Plan::careful`] is better.
     pub fn fast(seed: u64) -> Plan {
         let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 10 };
-        Plan { steps, settled: Some(HALF_A_LEVEL), ..Plan::published(seed) }
+        Plan { steps, early_termination: Some(HALF_A_LEVEL), ..Plan::published(seed) }
     }
 
     /// Levels that are chosen on the way, for an error of about a level of 255 (root mean square, 0.01 of values between -1
     /// and 1): 15 or 16 calls on the same data, and on data 0.001 wide as well.
     pub fn careful(seed: u64) -> Plan {
         let steps = Steps::Chosen { tolerance: 0.01, most_calls: 49 };
-        Plan { steps, settled: Some(HALF_A_LEVEL), ..Plan::published(seed) }
+        Plan { steps, early_termination: Some(HALF_A_LEVEL), ..Plan::published(seed) }
     }
 }

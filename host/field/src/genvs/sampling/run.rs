@@ -89,7 +89,7 @@ where
                 sigma = churned.level;
             }
             let denoised = self.call(&state, sigma)?;
-            if next <= 0.0 || self.is_settled(&denoised.values, sigma) {
+            if next <= 0.0 || self.may_end(&denoised.values, sigma) {
                 return Ok(self.finished(denoised.buffer, planned));
             }
             if let Some(begun) = begun.take() {
@@ -101,7 +101,7 @@ where
             let mut reached = self.mixed(&sampler.step(&self.history, next), &state, None)?;
             if sampler.corrected() == Corrected::ByAnotherCall {
                 let there = self.call(&reached, next)?;
-                if self.is_settled(&there.values, next) {
+                if self.may_end(&there.values, next) {
                     return Ok(self.finished(there.buffer, planned));
                 }
                 let correction = sampler.correction(&self.history, next);
@@ -135,7 +135,7 @@ where
         let mut newest = self.call(&state, sigma)?;
         loop {
             let is_last = sigma <= smallest || self.levels.len() >= most_calls as usize;
-            if is_last || self.is_settled(&newest.values, sigma) {
+            if is_last || self.may_end(&newest.values, sigma) {
                 return Ok(self.finished(newest.buffer, 0));
             }
             self.keep(sampler, sigma, &state, newest)?;
@@ -178,10 +178,12 @@ where
     }
 
     /// Whether no value of the picture changes any more by what can be seen.
-    fn is_settled(&self, values: &[f32], sigma: f32) -> bool {
-        let (Some(settled), Some((before, level))) = (self.plan.settled, &self.last) else { return false };
+    fn may_end(&self, values: &[f32], sigma: f32) -> bool {
+        let (Some(early_termination), Some((before, level))) = (self.plan.early_termination, &self.last) else {
+            return false;
+        };
         let change = values.iter().zip(before).fold(0.0, |largest: f32, (now, then)| largest.max((now - then).abs()));
-        change_to_come(change, *level, sigma) <= settled
+        change_to_come(change, *level, sigma) <= early_termination
     }
 
     /// Keeps what later steps need of a call.

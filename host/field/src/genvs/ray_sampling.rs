@@ -1,8 +1,8 @@
-//! How a target looks at volumes.
+//! Where a target's rays are sampled.
 
 /// How rays go through volumes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Looking {
+pub(super) struct RaySampling {
     /// Depths along a camera's principal axis between which its rays and its volume lie.
     pub(super) near_far: [f32; 2],
     /// Samples on a ray, at least 2; the first at `near`, the last at `far`.
