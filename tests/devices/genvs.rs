@@ -4,8 +4,8 @@ use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
 use std::error::Error;
 use viewfuse::check::verify::verify;
-use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::device::{Device, Memory};
 use viewfuse::field::FieldError;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
@@ -22,6 +22,7 @@ pub(crate) const TESTS: &[Test] = &[
     Test::new("genvs_has_the_reference_values", genvs_has_the_reference_values),
     Test::new("genvss_pictures_are_the_cpus", genvss_pictures_are_the_cpus),
     Test::new("genvs_without_denoiser_runs_no_kernel_of_it", genvs_without_denoiser_runs_no_kernel_of_it),
+    Test::new("genvss_feature_image_stays_on_the_device", genvss_feature_image_stays_on_the_device),
 ];
 
 /// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's, through three
@@ -98,6 +99,23 @@ fn genvs_without_denoiser_runs_no_kernel_of_it(candidate: &Candidate) -> Result<
     picture(&device, Omissions::EXACT, true).map_err(said)?;
     for kernel in DENOISERS {
         assert!(device.tally(kernel).dispatches > 0, "{} is not the denoiser's", kernel.name());
+    }
+    Ok(())
+}
+
+/// What comes back from the device: the picture, with a denoiser once more for every call, and indices of numbers that are
+/// not finite, one for some thousand numbers. The feature image alone would be more.
+fn genvss_feature_image_stays_on_the_device(candidate: &Candidate) -> Result<(), Failed> {
+    // Pictures of 22 pixels on a side are rendered with as many rows and columns as can be halved often enough. What comes
+    // back of a buffer that was used before may be twice as long.
+    for (has_denoiser, side, pictures, most) in [(false, 22, 1, 2), (true, 24, 4, 4)] {
+        let device = candidate.vulkan(&GpuOptions::default())?;
+        picture(&device, Omissions::default(), has_denoiser).map_err(said)?;
+        let (bytes, few) = (side * side * 3 * 4, 2048);
+        let downloaded = device.transfers().downloaded_bytes;
+        if !(pictures * bytes..=most * bytes + few).contains(&downloaded) {
+            return Err(format!("{downloaded} bytes downloaded, and {pictures} pictures have {bytes} each").into());
+        }
     }
     Ok(())
 }

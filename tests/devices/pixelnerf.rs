@@ -3,8 +3,8 @@
 use crate::candidate::{Candidate, Test};
 use libtest_mimic::Failed;
 use viewfuse::check::verify::verify;
-use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::device::{Device, Memory, Transfers};
 use viewfuse::field::On;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, Sampling, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, render};
@@ -12,15 +12,18 @@ use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::weighting::Weighting;
+use viewfuse_core::camera::CameraBlock;
 use viewfuse_tests::places::data;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
 pub(crate) const TESTS: &[Test] = &[
     Test::new("pixelnerf_has_the_reference_values", pixelnerf_has_the_reference_values),
     Test::new("pixelnerfs_pictures_are_the_cpus", pixelnerfs_pictures_are_the_cpus),
+    Test::new("pixelnerfs_sample_lists_stay_on_the_device", pixelnerfs_sample_lists_stay_on_the_device),
 ];
 
 const SIDE: u32 = 20;
+const COARSE_COUNT: u32 = 32;
 /// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's; a fine sample
 /// that falls into the next part of a ray for it moves by a 64th of the ray, which changes a pixel by little.
 const LARGEST_DIFFERENCE: f32 = 4.0e-3;
@@ -35,13 +38,14 @@ fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Faile
     }
 }
 
-fn picture<D: Device + Sync>(device: &D, omissions: Omissions) -> Result<Vec<[f32; 4]>, RenderError> {
+/// The colours of the last of some targets.
+fn picture<D: Device + Sync>(device: &D, omissions: Omissions, targets: &str) -> Result<Vec<[f32; 4]>, RenderError> {
     let scene = Scene::open(data("toy"))?;
     let selection =
-        Selection { targets: Some("20".to_owned()), sources: Some("1,7,13".to_owned()), ..Selection::default() };
+        Selection { targets: Some(targets.to_owned()), sources: Some("1,7,13".to_owned()), ..Selection::default() };
     let job = selection.resolve(&scene, 1).expect("views of it");
     let options = RenderOptions { size: Some([SIDE, SIDE]), ..RenderOptions::default() };
-    let sampling = Sampling { coarse_count: 32, importance_count: 8, depth_count: 8, ..Sampling::default() };
+    let sampling = Sampling { coarse_count: COARSE_COUNT, importance_count: 8, depth_count: 8, ..Sampling::default() };
     let body = test_networks::body(&Architecture::small(16));
     let field = PixelNerf::new(&body, PixelNerfOptions { sampling, omissions }).expect("a made network");
     let mut colours = Vec::new();
@@ -59,12 +63,12 @@ fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed>
     let own = GpuOptions::default();
     let short = GpuOptions { limits: Limits { buffer_range: 260 << 10, ..own.limits }, ..own };
     for omissions in [Omissions::NONE, Omissions::default()] {
-        let reference = picture(&Cpu, omissions).expect("a picture on the CPU");
+        let reference = picture(&Cpu, omissions, "20").expect("a picture on the CPU");
         let opaque = reference.iter().filter(|colour| colour[3] > 0.9).count();
         assert!(opaque > 20 && opaque < reference.len() / 2, "a body before nothing: {opaque}");
         for options in if omissions == Omissions::NONE { vec![own] } else { vec![own, short] } {
             let device = candidate.vulkan(&options)?;
-            let ours = picture(&device, omissions).map_err(|error| format!("{error:?}"))?;
+            let ours = picture(&device, omissions, "20").map_err(|error| format!("{error:?}"))?;
             assert_eq!(ours.len(), reference.len());
             let differences = ours.iter().flatten().zip(reference.iter().flatten()).map(|(a, e)| (a - e).abs());
             let worst =
@@ -74,5 +78,26 @@ fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed>
             }
         }
     }
+    Ok(())
+}
+
+/// What a further picture takes over the border of the device's memory: its pixels, its views and their weights; the picture,
+/// the probes' samples, and how many samples each list has.
+fn pixelnerfs_sample_lists_stay_on_the_device(candidate: &Candidate) -> Result<(), Failed> {
+    let transfers = |targets: &str| -> Result<Transfers, Failed> {
+        let device = candidate.vulkan(&GpuOptions::default())?;
+        picture(&device, Omissions::default(), targets).map_err(|error| format!("{error:?}"))?;
+        Ok(device.transfers())
+    };
+    let (one, two) = (transfers("20")?, transfers("20,21")?);
+    let pixel_count = u64::from(SIDE * SIDE);
+    let probe_count = u64::from(SIDE.div_ceil(Omissions::default().empty_space) + 1).pow(2);
+    let (few, view) = (256, size_of::<CameraBlock>() as u64 + 4);
+    let uploaded = two.uploaded_bytes - one.uploaded_bytes;
+    let most = 4 * (pixel_count + probe_count) + 3 * view + few;
+    assert!(uploaded > 0 && uploaded <= most, "{uploaded} bytes uploaded, of at most {most}");
+    let downloaded = two.downloaded_bytes - one.downloaded_bytes;
+    let most = pixel_count * (16 + 4) + probe_count * u64::from(COARSE_COUNT) * 16 + few;
+    assert!(downloaded > 20 * pixel_count && downloaded <= most, "{downloaded} bytes downloaded, of at most {most}");
     Ok(())
 }
