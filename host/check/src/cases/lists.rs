@@ -27,8 +27,8 @@ fn masks(random: &mut Random, size: u32) -> Vec<Vec<u32>> {
 }
 
 /// Every second marked element is no longer so: 1 % of a mark is a mark.
-fn unmark(masks: &mut Vec<Vec<u32>>) {
-    masks.iter_mut().for_each(|mask| mask.iter_mut().filter(|mark| **mark > 0).step_by(2).for_each(|mark| *mark = 0));
+fn unmark(mask: &mut [u32]) {
+    mask.iter_mut().filter(|mark| **mark > 0).step_by(2).for_each(|mark| *mark = 0);
 }
 
 fn run_count(mask: &[u32]) -> u32 {
@@ -76,7 +76,8 @@ impl Case for CountMarked {
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
-    const SPOILERS: &'static [Spoiler<Vec<Vec<u32>>>] = &[("mask", unmark)];
+    const SPOILERS: &'static [Spoiler<Vec<Vec<u32>>>] =
+        &[("mask", |masks| masks.iter_mut().for_each(|mask| unmark(mask)))];
 
     type Inputs = Vec<Vec<u32>>;
     type Loaded<D: Device> = Vec<[Buffer<D, u32>; 2]>;
@@ -182,11 +183,7 @@ impl Case for ListMarked {
     const LIMITS: Limits = EXACT;
     const REASON: &'static str = REASON;
     const SPOILERS: &'static [Spoiler<Vec<Listing>>] = &[
-        ("mask", |jobs| {
-            for job in jobs {
-                job.mask.iter_mut().filter(|mark| **mark > 0).step_by(2).for_each(|mark| *mark = 0);
-            }
-        }),
+        ("mask", |jobs| jobs.iter_mut().for_each(|job| unmark(&mut job.mask))),
         ("offsets", |jobs| {
             jobs.iter_mut().for_each(|job| job.offsets.iter_mut().for_each(|offset| *offset = *offset * 99 / 100))
         }),
