@@ -30,7 +30,7 @@
 //! | `write` | writes its elements, and reads nothing of it | a buffer |
 //! | `write_paged` | the same; it may be longer than a device can bind at once | a buffer |
 //!
-//! Buffers may be longer than the parameters say. [`for_each_kernel`] hands all rows to a macro.
+//! Buffers may be longer than the parameters say. [`for_each_kernel`](crate::for_each_kernel) hands all rows to a macro.
 //!
 //! A new kernel is its body in a module here, its row, an entry point in `vulkan/shaders/src/`, a form in
 //! `host/device/src/cpu/` and a case with its `f64` evaluation in `host/check/src/cases/`: five files. What is missing of
@@ -163,7 +163,7 @@ macro_rules! for_each_kernel {
                 write gathered: f32,
             }
             /// Convolutions of an image, summed in an order of the device's choice. An element is an 8x8 part of a tile of
-            /// [`TILE`](viewfuse_core::network::tile::TILE) pixels and channels.
+            /// `TILE` pixels and channels.
             Convolve convolve(block: ConvolveBlock) [0..tile_elements(block.pixel_count(), block.out_channels)]
             by network::convolve::convolve_element, twin, tiled {
                 filled inputs: f32,
@@ -181,7 +181,7 @@ macro_rules! for_each_kernel {
                 write outputs: f32,
             }
             /// Transposed convolutions, summed in an order of the device's choice, with `bias[output channel]`. An element
-            /// is an 8x8 part of a tile of [`TILE`](viewfuse_core::network::tile::TILE) input pixels and what they become.
+            /// is an 8x8 part of a tile of `TILE` input pixels and what they become.
             ConvolveTransposed convolve_transposed(block: TransposedBlock)
             [0..tile_elements(block.pixel_count(), block.column_count())]
             by network::transpose::transposed_element, twin, tiled {
@@ -204,7 +204,7 @@ macro_rules! for_each_kernel {
                 write outputs: f32,
             }
             /// Linear layers (a matrix product with bias, residual and rectification), summed in an order of the device's
-            /// choice. An element is an 8x8 part of a tile of [`TILE`](viewfuse_core::network::tile::TILE) rows and columns.
+            /// choice. An element is an 8x8 part of a tile of `TILE` rows and columns.
             Linear linear(block: LinearBlock) [0..tile_elements(block.row_count, block.column_count)]
             by network::linear::linear_element, twin, tiled {
                 filled inputs: f32,
@@ -244,7 +244,7 @@ macro_rules! for_each_kernel {
                 write outputs: f32,
             }
             /// Products of two computed matrices, which may lie in one buffer, summed in an order of the device's choice.
-            /// An element is an 8x8 part of a tile of [`TILE`](viewfuse_core::network::tile::TILE) rows and columns.
+            /// An element is an 8x8 part of a tile of `TILE` rows and columns.
             MatrixProduct matrix_product(block: MatrixBlock) [0..tile_elements(block.row_count, block.column_count)]
             by network::attend::matrix_element, twin, tiled {
                 filled left: f32,
@@ -321,7 +321,7 @@ macro_rules! for_each_kernel {
                 read depths: f32,
                 write mask: u32,
             }
-            /// How many elements of each run of [`RUN`](crate::compact::RUN) a mask marks: `counts[run]` of
+            /// How many elements of each run of 256 (`compact::RUN`) a mask marks: `counts[run]` of
             /// `mask[element]`. An element is a run.
             CountMarked count_marked(element_count: u32) [0..element_count.div_ceil(RUN)] by compact::marked_in_run {
                 read mask: u32,
@@ -341,7 +341,7 @@ macro_rules! for_each_kernel {
                 write list: u32,
             }
             /// Where numbers are not finite: `firsts[run]` is the index of the first infinite or NaN number of a run of
-            /// [`FINITE_RUN`](crate::finite::FINITE_RUN), or `u32::MAX`. An element is a run.
+            /// 1024 (`finite::FINITE_RUN`), or `u32::MAX`. An element is a run.
             FindNonFinite find_non_finite(value_count: u32) [0..value_count.div_ceil(FINITE_RUN)]
             by finite::first_non_finite {
                 read values: f32,
