@@ -183,8 +183,8 @@ fn attention_parameters_that_are_none() {
 }
 
 fn sizes_that_do_not_fit() {
-    assert_refused("render toy --targets 20 --size 64x48 -o out", &["--size 64x48", "128x128", "64x64"]);
-    assert_refused("evaluate toy --targets 20 --size 64x48", &["--size 64x48", "64x64"]);
+    assert_refused("render toy --targets 20 --size 64x48 -o out", &["size of 64x48", "128x128", "64x64", "--size"]);
+    assert_refused("evaluate toy --targets 20 --size 64x48", &["size of 64x48", "64x64", "--size"]);
     for size in ["0x0", "64", "-1x5", "100000x100000", "64x64x3"] {
         assert_wrong(&format!("render toy --targets 20 --size={size} -o out"), &["--size", size]);
     }

@@ -178,7 +178,7 @@ fn bad_input_is_refused() {
     refused("pareto toy -o out", &["toy: no targets", "--targets"]);
     refused("pareto nowhere --targets 20 -o out", &["nowhere"]);
     refused("pareto toy --targets 20 --device vulkan:99 -o out", &[]);
-    refused("pareto toy --targets 20 --size 64x48 --device cpu -o out", &["--size 64x48", "64x64"]);
+    refused("pareto toy --targets 20 --size 64x48 --device cpu -o out", &["size of 64x48", "64x64", "--size"]);
     wrong("pareto toy --targets 20 --weights foo -o out", &["unknown weighting scheme 'foo'"]);
     refused("pareto toy --targets 20 -o toy/intrinsics.txt", &["intrinsics.txt is not a folder"]);
     wrong("pareto toy --targets 20 --device gpu -o out", &["gpu", "vulkan:NUMBER"]);

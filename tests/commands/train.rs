@@ -127,7 +127,7 @@ fn genvs_goes_on_too() {
     done(path, &format!("{from} -o more"));
     assert_eq!(bytes(path, "more/model.safetensors"), bytes(path, model));
     let small = from.replace("--samples 8", "--samples 8 --side 32");
-    assert_refused(BINARY, path, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "--side is 32"]);
+    assert_refused(BINARY, path, &format!("{small} -o out"), &[model, "for pictures of 64x64 pixels", "not of 32x32"]);
     assert_wrong_arguments(BINARY, path, &format!("{from} --width 4 -o out"), &["--from", "--width"]);
 }
 

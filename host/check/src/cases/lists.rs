@@ -83,7 +83,7 @@ impl Case for CountMarked {
     type Loaded<D: Device> = Vec<[Buffer<D, u32>; 2]>;
 
     fn inputs(seed: u64, size: u32) -> Vec<Vec<u32>> {
-        masks(&mut random(61, seed, size), size.min(40))
+        masks(&mut random(61, seed, size), size.min(120))
     }
 
     fn element_count(masks: &Vec<Vec<u32>>) -> usize {
@@ -193,7 +193,7 @@ impl Case for ListMarked {
     type Loaded<D: Device> = Vec<[Buffer<D, u32>; 3]>;
 
     fn inputs(seed: u64, size: u32) -> Vec<Listing> {
-        let masks = masks(&mut random(63, seed, size), size.min(40));
+        let masks = masks(&mut random(63, seed, size), size.min(120));
         masks.into_iter().map(|mask| Listing { offsets: offsets(&counts(&mask)), mask }).collect()
     }
 
@@ -256,7 +256,7 @@ impl Case for FindNonFinite {
             };
             (0..count).map(&mut value).collect()
         };
-        let count = size.min(20) * FINITE_RUN;
+        let count = size.min(120) * FINITE_RUN;
         [(count, 0.0), (count - 1, 1.0e-3), (count / 2 + 1, 0.1), (size, 1.0)]
             .map(|(count, share)| values(count, share))
             .to_vec()

@@ -1,5 +1,6 @@
 //! What a person can do about an error of the library, which knows no options: the words behind the error's.
 
+use viewfuse_evaluate::EvaluateError;
 use viewfuse_evaluate::run_folder::FolderError;
 use viewfuse_field::render::RenderError;
 use viewfuse_field::training_free::NoObject;
@@ -13,7 +14,8 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let photographs = cause.downcast_ref::<PhotographsError>().and_then(of_photographs);
         let folder = cause.downcast_ref::<FolderError>().and_then(of_run_folder);
         let render = cause.downcast_ref::<RenderError>().and_then(of_render);
-        few_shot.or(photographs).or(folder).or(render).or_else(|| of_training(cause))
+        let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
+        few_shot.or(photographs).or(folder).or(render).or(evaluation).or_else(|| of_training(cause))
     })
 }
 
@@ -48,6 +50,15 @@ fn of_render(error: &RenderError) -> Option<&'static str> {
             Some("`viewfuse inspect` shows the poses, --background takes the background")
         }
         RenderError::Photographs(error) => of_photographs(error),
+        _ => None,
+    }
+}
+
+/// Transparent errors stand for their cause, which is no link of the chain then.
+fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
+    match error {
+        EvaluateError::Selection(error) => of_few_shot(error),
+        EvaluateError::Render(error) => of_render(error),
         _ => None,
     }
 }
