@@ -9,6 +9,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, test_networks};
+use viewfuse::job::progress::Silent;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_tests::lorry::photographs;
 
@@ -28,7 +29,7 @@ fn main() {
     let (mut encoder, mut calls) = (Vec::new(), Vec::new());
     for _ in 0..rounds {
         // Anew in every round: volumes are kept.
-        let mut reference = Reference::new(&field, &Cpu, &photographs).expect("sources on the device");
+        let mut reference = Reference::new(&field, &Cpu, &photographs, &Silent).expect("sources on the device");
         let start = Instant::now();
         for view in 0..SOURCES as usize {
             reference.encode(view).expect("a volume");

@@ -21,7 +21,7 @@ const BLOCK: FuseBlock = FuseBlock { view_count: 2, stride: 3, channel_count: 1,
 
 fn detail(outcome: Result<(), VulkanError>) -> Result<String, Failed> {
     match outcome {
-        Err(VulkanError::Arguments { kernel: "fuse_views" | "hull_entry" | "product", detail }) => Ok(detail),
+        Err(VulkanError::Arguments { kernel: "fuse_views" | "hull_entry" | "linear", detail }) => Ok(detail),
         other => Err(format!("{other:?}").into()),
     }
 }

@@ -35,7 +35,7 @@ const DENOISERS: [Kernel; 4] = [Kernel::DenoiserInput, Kernel::GroupNorm, Kernel
 fn genvs_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
     let file = data("genvs_small.safetensors");
-    let report = verify(&file, &device)?;
+    let report = verify(&file, &device, &Silent)?;
     assert_eq!(report.quantities.len(), 10);
     match report.quantities.iter().find(|quantity| !quantity.passes()) {
         Some(worst) => Err(format!("{worst:?}").into()),

@@ -30,7 +30,7 @@ const LARGEST_DIFFERENCE: f32 = 4.0e-3;
 
 fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
-    let report = verify(&data("pixelnerf_small.safetensors"), &device)?;
+    let report = verify(&data("pixelnerf_small.safetensors"), &device, &Silent)?;
     assert_eq!(report.quantities.len(), 39);
     match report.quantities.iter().find(|quantity| !quantity.passes()) {
         Some(worst) => Err(format!("{worst:?}").into()),

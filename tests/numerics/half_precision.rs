@@ -123,7 +123,7 @@ fn a_volume_is_the_nearest_of_16_bits() {
     let sources = sources();
     let volume = |half_volumes| {
         let field = field(half_volumes);
-        let mut reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
+        let mut reference = Reference::new(&field, &Cpu, &sources, &Silent).expect("a network on the device");
         reference.volume(1).expect("a volume")
     };
     let (whole, halves) = (volume(false), volume(true));
@@ -138,7 +138,7 @@ fn features_and_pictures_hardly_change() {
     let sources = sources();
     let features = |half_volumes| {
         let field = field(half_volumes);
-        let mut reference = Reference::new(&field, &Cpu, &sources).expect("a network on the device");
+        let mut reference = Reference::new(&field, &Cpu, &sources, &Silent).expect("a network on the device");
         let weights = [1.0 / VIEWS as f32; VIEWS as usize];
         reference.features(&weights, &target().block(0), [0.8, 1.8], 1.0).expect("features")
     };

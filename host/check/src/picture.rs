@@ -15,7 +15,7 @@ use viewfuse_device::choice::AnyDevice;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, render};
 use viewfuse_field::{AnyField, Renderer};
-use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Selection};
 use viewfuse_scene::photographs::longest_side;
@@ -60,7 +60,7 @@ impl Picture {
         let (folder, scene) = match path {
             Some(path) => (None, Scene::open(path)?),
             None => {
-                let folder = synthetic()?;
+                let folder = synthetic(progress)?;
                 let scene = Scene::open(folder.path().join("lorry"))?;
                 (Some(folder), scene)
             }
@@ -122,14 +122,14 @@ fn size(camera: &Camera) -> Option<[u32; 2]> {
 }
 
 /// A temporary folder with the synthetic scene `lorry`: every other training view of the sample, and one of its test views.
-fn synthetic() -> Result<TempDir, AnyError> {
+fn synthetic(progress: &dyn Progress) -> Result<TempDir, AnyError> {
     let folder = tempfile::tempdir()?;
     let cameras = toy::training_cameras()?.into_iter().step_by(2).chain(toy::test_cameras()?.into_iter().take(1));
     let smaller = |camera: Camera| -> Result<Camera, AnyError> {
         Ok(Camera { pinhole: camera.pinhole.resized(SYNTHETIC_SIDE, SYNTHETIC_SIDE)?, ..camera })
     };
     let cameras: Vec<Camera> = cameras.map(smaller).collect::<Result<_, _>>()?;
-    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE, &Silent)?;
+    write_scene(&folder.path().join("lorry"), &toy::lorry()?, &cameras, RAYS_PER_SIDE, &Quiet(progress))?;
     Ok(folder)
 }
 

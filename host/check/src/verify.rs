@@ -13,6 +13,7 @@ mod weighting;
 use safetensors::SafeTensors;
 use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
 
 /// Why a file could not be compared at all.
 #[derive(Debug, thiserror::Error)]
@@ -148,7 +149,7 @@ impl Report {
 /// # Errors
 /// [`VerifyError`] if the file cannot be compared at all. A tolerance that is exceeded is no error but part of the
 /// report.
-pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError> {
+pub fn verify<D: Device>(path: &Path, device: &D, progress: &dyn Progress) -> Result<Report, VerifyError> {
     let bytes = std::fs::read(path).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;
     let report = match SafeTensors::deserialize(&bytes) {
         Ok(tensors) => {
@@ -159,7 +160,7 @@ pub fn verify<D: Device>(path: &Path, device: &D) -> Result<Report, VerifyError>
             let mut covered = attention::verify(path, &tensors, &mut report)?;
             covered.extend(metrics::verify(path, &tensors, device, &mut report)?);
             covered.extend(pixelnerf::verify(path, &tensors, said("width"), device, &mut report)?);
-            covered.extend(genvs::verify(path, &tensors, said("member"), device, &mut report)?);
+            covered.extend(genvs::verify(path, &tensors, said("member"), device, &mut report, progress)?);
             let mut rest: Vec<&str> =
                 tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
             rest.sort_unstable();

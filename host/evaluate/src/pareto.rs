@@ -21,7 +21,7 @@ use std::time::Duration;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
 use viewfuse_field::{AnyField, Record, Renderer};
-use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{Album, SourceImages};
@@ -168,7 +168,7 @@ impl Subject<'_> {
         targets: &[Target],
         progress: &dyn Progress,
     ) -> Result<Round, RenderError> {
-        let (images, sources, quiet) = (Arc::clone(images), &self.job.sources, Silent);
+        let (images, sources, quiet) = (Arc::clone(images), &self.job.sources, Quiet(progress));
         let mut stage = Stage::of_images(self.scene, self.album, sources, images, renderer, options, &quiet)?;
         // What was sent to the device must not end within the first measured time.
         renderer.finish().map_err(viewfuse_field::FieldError::Device)?;

@@ -40,3 +40,32 @@ pub trait Progress: Sync {
 pub struct Silent;
 
 impl Progress for Silent {}
+
+/// Work inside work that shows its own progress: shows nothing, and stops when the other is to stop.
+#[derive(Clone, Copy)]
+pub struct Quiet<'a>(pub &'a dyn Progress);
+
+impl Progress for Quiet<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Stopped;
+
+    impl Progress for Stopped {
+        fn is_cancelled(&self) -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn what_is_quiet_still_stops() {
+        assert_eq!(Quiet(&Stopped).check(), Err(Interrupted));
+        assert_eq!((Quiet(&Silent).check(), Silent.check()), (Ok(()), Ok(())));
+    }
+}

@@ -5,6 +5,7 @@ use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::Genvs;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::learned::NoDepths;
+use viewfuse::job::progress::Silent;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
@@ -86,7 +87,7 @@ fn few_samples_and_many() {
 #[test]
 fn noise_levels_of_nothing_and_of_any_strength() {
     let field = made(exact());
-    let reference = Reference::new(&field, &Cpu, &sources(1)).expect("sources on the device");
+    let reference = Reference::new(&field, &Cpu, &sources(1), &Silent).expect("sources on the device");
     let noisy: Vec<f32> = (0..16 * 16 * 3).map(|index| (index % 7) as f32 / 3.0 - 1.0).collect();
     let features = vec![0.25; 16 * 16 * 16];
     let denoised = |level: f32| {

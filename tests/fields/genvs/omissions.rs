@@ -133,7 +133,7 @@ fn without_denoiser_the_first_features_are_the_picture() {
     let (picture, record) = recorded(&field, &sources, &Weights::mean(2), &target);
     assert_sound(&picture);
     assert_eq!(record.denoising, None);
-    let mut reference = Reference::new(&field, &Cpu, &sources).expect("sources on the device");
+    let mut reference = Reference::new(&field, &Cpu, &sources, &Silent).expect("sources on the device");
     let features = reference.features(&[0.5, 0.5], &target.block(0), [0.8, 1.8], 0.5).expect("features");
     for (colour, features) in picture.colours.iter().zip(features.chunks_exact(16)) {
         let expected = [0, 1, 2].map(|channel| (0.5 * (features[channel] + 1.0)).clamp(0.0, 1.0));

@@ -5,6 +5,7 @@ use std::collections::HashMap;
 use std::path::PathBuf;
 use viewfuse::check::verify::verify;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::job::progress::Silent;
 
 /// A tensor: its type, its shape, its bytes.
 type Tensor = (Dtype, Vec<usize>, Vec<u8>);
@@ -15,7 +16,7 @@ fn file() -> PathBuf {
 
 #[test]
 fn the_small_network_has_them() {
-    let report = verify(&file(), &Cpu).expect("a report");
+    let report = verify(&file(), &Cpu, &Silent).expect("a report");
     assert_eq!(report.quantities.len(), 10);
     for quantity in &report.quantities {
         assert!(quantity.passes(), "{quantity:?}");
@@ -38,7 +39,7 @@ fn said_of(member: Option<&str>, change: impl FnOnce(&mut HashMap<String, Tensor
     let path = folder.path().join("changed.safetensors");
     let written = safetensors::serialize(views, metadata).expect("bytes");
     std::fs::write(&path, written).expect("a file");
-    let report = verify(&path, &Cpu).map_err(|error| error.to_string())?;
+    let report = verify(&path, &Cpu, &Silent).map_err(|error| error.to_string())?;
     let failing = report.quantities.iter().filter(|quantity| !quantity.passes());
     Ok(failing.map(|quantity| quantity.name.clone()).collect())
 }

@@ -14,6 +14,7 @@ use viewfuse_device::Device;
 use viewfuse_field::genvs::reference::Reference;
 use viewfuse_field::genvs::sampling::{Plan, Steps};
 use viewfuse_field::genvs::{Architecture, COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, test_networks};
+use viewfuse_job::progress::Progress;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 
@@ -32,6 +33,7 @@ pub(super) fn verify<D: Device>(
     member: Option<&str>,
     device: &D,
     report: &mut Report,
+    progress: &dyn Progress,
 ) -> Result<Vec<String>, VerifyError> {
     if tensors.tensor("volume_value").is_err() || tensors.tensor("denoise_sigma").is_err() {
         return Ok(Vec::new());
@@ -51,7 +53,7 @@ pub(super) fn verify<D: Device>(
     if sources.images.iter().any(|image| image.texels.len() != side * side) {
         return Err(file.wrong("images", format!("are not {side}x{side}")));
     }
-    let mut reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
+    let mut reference = Reference::new(&field, device, &sources, progress).map_err(|error| failed(full(&error)))?;
     let mut comparison = Comparison { file: &file, reference: &mut reference, side };
     let mut known: Vec<String> = ["images", "src_poses", "tgt_pose", "focal_normalized"].map(str::to_owned).to_vec();
     known.extend(comparison.volumes(report)?);

@@ -3,11 +3,13 @@
 use super::options::DeviceOptions;
 use super::say;
 use super::table::table;
+use super::terminal::Terminal;
 use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_check::verify::{Measure, Report, verify};
 use viewfuse_device::choice::{AnyDevice, Chosen};
+use viewfuse_job::progress::Progress;
 
 #[derive(Args)]
 #[command(after_help = "Example:\n  viewfuse verify fixtures/weighting.json fixtures/metrics.safetensors\n\n\
@@ -25,10 +27,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Chosen { device, .. } = arguments.device.open()?;
     let mut all_pass = true;
     for path in &arguments.files {
+        let progress = Terminal::new("verifying");
         let report = match &device {
-            AnyDevice::Cpu(cpu) => verify(path, cpu)?,
-            AnyDevice::Vulkan(vulkan) => verify(path, vulkan.as_ref())?,
+            AnyDevice::Cpu(cpu) => verify(path, cpu, &progress),
+            AnyDevice::Vulkan(vulkan) => verify(path, vulkan.as_ref(), &progress),
         };
+        // Whatever an interrupted comparison says, it was interrupted.
+        progress.check()?;
+        drop(progress);
+        let report = report?;
         print_report(&report)?;
         all_pass &= report.passes();
     }

@@ -8,7 +8,7 @@ use crate::FieldError;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
-use viewfuse_job::progress::Silent;
+use viewfuse_job::progress::Progress;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
 use viewfuse_scene::photographs::SourceImages;
@@ -16,15 +16,21 @@ use viewfuse_scene::photographs::SourceImages;
 /// Sources on a device, with the network.
 pub struct Reference<'a, D: Device> {
     views: Views<'a, D>,
+    progress: &'a dyn Progress,
 }
 
 impl<'a, D: Device> Reference<'a, D> {
-    /// Takes sources and network to the device.
+    /// Takes sources and network to the device. Long work asks `progress` whether to go on.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn new(field: &'a Genvs, device: &'a D, sources: &SourceImages) -> Result<Self, FieldError> {
-        Ok(Reference { views: field.views(device, sources)? })
+    pub fn new(
+        field: &'a Genvs,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &'a dyn Progress,
+    ) -> Result<Self, FieldError> {
+        Ok(Reference { views: field.views(device, sources)?, progress })
     }
 
     /// The network's sizes.
@@ -104,7 +110,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let Views { device, parts, .. } = &self.views;
         let views = self.views.used(&all, weights)?;
         let mut scratch = Scratch::new(*device);
-        let image = parts.features(*device, &mut scratch, &views, target, &ray_sampling, &Silent)?;
+        let image = parts.features(*device, &mut scratch, &views, target, &ray_sampling, self.progress)?;
         Ok(device.download(&image.values)?)
     }
 
@@ -144,8 +150,8 @@ impl<'a, D: Device> Reference<'a, D> {
         let mut scratch = Scratch::new(*device);
         let features = self.condition(&mut scratch, features, size)?;
         let latents = device.upload(latents)?;
-        let (start, progress) = (Start::Latents(&latents), Silent);
-        let sampled = parts.picture(*device, &mut scratch, &features, plan, start, &progress)?;
+        let start = Start::Latents(&latents);
+        let sampled = parts.picture(*device, &mut scratch, &features, plan, start, self.progress)?;
         Ok(device.download(&sampled.picture)?)
     }
 
@@ -156,6 +162,7 @@ impl<'a, D: Device> Reference<'a, D> {
 
     /// Encodes a view, but for the rows of its volume, unless it is.
     fn encode_rowless(&mut self, view: usize) -> Result<(), FieldError> {
+        self.progress.check()?;
         if self.views.volumes[view].is_none() {
             self.views.encode_view(view)?;
         }

@@ -19,6 +19,7 @@ use viewfuse_field::genvs::{
     Architecture, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, ray_length, test_networks,
 };
 use viewfuse_field::learned::default_near_far;
+use viewfuse_job::progress::Silent;
 use viewfuse_nn::checkpoint::TensorShape;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
@@ -58,7 +59,7 @@ fn the_graph_is_the_renderers() {
     let network = Genvs::frozen(&made, 64, DType::F64).expect("a network");
     let field = Field::new(made, GenvsOptions::default()).expect("a network");
     let (sources, target) = (photographs(3, 64), target(64, 2.0));
-    let mut reference = Reference::new(&field, &Cpu, &sources).expect("sources");
+    let mut reference = Reference::new(&field, &Cpu, &sources, &Silent).expect("sources");
     let views = views(&sources, &[target], 1);
     let weights = [0.5_f32, 0.2, 0.3];
 
