@@ -3,7 +3,6 @@
 
 use std::fmt::Write;
 use std::fs;
-use std::path::PathBuf;
 use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
@@ -18,14 +17,14 @@ use viewfuse::scene::{Place, READERS, Scene, SceneError};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
+use viewfuse_tests::places::data;
 
 /// The sample's cameras are as far from its object.
 const PLANE: Plane = Plane { depth: 1.3 };
 
 /// The sample scene.
 fn sample() -> Scene {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../data/toy");
-    Scene::open(folder).expect("the sample")
+    Scene::open(data("toy")).expect("the sample")
 }
 
 /// The sample scene in a layout of one's own, with every third of its views.

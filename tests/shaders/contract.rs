@@ -154,7 +154,7 @@ fn other_push_constants_are_seen() {
         let offset = module.annotations.iter_mut().find(|annotation| annotation.operands[2..] == behind);
         offset.expect("the piece of rays").operands[3] = Operand::LiteralBit32(100);
     });
-    assert_one(&said, "cast_rays: push constants [Fixed { bytes: 108 }], not 104 bytes");
+    assert_one(&said, "_rays: push constants [Fixed { bytes: 108 }], not 104 bytes");
 }
 
 #[test]
