@@ -231,5 +231,7 @@ fn samplers_have_names() {
         assert_eq!(sampler.to_string().parse(), Ok(sampler));
     }
     let error = "huen".parse::<Sampler>().expect_err("no sampler");
-    assert_eq!(error.to_string(), "unknown sampler; there are: euler, heun, dpm++2m, dpm++3m, unipc, ipndm, ipndm-v");
+    let names = Sampler::ALL.map(Sampler::name).join(", ");
+    assert_eq!(error.to_string(), format!("unknown sampler; there are: {names}"));
+    assert!(names.starts_with("euler, heun, dpm++2m"));
 }

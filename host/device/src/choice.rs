@@ -21,9 +21,7 @@ pub enum DeviceChoice {
 
 /// A text that names no device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "unknown device '{0}'; the choices are auto, cpu, vulkan, vulkan:NUMBER and vulkan:NAME (see `viewfuse devices`)"
-)]
+#[error("unknown device '{0}'; the choices are auto, cpu, vulkan, vulkan:NUMBER, vulkan:NAME (see `viewfuse devices`)")]
 pub struct UnknownDevice(String);
 
 impl FromStr for DeviceChoice {

@@ -70,9 +70,14 @@ pub fn train_weighting(
     folder: &Path,
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
-    let network = match Family::of(checkpoint)? {
-        Family::PixelNerf => Frozen::PixelNerf(PixelNerf::frozen(checkpoint, DType::F32)?),
-        Family::Genvs => Frozen::Genvs(Genvs::frozen(checkpoint, settings.side, DType::F32)?),
+    let family = Family::of(checkpoint)?;
+    let network = if family == Family::PixelNerf {
+        Frozen::PixelNerf(PixelNerf::frozen(checkpoint, DType::F32)?)
+    } else if family == Family::Genvs {
+        Frozen::Genvs(Genvs::frozen(checkpoint, settings.side, DType::F32)?)
+    } else {
+        let reason = format!("a weighting cannot be trained for a {family}");
+        return Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
     };
     let least_views = SOURCE_COUNTS.into_iter().max().unwrap_or(1) + 1;
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
