@@ -1,4 +1,4 @@
-//! The weight-free field as a whole, on the CPU.
+//! The training-free field as a whole, on the CPU.
 
 mod extremes;
 mod geometry;

@@ -1,4 +1,4 @@
-//! What the kernels of the weight-free field are made of, against `f64`: functions that are no kernels themselves.
+//! What the kernels of the training-free field are made of, against `f64`: functions that are no kernels themselves.
 //!
 //! Every element has its own tolerance: the oracle counts the roundings on the way to it (two for each operation) and
 //! multiplies them by what follows; an image coordinate's error counts as far as the image changes over it. Elements

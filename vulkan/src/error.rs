@@ -47,7 +47,7 @@ pub enum VulkanError {
         /// What the device allows.
         available: u64,
     },
-    /// There is no room.
+    /// There is not enough memory.
     #[error("{device} is out of memory: {asked} bytes were asked for, {available} of {total} are free")]
     OutOfMemory {
         /// The device.

@@ -45,7 +45,7 @@ pub trait Case {
     /// Takes the inputs to a device.
     ///
     /// # Errors
-    /// If the device has no room.
+    /// If the device has no memory left.
     fn load<D: Device>(device: &D, inputs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError>;
 
     /// Runs the kernel, once for each dispatch.

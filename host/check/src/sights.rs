@@ -84,7 +84,7 @@ pub fn point(random: &mut Random, views: &[CameraBlock]) -> RayPoint {
 /// Rays of pixels in a device's memory.
 ///
 /// # Errors
-/// If the device has no room.
+/// If the device has no memory left.
 pub fn load_rays<D: Device>(device: &D, pixels: &[u32], rays: &[TargetRay]) -> Result<Rays<D>, DeviceError> {
     Ok(Rays { count: pixels.len() as u32, pixels: device.upload(pixels)?, rays: device.upload(rays)? })
 }

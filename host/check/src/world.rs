@@ -143,7 +143,7 @@ impl World {
     /// Everything that the photo kernels share, in a device's memory.
     ///
     /// # Errors
-    /// If the device has no room.
+    /// If the device has no memory left.
     pub fn load<D: Device>(&self, device: &D) -> Result<PhotoScene<D>, DeviceError> {
         Ok(PhotoScene {
             object: self.object,

@@ -45,13 +45,13 @@ pub trait Memory {
     /// A buffer with these values.
     ///
     /// # Errors
-    /// If the device has no room.
+    /// If the device has no memory left.
     fn upload<T: Element>(&self, values: &[T]) -> Result<Self::Buffer<T>, DeviceError>;
 
     /// A buffer of `count` default values.
     ///
     /// # Errors
-    /// If the device has no room.
+    /// If the device has no memory left.
     fn zeros<T: Element>(&self, count: usize) -> Result<Self::Buffer<T>, DeviceError>;
 
     /// Most elements of a buffer that is bound as a whole: what grows with the work is cut so that it fits.

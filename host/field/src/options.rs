@@ -36,7 +36,7 @@ pub struct FieldOptions {
     pub tolerance: Option<f32>,
     /// Noise that is added on the way, over the whole run.
     pub churn: Option<f32>,
-    /// Keep views' features in 16 bits.
+    /// Keep views' features in half precision (f16).
     pub half_volumes: bool,
     /// The noise level at which a frame starts from the one before.
     pub reuse: Option<f32>,

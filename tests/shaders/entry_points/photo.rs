@@ -1,4 +1,4 @@
-//! The field that needs no weights file. Arrays that may lie in pages are on one and on four.
+//! The training-free field. Arrays that may lie in pages are on one and on four.
 
 use super::{UNTOUCHED, dispatch, numbers};
 use viewfuse::check::world::World;

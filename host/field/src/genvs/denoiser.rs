@@ -93,7 +93,7 @@ impl<D: Device> Denoiser<D> {
     /// tensors, from the largest, at least one.
     ///
     /// # Errors
-    /// If the checkpoint cannot be read, or the device has no room.
+    /// If the checkpoint cannot be read, or the device has no memory left.
     pub(super) fn load(loader: &Loader<'_, D>, side: u32, resolutions: &[u32]) -> Result<Denoiser<D>, FieldError> {
         let mut blocks = Blocks { loader, shifts: ShiftLayers::default() };
         let (mut levels, mut decoder_levels) = (Vec::new(), Vec::new());
@@ -135,7 +135,7 @@ impl<D: Device> Denoiser<D> {
     /// `[row][column][channel]`. Rows and columns are multiples of two to the number of halvings.
     ///
     /// # Errors
-    /// If the device is lost or has no room.
+    /// If the device is lost or has no memory left.
     pub(super) fn run(
         &self,
         scratch: &mut Scratch<'_, D>,

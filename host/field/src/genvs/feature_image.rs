@@ -68,10 +68,10 @@ impl<D: Device> PointNetwork<D> {
         third.run(device, point_count, LinearOptions::PLAIN, next, None, raw)
     }
 
-    /// Room for what is inside it at so many points.
+    /// Buffers for the hidden layers at so many points.
     pub(super) fn hidden(&self, device: &D, point_count: usize) -> Result<[D::Buffer<f32>; 2], DeviceError> {
-        let room = || device.zeros(point_count * self.width as usize);
-        Ok([room()?, room()?])
+        let hidden = || device.zeros(point_count * self.width as usize);
+        Ok([hidden()?, hidden()?])
     }
 }
 

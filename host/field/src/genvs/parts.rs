@@ -35,7 +35,7 @@ impl<D: Device> Parts<D> {
     /// Reads them, for images of at least `side` rows and columns.
     ///
     /// # Errors
-    /// If the checkpoint cannot be read, or the device has no room.
+    /// If the checkpoint cannot be read, or the device has no memory left.
     pub(super) fn load(
         device: &D,
         checkpoint: &Checkpoint,

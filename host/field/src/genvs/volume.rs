@@ -31,7 +31,7 @@ enum Nodes<D: Device> {
         deep: Image<D>,
         image: Image<D>,
     },
-    /// All of them, in 16 bits each, two in a word.
+    /// All of them in half precision (f16), two in a word.
     F16(D::Buffer<u32>),
 }
 
@@ -39,7 +39,7 @@ impl<D: Device> Volume<D> {
     /// Encodes an image up to the last layer.
     ///
     /// # Errors
-    /// If the device is lost or has no room.
+    /// If the device is lost or has no memory left.
     pub(super) fn encode(
         device: &D,
         encoder: &Encoder<D>,
@@ -104,10 +104,10 @@ impl<D: Device> Volume<D> {
         }
     }
 
-    /// Keeps what is there in 16 bits, and nothing that further rows could be made of: all rows are filled.
+    /// Keeps what is there in half precision (f16), and nothing that further rows could be made of: all rows are filled.
     ///
     /// # Errors
-    /// If the device is lost or has no room.
+    /// If the device is lost or has no memory left.
     pub(super) fn pack(&mut self, device: &D) -> Result<(), DeviceError> {
         let Nodes::Whole { image, .. } = &self.nodes else { return Ok(()) };
         let number_count = self.number_count();

@@ -46,7 +46,7 @@ pub(super) struct Workspace<D: Device> {
 }
 
 impl<D: Device> Workspace<D> {
-    /// Room for as many points as keep the device busy, for `view_count` views; at most `most_points`.
+    /// Buffers for as many points as keep the device busy, for `view_count` views; at most `most_points`.
     pub(super) fn new(
         device: &D,
         architecture: &Architecture,
@@ -71,7 +71,7 @@ impl<D: Device> Workspace<D> {
     }
 }
 
-/// How many points [`Workspace::new`] makes room for.
+/// How many points [`Workspace::new`] has buffers for.
 fn points_at_once<D: Device>(
     device: &D,
     architecture: &Architecture,

@@ -36,7 +36,7 @@ pub struct Written {
     pub tensors: Vec<(String, Element, Vec<usize>, u64)>,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Largest relative error by rounding, of values that are normal numbers in 16 bits.
+    /// Largest relative error by rounding, of values that are normal numbers in half precision.
     pub relative_error: f64,
     /// How many values are smaller than those.
     pub tiny_count: u64,
@@ -115,7 +115,7 @@ impl Checkpoint {
         Ok(written)
     }
 
-    /// Values in 16 bits; the first is element `done` of the tensor.
+    /// Values in half precision; the first is element `done` of the tensor.
     fn halved(
         &self,
         name: &str,

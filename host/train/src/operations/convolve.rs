@@ -89,22 +89,22 @@ impl Convolution {
     }
 
     /// Windows of some rows of an image, in rows `[pixel][place][channel]`.
-    fn unfold<'a, T: Real>(&self, image: &'a [T], strip: &Range<usize>, room: &'a mut Vec<T>) -> &'a [T] {
+    fn unfold<'a, T: Real>(&self, image: &'a [T], strip: &Range<usize>, scratch: &'a mut Vec<T>) -> &'a [T] {
         let [_, height, width, channels] = self.input;
         let [_, out_width] = self.out_size();
         let row_len = self.row_len();
         if self.window.is_a_pixel() {
             return &image[strip.start * width * channels..strip.end * width * channels];
         }
-        room.clear();
-        room.resize(strip.len() * out_width * row_len, T::zero());
-        for (pixel, own) in room.chunks_exact_mut(row_len).enumerate() {
+        scratch.clear();
+        scratch.resize(strip.len() * out_width * row_len, T::zero());
+        for (pixel, own) in scratch.chunks_exact_mut(row_len).enumerate() {
             let (row, column) = (strip.start + pixel / out_width, pixel % out_width);
             self.window.visit([height, width], row, column, |from, place| {
                 own[place * channels..][..channels].copy_from_slice(&image[from * channels..][..channels]);
             });
         }
-        room
+        scratch
     }
 
     /// The sum of the rows' numbers where they came from.
@@ -138,9 +138,9 @@ impl Operation<3> for Convolution {
         let each = images.par_chunks_exact(height * width * channels).zip(output.par_chunks_exact_mut(pixels * outs));
         each.enumerate().for_each(|(index, (image, output))| {
             let biases = &biases[if self.has_own_biases { index * outs } else { 0 }..][..outs];
-            let mut room = Vec::new();
+            let mut scratch = Vec::new();
             for strip in self.strips() {
-                let rows = self.unfold(image, &strip, &mut room);
+                let rows = self.unfold(image, &strip, &mut scratch);
                 let own = &mut output[strip.start * out_width * outs..strip.end * out_width * outs];
                 own.chunks_exact_mut(outs).for_each(|own| own.copy_from_slice(biases));
                 let count = strip.len() * out_width;
@@ -166,7 +166,7 @@ impl Operation<3> for Convolution {
         let one = |(index, of_image): (usize, &mut [T])| {
             let image = &images[index * image_len..][..image_len];
             let (mut of_weights, mut of_biases) = (vec![T::zero(); outs * row_len], vec![T::zero(); outs]);
-            let (mut room, mut of_rows, mut passed) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut scratch, mut of_rows, mut passed) = (Vec::new(), Vec::new(), Vec::new());
             for strip in self.strips() {
                 let count = strip.len() * out_width;
                 let own = (index * pixels + strip.start * out_width) * outs;
@@ -181,7 +181,7 @@ impl Operation<3> for Convolution {
                     of_biases.iter_mut().zip(row).for_each(|(to, own)| *to += *own);
                 }
                 let gradient = matrix(gradient, count, outs);
-                let rows = matrix(self.unfold(image, &strip, &mut room), count, row_len);
+                let rows = matrix(self.unfold(image, &strip, &mut scratch), count, row_len);
                 add_product(gradient.t(), rows, matrix_mut(&mut of_weights, outs, row_len));
                 if !self.differentiates_input {
                     continue;

@@ -21,7 +21,7 @@ pub(crate) struct RunOptions {
     /// Add noise on the way, as much as this over the whole run; samplers that look back begin anew each time, so take heun
     #[arg(long, value_name = "AMOUNT", value_parser = parse_churn, requires = "model", conflicts_with = "tolerance", help_heading = GENVS)]
     churn: Option<f32>,
-    /// Keep views' features in 16 bits: half the memory, every row of them computed
+    /// Keep views' features in half precision (f16): half the memory, every row of them computed
     #[arg(long, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
     half_volumes: bool,
 }
