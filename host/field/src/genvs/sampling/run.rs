@@ -1,8 +1,8 @@
 //! One picture on its way from noise.
 
-use super::super::super::FieldError;
-use super::super::super::finite::download_finite;
 use super::{Plan, Sampled, Start};
+use crate::FieldError;
+use crate::finite::download_finite;
 use std::collections::VecDeque;
 use viewfuse_core::math::{clamp, ln_ratio};
 use viewfuse_core::sampler::control::{FIRST_STEP, change_to_come, reached, verdict};
