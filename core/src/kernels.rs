@@ -58,14 +58,14 @@ pub use crate::network::group_norm::{GroupNormBlock, MeanBlock};
 pub use crate::network::linear::LinearBlock;
 pub use crate::network::resample::{PoolBlock, UpsampleBlock};
 pub use crate::network::transpose::TransposedBlock;
-pub use crate::photo::ObjectBlock;
-pub use crate::photo::ray_marching::MarchBlock;
-pub use crate::photo::sweep::SweepBlock;
 pub use crate::pixelnerf::{EmbedBlock, GatherBlock};
 pub use crate::pose::PoseBlock;
 pub use crate::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};
 pub use crate::sample_mask::{RaysBlock, SampleMaskBlock};
 pub use crate::sampler::{Mix, NoiseBlock};
+pub use crate::visual_hull::ObjectBlock;
+pub use crate::visual_hull::ray_marching::MarchBlock;
+pub use crate::visual_hull::sweep::SweepBlock;
 pub use crate::weighting::{MOST_WEIGHED, WeighBlock};
 
 /// Calls `$callback!` with the rows of all kernels, in the order of the data; see [`kernels`](crate::kernels). What the
@@ -372,7 +372,7 @@ macro_rules! for_each_kernel {
             }
             /// Where the rays of one view's pixels enter the visual hull: the view's part of `entries[view][row][column]`.
             /// An element is a pixel of the view.
-            HullEntry hull_entry(view: u32; pixel_count) [0..pixel_count] by photo::hull::hull_entry {
+            HullEntry hull_entry(view: u32; pixel_count) [0..pixel_count] by visual_hull::hull::hull_entry {
                 one object: ObjectBlock,
                 read views: CameraBlock,
                 paged texels: [f32; 4],
@@ -380,7 +380,7 @@ macro_rules! for_each_kernel {
             }
             /// How badly other views match, at all planes: `costs[row][column][plane]` of a band. An element is a pixel of
             /// the band.
-            MatchCost match_cost(block: SweepBlock) [0..block.row_count * block.width] by photo::sweep::match_cost {
+            MatchCost match_cost(block: SweepBlock) [0..block.row_count * block.width] by visual_hull::sweep::match_cost {
                 one object: ObjectBlock,
                 read views: CameraBlock,
                 paged texels: [f32; 4],
@@ -391,13 +391,13 @@ macro_rules! for_each_kernel {
             /// Costs summed over a window's columns: `row_sums[row][column][plane]` = sum, count. An element is a plane of
             /// a pixel of the band.
             SumRow sum_row(block: SweepBlock) [0..block.row_count * block.width * block.plane_count]
-            by photo::sweep::sum_row {
+            by visual_hull::sweep::sum_row {
                 read costs: f32,
                 write row_sums: [f32; 2],
             }
             /// Costs averaged over a window: `means[row][column][plane]`. An element is a plane of a pixel of the band.
             MeanColumn mean_column(block: SweepBlock) [0..block.row_count * block.width * block.plane_count]
-            by photo::sweep::mean_column {
+            by visual_hull::sweep::mean_column {
                 read costs: f32,
                 read row_sums: [f32; 2],
                 write means: f32,
@@ -406,7 +406,7 @@ macro_rules! for_each_kernel {
             /// `picked[view][row][column]`. An element is a pixel of the band.
             PickDepth pick_depth(block: SweepBlock; first_row, row_count)
             [first_row * block.width..(first_row + row_count) * block.width]
-            by photo::sweep::pick_depth {
+            by visual_hull::sweep::pick_depth {
                 one object: ObjectBlock,
                 read views: CameraBlock,
                 read means: f32,
@@ -418,7 +418,7 @@ macro_rules! for_each_kernel {
             /// `pixel_depths[row][column]`. An element is a pixel of the target.
             MarchRays march_rays(block: MarchBlock; first_row, row_count)
             [first_row * block.target.width..(first_row + row_count) * block.target.width]
-            by photo::ray_marching::march_ray {
+            by visual_hull::ray_marching::march_ray {
                 one object: ObjectBlock,
                 read views: CameraBlock,
                 read footprints: f32,

@@ -26,7 +26,7 @@
 //! genvs             volumes of features become a feature image    VolumePlace, weigh_features, denoiser_input
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
 //! sampler           ... with few calls of the denoiser            Sampler, Mix, History, Churn, verdict
-//! photo             the field that needs no weights file          matched depth, signed distance, density and colour
+//! visual_hull       the training-free field inside silhouettes  matched depth, signed distance, density and colour
 //! metrics           how good is the picture                       psnr, ssim
 //! kernels           the list of kernels, one row each             Kernel, for_each_kernel
 //! ```
@@ -51,7 +51,6 @@ pub mod math;
 pub mod metrics;
 pub mod network;
 pub mod pages;
-pub mod photo;
 pub mod pixelnerf;
 pub mod pose;
 pub mod random;
@@ -60,6 +59,7 @@ pub mod sample_mask;
 pub mod sampler;
 pub mod schedule;
 pub mod sources;
+pub mod visual_hull;
 pub mod weighting;
 pub mod weights;
 

@@ -103,7 +103,7 @@ fn the_page_holds_everything() {
     for part in [
         "<h2>Number of sources</h2>",
         "<h2>Random sources and targets</h2>",
-        "<h2>Error over run time: photo</h2>",
+        "<h2>Error over run time: training-free</h2>",
         "<h2>Training: trained</h2>",
         "count:sources=2+4+8",
         "<th scope=\"row\">--size</th><td>24x24</td>",

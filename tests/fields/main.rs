@@ -1,6 +1,6 @@
 //! Fields as a whole, on the CPU: pictures of scenes whose geometry is known, extremes, and what may be left out.
 
 mod genvs;
-mod photo;
 mod pixelnerf;
 mod sampling;
+mod visual_hull;

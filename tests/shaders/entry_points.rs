@@ -4,7 +4,7 @@
 
 mod lists;
 mod networks;
-mod photo;
+mod visual_hull;
 mod volumes;
 
 use viewfuse::check::poses::Random;

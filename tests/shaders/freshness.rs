@@ -57,7 +57,8 @@ fn the_stamp_is_written_as_it_is_read() {
 
 #[test]
 fn a_changed_source_is_noticed() {
-    for file in ["core/src/photo/sweep.rs", "vulkan/shaders/src/ray_marching.rs", "vulkan/compiler/src/refine.rs"] {
+    for file in ["core/src/visual_hull/sweep.rs", "vulkan/shaders/src/ray_marching.rs", "vulkan/compiler/src/refine.rs"]
+    {
         let folder = copy();
         assert_eq!(stale(folder.path()), Vec::<String>::new());
         change(folder.path(), file, |text| text + " ");
@@ -68,18 +69,18 @@ fn a_changed_source_is_noticed() {
 #[test]
 fn a_new_and_a_lost_source_are_noticed() {
     let folder = copy();
-    fs::write(folder.path().join("core/src/photo/new.rs"), "").expect("a file");
-    fs::remove_file(folder.path().join("core/src/photo/ray_marching.rs")).expect("a file");
+    fs::write(folder.path().join("core/src/visual_hull/new.rs"), "").expect("a file");
+    fs::remove_file(folder.path().join("core/src/visual_hull/ray_marching.rs")).expect("a file");
     assert_eq!(
         stale(folder.path()),
-        ["source core/src/photo/ray_marching.rs is gone", "source core/src/photo/new.rs is new"]
+        ["source core/src/visual_hull/ray_marching.rs is gone", "source core/src/visual_hull/new.rs is new"]
     );
 }
 
 #[test]
 fn line_ends_of_another_system_are_no_change() {
     let folder = copy();
-    change(folder.path(), "core/src/photo/ray_marching.rs", |text| text.replace('\n', "\r\n"));
+    change(folder.path(), "core/src/visual_hull/ray_marching.rs", |text| text.replace('\n', "\r\n"));
     assert_eq!(stale(folder.path()), Vec::<String>::new());
 }
 

@@ -8,7 +8,7 @@
 //! ```text
 //! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
 //! oracle, attention_oracle,     what must come out
-//!   camera_oracle, photo_oracle,
+//!   camera_oracle, hull_oracle,
 //!   ray_oracle, compositing_oracle,
 //!   winograd_oracle,
 //!   network_oracle, point_oracle,
@@ -31,11 +31,11 @@ pub mod cases;
 pub mod compare;
 pub mod compositing_oracle;
 pub mod group_norm_oracle;
+pub mod hull_oracle;
 pub mod matrix_oracle;
 pub mod measure;
 pub mod network_oracle;
 pub mod oracle;
-pub mod photo_oracle;
 pub mod picture;
 pub mod point_oracle;
 pub mod poses;

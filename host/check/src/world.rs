@@ -1,15 +1,15 @@
 //! Small random worlds for kernels: cameras of unequal sizes around a box, smooth blobs for pictures, depths of a ball
 //! with dents and holes.
 
-use super::photo_oracle::Scene;
+use super::hull_oracle::Scene;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
-use viewfuse_core::photo::sweep::{OUTSIDE, SweepBlock};
-use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
+use viewfuse_core::visual_hull::sweep::{OUTSIDE, SweepBlock};
+use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 use viewfuse_device::DeviceError;
-use viewfuse_device::{Device, PhotoScene};
+use viewfuse_device::{Device, HullScene};
 
 /// What kernels read.
 #[derive(Clone, Debug)]
@@ -140,12 +140,12 @@ impl World {
         }
     }
 
-    /// Everything that the photo kernels share, in a device's memory.
+    /// Everything that the kernels of the visual hull share, in a device's memory.
     ///
     /// # Errors
     /// If the device has no memory left.
-    pub fn load<D: Device>(&self, device: &D) -> Result<PhotoScene<D>, DeviceError> {
-        Ok(PhotoScene {
+    pub fn load<D: Device>(&self, device: &D) -> Result<HullScene<D>, DeviceError> {
+        Ok(HullScene {
             object: self.object,
             object_buffer: device.upload(&[self.object])?,
             cameras: self.views.clone(),

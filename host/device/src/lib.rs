@@ -11,7 +11,7 @@
 //! memory        buffers on a device                                     Memory, Element, KernelTime
 //! parallel      one parallel driver under all kernels of the CPU
 //! kernels       a method for each kernel, made from the rows            Device, LayerShape
-//! bundles       arguments that belong together                          Layer, PhotoScene, Pixels, Rays
+//! bundles       arguments that belong together                          Layer, HullScene, Pixels, Rays
 //! cpu, vulkan   the devices                                             Cpu, Vulkan
 //! choice        which of those that are there                           Choice
 //! ```
@@ -26,7 +26,7 @@ pub mod memory;
 pub mod parallel;
 pub mod vulkan;
 
-pub use bundles::{Layer, PhotoScene, Pixels, Rays};
+pub use bundles::{HullScene, Layer, Pixels, Rays};
 pub use error::DeviceError;
 pub use kernels::{Device, LayerShape};
 pub use memory::{Element, KernelTime, Memory, Transfers};

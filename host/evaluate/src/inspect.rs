@@ -4,7 +4,7 @@ use image::RgbImage;
 use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
-use viewfuse_core::photo::ObjectBlock;
+use viewfuse_core::visual_hull::ObjectBlock;
 use viewfuse_field::training_free::find_object;
 use viewfuse_job::progress::Interrupted;
 use viewfuse_job::progress::Progress;

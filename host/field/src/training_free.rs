@@ -1,15 +1,15 @@
 //! The training-free field, on any device: a visual hull from silhouettes, depths by plane sweep, colours by weighted
-//! fusion; the mathematics is in [`viewfuse_core::photo`].
+//! fusion; the mathematics is in [`viewfuse_core::visual_hull`].
 
 mod bounds;
 
 use super::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, SourceSide};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::photo::ray_marching::MarchBlock;
-use viewfuse_core::photo::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
-use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
-use viewfuse_device::{Device, PhotoScene, Pixels};
+use viewfuse_core::visual_hull::ray_marching::MarchBlock;
+use viewfuse_core::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
+use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_device::{Device, HullScene, Pixels};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
@@ -53,7 +53,7 @@ struct NotWeighed;
 struct Views<'a, D: Device> {
     field: &'a TrainingFree,
     device: &'a D,
-    scene: PhotoScene<D>,
+    scene: HullScene<D>,
     entries: D::Buffer<f32>,
     texel_count: usize,
     background: [f32; 3],
@@ -109,7 +109,7 @@ impl TrainingFree {
         let (cameras, texels) = joined(sources);
         let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
-        let scene = PhotoScene {
+        let scene = HullScene {
             object,
             object_buffer: device.upload(&[object])?,
             views: device.upload(&cameras)?,
@@ -121,7 +121,7 @@ impl TrainingFree {
         progress.expect(scene.cameras.len());
         for view in 0..object.view_count {
             progress.check()?;
-            let PhotoScene { object_buffer, views, texels, cameras, .. } = &scene;
+            let HullScene { object_buffer, views, texels, cameras, .. } = &scene;
             let camera = &cameras[view as usize];
             let pixel_count = camera.width * camera.height;
             device.hull_entry(&view, pixel_count, object_buffer, views, texels, &mut entries)?;
@@ -141,7 +141,7 @@ impl Field for TrainingFree {
             source_side: SourceSide::Share(self.source_share),
             encoding: Encoding::EachWeighting,
             ends_rays: true,
-            ..About::new("photo")
+            ..About::new("training-free")
         }
     }
 
@@ -177,7 +177,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let Some(Depths { maps, sweep: Some(Sweep { pair_weights, nothing, first_guess }) }) = depths else {
             return Err(FieldError::unsuitable(NotWeighed));
         };
-        let PhotoScene { object_buffer: object, views, texels, .. } = &*scene;
+        let HullScene { object_buffer: object, views, texels, .. } = &*scene;
         // The widest of a sweep's three buffers is bound as a whole.
         let most_values = field.most_band_values.min(device.most_elements::<[f32; 2]>());
         let camera = &scene.cameras[view];
@@ -214,7 +214,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         for first_row in (0..height).step_by(band_rows as usize) {
             progress.check()?;
             let row_count = band_rows.min(height - first_row);
-            let PhotoScene { object_buffer: object, views, footprints, texels, .. } = &*scene;
+            let HullScene { object_buffer: object, views, footprints, texels, .. } = &*scene;
             let Pixels { colours, depths: pixel_depths } = &mut pixels;
             device.march_rays(
                 &target,

@@ -5,8 +5,8 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pages::{Pages, PagesMut};
-use viewfuse_core::photo::ObjectBlock;
-use viewfuse_core::photo::ray_marching::MarchBlock;
+use viewfuse_core::visual_hull::ObjectBlock;
+use viewfuse_core::visual_hull::ray_marching::MarchBlock;
 
 /// The ray of pixel number `first + id.x` of the target through the solid.
 #[spirv(compute(threads(64), entry_point_name = "march_rays"))]
@@ -48,8 +48,9 @@ pub fn march_rays(
     let mut colours = PagesMut { a: colours_a, b: colours_b, c: colours_c, d: colours_d, shift: page_shift };
     let mut pixel_depths =
         PagesMut { a: pixel_depths_a, b: pixel_depths_b, c: pixel_depths_c, d: pixel_depths_d, shift: page_shift };
-    let seen =
-        viewfuse_core::photo::ray_marching::march_ray(object, views, footprints, &texels, &depths, weights, block, at);
+    let seen = viewfuse_core::visual_hull::ray_marching::march_ray(
+        object, views, footprints, &texels, &depths, weights, block, at,
+    );
     colours.store(pixel as usize, [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity]);
     pixel_depths.store(pixel as usize, seen.depth);
 }

@@ -5,8 +5,8 @@ use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pages::{Pages, PagesMut, StartingAt};
-use viewfuse_core::photo::sweep::{OUTSIDE, SweepBlock, SweptPixel};
-use viewfuse_core::photo::{ObjectBlock, hull, sweep};
+use viewfuse_core::visual_hull::sweep::{OUTSIDE, SweepBlock, SweptPixel};
+use viewfuse_core::visual_hull::{ObjectBlock, hull, sweep};
 
 /// Where the ray of pixel number `first + id.x` of a view, the parameter, enters the hull.
 #[spirv(compute(threads(64), entry_point_name = "hull_entry"))]

@@ -3,11 +3,11 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::photo_oracle;
+use crate::hull_oracle;
 use crate::world::World;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
-use viewfuse_device::{Device, PhotoScene};
+use viewfuse_device::{Device, HullScene};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// See the module.
@@ -23,7 +23,7 @@ impl Case for HullEntry {
         &[("object", World::spoil_box), ("views", World::spoil_focal), ("texels", World::spoil_texels)];
 
     type Inputs = World;
-    type Loaded<D: Device> = (PhotoScene<D>, D::Buffer<f32>);
+    type Loaded<D: Device> = (HullScene<D>, D::Buffer<f32>);
 
     fn inputs(seed: u64, size: u32) -> World {
         World::of_size(seed, size)
@@ -38,7 +38,7 @@ impl Case for HullEntry {
     }
 
     fn run<D: Device>(device: &D, _: &World, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        let (PhotoScene { object_buffer, views, texels, cameras, .. }, entries) = loaded;
+        let (HullScene { object_buffer, views, texels, cameras, .. }, entries) = loaded;
         (0..).zip(&*cameras).try_for_each(|(view, camera)| {
             device.hull_entry(&view, camera.width * camera.height, object_buffer, views, texels, entries)
         })
@@ -51,6 +51,6 @@ impl Case for HullEntry {
     fn expected(world: &World) -> Vec<Option<Bounded>> {
         let scene = world.scene();
         let pixels: Vec<(u32, u32)> = world.pixels().collect();
-        map(pixels.len(), 1, |at| photo_oracle::hull_entry(&scene, pixels[at].0, pixels[at].1))
+        map(pixels.len(), 1, |at| hull_oracle::hull_entry(&scene, pixels[at].0, pixels[at].1))
     }
 }

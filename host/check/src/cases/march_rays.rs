@@ -3,12 +3,12 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::photo_oracle;
+use crate::hull_oracle;
 use crate::world::World;
-use viewfuse_core::photo::ray_marching::MarchBlock;
+use viewfuse_core::visual_hull::ray_marching::MarchBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
-use viewfuse_device::{Device, PhotoScene, Pixels};
+use viewfuse_device::{Device, HullScene, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The world, and how it is looked at.
@@ -20,7 +20,7 @@ pub struct Inputs {
 
 /// The same in a device's memory, and the picture.
 pub struct Loaded<D: Device> {
-    scene: PhotoScene<D>,
+    scene: HullScene<D>,
     depths: D::Buffer<f32>,
     weights: D::Buffer<f32>,
     pixels: Pixels<D>,
@@ -76,7 +76,7 @@ impl Case for MarchRays {
         let middle = height / 2;
         for (first_row, row_count) in [(0, middle), (middle, height - middle)] {
             if row_count > 0 {
-                let PhotoScene { object_buffer, views, footprints, texels, .. } = &*scene;
+                let HullScene { object_buffer, views, footprints, texels, .. } = &*scene;
                 device.march_rays(
                     &inputs.block,
                     first_row,
@@ -106,7 +106,7 @@ impl Case for MarchRays {
         let World { footprints, depths, weights, .. } = world;
         let pixel = |pixel: u32| {
             let at = [(pixel % target.width) as f32 + 0.5, (pixel / target.width) as f32 + 0.5];
-            photo_oracle::march_ray(&world.scene(), footprints, depths, weights, target, at, *background, *termination)
+            hull_oracle::march_ray(&world.scene(), footprints, depths, weights, target, at, *background, *termination)
         };
         let pixels = map((target.width * target.height) as usize, 1, |index| pixel(index as u32));
         let mut expected = Vec::new();

@@ -3,12 +3,12 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::photo_oracle;
+use crate::hull_oracle;
 use crate::world::World;
-use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_core::visual_hull::sweep::SweepBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
-use viewfuse_device::{Device, PhotoScene};
+use viewfuse_device::{Device, HullScene};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// What is swept.
@@ -20,7 +20,7 @@ pub struct Inputs {
 
 /// A sweep in a device's memory.
 pub struct Loaded<D: Device> {
-    scene: PhotoScene<D>,
+    scene: HullScene<D>,
     entries: D::Buffer<f32>,
     pair_weights: D::Buffer<f32>,
     costs: D::Buffer<f32>,
@@ -70,7 +70,7 @@ impl Case for MatchCost {
 
     fn run<D: Device>(device: &D, inputs: &Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
         let Loaded { scene, entries, pair_weights, costs } = loaded;
-        let PhotoScene { object_buffer, views, texels, .. } = scene;
+        let HullScene { object_buffer, views, texels, .. } = scene;
         device.match_cost(&inputs.sweep, object_buffer, views, texels, entries, pair_weights, costs)
     }
 
@@ -83,7 +83,7 @@ impl Case for MatchCost {
         let first = sweep.first_row * sweep.width;
         let pixels = first..first + sweep.row_count * sweep.width;
         let cost = |pixel, plane| {
-            photo_oracle::match_cost(&world.scene(), sweep, &world.entries, &world.pair_weights, pixel, plane)
+            hull_oracle::match_cost(&world.scene(), sweep, &world.entries, &world.pair_weights, pixel, plane)
         };
         let costs = |index: usize| -> Vec<_> {
             (0..sweep.plane_count).map(|plane| cost(pixels.start + index as u32, plane)).collect()

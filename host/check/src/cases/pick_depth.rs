@@ -3,14 +3,14 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::photo_oracle;
+use crate::hull_oracle;
 use crate::world::{Numbers, World, costs};
 use std::ops::Range;
-use viewfuse_core::photo::NO_SURFACE;
-use viewfuse_core::photo::sweep::SweepBlock;
+use viewfuse_core::visual_hull::NO_SURFACE;
+use viewfuse_core::visual_hull::sweep::SweepBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
-use viewfuse_device::{Device, PhotoScene};
+use viewfuse_device::{Device, HullScene};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The world, and each view's sweep with its mean costs.
@@ -25,7 +25,7 @@ pub struct Inputs {
 
 /// The same in a device's memory.
 pub struct Loaded<D: Device> {
-    scene: PhotoScene<D>,
+    scene: HullScene<D>,
     entries: D::Buffer<f32>,
     means: Vec<D::Buffer<f32>>,
     /// With each guess, what is picked.
@@ -95,7 +95,7 @@ impl Case for PickDepth {
         let Loaded { scene, entries, means, guesses } = loaded;
         for (guess, picked) in guesses {
             for ((sweep, _), means) in inputs.bands.iter().zip(&*means) {
-                let PhotoScene { object_buffer, views, .. } = &*scene;
+                let HullScene { object_buffer, views, .. } = &*scene;
                 let (first, count) = (rows(sweep).start, rows(sweep).len() as u32);
                 device.pick_depth(sweep, first, count, object_buffer, views, means, entries, guess, picked)?;
             }
@@ -120,7 +120,7 @@ impl Case for PickDepth {
                 let (entries, guess) = (&world.entries[first..], &guess[first..]);
                 let pixels = rows(sweep).start * sweep.width..rows(sweep).end * sweep.width;
                 let pick =
-                    |pixel| photo_oracle::pick_depth(&world.object, sweep, sweep.width, means, entries, guess, pixel);
+                    |pixel| hull_oracle::pick_depth(&world.object, sweep, sweep.width, means, entries, guess, pixel);
                 let written = first + pixels.start as usize..first + pixels.end as usize;
                 let picked = map(pixels.len(), 1, |index| pick(pixels.start + index as u32));
                 depths[written].copy_from_slice(&picked);

@@ -3,9 +3,9 @@
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
-use crate::photo_oracle;
+use crate::hull_oracle;
 use crate::world::{Numbers, World, costs};
-use viewfuse_core::photo::sweep::{SweepBlock, sum_row};
+use viewfuse_core::visual_hull::sweep::{SweepBlock, sum_row};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
@@ -75,7 +75,7 @@ impl Case for SumRow {
 
     fn expected(inputs: &Inputs) -> Vec<Option<Bounded>> {
         let Inputs { sweep, costs, .. } = inputs;
-        let sum = |(pixel, plane)| photo_oracle::sum_row(sweep, sweep.width, costs, pixel, plane);
+        let sum = |(pixel, plane)| hull_oracle::sum_row(sweep, sweep.width, costs, pixel, plane);
         let elements: Vec<_> = elements(sweep).collect();
         map(elements.len(), 64, |at| sum(elements[at])).into_iter().flatten().collect()
     }
@@ -121,7 +121,7 @@ impl Case for MeanColumn {
 
     fn expected(inputs: &Inputs) -> Vec<Option<Bounded>> {
         let Inputs { sweep, costs, .. } = inputs;
-        let mean = |(pixel, plane)| photo_oracle::mean_column(sweep, sweep.width, costs, pixel, plane);
+        let mean = |(pixel, plane)| hull_oracle::mean_column(sweep, sweep.width, costs, pixel, plane);
         let elements: Vec<_> = elements(sweep).collect();
         map(elements.len(), 16, |at| mean(elements[at]))
     }

@@ -2,8 +2,8 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::photo::ObjectBlock;
-use viewfuse_core::photo::hull::hull_alpha;
+use viewfuse_core::visual_hull::ObjectBlock;
+use viewfuse_core::visual_hull::hull::hull_alpha;
 use viewfuse_device::parallel::map;
 use viewfuse_scene::rig::nearest_point_to_lines;
 

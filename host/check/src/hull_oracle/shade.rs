@@ -3,9 +3,9 @@
 use super::{NOWHERE, Scene, Seen, Vector, along, centre, interval, look_up, project, radius, tents, towards};
 use crate::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::photo::NO_SURFACE;
-use viewfuse_core::photo::ray_marching::{MOST_STEPS, STEP};
-use viewfuse_core::photo::shade::{
+use viewfuse_core::visual_hull::NO_SURFACE;
+use viewfuse_core::visual_hull::ray_marching::{MOST_STEPS, STEP};
+use viewfuse_core::visual_hull::shade::{
     DEEPEST, EMPTY_ALPHA, FULL_ALPHA, HIDDEN_SHARE, JUMP, SEEN_BEHIND, SURFACE_OFFSET, SURFACE_WIDTH, TRUNCATION,
 };
 

@@ -2,12 +2,12 @@
 
 use super::{NOWHERE, Scene, along, centre, look_up, project, radius, towards};
 use crate::bounded::{Bounded, ROUNDING};
-use viewfuse_core::photo::hull::SWEPT_ALPHA;
-use viewfuse_core::photo::sweep::{
+use viewfuse_core::visual_hull::hull::SWEPT_ALPHA;
+use viewfuse_core::visual_hull::sweep::{
     DEPTH_COST, MOST_DIFFERENCE, MOST_ROUGHNESS, NO_WITNESS, OUTSIDE, ROUGHNESS_COST, SEEN_BEHIND_ENTRY,
     SWEPT_BEHIND_ENTRY, SweepBlock, WINDOW_REACH,
 };
-use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
+use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 
 /// What lies outside the hull costs.
 const OUT: Bounded = Bounded { value: OUTSIDE as f64, error: 0.0 };

@@ -1,4 +1,4 @@
-//! The training-free field: a solid carved by silhouettes and by photo-consistency, coloured by weighted
+//! The training-free field inside silhouettes: a solid carved by silhouettes and by photo-consistency, coloured by weighted
 //! fusion of what the views see.
 //!
 //! Four stages, each a few data-parallel kernels; a kernel is a function of one output element.

@@ -7,10 +7,10 @@
 use viewfuse::check::agreement::{Disagreement, Limits, measure};
 use viewfuse::check::bounded::Bounded;
 use viewfuse::check::world::{Numbers, World};
-use viewfuse::check::{camera_oracle, photo_oracle as oracle};
-use viewfuse_core::photo::NO_SURFACE;
-use viewfuse_core::photo::hull::{hull_alpha, hull_entry};
-use viewfuse_core::photo::shade::{JUMP, depth_at, sample};
+use viewfuse::check::{camera_oracle, hull_oracle as oracle};
+use viewfuse_core::visual_hull::NO_SURFACE;
+use viewfuse_core::visual_hull::hull::{hull_alpha, hull_entry};
+use viewfuse_core::visual_hull::shade::{JUMP, depth_at, sample};
 
 const SEEDS: std::ops::Range<u64> = 1..5;
 

@@ -1,4 +1,4 @@
-//! The kernels of [`viewfuse_core::photo`] evaluated in `f64` from their documentation, with bounds on what `f32` may
+//! The kernels of [`viewfuse_core::visual_hull`] evaluated in `f64` from their documentation, with bounds on what `f32` may
 //! make of them.
 //!
 //! `None` means that rounding decides: a value lies so near to a threshold that `f32` may fall on either side of it.
@@ -12,8 +12,8 @@ pub use sweep::{match_cost, mean_column, pick_depth, sum_row};
 use crate::bounded::{Bounded, ROUNDING};
 use crate::camera_oracle::{Seen, Vector, along, bilinear, centre, project, tents, towards};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::photo::hull::{ENTRY_ALPHA, ENTRY_STEP, LEAST_ALPHA};
-use viewfuse_core::photo::{NO_SURFACE, ObjectBlock};
+use viewfuse_core::visual_hull::hull::{ENTRY_ALPHA, ENTRY_STEP, LEAST_ALPHA};
+use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 
 /// What nothing is seen at; the same number in both precisions.
 pub const NOWHERE: Bounded = Bounded { value: NO_SURFACE as f64, error: 0.0 };
