@@ -163,7 +163,7 @@ impl<'a> Album<'a> {
         border: Option<&matte::Border>,
         backdrop: &matte::Backdrop,
     ) -> Result<SourceImage, PhotographsError> {
-        let View { name, camera, image } = &self.scene.views[view];
+        let View { name, camera, image, .. } = &self.scene.views[view];
         let photograph = self.photograph(view)?;
         // Enlarging a source would add pixels but no detail.
         let (width, height) = reduced_size(camera, longest_side);
