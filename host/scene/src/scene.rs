@@ -168,6 +168,7 @@ impl Scene {
             let Some(found) = reader.recognise(path)? else { continue };
             let mut checked = check::scene(&found, reader.form(), reader.read(&found)?)?;
             distinguish(&mut checked.views);
+            checked.warnings.extend(masks::find(path, &mut checked.views));
             let mut names = HashSet::new();
             for view in &checked.views {
                 if !names.insert(view.name.as_str()) {

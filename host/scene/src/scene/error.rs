@@ -64,6 +64,16 @@ pub enum SceneError {
         /// The photograph that was looked for (where the name has no extension: with any of those that we read).
         image: PathBuf,
     },
+    /// A mask that is named and missing.
+    #[error("{path}{place}: there is no mask {mask}")]
+    NoMask {
+        /// The file that names it.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// The mask that was looked for.
+        mask: PathBuf,
+    },
     /// A photograph whose pose is missing.
     #[error("{path}: this photograph has no pose: there is no {pose}")]
     ImageWithoutPose {
@@ -142,9 +152,9 @@ pub enum SceneError {
         /// What is wrong with them.
         fault: IntrinsicsFault,
     },
-    /// The photograph was taken through a lens that is not a pinhole.
+    /// The photograph was taken through a lens that is not supported.
     #[error(
-        "{path}: {key} is {value}: lens distortion is not supported; undistort the photographs first, for example \
+        "{path}: {key} is {value}: this lens is not supported; undistort the photographs first, for example \
          with COLMAP's image_undistorter, and use the cameras that it writes"
     )]
     Distorted {
