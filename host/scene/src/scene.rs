@@ -9,6 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use image::metadata::Orientation;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::lens::Lens;
@@ -197,22 +198,40 @@ impl Scene {
     /// [`SceneError`] if there is no such view, if it has no photograph, if a file cannot be decoded, or if its size
     /// is no longer what it was when the scene was opened.
     pub fn photograph(&self, view: usize) -> Result<Photograph, SceneError> {
-        let Some(view) = self.views.get(view) else {
-            let (path, view_count) = (self.path.clone(), self.views.len());
-            return Err(SceneError::NoSuchView { path, view, view_count });
-        };
-        let Some(path) = &view.image else {
-            return Err(SceneError::NoPhotograph { path: self.path.clone(), name: view.name.clone() });
-        };
-        let pinhole = &view.camera.pinhole;
-        let mut photograph = images::decode(path, [pinhole.width(), pinhole.height()])?;
-        if let Some(mask) = &view.mask {
+        let mut photograph = self.stored_photograph(view)?;
+        let View { camera, lens, mask, .. } = &self.views[view];
+        if let Some(mask) = mask {
             masks::apply(mask, &mut photograph)?;
         }
-        Ok(match &view.lens {
-            Some(lens) => undistort::undistorted(&photograph, lens, pinhole),
+        Ok(match lens {
+            Some(lens) => undistort::undistorted(&photograph, lens, &camera.pinhole),
             None => photograph,
         })
+    }
+
+    /// The photograph of a view upright, and otherwise as it is stored: without its mask, not undistorted.
+    pub(crate) fn stored_photograph(&self, view: usize) -> Result<Photograph, SceneError> {
+        let pinhole = self.view(view)?.camera.pinhole;
+        images::decode(self.photograph_file(view)?, [pinhole.width(), pinhole.height()])
+    }
+
+    /// The file of a view's photograph if its pixels are upright as they are stored.
+    pub(crate) fn upright_file(&self, view: usize) -> Result<Option<&Path>, SceneError> {
+        let file = self.photograph_file(view)?;
+        Ok((images::header(file)?.orientation == Orientation::NoTransforms).then_some(file))
+    }
+
+    fn view(&self, view: usize) -> Result<&View, SceneError> {
+        self.views.get(view).ok_or_else(|| {
+            let (path, view_count) = (self.path.clone(), self.views.len());
+            SceneError::NoSuchView { path, view, view_count }
+        })
+    }
+
+    fn photograph_file(&self, view: usize) -> Result<&Path, SceneError> {
+        let View { name, image, .. } = self.view(view)?;
+        let missing = || SceneError::NoPhotograph { path: self.path.clone(), name: name.clone() };
+        image.as_deref().ok_or_else(missing)
     }
 
     /// The index of the view that a person means by `text`: the view of exactly this name; otherwise, if `text` is a
