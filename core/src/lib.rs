@@ -1,7 +1,7 @@
 //! The mathematics of viewfuse, at fixed sizes.
 //!
 //! Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32` and 32-bit integers (only the
-//! metrics, which never run on a device, in `f64`), so that one body serves as the definition on a workstation, as the
+//! metrics, which never run on a device, in `f64`; lenses in either), so that one body serves as the definition on a workstation, as the
 //! source of a GPU kernel and as firmware. The modules stand in the order of the data:
 //!
 //! ```text
@@ -11,6 +11,7 @@
 //! finite            where the first NaN or infinity is             first_non_finite
 //! half_precision    two numbers in a word (f16)                    f16_bits, f16_value, packed_f16
 //! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
+//! lens              what a lens does to a pinhole's image          Lens, LensBlock: distort, undistort
 //! sources           the poses of the source views                 Sources<S>
 //! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
 //! weighting         pose -> weight, by formula                    Scheme, weigh
@@ -47,6 +48,7 @@ pub mod fuse;
 pub mod genvs;
 pub mod half_precision;
 pub mod kernels;
+pub mod lens;
 pub mod lookup;
 pub mod math;
 pub mod metrics;

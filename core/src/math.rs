@@ -6,7 +6,7 @@
 //! (S. Moshier, single precision); the stated errors are the largest seen in `tests/numerics/math.rs` against `f64`.
 //!
 //! This is the only module that names `libm`, and it takes only the correctly rounded square root from it
-//! (plus `log10` in `f64` for the metrics, which never run on a device).
+//! (plus, in `f64` and never run on a device, `log10` for the metrics and three functions for lenses).
 
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LOG2_E, PI};
 
@@ -19,6 +19,24 @@ pub fn sqrt(x: f32) -> f32 {
 /// Decimal logarithm in `f64`, for metrics on the host.
 pub(crate) fn log10(x: f64) -> f64 {
     libm::log10(x)
+}
+
+/// Square root in `f64`, correctly rounded, for lenses on the host.
+#[inline]
+pub(crate) fn sqrt_f64(x: f64) -> f64 {
+    libm::sqrt(x)
+}
+
+/// Arc tangent in `f64`, for lenses on the host.
+#[inline]
+pub(crate) fn arc_tangent_f64(x: f64) -> f64 {
+    libm::atan(x)
+}
+
+/// Tangent in `f64`, for lenses on the host.
+#[inline]
+pub(crate) fn tangent_f64(x: f64) -> f64 {
+    libm::tan(x)
 }
 
 /// Absolute value.

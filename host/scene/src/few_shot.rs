@@ -188,7 +188,7 @@ impl Selection {
 
 /// A view of the scene as a target; its photograph, if it has one, is the truth.
 pub fn target_of(scene: &Scene, view: usize) -> Target {
-    let View { name, camera, image } = &scene.views[view];
+    let View { name, camera, image, .. } = &scene.views[view];
     Target { name: name.clone(), camera: *camera, truth: image.is_some().then_some(view) }
 }
 

@@ -3,7 +3,7 @@
 //! The modules stand in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
-//! scene         a folder of posed photographs, in any layout: Scene, View, Photograph
+//! scene         a folder of posed photographs, in any layout: Scene, View, Photograph, ScenePoint
 //!               reader: what a layout's reader is, and READERS, all of them
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up, orbits
@@ -19,7 +19,8 @@ pub mod rig;
 mod scene;
 
 pub use scene::{
-    IntrinsicsFault, LARGEST_SIDE, Photograph, Place, READERS, Scene, SceneError, View, looked_for, reader,
+    IntrinsicsFault, LARGEST_SIDE, Photograph, Place, READERS, Scene, SceneError, SceneFrame, ScenePoint, Split, View,
+    looked_for, reader,
 };
 
 /// The examples of the README, compiled and run.

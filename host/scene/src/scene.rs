@@ -8,7 +8,10 @@ use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
+use viewfuse_core::lens::Lens;
 
 mod check;
 mod error;
@@ -16,14 +19,19 @@ mod fault;
 mod files;
 mod images;
 mod json;
+mod masks;
 mod middlebury;
 pub mod reader;
+mod split;
 mod srn;
 mod transforms;
+mod undistort;
 
+use check::Checked;
 pub use error::SceneError;
 pub use fault::{IntrinsicsFault, Place};
 use reader::Reader;
+pub use split::{Split, UnknownSplit};
 
 /// The readers of all layouts, in the order in which they are asked: a path is taken for the first that fits.
 pub const READERS: [&dyn Reader; 3] = [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn];
@@ -37,6 +45,9 @@ pub fn looked_for(readers: &[&dyn Reader]) -> String {
 pub const LARGEST_SIDE: u32 = 16_384;
 
 /// One camera of a scene, with the photograph it took if there is one.
+///
+/// The camera is always a pinhole. Where the photograph was taken through a lens that is none, [`Scene::photograph`] undistorts
+/// it to that pinhole, at the same size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
     /// What people call it: the stem of the photograph's file; `target_1` for `target_pose/1.txt` of an SRN folder.
@@ -46,6 +57,56 @@ pub struct View {
     pub camera: Camera,
     /// The photograph; `None` for a target pose without one.
     pub image: Option<PathBuf>,
+    /// What the lens did to the stored photograph; `None` where it is a pinhole's. Normalised coordinates of `camera`.
+    pub lens: Option<Lens>,
+    /// A file whose pixels say what of the stored photograph counts (0: nothing): it becomes the alpha channel.
+    pub mask: Option<PathBuf>,
+    /// Nearest and furthest depth of what the view shows, where its file says so: along the principal axis, in world units.
+    pub near_far: Option<[f32; 2]>,
+    /// The part of the scene that it belongs to, where its files say so.
+    pub split: Option<Split>,
+}
+
+/// A point of the scene that was reconstructed with its cameras.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScenePoint {
+    /// World coordinates.
+    pub position_world: Vec3,
+    /// Mean reprojection error in pixels of the photographs that it was made from; `None` where the file does not say.
+    pub error: Option<f32>,
+    /// Red, green, blue.
+    pub colour: [u8; 3],
+    /// The views that saw it, as indices into [`Scene::views`], ascending, each once.
+    pub views: Vec<u32>,
+}
+
+/// Where the world lies in the coordinates of the scene's files: `point_file = origin + scale * point_world`.
+///
+/// Cameras far from the origin (surveyed coordinates) would lose what lies between them to rounding, so that they are moved
+/// there before anything is rounded to `f32`: where the centroid of their centres is more than 16 times their spread (root
+/// mean square distance from it) away. The scale is a power of two, other than 1 only where that spread is below 1e-3
+/// or above 1e4. An ordinary scene keeps its numbers to the bit: learned fields depend on the unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SceneFrame {
+    /// The world's origin in the file's coordinates.
+    pub origin: DVec3,
+    /// The world's unit in the file's units.
+    pub scale: f64,
+}
+
+impl SceneFrame {
+    /// The file's coordinates themselves.
+    pub const FILE: SceneFrame = SceneFrame { origin: DVec3::ZERO, scale: 1.0 };
+
+    /// A point of the file in the world.
+    pub fn world(&self, point_file: DVec3) -> DVec3 {
+        (point_file - self.origin) / self.scale
+    }
+
+    /// A point of the world in the file's coordinates.
+    pub fn file(&self, point_world: DVec3) -> DVec3 {
+        self.origin + self.scale * point_world
+    }
 }
 
 /// A photograph in memory.
@@ -53,8 +114,11 @@ pub struct View {
 pub struct Photograph {
     /// Straight (not premultiplied) 8-bit RGBA.
     pub pixels: image::RgbaImage,
-    /// Whether any pixel is not opaque; if not, the background must be told from the colours.
+    /// Whether any pixel is not opaque, or a mask said what counts; if not, the background must be told from the colours.
     pub has_alpha: bool,
+    /// 255 where the undistorted picture shows something, 0 where the stored photograph ends; there, `pixels` repeat what is
+    /// nearest. `None` where all of it shows something.
+    pub seen: Option<image::GrayImage>,
 }
 
 /// A scene whose poses and image headers have been read and checked.
@@ -67,6 +131,12 @@ pub struct Scene {
     /// Views with photographs first (at least one), then target poses without. In the order of the list where the
     /// layout has one, otherwise in natural order of the names (`2` before `10`).
     pub views: Vec<View>,
+    /// Points that were reconstructed with the cameras; often none.
+    pub points: Vec<ScenePoint>,
+    /// What was left out or ignored when the scene was opened, a line each: photographs that are missing, keys without use.
+    pub warnings: Vec<String>,
+    /// Where the world lies in the coordinates of the files.
+    pub frame: SceneFrame,
 }
 
 impl Scene {
@@ -88,16 +158,17 @@ impl Scene {
         fs::metadata(path).map_err(|cause| files::unreadable(path, cause))?;
         for reader in readers {
             let Some(found) = reader.recognise(path)? else { continue };
-            let mut views = check::views(&found, reader.form(), reader.read(&found)?)?;
-            distinguish(&mut views);
+            let mut checked = check::scene(&found, reader.form(), reader.read(&found)?)?;
+            distinguish(&mut checked.views);
             let mut names = HashSet::new();
-            for view in &views {
+            for view in &checked.views {
                 if !names.insert(view.name.as_str()) {
                     let path = view.image.clone().unwrap_or(found);
                     return Err(SceneError::DuplicateName { path, name: view.name.clone() });
                 }
             }
-            return Ok(Scene { path: path.to_path_buf(), layout: reader.name(), views });
+            let Checked { views, points, warnings, frame } = checked;
+            return Ok(Scene { path: path.to_path_buf(), layout: reader.name(), views, points, warnings, frame });
         }
         Err(SceneError::UnknownLayout { path: path.to_path_buf(), looked_for: looked_for(readers) })
     }
@@ -110,29 +181,29 @@ impl Scene {
         name.map_or_else(|| self.path.display().to_string(), |name| name.to_string_lossy().into_owned())
     }
 
-    /// Decodes the photograph of the view with this index. An orientation tag in the file is not applied: the pose is
-    /// that of the pixels as they are stored.
+    /// Decodes the photograph of the view with this index: turned upright where the cameras are those of the upright
+    /// picture, its mask as the alpha channel, undistorted to the view's pinhole.
     ///
     /// # Errors
-    /// [`SceneError`] if there is no such view, if it has no photograph, if the file cannot be decoded, or if its size
+    /// [`SceneError`] if there is no such view, if it has no photograph, if a file cannot be decoded, or if its size
     /// is no longer what it was when the scene was opened.
     pub fn photograph(&self, view: usize) -> Result<Photograph, SceneError> {
-        let Some(View { name, camera, image }) = self.views.get(view) else {
+        let Some(view) = self.views.get(view) else {
             let (path, view_count) = (self.path.clone(), self.views.len());
             return Err(SceneError::NoSuchView { path, view, view_count });
         };
-        let Some(path) = image else {
-            return Err(SceneError::NoPhotograph { path: self.path.clone(), name: name.clone() });
+        let Some(path) = &view.image else {
+            return Err(SceneError::NoPhotograph { path: self.path.clone(), name: view.name.clone() });
         };
-        let photograph = images::decode(path)?;
-        let (width, height) = photograph.pixels.dimensions();
-        let (declared_width, declared_height) = (camera.pinhole.width(), camera.pinhole.height());
-        if (width, height) != (declared_width, declared_height) {
-            let declared_in = "the scene as it was opened".to_string();
-            let path = path.clone();
-            return Err(SceneError::SizeMismatch { path, width, height, declared_in, declared_width, declared_height });
+        let pinhole = &view.camera.pinhole;
+        let mut photograph = images::decode(path, [pinhole.width(), pinhole.height()])?;
+        if let Some(mask) = &view.mask {
+            masks::apply(mask, &mut photograph)?;
         }
-        Ok(photograph)
+        Ok(match &view.lens {
+            Some(lens) => undistort::undistorted(&photograph, lens, pinhole),
+            None => photograph,
+        })
     }
 
     /// The index of the view that a person means by `text`: the view of exactly this name; otherwise, if `text` is a

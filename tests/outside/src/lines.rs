@@ -1,7 +1,9 @@
 //! A layout of scenes.
 
 use std::path::{Path, PathBuf};
-use viewfuse::scene::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader, number_lines, read_text};
+use viewfuse::scene::reader::{
+    ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader, number_lines, read_text,
+};
 use viewfuse::scene::{Place, SceneError};
 
 /// `cameras.list`: of `photograph_0.png` and so on a line each, the focal length, then the pose's upper three rows.
@@ -25,9 +27,10 @@ impl Reader for Lines {
         Ok(list.is_file().then_some(list))
     }
 
-    fn read(&self, list: &Path) -> Result<Vec<RawView>, SceneError> {
+    fn read(&self, list: &Path) -> Result<RawScene, SceneError> {
         let lines = number_lines(list, &read_text(list)?)?;
-        lines.iter().enumerate().map(|(index, (line, numbers))| view(list, index, *line, numbers)).collect()
+        let view = |(index, (line, numbers)): (usize, &(usize, Vec<f64>))| view(list, index, *line, numbers);
+        Ok(RawScene::from(lines.iter().enumerate().map(view).collect::<Result<Vec<_>, _>>()?))
     }
 }
 
@@ -45,11 +48,12 @@ fn view(list: &Path, index: usize, line: usize, numbers: &[f64]) -> Result<RawVi
     let intrinsics = RawIntrinsics {
         focal: [focal; 2],
         principal: size.map(|side| f64::from(side) / 2.0),
-        size,
+        size: Some(size),
+        lens: None,
         path: path.clone(),
         place: place.clone(),
         size_place: place.clone(),
     };
     let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
-    Ok(RawView { name, image: Some(image), pose, intrinsics: Some(intrinsics) })
+    Ok(RawView::new(name, Some(image), pose, Some(intrinsics)))
 }

@@ -4,77 +4,191 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+use image::metadata::Orientation;
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::pose::{Pose, PoseError};
+use viewfuse_core::pose::{LARGEST_COORDINATE, Pose, PoseError};
 
-use super::View;
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
-use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
+use super::images;
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView};
+use super::{SceneFrame, ScenePoint, View};
 
-/// The views of a scene, those with photographs first.
-pub(super) fn views(found: &Path, form: &'static str, raw: Vec<RawView>) -> Result<Vec<View>, SceneError> {
-    let (photographs, targets): (Vec<RawView>, Vec<RawView>) = raw.into_iter().partition(|view| view.image.is_some());
-    let mut views: Vec<View> = Vec::with_capacity(photographs.len() + targets.len());
-    for view in photographs.into_iter().chain(targets) {
-        if view.name.is_empty() || view.name.contains(std::path::is_separator) {
-            return Err(SceneError::Name { path: found.to_path_buf(), name: view.name });
+/// The centroid of the cameras may be so many times their spread away from the origin.
+const FAR_FROM_ORIGIN: f64 = 16.0;
+
+/// Spreads of cameras, in units of the file, that need no other unit.
+const USUAL_SPREADS: std::ops::RangeInclusive<f64> = 1.0e-3..=1.0e4;
+
+/// A scene whose numbers were checked.
+pub(super) struct Checked {
+    pub(super) views: Vec<View>,
+    pub(super) points: Vec<ScenePoint>,
+    pub(super) warnings: Vec<String>,
+    pub(super) frame: SceneFrame,
+}
+
+/// The scene, its views with photographs first.
+pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<Checked, SceneError> {
+    let RawScene { views: raw_views, points, warnings } = raw;
+    let mut order: Vec<usize> = (0..raw_views.len()).collect();
+    // Stable: photographs first, otherwise as they were.
+    order.sort_by_key(|&view| raw_views[view].image.is_none());
+    let no_views = || SceneError::NoViews { path: found.to_path_buf(), looked_for: form };
+
+    let mut views: Vec<View> = Vec::with_capacity(raw_views.len());
+    for raw in order.iter().map(|&view| &raw_views[view]) {
+        if raw.name.is_empty() || raw.name.contains(std::path::is_separator) {
+            return Err(SceneError::Name { path: found.to_path_buf(), name: raw.name.clone() });
         }
-        let pinhole = match (&view.intrinsics, views.first()) {
-            (Some(intrinsics), _) => pinhole_of(intrinsics, view.image.as_ref())?,
+        let pinhole = match (&raw.intrinsics, views.first()) {
+            (Some(intrinsics), _) => pinhole_of(intrinsics, raw.image.as_ref())?,
             (None, Some(first)) => first.camera.pinhole,
-            (None, None) => return Err(SceneError::NoViews { path: found.to_path_buf(), looked_for: form }),
+            (None, None) => return Err(no_views()),
         };
-        let camera = Camera { pose: pose(&view.pose)?, pinhole };
-        views.push(View { name: view.name, camera, image: view.image.map(|image| image.path().to_path_buf()) });
+        views.push(View {
+            name: raw.name.clone(),
+            camera: Camera { pose: pose(&raw.pose, &SceneFrame::FILE)?, pinhole },
+            image: raw.image.as_ref().map(|image| image.path().to_path_buf()),
+            lens: raw.intrinsics.as_ref().and_then(|intrinsics| intrinsics.lens).filter(|lens| !lens.is_pinhole()),
+            mask: raw.mask.clone(),
+            near_far: None,
+            split: raw.split,
+        });
     }
-    match views.first().is_some_and(|view| view.image.is_some()) {
-        true => Ok(views),
-        false => Err(SceneError::NoViews { path: found.to_path_buf(), looked_for: form }),
+    if !views.first().is_some_and(|view| view.image.is_some()) {
+        return Err(no_views());
+    }
+
+    let frame = frame_of(&raw_views);
+    for (view, raw) in views.iter_mut().zip(order.iter().map(|&view| &raw_views[view])) {
+        if frame != SceneFrame::FILE {
+            view.camera.pose = pose(&raw.pose, &frame)?;
+        }
+        view.near_far = near_far(raw, &frame)?;
+    }
+    let mut place = vec![0; order.len()];
+    for (now, &before) in order.iter().enumerate() {
+        place[before] = now as u32;
+    }
+    let points = points.into_iter().map(|raw| point(found, raw, &frame, &place)).collect::<Result<_, _>>()?;
+    Ok(Checked { views, points, warnings, frame })
+}
+
+/// Where the world is put so that `f32` holds what lies between the cameras; see [`SceneFrame`].
+fn frame_of(views: &[RawView]) -> SceneFrame {
+    let centres: Vec<DVec3> = views.iter().map(|view| centre(&world_from_camera(&view.pose))).collect();
+    let count = centres.len().max(1) as f64;
+    let centroid = centres.iter().map(|centre| *centre / count).sum::<DVec3>();
+    let spread = (centres.iter().map(|centre| centre.distance_squared(centroid) / count).sum::<f64>()).sqrt();
+    // One camera, or several in one place: there is nothing between them to lose.
+    if !(spread > 0.0 && spread.is_finite()) {
+        return SceneFrame::FILE;
+    }
+    SceneFrame {
+        origin: if centroid.length() > FAR_FROM_ORIGIN * spread { centroid } else { DVec3::ZERO },
+        scale: if USUAL_SPREADS.contains(&spread) { 1.0 } else { spread.log2().floor().exp2() },
     }
 }
 
-/// A pose from the 16 numbers of a row-major matrix.
-fn pose(raw: &RawPose) -> Result<Pose, SceneError> {
+/// Depths of a view in world units.
+fn near_far(raw: &RawView, frame: &SceneFrame) -> Result<Option<[f32; 2]>, SceneError> {
+    let Some([near, far]) = raw.near_far else { return Ok(None) };
+    let [low, high] = [near, far].map(|depth| (depth / frame.scale) as f32);
+    if low > 0.0 && low < high && high <= LARGEST_COORDINATE {
+        return Ok(Some([low, high]));
+    }
+    let RawPose { path, place, .. } = &raw.pose;
+    Err(SceneError::Depths { path: path.clone(), place: place.clone(), near, far })
+}
+
+fn point(found: &Path, raw: RawPoint, frame: &SceneFrame, place: &[u32]) -> Result<ScenePoint, SceneError> {
+    let [x, y, z] = raw.position;
+    let position_world = frame.world(DVec3::from_array(raw.position)).as_vec3();
+    if !(position_world.abs().max_element() <= LARGEST_COORDINATE) || position_world.is_nan() {
+        return Err(SceneError::Point { path: found.to_path_buf(), x, y, z });
+    }
+    let mut views: Vec<u32> = raw.views.iter().filter_map(|&view| place.get(view as usize).copied()).collect();
+    views.sort_unstable();
+    views.dedup();
+    let error = (raw.error >= 0.0).then_some(raw.error as f32).filter(|error| error.is_finite());
+    Ok(ScenePoint { position_world, error, colour: raw.colour, views })
+}
+
+/// A pose from the 16 numbers of a row-major matrix, in the world of a frame.
+fn pose(raw: &RawPose, frame: &SceneFrame) -> Result<Pose, SceneError> {
     let RawPose { matrix, form, path, place } = raw;
-    let checked = match form {
-        PoseForm::WorldFromOpenCv => Pose::from_opencv(&rows(matrix)),
-        PoseForm::WorldFromOpenGl => Pose::from_opengl(&rows(matrix)),
-        PoseForm::OpenCvFromWorld => pose_from_inverse(matrix),
+    let checked = if *frame == SceneFrame::FILE {
+        match form {
+            PoseForm::WorldFromOpenCv => Pose::from_opencv(&rows(matrix)),
+            PoseForm::WorldFromOpenGl => Pose::from_opengl(&rows(matrix)),
+            // Transposing inverts a rigid matrix only, so the matrix as given must pass too.
+            PoseForm::OpenCvFromWorld => {
+                Pose::from_opencv(&rows(matrix)).and_then(|_| Pose::from_opencv(&rows(&world_from_camera(raw))))
+            }
+        }
+    } else {
+        let mut moved = world_from_camera(raw);
+        let centre = frame.world(centre(&moved));
+        (moved[3], moved[7], moved[11]) = (centre.x, centre.y, centre.z);
+        Pose::from_opencv(&rows(&moved))
     };
-    checked.map_err(|reason| SceneError::Pose { path: path.clone(), place: place.clone(), reason })
+    checked.map_err(|reason: PoseError| SceneError::Pose { path: path.clone(), place: place.clone(), reason })
 }
 
 fn rows(matrix: &[f64; 16]) -> [[f32; 4]; 4] {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[4 * row + column] as f32))
 }
 
-/// A pose from a world-to-camera matrix in OpenCV axes: `[R^T | -R^T t]`.
-fn pose_from_inverse(camera_from_world: &[f64; 16]) -> Result<Pose, PoseError> {
-    // Transposing inverts a rigid matrix only, so the matrix as given must pass too.
-    Pose::from_opencv(&rows(camera_from_world))?;
-    let m = camera_from_world;
-    let mut inverse = [0.0; 16];
-    for row in 0..3 {
-        for column in 0..3 {
-            inverse[4 * row + column] = m[4 * column + row];
+/// The camera's centre from a camera-to-world matrix.
+fn centre(world_from_camera: &[f64; 16]) -> DVec3 {
+    DVec3::new(world_from_camera[3], world_from_camera[7], world_from_camera[11])
+}
+
+/// The camera-to-world matrix in OpenCV axes; of a world-to-camera one, `[R^T | -R^T t]`.
+fn world_from_camera(raw: &RawPose) -> [f64; 16] {
+    let mut m = raw.matrix;
+    match raw.form {
+        PoseForm::WorldFromOpenCv => m,
+        PoseForm::WorldFromOpenGl => {
+            for row in 0..3 {
+                m[4 * row + 1] = -m[4 * row + 1];
+                m[4 * row + 2] = -m[4 * row + 2];
+            }
+            m
         }
-        inverse[4 * row + 3] = -(m[row] * m[3] + m[4 + row] * m[7] + m[8 + row] * m[11]);
+        PoseForm::OpenCvFromWorld => {
+            let mut inverse = [0.0; 16];
+            for row in 0..3 {
+                for column in 0..3 {
+                    inverse[4 * row + column] = m[4 * column + row];
+                }
+                inverse[4 * row + 3] = -(m[row] * m[3] + m[4 + row] * m[7] + m[8 + row] * m[11]);
+            }
+            inverse[15] = 1.0;
+            inverse
+        }
     }
-    inverse[15] = 1.0;
-    Pose::from_opencv(&rows(&inverse))
 }
 
 /// The pinhole of a view: of the intrinsics' own size, or of a photograph that may be a resampled copy of such an image.
 ///
 /// # Errors
-/// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale.
+/// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale, [`SceneError::Orientation`] if
+/// it cannot be told whether the camera is that of the stored or of the upright picture.
 fn pinhole_of(raw: &RawIntrinsics, image: Option<&ImageFile>) -> Result<Pinhole, SceneError> {
-    let RawIntrinsics { focal, principal, size, path, place, size_place } = raw;
-    let own = pinhole(path, place, *focal, *principal, *size)?;
-    let Some(image) = image else { return Ok(own) };
-    let image_size = image.size();
-    if !same_shape(*size, image_size) {
+    let RawIntrinsics { focal, principal, size: stated, lens: _, path, place, size_place } = raw;
+    let image_size = match image {
+        Some(image) => Some(upright_size(image, *stated)?),
+        None => None,
+    };
+    let Some(size) = (*stated).or(image_size) else {
+        return Err(SceneError::MissingKey { path: path.clone(), key: "the size of the image".to_string() });
+    };
+    let own = pinhole(path, place, *focal, *principal, size)?;
+    let (Some(image), Some(image_size)) = (image, image_size) else { return Ok(own) };
+    if !same_shape(size, image_size) {
         return Err(SceneError::SizeMismatch {
             path: image.path().to_path_buf(),
             width: image_size[0],
@@ -87,6 +201,25 @@ fn pinhole_of(raw: &RawIntrinsics, image: Option<&ImageFile>) -> Result<Pinhole,
     let scale = [0, 1].map(|axis| f64::from(image_size[axis]) / f64::from(size[axis]));
     let scaled = |pair: &[f64; 2]| [pair[0] * scale[0], pair[1] * scale[1]];
     pinhole(path, size_place, scaled(focal), scaled(principal), image_size)
+}
+
+/// The size of the picture that the camera is of: the stored one, or the upright one where the file says that it must be turned.
+fn upright_size(image: &ImageFile, stated: Option<[u32; 2]>) -> Result<[u32; 2], SceneError> {
+    let stored = image.size();
+    if image.orientation() == Orientation::NoTransforms {
+        return Ok(stored);
+    }
+    let turned = images::turned(stored, image.orientation());
+    let fits = |size: [u32; 2]| stated.is_some_and(|stated| same_shape(stated, size));
+    match (fits(stored), fits(turned)) {
+        (true, false) => Ok(stored),
+        (false, true) => Ok(turned),
+        _ => Err(SceneError::Orientation {
+            path: image.path().to_path_buf(),
+            tag: image.orientation().to_exif(),
+            orientation: image.orientation(),
+        }),
+    }
 }
 
 /// The pinhole of images of this size, if the numbers are a pinhole camera.
@@ -117,7 +250,7 @@ pub(super) fn size(path: &Path, place: Place, width: f64, height: f64) -> Result
 /// Whether one size is the other at another scale, each side rounded to a whole pixel up or down.
 ///
 /// An image that keeps one side and changes the other is a crop, however small the change.
-fn same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
+pub(super) fn same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
     if a[0] == b[0] || a[1] == b[1] {
         return a == b;
     }

@@ -218,6 +218,44 @@ pub enum SceneError {
         /// Height that the cameras are for.
         declared_height: u32,
     },
+    /// A photograph that must be turned to be upright, and cameras that do not say whether they are of it or of the stored one.
+    #[error(
+        "{path}: the file says that its pixels must be turned to be upright (EXIF orientation {tag}, {orientation:?}), and the \
+         size that the cameras are for does not tell whether they are those of the stored or of the upright picture; save \
+         the photograph without the tag"
+    )]
+    Orientation {
+        /// The image file.
+        path: PathBuf,
+        /// The tag's value, from 2 to 8.
+        tag: u8,
+        /// What it means.
+        orientation: image::metadata::Orientation,
+    },
+    /// Near and far depth of a view do not bound anything.
+    #[error("{path}{place}: near {near} and far {far} are not two positive depths, the near one first")]
+    Depths {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// The near depth.
+        near: f64,
+        /// The far depth.
+        far: f64,
+    },
+    /// A reconstructed point is not finite, or too far away.
+    #[error("{path}: the point ({x}, {y}, {z}) is not finite, or further than 1e30 from the origin")]
+    Point {
+        /// The file or folder.
+        path: PathBuf,
+        /// Its first coordinate.
+        x: f64,
+        /// Its second.
+        y: f64,
+        /// Its third.
+        z: f64,
+    },
     /// The pixels of a view without a photograph were asked for.
     #[error("{path}: view {name:?} is a pose without a photograph")]
     NoPhotograph {

@@ -1,12 +1,15 @@
 //! Image files: their headers when a scene is opened, their pixels when a view is needed.
 //!
-//! An orientation tag (EXIF) is not applied: the poses are those of the pixels as they are stored.
+//! A tag that says how the pixels must be turned to be upright (EXIF) is read with the header. Whether the poses are those of the
+//! pixels as stored or of the upright picture follows from the size that the cameras are for
+//! ([`super::check`]); where that cannot tell, the photograph is refused.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Cursor, Read};
 use std::path::Path;
 
-use image::{ImageReader, Limits};
+use image::metadata::Orientation;
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use super::error::SceneError;
 use super::files::unreadable;
@@ -18,36 +21,108 @@ const LARGEST_PIXEL: u64 = 8;
 /// What a decoder may need beside the pixels: its rows, tables, colour profiles.
 const DECODER_ALLOWANCE: u64 = 64 << 20;
 
-/// Width and height from the header; nothing of the size that it states is allocated.
+/// So much of a JPEG file is read for its header at first: the tags with their small picture, colour profiles. The decoder
+/// would read the whole file.
+const JPEG_HEADER: u64 = 256 << 10;
+
+/// What an image file says about itself.
+pub(super) struct Header {
+    /// Width and height as stored.
+    pub(super) size: [u32; 2],
+    /// How the pixels must be turned to be upright.
+    pub(super) orientation: Orientation,
+}
+
+/// Size and orientation; nothing of the size that the header states is allocated.
 ///
 /// # Errors
 /// [`SceneError::TooLarge`] if a side has more than [`LARGEST_SIDE`] pixels; otherwise as for any unreadable image.
-pub(super) fn size(path: &Path) -> Result<[u32; 2], SceneError> {
-    let dimensions = open(path)?.into_dimensions();
-    let (width, height) = dimensions.map_err(|cause| SceneError::Image { path: path.to_path_buf(), cause })?;
+pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
+    let (width, height, orientation) = match beginning_of_jpeg(path)? {
+        Some(found) => found,
+        None => described(open(path)?).map_err(|cause| undecodable(path, cause))?,
+    };
     if width > LARGEST_SIDE || height > LARGEST_SIDE {
         return Err(SceneError::TooLarge { path: path.to_path_buf(), width, height });
     }
-    Ok([width, height])
+    Ok(Header { size: [width, height], orientation })
 }
 
-/// The pixels as straight 8-bit RGBA; 16-bit channels are rounded to the nearest.
+/// What the first bytes of a JPEG file say; `None` for other files, and where more bytes are needed.
+fn beginning_of_jpeg(path: &Path) -> Result<Option<(u32, u32, Orientation)>, SceneError> {
+    let failed = |cause| unreadable(path, cause);
+    let mut first = Vec::new();
+    let mut file = File::open(path).map_err(failed)?.take(JPEG_HEADER);
+    file.by_ref().take(2).read_to_end(&mut first).map_err(failed)?;
+    if first != [0xff, 0xd8] {
+        return Ok(None);
+    }
+    file.read_to_end(&mut first).map_err(failed)?;
+    Ok(described(ImageReader::with_format(Cursor::new(first), ImageFormat::Jpeg)).ok())
+}
+
+fn described<R: std::io::BufRead + std::io::Seek>(
+    reader: ImageReader<R>,
+) -> Result<(u32, u32, Orientation), image::ImageError> {
+    let mut decoder = reader.into_decoder()?;
+    let (width, height) = decoder.dimensions();
+    // A tag that cannot be read says nothing.
+    Ok((width, height, decoder.orientation().unwrap_or(Orientation::NoTransforms)))
+}
+
+/// The pixels of a photograph as straight 8-bit RGBA, of this width and height: turned upright where only that fits.
+///
+/// # Errors
+/// [`SceneError::SizeMismatch`] if the file has another size.
+pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<Photograph, SceneError> {
+    let (mut decoded, orientation) = pixels(path)?;
+    let stored = [decoded.width(), decoded.height()];
+    if stored != size && turned(stored, orientation) == size {
+        decoded.apply_orientation(orientation);
+    }
+    let (width, height) = (decoded.width(), decoded.height());
+    if [width, height] != size {
+        return Err(SceneError::SizeMismatch {
+            path: path.to_path_buf(),
+            width,
+            height,
+            declared_in: "the scene as it was opened".to_string(),
+            declared_width: size[0],
+            declared_height: size[1],
+        });
+    }
+    let has_channel = decoded.color().has_alpha();
+    let pixels = decoded.into_rgba8();
+    // SRN's photographs carry an alpha channel that is 255 everywhere: it says nothing.
+    let has_alpha = has_channel && pixels.pixels().any(|pixel| pixel[3] < u8::MAX);
+    Ok(Photograph { pixels, has_alpha, seen: None })
+}
+
+/// The size of an image when it is upright.
+pub(super) fn turned(size: [u32; 2], orientation: Orientation) -> [u32; 2] {
+    use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+    match orientation {
+        Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH => [size[1], size[0]],
+        _ => size,
+    }
+}
+
+/// All pixels of an image file, as stored.
 ///
 /// The header is checked first, and the decoder may allocate no more than an image of that size can need.
-pub(super) fn decode(path: &Path) -> Result<Photograph, SceneError> {
-    let [width, height] = size(path)?;
+pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneError> {
+    let Header { size: [width, height], orientation } = header(path)?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(width);
     limits.max_image_height = Some(height);
     limits.max_alloc = Some(u64::from(width) * u64::from(height) * LARGEST_PIXEL + DECODER_ALLOWANCE);
     let mut reader = open(path)?;
     reader.limits(limits);
-    let decoded = reader.decode().map_err(|cause| SceneError::Image { path: path.to_path_buf(), cause })?;
-    let has_channel = decoded.color().has_alpha();
-    let pixels = decoded.into_rgba8();
-    // SRN's photographs carry an alpha channel that is 255 everywhere: it says nothing.
-    let has_alpha = has_channel && pixels.pixels().any(|pixel| pixel[3] < u8::MAX);
-    Ok(Photograph { pixels, has_alpha })
+    Ok((reader.decode().map_err(|cause| undecodable(path, cause))?, orientation))
+}
+
+fn undecodable(path: &Path, cause: image::ImageError) -> SceneError {
+    SceneError::Image { path: path.to_path_buf(), cause }
 }
 
 /// A reader whose format is that of the content, whatever the file's extension says.

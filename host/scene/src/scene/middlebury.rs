@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
 use super::files;
-use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
 /// How the name of a list ends.
 const SUFFIX: &str = "_par.txt";
@@ -50,8 +50,8 @@ impl Reader for Middlebury {
         }
     }
 
-    fn read(&self, list: &Path) -> Result<Vec<RawView>, SceneError> {
-        read(list)
+    fn read(&self, list: &Path) -> Result<RawScene, SceneError> {
+        Ok(RawScene::from(read(list)?))
     }
 }
 
@@ -106,10 +106,11 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneEr
     let intrinsics = RawIntrinsics {
         focal: [k[0], k[4]],
         principal: [k[2] + 0.5, k[5] + 0.5],
-        size: image.size(),
+        size: None,
+        lens: None,
         path: path(),
         place: place.clone(),
         size_place: place,
     };
-    Ok(RawView { name: files::stem(image.path()), image: Some(image), pose, intrinsics: Some(intrinsics) })
+    Ok(RawView::new(files::stem(image.path()), Some(image), pose, Some(intrinsics)))
 }

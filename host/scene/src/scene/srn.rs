@@ -17,7 +17,7 @@ use super::check;
 use super::error::SceneError;
 use super::fault::Place;
 use super::files::{self, IMAGE_EXTENSIONS};
-use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
 /// Put before the name of a view from `target_pose/`, which often counts from 1 like the photographs do. A name
 /// without a separator of folders can be the name of an output file.
@@ -41,8 +41,8 @@ impl Reader for Srn {
         Ok(is_there.then(|| path.to_path_buf()))
     }
 
-    fn read(&self, folder: &Path) -> Result<Vec<RawView>, SceneError> {
-        read(folder)
+    fn read(&self, folder: &Path) -> Result<RawScene, SceneError> {
+        Ok(RawScene::from(read(folder)?))
     }
 }
 
@@ -63,7 +63,7 @@ fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
         let name = files::stem(&image);
         let image = Some(ImageFile::open(&image)?);
         let pose = read_pose(&pose_folder.join(format!("{name}.txt")), list.form)?;
-        views.push(RawView { name, image, pose, intrinsics: Some(list.intrinsics.clone()) });
+        views.push(RawView::new(name, image, pose, Some(list.intrinsics.clone())));
     }
     let target_folder = folder.join("target_pose");
     if target_folder.is_dir() {
@@ -72,7 +72,7 @@ fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
             let name = format!("{TARGET_PREFIX}{}", files::stem(&path));
             // A target is rendered at the size of the photographs; where these are smaller than `intrinsics.txt` says, so
             // is it.
-            views.push(RawView { name, image: None, pose, intrinsics: None });
+            views.push(RawView::new(name, None, pose, None));
         }
     }
     Ok(views)
@@ -148,7 +148,10 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
         }
     };
     let (place, size_place) = (Place::Line(*focal_line), Place::Line(size_line));
-    let size = check::size(path, size_place.clone(), width, height)?;
+    let size = Some(check::size(path, size_place.clone(), width, height)?);
     let (focal, principal, path) = ([focal, focal], [x, y], path.to_path_buf());
-    Ok(IntrinsicsFile { intrinsics: RawIntrinsics { focal, principal, size, path, place, size_place }, form })
+    Ok(IntrinsicsFile {
+        intrinsics: RawIntrinsics { focal, principal, size, lens: None, path, place, size_place },
+        form,
+    })
 }

@@ -18,7 +18,7 @@ use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::json::{self, Object};
-use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView, Reader};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
 /// Names of the file, in the order in which they are looked for.
 const FILE_NAMES: [&str; 2] = ["transforms.json", "transforms_train.json"];
@@ -52,8 +52,8 @@ impl Reader for Transforms {
         Ok(FILE_NAMES.iter().map(|name| path.join(name)).find(|file| file.is_file()))
     }
 
-    fn read(&self, file: &Path) -> Result<Vec<RawView>, SceneError> {
-        read(file)
+    fn read(&self, file: &Path) -> Result<RawScene, SceneError> {
+        Ok(RawScene::from(read(file)?))
     }
 }
 
@@ -94,7 +94,7 @@ impl<'a> Frame<'a> {
         };
         let image = ImageFile::open(&self.image(frame.text("file_path")?)?)?;
         let intrinsics = Some(self.intrinsics(image.size())?);
-        Ok(RawView { name: files::stem(image.path()), image: Some(image), pose, intrinsics })
+        Ok(RawView::new(files::stem(image.path()), Some(image), pose, intrinsics))
     }
 
     /// The photograph of a `file_path`, with the extension that the Blender flavour leaves out.
@@ -116,12 +116,13 @@ impl<'a> Frame<'a> {
 
     fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
         let place = || Place::Key(self.key.clone());
-        let size = match (self.number("w")?, self.number("h")?) {
-            (None, None) => image_size,
-            (Some((width, _)), Some((height, _))) => check::size(self.path, place(), width, height)?,
+        let stated = match (self.number("w")?, self.number("h")?) {
+            (None, None) => None,
+            (Some((width, _)), Some((height, _))) => Some(check::size(self.path, place(), width, height)?),
             (Some(_), None) => return Err(self.missing("h")),
             (None, Some(_)) => return Err(self.missing("w")),
         };
+        let size = stated.unwrap_or(image_size);
         let focal_x =
             self.focal("fl_x", "camera_angle_x", size[0])?.ok_or_else(|| self.missing("fl_x (or camera_angle_x)"))?;
         let focal_y = self.focal("fl_y", "camera_angle_y", size[1])?.unwrap_or(focal_x);
@@ -131,7 +132,7 @@ impl<'a> Frame<'a> {
             self.number("cy")?.map_or(centre[1], |(value, _)| value),
         ];
         let (path, place, size_place) = (self.path.to_path_buf(), place(), place());
-        Ok(RawIntrinsics { focal: [focal_x, focal_y], principal, size, path, place, size_place })
+        Ok(RawIntrinsics { focal: [focal_x, focal_y], principal, size: stated, lens: None, path, place, size_place })
     }
 
     /// A focal length: what the frame says in either form, otherwise what the top of the file says.

@@ -1,0 +1,40 @@
+//! The parts that data is split into: of a data set its scenes, of a scene its views.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// Which of the scenes of a data set, or of the views of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Split {
+    /// To learn from.
+    Train,
+    /// To watch the learning with.
+    Validation,
+    /// To measure the result with.
+    Test,
+}
+
+/// The name is none of a split.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a split of a data set: train, val or test")]
+pub struct UnknownSplit(String);
+
+impl fmt::Display for Split {
+    /// As folders end: `train`, `val`, `test`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Split::Train => "train",
+            Split::Validation => "val",
+            Split::Test => "test",
+        })
+    }
+}
+
+impl FromStr for Split {
+    type Err = UnknownSplit;
+
+    fn from_str(name: &str) -> Result<Split, UnknownSplit> {
+        let all = [Split::Train, Split::Validation, Split::Test];
+        all.into_iter().find(|split| split.to_string() == name).ok_or_else(|| UnknownSplit(name.to_owned()))
+    }
+}

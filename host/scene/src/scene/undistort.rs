@@ -1,0 +1,74 @@
+//! Photographs taken through a lens, as the pinhole camera of the same focal length would have taken them.
+//!
+//! Each pixel of the result is looked up where the lens shows it, in f64, and interpolated between the four nearest
+//! (premultiplied by alpha). What lies outside the photograph, or where the lens's polynomials fold the image over, is marked
+//! as not seen.
+
+use image::{GrayImage, Luma, Rgba, RgbaImage};
+use rayon::prelude::*;
+use viewfuse_core::camera::Pinhole;
+use viewfuse_core::lens::Lens;
+
+use super::Photograph;
+
+/// The photograph of a pinhole camera of the same size.
+pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhole) -> Photograph {
+    let (width, height) = photograph.pixels.dimensions();
+    let focal = pinhole.focal().map(f64::from);
+    let principal = pinhole.principal().map(f64::from);
+    let to_ideal = |x: f64, y: f64| [(x - principal[0]) / focal[0], (y - principal[1]) / focal[1]];
+    let corners = [(0, 0), (width, 0), (0, height), (width, height)];
+    let furthest = corners.map(|(x, y)| to_ideal(x.into(), y.into())).map(|[x, y]| x.hypot(y)).into_iter();
+    let reach = lens.reach(furthest.fold(0.0, f64::max));
+
+    let row_of = |row: u32| {
+        let look = |column: u32| {
+            let ideal = to_ideal(f64::from(column) + 0.5, f64::from(row) + 0.5);
+            let [x, y] = lens.distort(ideal);
+            let (x, y) = (x * focal[0] + principal[0], y * focal[1] + principal[1]);
+            let inside = x >= 0.0 && y >= 0.0 && x <= f64::from(width) && y <= f64::from(height);
+            let seen = inside && ideal[0].hypot(ideal[1]) <= reach;
+            (interpolated(&photograph.pixels, x, y), seen)
+        };
+        (0..width).map(look).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<(Rgba<u8>, bool)>> = (0..height).into_par_iter().map(row_of).collect();
+
+    let mut pixels = RgbaImage::new(width, height);
+    let mut seen = GrayImage::new(width, height);
+    let mut all_seen = true;
+    for (at, (pixel, is_seen)) in rows.iter().flatten().enumerate() {
+        let (column, row) = (at as u32 % width, at as u32 / width);
+        pixels.put_pixel(column, row, *pixel);
+        seen.put_pixel(column, row, Luma([if *is_seen { u8::MAX } else { 0 }]));
+        all_seen &= is_seen;
+    }
+    Photograph { pixels, has_alpha: photograph.has_alpha, seen: (!all_seen).then_some(seen) }
+}
+
+/// The value at a continuous image coordinate (pixel centres at halves), from the four nearest pixels; outside, that of the
+/// nearest pixel. A coordinate that is NaN gives the first pixel.
+fn interpolated(image: &RgbaImage, x: f64, y: f64) -> Rgba<u8> {
+    let (width, height) = image.dimensions();
+    let split = |at: f64, side: u32| {
+        let place = (at - 0.5).max(0.0).min(f64::from(side - 1));
+        let first = place as u32;
+        (first, (first + 1).min(side - 1), (place - f64::from(first)) as f32)
+    };
+    let ((left, right, across), (top, bottom, below)) = (split(x, width), split(y, height));
+    let corners = [
+        (image.get_pixel(left, top), (1.0 - across) * (1.0 - below)),
+        (image.get_pixel(right, top), across * (1.0 - below)),
+        (image.get_pixel(left, bottom), (1.0 - across) * below),
+        (image.get_pixel(right, bottom), across * below),
+    ];
+    let alpha: f32 = corners.iter().map(|(pixel, share)| share * f32::from(pixel[3])).sum();
+    let level = |value: f32| (value + 0.5) as u8;
+    let colour = |channel: usize| {
+        // Under no alpha at all the colours are mixed as they are.
+        let weight =
+            |pixel: &Rgba<u8>, share: f32| if alpha > 0.0 { share * f32::from(pixel[3]) / alpha } else { share };
+        level(corners.iter().map(|(pixel, share)| weight(pixel, *share) * f32::from(pixel[channel])).sum())
+    };
+    Rgba([colour(0), colour(1), colour(2), level(alpha)])
+}
