@@ -59,6 +59,12 @@ pub use crate::network::linear::LinearBlock;
 pub use crate::network::resample::{PoolBlock, UpsampleBlock};
 pub use crate::network::transpose::TransposedBlock;
 pub use crate::pixelnerf::{EmbedBlock, GatherBlock};
+pub use crate::plane_sweep::Planes;
+pub use crate::plane_sweep::blend::BlendBlock;
+pub use crate::plane_sweep::evidence::ViewPair;
+pub use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
+pub use crate::plane_sweep::path::CostBlock;
+pub use crate::plane_sweep::window::WindowBlock;
 pub use crate::pose::PoseBlock;
 pub use crate::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay};
 pub use crate::sample_mask::{RaysBlock, SampleMaskBlock};
@@ -427,6 +433,72 @@ macro_rules! for_each_kernel {
                 read weights: f32,
                 write_paged colours: [f32; 4],
                 write_paged pixel_depths: f32,
+            }
+            /// What views show on planes, and how far their colours agree: `grey[view][row][column][group]` and
+            /// `evidence[row][column][group][4]` of a band of a frustum. An element is a group of planes of a pixel.
+            CompareViews compare_views(block: FrustumBlock) [0..block.row_count * block.camera.width * block.group_count]
+            by plane_sweep::evidence::evidence {
+                read views: SweptView,
+                read pairs: ViewPair,
+                read texels: [f32; 4],
+                read disparities: [f32; 2],
+                write grey: Planes,
+                write evidence: Planes,
+            }
+            /// Costs of planes by colour and census, in some rows of a band, counted from its first: their part of
+            /// `costs[row][column][group][cost times weight, weight]`. An element is a group of planes of a pixel.
+            CensusCost census_cost(block: FrustumBlock; first_row, row_count)
+            [first_row * block.camera.width * block.group_count
+                ..(first_row + row_count) * block.camera.width * block.group_count]
+            by plane_sweep::census::census_cost {
+                read pairs: ViewPair,
+                read grey: Planes,
+                read evidence: Planes,
+                write costs: Planes,
+            }
+            /// Costs summed over rows of three windows: `sums[row][column][group][window][2]`. An element is a group of
+            /// planes of a pixel.
+            RowSums row_sums(block: WindowBlock) [0..block.width * block.height * block.group_count]
+            by plane_sweep::window::row_sums {
+                read costs: Planes,
+                write sums: Planes,
+            }
+            /// Costs averaged over three windows: `means[row][column][group]`. An element is a group of planes of a pixel.
+            WindowCost window_cost(block: WindowBlock) [0..block.width * block.height * block.group_count]
+            by plane_sweep::window::window_cost {
+                read sums: Planes,
+                write means: Planes,
+            }
+            /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a line.
+            FollowPaths follow_paths(block: CostBlock) [0..block.line_count()] by plane_sweep::path::Line {
+                read means: Planes,
+                write paths: Planes,
+            }
+            /// The mean of the four directions' costs: `costs[row][column][group]`. An element is a group of planes of a pixel.
+            JoinPaths join_paths(block: CostBlock) [0..block.width * block.height * block.group_count]
+            by plane_sweep::path::joined_cost {
+                read paths: Planes,
+                write costs: Planes,
+            }
+            /// Disparity and confidence of a view's pixels: the view's part of `disparities[view][row][column]`. An element is
+            /// a pixel.
+            PickDisparity pick_disparity(block: FrustumBlock) [0..block.camera.width * block.camera.height]
+            by plane_sweep::disparity::pick_disparity {
+                read costs: Planes,
+                write disparities: [f32; 2],
+            }
+            /// Pixels blended from planes, for some rows of a target: `colours[row][column]` (red, green, blue, opacity),
+            /// `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the target.
+            BlendPlanes blend_planes(block: BlendBlock; first_row, row_count)
+            [first_row * block.target.width..(first_row + row_count) * block.target.width]
+            by plane_sweep::blend::blend {
+                read views: SweptView,
+                paged texels: [f32; 4],
+                read disparities: [f32; 2],
+                read costs: Planes,
+                write_paged colours: [f32; 4],
+                write pixel_depths: f32,
+                write confidences: f32,
             }
             /// Linear combinations of pictures: `mixed[element]` of `state[element]` and four results, the newest first.
             /// What has coefficient 0 is not read and may be any buffer. An element is a channel of a pixel.

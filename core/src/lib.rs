@@ -27,7 +27,8 @@
 //! genvs             volumes of features become a feature image    VolumePlace, weigh_features, denoiser_input
 //! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
 //! sampler           ... with few calls of the denoiser            Sampler, Mix, History, Churn, verdict
-//! visual_hull       the training-free field inside silhouettes  matched depth, signed distance, density and colour
+//! visual_hull       the training-free field in silhouettes     matched depth, signed distance, density and colour
+//! plane_sweep       ... and for any scene                      evidence, census, paths, disparity, blend
 //! metrics           how good is the picture                       psnr, ssim
 //! kernels           the list of kernels, one row each             Kernel, for_each_kernel
 //! ```
@@ -54,6 +55,7 @@ pub mod metrics;
 pub mod network;
 pub mod pages;
 pub mod pixelnerf;
+pub mod plane_sweep;
 pub mod pose;
 pub mod random;
 pub mod rays;

@@ -111,7 +111,13 @@ fn sources() -> SourceImages {
         SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() }
     };
     let cameras = orbit().spiral(VIEWS, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
+    SourceImages {
+        images: cameras.into_iter().map(image).collect(),
+        background: [1.0; 3],
+        has_silhouettes: true,
+        points: Vec::new(),
+        warning: None,
+    }
 }
 
 fn picture(field: &Genvs, sources: &SourceImages) -> (Rendered, Record) {

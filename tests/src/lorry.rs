@@ -28,7 +28,13 @@ pub fn photographs(count: u32, side: u32) -> SourceImages {
         SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() }
     };
     let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
+    SourceImages {
+        images: cameras.into_iter().map(image).collect(),
+        background: [1.0; 3],
+        has_silhouettes: true,
+        points: Vec::new(),
+        warning: None,
+    }
 }
 
 /// A camera that is none of the sources.

@@ -1,135 +1,45 @@
-//! The training-free field, on any device: a visual hull from silhouettes, depths by plane sweep, colours by weighted
-//! fusion; the mathematics is in [`viewfuse_core::visual_hull`].
+//! The training-free field, for any scene and on any device.
+//!
+//! ```text
+//! hull     sources that show a silhouette: a solid carved by them and by photo-consistency
+//! sweep    any sources: planes through the frusta of sources and target
+//! space    which depths there are, for the planes
+//! ```
 
-mod bounds;
+pub mod hull;
+mod space;
+mod sweep;
 
-use super::{About, Encoding, Field, FieldError, Prepared, Rendered, Request, SourceSide};
-use std::ops::Range;
-use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::visual_hull::ray_marching::MarchBlock;
-use viewfuse_core::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
-use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
-use viewfuse_device::{Device, HullScene, Pixels};
+use super::{About, Encoding, Field, FieldError, Prepared, SourceSide};
+use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_weighting::sources::SourceWeights;
 
-/// Rows rendered between two looks at the interrupt flag.
-const BAND_ROWS: u32 = 16;
-/// Rows around a band that its depths depend on: the window's and the neighbours' reach.
-const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
+pub use hull::{NoObject, find_object};
+pub use sweep::Sweep;
 
-/// Density from silhouettes and photo-consistency, colour by weighted fusion with visibility.
+/// Depths from what the photographs have in common, colour by weighted fusion with visibility. Nothing is learned.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingFree {
-    /// Most values in each of the three buffers of a sweep. Larger pictures are swept in bands of rows, which changes
-    /// the memory and the time but not the result.
-    pub most_band_values: usize,
+    /// How it goes about sources with silhouettes.
+    pub hull: hull::Hull,
+    /// How it goes about others.
+    pub sweep: Sweep,
     /// Side of the sources as a share of the pictures', above 0: matching sources costs less and less as they shrink.
     pub source_share: f32,
+    /// Sweep also where there are silhouettes.
+    pub always_sweep: bool,
 }
 
 impl Default for TrainingFree {
-    /// 16 Mi values: 256 MiB in all. Sources as large as the pictures.
+    /// Sources as large as the pictures.
     fn default() -> TrainingFree {
-        TrainingFree { most_band_values: 16 << 20, source_share: 1.0 }
-    }
-}
-
-/// The silhouettes have no point of space in common.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the silhouettes of the sources have no common object: no point lies inside all of them; check the poses and the \
-     background"
-)]
-pub struct NoObject;
-
-/// A view was to be encoded, or a target rendered, before a weighting began.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("depths are known only under a weighting, and none has begun")]
-struct NotWeighed;
-
-/// Photographs on the device, with the object's box and where each pixel's ray enters the hull.
-struct Views<'a, D: Device> {
-    field: &'a TrainingFree,
-    device: &'a D,
-    scene: HullScene<D>,
-    entries: D::Buffer<f32>,
-    texel_count: usize,
-    background: [f32; 3],
-    depths: Option<Depths<D>>,
-}
-
-/// Depth maps under a weighting, one behind another.
-struct Depths<D: Device> {
-    maps: D::Buffer<f32>,
-    /// What further maps are made with, until the first target.
-    sweep: Option<Sweep<D>>,
-}
-
-/// What a depth map is made with.
-struct Sweep<D: Device> {
-    /// `[view][other]`.
-    pair_weights: D::Buffer<f32>,
-    /// A map without any surface.
-    nothing: D::Buffer<f32>,
-    /// Depths before the second pick.
-    first_guess: D::Buffer<f32>,
-}
-
-impl TrainingFree {
-    /// The depth maps of all sources, one behind another, row-major: depths along the principal axis in world units,
-    /// [`NO_SURFACE`] where nothing was found. `relevance[view]` are the weights of all sources for source `view`.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn depth_maps<D: Device>(
-        &self,
-        device: &D,
-        sources: &SourceImages,
-        relevance: &[SourceWeights],
-        progress: &dyn Progress,
-    ) -> Result<Vec<f32>, FieldError> {
-        let mut views = self.views(device, sources, progress)?;
-        views.weigh(relevance)?;
-        for view in 0..sources.images.len() {
-            views.encode(view, progress)?;
+        TrainingFree {
+            hull: hull::Hull::default(),
+            sweep: Sweep::default(),
+            source_share: 1.0,
+            always_sweep: std::env::var("VF_SWEEP").is_ok(),
         }
-        let depths = views.depths.ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
-        Ok(device.download(&depths.maps)?)
-    }
-
-    /// Takes the photographs to a device and finds the object.
-    fn views<'a, D: Device>(
-        &'a self,
-        device: &'a D,
-        sources: &SourceImages,
-        progress: &dyn Progress,
-    ) -> Result<Views<'a, D>, FieldError> {
-        let (cameras, texels) = joined(sources);
-        let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
-        let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
-        let scene = HullScene {
-            object,
-            object_buffer: device.upload(&[object])?,
-            views: device.upload(&cameras)?,
-            footprints: device.upload(&footprints)?,
-            texels: device.upload(&texels)?,
-            cameras,
-        };
-        let mut entries = device.zeros(texels.len())?;
-        progress.expect(scene.cameras.len());
-        for view in 0..object.view_count {
-            progress.check()?;
-            let HullScene { object_buffer, views, texels, cameras, .. } = &scene;
-            let camera = &cameras[view as usize];
-            let pixel_count = camera.width * camera.height;
-            device.hull_entry(&view, pixel_count, object_buffer, views, texels, &mut entries)?;
-            progress.step();
-        }
-        device.finish()?;
-        let (texel_count, background) = (texels.len(), sources.background);
-        Ok(Views { field: self, device, scene, entries, texel_count, background, depths: None })
     }
 }
 
@@ -151,132 +61,10 @@ impl Field for TrainingFree {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        Ok(Box::new(self.views(device, sources, progress)?))
-    }
-}
-
-impl<D: Device> Prepared for Views<'_, D> {
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        let (device, texel_count) = (self.device, self.texel_count);
-        let view_count = self.scene.object.view_count as usize;
-        // The last weighting's buffers go before there are new ones.
-        self.depths = None;
-        let pair_weights: Vec<f32> =
-            relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
-        let sweep = Sweep {
-            pair_weights: device.upload(&pair_weights)?,
-            nothing: device.upload(&vec![NO_SURFACE; texel_count])?,
-            first_guess: device.zeros(texel_count)?,
-        };
-        self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
-        Ok(())
-    }
-
-    fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        let Views { field, device, scene, entries, depths, .. } = self;
-        let Some(Depths { maps, sweep: Some(Sweep { pair_weights, nothing, first_guess }) }) = depths else {
-            return Err(FieldError::unsuitable(NotWeighed));
-        };
-        let HullScene { object_buffer: object, views, texels, .. } = &*scene;
-        // The widest of a sweep's three buffers is bound as a whole.
-        let most_values = field.most_band_values.min(device.most_elements::<[f32; 2]>());
-        let camera = &scene.cameras[view];
-        let whole = SweepBlock::new(&scene.object, camera, view as u32);
-        for (sweep, kept_rows) in bands(whole, most_values) {
-            progress.check()?;
-            let count = (sweep.row_count * camera.width * sweep.plane_count) as usize;
-            let mut costs = device.zeros(count)?;
-            let mut row_sums = device.zeros(count)?;
-            let mut means = device.zeros(count)?;
-            device.match_cost(&sweep, object, views, texels, entries, pair_weights, &mut costs)?;
-            device.sum_row(&sweep, &costs, &mut row_sums)?;
-            device.mean_column(&sweep, &costs, &row_sums, &mut means)?;
-            let all = sweep.row_count;
-            device.pick_depth(&sweep, 0, all, object, views, &means, entries, nothing, first_guess)?;
-            let (first, kept) = (kept_rows.start, kept_rows.len() as u32);
-            device.pick_depth(&sweep, first, kept, object, views, &means, entries, first_guess, maps)?;
+        if sources.has_silhouettes && !self.always_sweep {
+            Ok(Box::new(self.hull.views(device, sources, progress)?))
+        } else {
+            Ok(Box::new(self.sweep.views(device, sources, progress)?))
         }
-        Ok(())
     }
-
-    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let Views { device, scene, background, depths, .. } = self;
-        let depths = depths.as_mut().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
-        depths.sweep = None;
-        let &Request { camera: target, early_termination, .. } = request;
-        let (width, height) = (target.pinhole.width(), target.pinhole.height());
-        let count = (width * height) as usize;
-        let weights = device.upload(&request.view_weights())?;
-        let target = MarchBlock { target: target.block(0), background: *background, termination: early_termination };
-        let mut pixels: Pixels<D> = Pixels { colours: device.zeros(count)?, depths: device.zeros(count)? };
-        let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
-        progress.expect(height.div_ceil(band_rows) as usize);
-        for first_row in (0..height).step_by(band_rows as usize) {
-            progress.check()?;
-            let row_count = band_rows.min(height - first_row);
-            let HullScene { object_buffer: object, views, footprints, texels, .. } = &*scene;
-            let Pixels { colours, depths: pixel_depths } = &mut pixels;
-            device.march_rays(
-                &target,
-                first_row,
-                row_count,
-                object,
-                views,
-                footprints,
-                texels,
-                &depths.maps,
-                &weights,
-                colours,
-                pixel_depths,
-            )?;
-            progress.step();
-        }
-        let (colours, depths) = (device.download(&pixels.colours)?, device.download(&pixels.depths)?);
-        Ok(Rendered { colours, depths, width, height })
-    }
-}
-
-/// The box around the object that the silhouettes of the sources show, or `None` if they show none.
-pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
-    let (cameras, texels) = joined(sources);
-    bounds::find(&cameras, &texels)
-}
-
-/// All sources' texels behind one another, and the cameras that know where theirs are.
-fn joined(sources: &SourceImages) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
-    let mut cameras = Vec::with_capacity(sources.images.len());
-    let mut texels = Vec::new();
-    for image in &sources.images {
-        cameras.push(image.camera.block(texels.len() as u32));
-        texels.extend_from_slice(&image.texels);
-    }
-    (cameras, texels)
-}
-
-/// A pixel's side at the middle of the object.
-fn footprint(object: &ObjectBlock, camera: &CameraBlock) -> f32 {
-    // A camera that has the object behind it sees nothing of it; any positive length will do.
-    let depth = camera.project(object.middle()).depth.max(0.01 * object.radius);
-    depth / camera.intrinsics[0]
-}
-
-/// Cuts a sweep over all rows into bands of bounded memory. With each band come the rows, counted from its first, whose
-/// depths are final; the others are its halo.
-fn bands(whole: SweepBlock, most_values: usize) -> Vec<(SweepBlock, Range<u32>)> {
-    let row_values = whole.width as usize * whole.plane_count as usize;
-    let affordable = u32::try_from(most_values / row_values).unwrap_or(u32::MAX);
-    if affordable >= whole.row_count {
-        return vec![(whole, 0..whole.row_count)];
-    }
-    let kept = affordable.saturating_sub(2 * HALO_ROWS).max(1);
-    (0..whole.row_count)
-        .step_by(kept as usize)
-        .map(|first_kept| {
-            let first_row = first_kept.saturating_sub(HALO_ROWS);
-            let end_kept = (first_kept + kept).min(whole.row_count);
-            let end_row = (end_kept + HALO_ROWS).min(whole.row_count);
-            let band = SweepBlock { first_row, row_count: end_row - first_row, ..whole };
-            (band, first_kept - first_row..end_kept - first_row)
-        })
-        .collect()
 }

@@ -9,6 +9,7 @@ use crate::{Photograph, Scene, SceneError, View};
 use image::RgbImage;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_job::progress::{Interrupted, Progress};
 
@@ -55,6 +56,20 @@ pub struct SourceImage {
     pub texels: Vec<[f32; 4]>,
 }
 
+impl SourceImage {
+    /// The same picture with a longest side of at most `side` pixels, averaged by area.
+    ///
+    /// # Errors
+    /// [`PinholeError`] if the focal length becomes too short.
+    pub fn reduced(&self, side: u32) -> Result<SourceImage, PinholeError> {
+        let (width, height) = reduced_size(&self.camera, side);
+        let pinhole = self.camera.pinhole.resized(width, height)?;
+        let own_size = [self.camera.pinhole.width(), self.camera.pinhole.height()];
+        let texels = resample::area_average(&self.texels, own_size, [width, height]);
+        Ok(SourceImage { camera: Camera { pinhole, ..self.camera }, texels })
+    }
+}
+
 /// All sources of a run at working size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SourceImages {
@@ -62,6 +77,10 @@ pub struct SourceImages {
     pub images: Vec<SourceImage>,
     /// What is behind the object, red green blue in `[0, 1]`.
     pub background: [f32; 3],
+    /// Whether alpha is an object's silhouette. Otherwise photographs are whole, and alpha 0 marks what they do not show.
+    pub has_silhouettes: bool,
+    /// Points of surfaces in world coordinates, where the scene's files know some.
+    pub points: Vec<Vec3>,
     /// What is doubtful about the background, if anything.
     pub warning: Option<String>,
 }
@@ -143,25 +162,66 @@ impl<'a> Album<'a> {
             progress.check()?;
             Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
         };
-        let borders: Vec<_> = views.par_iter().map(look).collect::<Result<_, PhotographsError>>()?;
+        let mut borders: Vec<_> = views.par_iter().map(look).collect::<Result<_, PhotographsError>>()?;
         let backdrop = matte::Backdrop::of(borders.iter().flatten(), choice);
-        let images = views
-            .par_iter()
-            .zip(&borders)
-            .map(|(&view, border)| {
+        let (background, mut warning) = (backdrop.colour(), None);
+        let whole_pictures = match choice {
+            BackgroundChoice::None => true,
+            BackgroundChoice::Colour(_) => false,
+            BackgroundChoice::Auto => !backdrop.can_be_told(),
+        };
+        if choice == BackgroundChoice::Auto && whole_pictures {
+            warning = Some(format!(
+                "the photographs' borders are not of one colour (they stray by {:.0} of 255 from {backdrop}): nothing is cut \
+                 out, whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG \
+                 with alpha)",
+                backdrop.noise_level()
+            ));
+        }
+        let all = |borders: &[Option<matte::Border>]| {
+            let images = views.par_iter().zip(borders).map(|(&view, border)| {
                 progress.check()?;
-                self.cut_out(view, longest_side, border.as_ref(), &backdrop)
-            })
-            .collect::<Result<_, PhotographsError>>()?;
-        Ok(SourceImages { images, background: backdrop.colour(), warning: backdrop.warning() })
+                self.cut_out(view, longest_side, border.as_ref(), &backdrop, border.is_some() || !whole_pictures)
+            });
+            images.collect::<Result<Vec<_>, PhotographsError>>()
+        };
+        if whole_pictures {
+            borders.iter_mut().for_each(|border| *border = None);
+        }
+        match all(&borders) {
+            Err(PhotographsError::NoSilhouette { path, colour }) if choice == BackgroundChoice::Auto => {
+                warning = Some(format!(
+                    "{path}: shows no object before a background of {colour}: nothing is cut out, whole pictures are used"
+                ));
+                borders.iter_mut().for_each(|border| *border = None);
+                let images = views
+                    .par_iter()
+                    .map(|&view| {
+                        progress.check()?;
+                        self.cut_out(view, longest_side, None, &backdrop, false)
+                    })
+                    .collect::<Result<Vec<_>, PhotographsError>>()?;
+                Ok(SourceImages { images, background, has_silhouettes: false, points: Vec::new(), warning })
+            }
+            images => Ok(SourceImages {
+                images: images?,
+                background,
+                has_silhouettes: !whole_pictures,
+                points: Vec::new(),
+                warning,
+            }),
+        }
     }
 
+    /// A source at working size; `must_show` says that it must show both an object and, unless its alpha channel says so, a
+    /// background.
     fn cut_out(
         &self,
         view: usize,
         longest_side: u32,
         border: Option<&matte::Border>,
         backdrop: &matte::Backdrop,
+        must_show: bool,
     ) -> Result<SourceImage, PhotographsError> {
         let View { name, camera, image, .. } = &self.scene.views[view];
         let photograph = self.photograph(view)?;
@@ -175,7 +235,7 @@ impl<'a> Album<'a> {
         })?;
         let premultiplied = matte::premultiplied(&photograph, border, backdrop);
         let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
-        if opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha) {
+        if must_show && (opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha)) {
             let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
             return Err(PhotographsError::NoSilhouette { path, colour: backdrop.to_string() });
         }

@@ -19,7 +19,13 @@ pub(super) fn photographs(count: u32, side: u32) -> SourceImages {
     };
     let image = |camera: Camera| SourceImage { camera, texels: render(&lorry, &camera).pixels().map(texel).collect() };
     let cameras = orbit(side).spiral(count, [-0.4, 0.8]).expect("cameras off the pole");
-    SourceImages { images: cameras.into_iter().map(image).collect(), background: [1.0; 3], warning: None }
+    SourceImages {
+        images: cameras.into_iter().map(image).collect(),
+        background: [1.0; 3],
+        has_silhouettes: true,
+        points: Vec::new(),
+        warning: None,
+    }
 }
 
 pub(super) fn tensor(values: Vec<f32>, shape: &[usize], dtype: DType) -> Tensor {

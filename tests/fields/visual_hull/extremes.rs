@@ -62,7 +62,13 @@ fn a_white_object_on_white() {
 fn photographs_without_any_background() {
     let cameras = orbit(24).spiral(6, [-0.5, 0.8]).expect("cameras");
     let full = |camera: &Camera| source(*camera, &RgbaImage::from_pixel(24, 24, Rgba([90, 120, 30, 255])));
-    let sources = SourceImages { images: cameras.iter().map(full).collect(), background: [0.0; 3], warning: None };
+    let sources = SourceImages {
+        images: cameras.iter().map(full).collect(),
+        background: [0.0; 3],
+        has_silhouettes: true,
+        points: Vec::new(),
+        warning: None,
+    };
     assert_sound(&Run::default().picture(&sources, &target(24)).expect("a picture"));
 }
 
@@ -71,7 +77,8 @@ fn pictures_of_hardly_any_pixels() {
     for side in [1, 2, 3] {
         let cameras = orbit(side).spiral(6, [-0.5, 0.8]).expect("cameras");
         let images = cameras.iter().map(|camera| source(*camera, &render(&ball(), camera))).collect();
-        let sources = SourceImages { images, background: [1.0; 3], warning: None };
+        let sources =
+            SourceImages { images, background: [1.0; 3], has_silhouettes: true, points: Vec::new(), warning: None };
         for target_side in [1, 5] {
             match Run::default().picture(&sources, &target(target_side)) {
                 Ok(picture) => assert_sound(&picture),

@@ -28,12 +28,14 @@ pub enum BackgroundChoice {
     Auto,
     /// This colour, red green blue in `[0, 1]`.
     Colour([f32; 3]),
+    /// Nothing is background: photographs of whole scenes.
+    None,
 }
 
 /// The text is not a background.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "unknown background '{0}'; the choices are auto, black, white, and RED,GREEN,BLUE with whole numbers from 0 to 255"
+    "unknown background '{0}'; the choices are auto, none, black, white, and RED,GREEN,BLUE with whole numbers from 0 to 255"
 )]
 pub struct BackgroundError(String);
 
@@ -43,6 +45,7 @@ impl FromStr for BackgroundChoice {
     fn from_str(text: &str) -> Result<BackgroundChoice, BackgroundError> {
         match text {
             "auto" => return Ok(BackgroundChoice::Auto),
+            "none" => return Ok(BackgroundChoice::None),
             "black" => return Ok(BackgroundChoice::Colour([0.0; 3])),
             "white" => return Ok(BackgroundChoice::Colour([1.0; 3])),
             _ => {}
@@ -59,6 +62,7 @@ impl fmt::Display for BackgroundChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             BackgroundChoice::Auto => f.write_str("auto"),
+            BackgroundChoice::None => f.write_str("none"),
             BackgroundChoice::Colour(colour) => {
                 let [r, g, b] = colour.map(|value| (value * 255.0).round() as u8);
                 write!(f, "{r},{g},{b}")
@@ -78,7 +82,7 @@ impl Border {
     pub(super) fn of(photograph: &Photograph, choice: BackgroundChoice) -> Option<Border> {
         let given = match choice {
             BackgroundChoice::Colour(colour) => Some(colour),
-            BackgroundChoice::Auto => None,
+            BackgroundChoice::Auto | BackgroundChoice::None => None,
         };
         (!photograph.has_alpha).then(|| look_at_border(photograph, given))
     }
@@ -105,23 +109,21 @@ impl Backdrop {
             || [0, 1, 2].map(|channel| median(borders.iter().map(|border| border.colour[channel]).collect()));
         let (colour, from_border) = match choice {
             BackgroundChoice::Colour(colour) => (colour, false),
-            BackgroundChoice::Auto if borders.is_empty() => ([1.0; 3], false),
-            BackgroundChoice::Auto => (median_colour(), true),
+            _ if borders.is_empty() => ([1.0; 3], false),
+            BackgroundChoice::Auto | BackgroundChoice::None => (median_colour(), true),
         };
         let noise = median(borders.iter().map(|border| border.noise).collect());
         Backdrop { colour, threshold: (NOISE_FACTOR * noise).clamp(THRESHOLD.0, THRESHOLD.1), from_border, noise }
     }
 
-    /// What is doubtful about it: borders that stray further than any threshold allows for.
-    pub(super) fn warning(&self) -> Option<String> {
-        (NOISE_FACTOR * self.noise > THRESHOLD.1).then(|| {
-            format!(
-                "the photographs' borders are not of one colour (they stray by {:.0} of 255 from {self}): the object \
-                 cannot be told from such a background; photograph before a plain one, or cut the object out (PNG with \
-                 alpha)",
-                self.noise * 255.0
-            )
-        })
+    /// Whether an object can be told from it: its borders stray no further than a threshold allows for.
+    pub(super) fn can_be_told(&self) -> bool {
+        NOISE_FACTOR * self.noise <= THRESHOLD.1
+    }
+
+    /// How far the typical border strays from one colour, of 255.
+    pub(super) fn noise_level(&self) -> f32 {
+        self.noise * 255.0
     }
 
     /// Red, green, blue in `[0, 1]`.

@@ -1,0 +1,258 @@
+//! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
+//! fusion; the mathematics is in [`viewfuse_core::visual_hull`].
+
+mod bounds;
+
+use crate::{FieldError, Prepared, Rendered, Request};
+use std::ops::Range;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::visual_hull::ray_marching::MarchBlock;
+use viewfuse_core::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
+use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_device::{Device, HullScene, Pixels};
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_weighting::sources::SourceWeights;
+
+/// Rows rendered between two looks at the interrupt flag.
+const BAND_ROWS: u32 = 16;
+/// Rows around a band that its depths depend on: the window's and the neighbours' reach.
+const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
+
+/// Density from silhouettes and photo-consistency, colour by weighted fusion with visibility.
+#[derive(Clone, Copy, Debug)]
+pub struct Hull {
+    /// Most values in each of the three buffers of a sweep. Larger pictures are swept in bands of rows, which changes
+    /// the memory and the time but not the result.
+    pub most_band_values: usize,
+}
+
+impl Default for Hull {
+    /// 16 Mi values: 256 MiB in all.
+    fn default() -> Hull {
+        Hull { most_band_values: 16 << 20 }
+    }
+}
+
+/// The silhouettes have no point of space in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the silhouettes of the sources have no common object: no point lies inside all of them; check the poses and the \
+     background"
+)]
+pub struct NoObject;
+
+/// A view was to be encoded, or a target rendered, before a weighting began.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("depths are known only under a weighting, and none has begun")]
+struct NotWeighed;
+
+/// Photographs on the device, with the object's box and where each pixel's ray enters the hull.
+pub(super) struct Views<'a, D: Device> {
+    field: &'a Hull,
+    device: &'a D,
+    scene: HullScene<D>,
+    entries: D::Buffer<f32>,
+    texel_count: usize,
+    background: [f32; 3],
+    depths: Option<Depths<D>>,
+}
+
+/// Depth maps under a weighting, one behind another.
+struct Depths<D: Device> {
+    maps: D::Buffer<f32>,
+    /// What further maps are made with, until the first target.
+    sweep: Option<Sweep<D>>,
+}
+
+/// What a depth map is made with.
+struct Sweep<D: Device> {
+    /// `[view][other]`.
+    pair_weights: D::Buffer<f32>,
+    /// A map without any surface.
+    nothing: D::Buffer<f32>,
+    /// Depths before the second pick.
+    first_guess: D::Buffer<f32>,
+}
+
+impl Hull {
+    /// The depth maps of all sources, one behind another, row-major: depths along the principal axis in world units,
+    /// [`NO_SURFACE`] where nothing was found. `relevance[view]` are the weights of all sources for source `view`.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn depth_maps<D: Device>(
+        &self,
+        device: &D,
+        sources: &SourceImages,
+        relevance: &[SourceWeights],
+        progress: &dyn Progress,
+    ) -> Result<Vec<f32>, FieldError> {
+        let mut views = self.views(device, sources, progress)?;
+        views.weigh(relevance)?;
+        for view in 0..sources.images.len() {
+            views.encode(view, progress)?;
+        }
+        let depths = views.depths.ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
+        Ok(device.download(&depths.maps)?)
+    }
+
+    /// Takes the photographs to a device and finds the object.
+    pub(super) fn views<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Views<'a, D>, FieldError> {
+        let (cameras, texels) = joined(&sources.images);
+        let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
+        let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
+        let scene = HullScene {
+            object,
+            object_buffer: device.upload(&[object])?,
+            views: device.upload(&cameras)?,
+            footprints: device.upload(&footprints)?,
+            texels: device.upload(&texels)?,
+            cameras,
+        };
+        let mut entries = device.zeros(texels.len())?;
+        progress.expect(scene.cameras.len());
+        for view in 0..object.view_count {
+            progress.check()?;
+            let HullScene { object_buffer, views, texels, cameras, .. } = &scene;
+            let camera = &cameras[view as usize];
+            let pixel_count = camera.width * camera.height;
+            device.hull_entry(&view, pixel_count, object_buffer, views, texels, &mut entries)?;
+            progress.step();
+        }
+        device.finish()?;
+        let (texel_count, background) = (texels.len(), sources.background);
+        Ok(Views { field: self, device, scene, entries, texel_count, background, depths: None })
+    }
+}
+
+impl<D: Device> Prepared for Views<'_, D> {
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        let (device, texel_count) = (self.device, self.texel_count);
+        let view_count = self.scene.object.view_count as usize;
+        // The last weighting's buffers go before there are new ones.
+        self.depths = None;
+        let pair_weights: Vec<f32> =
+            relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
+        let sweep = Sweep {
+            pair_weights: device.upload(&pair_weights)?,
+            nothing: device.upload(&vec![NO_SURFACE; texel_count])?,
+            first_guess: device.zeros(texel_count)?,
+        };
+        self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
+        Ok(())
+    }
+
+    fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        let Views { field, device, scene, entries, depths, .. } = self;
+        let Some(Depths { maps, sweep: Some(Sweep { pair_weights, nothing, first_guess }) }) = depths else {
+            return Err(FieldError::unsuitable(NotWeighed));
+        };
+        let HullScene { object_buffer: object, views, texels, .. } = &*scene;
+        // The widest of a sweep's three buffers is bound as a whole.
+        let most_values = field.most_band_values.min(device.most_elements::<[f32; 2]>());
+        let camera = &scene.cameras[view];
+        let whole = SweepBlock::new(&scene.object, camera, view as u32);
+        for (sweep, kept_rows) in bands(whole, most_values) {
+            progress.check()?;
+            let count = (sweep.row_count * camera.width * sweep.plane_count) as usize;
+            let mut costs = device.zeros(count)?;
+            let mut row_sums = device.zeros(count)?;
+            let mut means = device.zeros(count)?;
+            device.match_cost(&sweep, object, views, texels, entries, pair_weights, &mut costs)?;
+            device.sum_row(&sweep, &costs, &mut row_sums)?;
+            device.mean_column(&sweep, &costs, &row_sums, &mut means)?;
+            let all = sweep.row_count;
+            device.pick_depth(&sweep, 0, all, object, views, &means, entries, nothing, first_guess)?;
+            let (first, kept) = (kept_rows.start, kept_rows.len() as u32);
+            device.pick_depth(&sweep, first, kept, object, views, &means, entries, first_guess, maps)?;
+        }
+        Ok(())
+    }
+
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        let Views { device, scene, background, depths, .. } = self;
+        let depths = depths.as_mut().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
+        depths.sweep = None;
+        let &Request { camera: target, early_termination, .. } = request;
+        let (width, height) = (target.pinhole.width(), target.pinhole.height());
+        let count = (width * height) as usize;
+        let weights = device.upload(&request.view_weights())?;
+        let target = MarchBlock { target: target.block(0), background: *background, termination: early_termination };
+        let mut pixels: Pixels<D> = Pixels { colours: device.zeros(count)?, depths: device.zeros(count)? };
+        let band_rows = BAND_ROWS.max(u32::try_from(device.busy_elements() / width as usize).unwrap_or(u32::MAX));
+        progress.expect(height.div_ceil(band_rows) as usize);
+        for first_row in (0..height).step_by(band_rows as usize) {
+            progress.check()?;
+            let row_count = band_rows.min(height - first_row);
+            let HullScene { object_buffer: object, views, footprints, texels, .. } = &*scene;
+            let Pixels { colours, depths: pixel_depths } = &mut pixels;
+            device.march_rays(
+                &target,
+                first_row,
+                row_count,
+                object,
+                views,
+                footprints,
+                texels,
+                &depths.maps,
+                &weights,
+                colours,
+                pixel_depths,
+            )?;
+            progress.step();
+        }
+        let (colours, depths) = (device.download(&pixels.colours)?, device.download(&pixels.depths)?);
+        Ok(Rendered { colours, depths, width, height })
+    }
+}
+
+/// The box around the object that the silhouettes of the sources show, or `None` if they show none.
+pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
+    let (cameras, texels) = joined(&sources.images);
+    bounds::find(&cameras, &texels)
+}
+
+/// All sources' texels behind one another, and the cameras that know where theirs are.
+pub(super) fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
+    let mut cameras = Vec::with_capacity(images.len());
+    let mut texels = Vec::new();
+    for image in images {
+        cameras.push(image.camera.block(texels.len() as u32));
+        texels.extend_from_slice(&image.texels);
+    }
+    (cameras, texels)
+}
+
+/// A pixel's side at the middle of the object.
+fn footprint(object: &ObjectBlock, camera: &CameraBlock) -> f32 {
+    // A camera that has the object behind it sees nothing of it; any positive length will do.
+    let depth = camera.project(object.middle()).depth.max(0.01 * object.radius);
+    depth / camera.intrinsics[0]
+}
+
+/// Cuts a sweep over all rows into bands of bounded memory. With each band come the rows, counted from its first, whose
+/// depths are final; the others are its halo.
+fn bands(whole: SweepBlock, most_values: usize) -> Vec<(SweepBlock, Range<u32>)> {
+    let row_values = whole.width as usize * whole.plane_count as usize;
+    let affordable = u32::try_from(most_values / row_values).unwrap_or(u32::MAX);
+    if affordable >= whole.row_count {
+        return vec![(whole, 0..whole.row_count)];
+    }
+    let kept = affordable.saturating_sub(2 * HALO_ROWS).max(1);
+    (0..whole.row_count)
+        .step_by(kept as usize)
+        .map(|first_kept| {
+            let first_row = first_kept.saturating_sub(HALO_ROWS);
+            let end_kept = (first_kept + kept).min(whole.row_count);
+            let end_row = (end_kept + HALO_ROWS).min(whole.row_count);
+            let band = SweepBlock { first_row, row_count: end_row - first_row, ..whole };
+            (band, first_kept - first_row..end_kept - first_row)
+        })
+        .collect()
+}

@@ -1,0 +1,353 @@
+//! Any sources: planes of equal disparity through the frusta of the sources and of the target; the mathematics is in
+//! [`viewfuse_core::plane_sweep`].
+
+use super::space::{Space, first_guess};
+use crate::{FieldError, Prepared, Rendered, Request};
+use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::plane_sweep::blend::BlendBlock;
+use viewfuse_core::plane_sweep::census::REACH;
+use viewfuse_core::plane_sweep::disparity::TEMPERATURE;
+use viewfuse_core::plane_sweep::evidence::ViewPair;
+use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_core::plane_sweep::path::{CostBlock, DIRECTIONS};
+use viewfuse_core::plane_sweep::window::WindowBlock;
+use viewfuse_core::plane_sweep::{MOST_MATCHED, PLANES, Planes};
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
+use viewfuse_weighting::sources::SourceWeights;
+
+/// Longest side at which the range of depths is looked for.
+const RANGE_SIDE: u32 = 128;
+/// Planes of that search.
+const RANGE_PLANES: u32 = 128;
+/// Confidence from which on a pixel counts there.
+const RANGE_CONFIDENCE: f32 = 0.6;
+/// Most pairs that are compared, for each view.
+const PAIRS_PER_VIEW: usize = 3;
+
+/// Settings of the sweep.
+#[derive(Clone, Copy, Debug)]
+pub struct Sweep {
+    /// Planes of a frustum: a multiple of 16, at most 128.
+    pub plane_count: u32,
+    /// Longest side at which views are compared, in pixels. Colours are blended at the size of the pictures.
+    pub match_side: u32,
+}
+
+impl Default for Sweep {
+    fn default() -> Sweep {
+        let e = |n: &str, d: u32| std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
+        Sweep { plane_count: e("VF_PLANES", 64), match_side: e("VF_SIDE", 256) }
+    }
+}
+
+/// Photographs on the device at two sizes, and what is known of their disparities.
+pub(super) struct Views<'a, D: Device> {
+    settings: &'a Sweep,
+    device: &'a D,
+    has_silhouettes: bool,
+    background: [f32; 3],
+    /// As large as the pictures.
+    pictures: Images<D>,
+    /// As large as they are compared.
+    matched: Images<D>,
+    disparities: D::Buffer<[f32; 2]>,
+    /// From a plane's disparity to the next one's, of each view that has a map.
+    steps: Vec<f32>,
+    relevance: Vec<SourceWeights>,
+    space: Space,
+}
+
+/// The sources at one size.
+struct Images<D: Device> {
+    cameras: Vec<CameraBlock>,
+    texels: D::Buffer<[f32; 4]>,
+}
+
+impl<D: Device> Images<D> {
+    fn upload(device: &D, images: &[SourceImage]) -> Result<Images<D>, FieldError> {
+        let (cameras, texels) = super::hull::joined(images);
+        Ok(Images { cameras, texels: device.upload(&texels)? })
+    }
+}
+
+/// A camera's planes.
+#[derive(Clone, Copy)]
+struct Range {
+    far_disparity: f32,
+    step: f32,
+    group_count: u32,
+}
+
+impl Range {
+    fn new([least, greatest]: [f32; 2], plane_count: u32) -> Range {
+        let group_count = plane_count.div_ceil(PLANES as u32);
+        let intervals = (group_count * PLANES as u32 - 1) as f32;
+        Range { far_disparity: least, step: (greatest - least) / intervals, group_count }
+    }
+}
+
+impl Sweep {
+    pub(super) fn views<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Views<'a, D>, FieldError> {
+        let reduced = |side: u32| -> Result<Vec<SourceImage>, FieldError> {
+            let images = sources.images.iter().map(|image| image.reduced(side));
+            images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)
+        };
+        let small = reduced(self.match_side)?;
+        let matched = Images::upload(device, &small)?;
+        let map_len: usize = small.iter().map(|image| image.texels.len()).sum();
+        let mut views = Views {
+            settings: self,
+            device,
+            has_silhouettes: sources.has_silhouettes,
+            background: sources.background,
+            pictures: Images::upload(device, &sources.images)?,
+            matched,
+            disparities: device.zeros(map_len)?,
+            steps: vec![0.0; sources.images.len()],
+            relevance: Vec::new(),
+            space: Space::new(sources.points.clone()),
+        };
+        if sources.points.is_empty() {
+            views.space = views.find_range(&reduced(RANGE_SIDE)?, progress)?;
+        }
+        Ok(views)
+    }
+}
+
+impl<D: Device> Views<'_, D> {
+    /// Points of surfaces, from a coarse sweep of every source against its nearest neighbours.
+    fn find_range(&self, images: &[SourceImage], progress: &dyn Progress) -> Result<Space, FieldError> {
+        let device = self.device;
+        let small = Images::upload(device, images)?;
+        let cameras: Vec<Camera> = images.iter().map(|image| image.camera).collect();
+        let guess = first_guess(&cameras);
+        let mut points = Vec::new();
+        for (view, camera) in cameras.iter().enumerate() {
+            progress.check()?;
+            let mut near: Vec<(usize, f32)> = (0..cameras.len())
+                .filter(|other| *other != view)
+                .map(|other| (other, camera.pose.centre_world().distance(cameras[other].pose.centre_world())))
+                .collect();
+            near.sort_by(|a, b| a.1.total_cmp(&b.1));
+            near.truncate(4);
+            let mut weights: Vec<(usize, f32)> =
+                near.iter().map(|(other, gap)| (*other, 1.0 / (gap * gap + 1.0e-12))).collect();
+            let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
+            weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
+            weights.push((view, 1.0));
+            let range = Range::new(guess, RANGE_PLANES);
+            let swept = self.swept(&small, &small, &weights, false);
+            let costs = self.costs(small.cameras[view], range, &small, &swept, progress)?;
+            let mut map = device.zeros(images.iter().map(|image| image.texels.len()).sum())?;
+            let frustum = self.frustum(small.cameras[view], range, &swept);
+            device.pick_disparity(&frustum, &costs, &mut map)?;
+            let map = device.download(&map)?;
+            let block = &small.cameras[view];
+            let first = block.first_texel as usize;
+            for row in 2..block.height.saturating_sub(2) {
+                for column in 2..block.width.saturating_sub(2) {
+                    let [disparity, confidence] = map[first + (row * block.width + column) as usize];
+                    if confidence > RANGE_CONFIDENCE && disparity > 0.5 * range.step {
+                        let towards = block.towards(column as f32 + 0.5, row as f32 + 0.5);
+                        points.push(block.centre_world() + towards / disparity);
+                    }
+                }
+            }
+        }
+        Ok(Space::new(points))
+    }
+
+    /// The views with a weight as they take part, those of the greatest weights first.
+    fn swept(&self, images: &Images<D>, maps: &Images<D>, weights: &[(usize, f32)], use_maps: bool) -> Vec<SweptView> {
+        let mut order: Vec<(usize, f32)> = weights.iter().copied().filter(|(_, weight)| *weight > 0.0).collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let view = |(view, weight): (usize, f32)| {
+            let map = &maps.cameras[view];
+            SweptView {
+                camera: images.cameras[view],
+                gain: [1.0; 4],
+                weight,
+                disparity_step: if use_maps { self.steps[view] } else { 0.0 },
+                first_disparity: map.first_texel,
+                map_width: map.width,
+                map_height: map.height,
+                padding: [0; 3],
+            }
+        };
+        order.into_iter().map(view).collect()
+    }
+
+    fn frustum(&self, camera: CameraBlock, range: Range, swept: &[SweptView]) -> FrustumBlock {
+        FrustumBlock {
+            camera,
+            far_disparity: range.far_disparity,
+            disparity_step: range.step,
+            group_count: range.group_count,
+            view_count: swept.len().min(MOST_MATCHED) as u32,
+            pair_count: pairs(swept).len() as u32,
+            has_silhouettes: u32::from(self.has_silhouettes),
+            first_row: 0,
+            row_count: camera.height,
+        }
+    }
+
+    /// The costs of all planes in a frustum: `costs[row][column][group]`.
+    fn costs(
+        &self,
+        camera: CameraBlock,
+        range: Range,
+        images: &Images<D>,
+        swept: &[SweptView],
+        progress: &dyn Progress,
+    ) -> Result<D::Buffer<Planes>, FieldError> {
+        let device = self.device;
+        let pairs = pairs(swept);
+        let matched = &swept[..swept.len().min(MOST_MATCHED)];
+        let whole = self.frustum(camera, range, swept);
+        let row_len = (camera.width * range.group_count) as usize;
+        let volume = row_len * camera.height as usize;
+        let (views, pair_buffer) = (device.upload(matched)?, device.upload(&pairs)?);
+        let mut costs = device.zeros::<Planes>(2 * volume)?;
+        let band_rows = 32.min(camera.height);
+        let rows = (band_rows + REACH).min(camera.height) as usize;
+        let mut grey = device.zeros::<Planes>(rows * row_len * matched.len())?;
+        let mut evidence = device.zeros::<Planes>(4 * rows * row_len)?;
+        for first in (0..camera.height).step_by(band_rows as usize) {
+            progress.check()?;
+            let halo = first.min(REACH);
+            let kept = band_rows.min(camera.height - first);
+            let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..whole };
+            device.compare_views(
+                &band,
+                &views,
+                &pair_buffer,
+                &images.texels,
+                &self.disparities,
+                &mut grey,
+                &mut evidence,
+            )?;
+            device.census_cost(&band, halo, kept, &pair_buffer, &grey, &evidence, &mut costs)?;
+        }
+        let window = WindowBlock::new(&whole);
+        let mut sums = device.zeros::<Planes>(6 * volume)?;
+        device.row_sums(&window, &costs, &mut sums)?;
+        drop(costs);
+        let mut means = device.zeros::<Planes>(volume)?;
+        device.window_cost(&window, &sums, &mut means)?;
+        drop(sums);
+        let block =
+            CostBlock { width: camera.width, height: camera.height, group_count: range.group_count, padding: 0 };
+        let mut paths = device.zeros::<Planes>(DIRECTIONS as usize * volume)?;
+        device.follow_paths(&block, &means, &mut paths)?;
+        device.join_paths(&block, &paths, &mut means)?;
+        Ok(means)
+    }
+
+    /// Planes for a camera: what the points say, or the bounds of the whole.
+    fn range(&self, camera: &CameraBlock) -> Range {
+        let all = || {
+            let cameras = self.matched.cameras.iter();
+            cameras.filter_map(|camera| self.space.disparities(camera)).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+        };
+        let bounds = self.space.disparities(camera).or_else(all).unwrap_or([0.0, 1.0]);
+        Range::new(bounds, self.settings.plane_count)
+    }
+}
+
+/// The pairs that are compared, of the greatest products of weights.
+fn pairs(swept: &[SweptView]) -> Vec<ViewPair> {
+    let count = swept.len().min(MOST_MATCHED);
+    let mut pairs: Vec<ViewPair> = (0..count)
+        .flat_map(|first| (first + 1..count).map(move |second| (first, second)))
+        .map(|(first, second)| ViewPair {
+            first: first as u32,
+            second: second as u32,
+            weight: swept[first].weight * swept[second].weight,
+            padding: 0,
+        })
+        .collect();
+    pairs.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    pairs.truncate((PAIRS_PER_VIEW * count).max(1));
+    let sum: f32 = pairs.iter().map(|pair| pair.weight).sum();
+    pairs.iter_mut().for_each(|pair| pair.weight /= sum.max(1.0e-30));
+    pairs
+}
+
+impl<D: Device> Prepared for Views<'_, D> {
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.relevance = relevance.to_vec();
+        self.steps.fill(0.0);
+        Ok(())
+    }
+
+    fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        let camera = self.matched.cameras[view];
+        let range = self.range(&camera);
+        let count = self.matched.cameras.len();
+        let relevance = &self.relevance[view];
+        let mut weights: Vec<(usize, f32)> =
+            (0..count).filter(|other| *other != view).map(|other| (other, relevance.get(other as u32))).collect();
+        weights.push((view, 1.0));
+        let swept = self.swept(&self.matched, &self.matched, &weights, false);
+        let costs = self.costs(camera, range, &self.matched, &swept, progress)?;
+        let frustum = self.frustum(camera, range, &swept);
+        self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
+        self.steps[view] = range.step;
+        Ok(())
+    }
+
+    fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        let device = self.device;
+        let &Request { camera: target, views, .. } = request;
+        let (width, height) = (target.pinhole.width(), target.pinhole.height());
+        let (small_width, small_height) = reduced_size(target, self.settings.match_side);
+        let pinhole = target.pinhole.resized(small_width, small_height).map_err(FieldError::unsuitable)?;
+        let camera = Camera { pinhole, ..*target }.block(0);
+        let weights: Vec<(usize, f32)> = views.iter().copied().zip(request.view_weights()).collect();
+        let range = self.range(&camera);
+        let use_maps = std::env::var("VF_NOMAP").is_err();
+        let matched = self.swept(&self.matched, &self.matched, &weights, use_maps);
+        let costs = self.costs(camera, range, &self.matched, &matched, progress)?;
+        let blended = self.swept(&self.pictures, &self.matched, &weights, use_maps);
+        let block = BlendBlock {
+            target: target.block(0),
+            far_disparity: range.far_disparity,
+            disparity_step: range.step,
+            volume_width: camera.width,
+            volume_height: camera.height,
+            group_count: range.group_count,
+            view_count: blended.len() as u32,
+            sharpness: 1.0 / TEMPERATURE,
+            has_silhouettes: u32::from(self.has_silhouettes),
+        };
+        let count = (width * height) as usize;
+        let blend_views = device.upload(&blended)?;
+        let (mut colours, mut depths, mut confidences) =
+            (device.zeros::<[f32; 4]>(count)?, device.zeros::<f32>(count)?, device.zeros::<f32>(count)?);
+        device.blend_planes(
+            &block,
+            0,
+            height,
+            &blend_views,
+            &self.pictures.texels,
+            &self.disparities,
+            &costs,
+            &mut colours,
+            &mut depths,
+            &mut confidences,
+        )?;
+        let mut colours = device.download(&colours)?;
+        for colour in &mut colours {
+            let behind = 1.0 - colour[3];
+            (0..3).for_each(|channel| colour[channel] += behind * self.background[channel]);
+        }
+        Ok(Rendered { colours, depths: device.download(&depths)?, width, height })
+    }
+}
