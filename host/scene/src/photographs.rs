@@ -99,14 +99,28 @@ impl SourceImages {
 /// Most bytes of decoded photographs that are kept. Where a run needs more, each is decoded again whenever it is needed.
 const MOST_KEPT_BYTES: u64 = 512 << 20;
 
+/// Most bytes of photographs that are being decoded at a time, but for a single one that needs more.
+const MOST_DECODING_BYTES: u64 = 512 << 20;
+
+/// What decoding takes for a pixel: as decoded, as RGBA, undistorted.
+const DECODING_BYTES: u64 = 16;
+
+/// Photographs of less than twice this side are kept at their own size, however small they are needed.
+const LEAST_KEPT_SIDE: u32 = 640;
+
 /// Photographs of a scene, decoded once where memory allows.
 pub struct Album<'a> {
     scene: &'a Scene,
     kept: Vec<Option<Photograph>>,
+    /// The longest side that is worth keeping.
+    side: Option<u32>,
 }
 
 impl<'a> Album<'a> {
-    /// Reads the photographs of these views, all cores at once.
+    /// Reads the photographs of these views at their own size, all cores at once.
+    ///
+    /// At most 512 MiB of them are kept; where they need more, each is read again whenever it is needed. Beside them, at most
+    /// 512 MiB are in use while photographs are decoded, or what a single one needs.
     ///
     /// # Errors
     /// [`PhotographsError`] of the first view that cannot be read, or if the work is stopped.
@@ -115,33 +129,83 @@ impl<'a> Album<'a> {
         views: impl IntoIterator<Item = usize>,
         progress: &dyn Progress,
     ) -> Result<Album<'a>, PhotographsError> {
+        Album { scene, kept: vec![None; scene.views.len()], side: None }.filled(views, progress)
+    }
+
+    /// As [`Album::open`], for sources and truths of at most `longest_side` pixels on a side: larger photographs are reduced as
+    /// soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times that side, keep
+    /// their own size, and give the same numbers to the bit.
+    ///
+    /// # Errors
+    /// As [`Album::open`].
+    pub fn open_at(
+        scene: &'a Scene,
+        views: impl IntoIterator<Item = usize>,
+        longest_side: u32,
+        progress: &dyn Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
+        let side = Some(longest_side.saturating_mul(2).max(LEAST_KEPT_SIDE));
+        Album { scene, kept: vec![None; scene.views.len()], side }.filled(views, progress)
+    }
+
+    fn filled(
+        mut self,
+        views: impl IntoIterator<Item = usize>,
+        progress: &dyn Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
         let mut wanted: Vec<usize> = views.into_iter().collect();
         wanted.sort_unstable();
         wanted.dedup();
-        let mut kept = vec![None; scene.views.len()];
-        let bytes = |view: &usize| {
-            let pinhole = &scene.views[*view].camera.pinhole;
-            4 * u64::from(pinhole.width()) * u64::from(pinhole.height())
-        };
-        if wanted.iter().map(bytes).sum::<u64>() <= MOST_KEPT_BYTES {
-            progress.expect(wanted.len());
-            let read = |view: usize| {
+        let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
+        if wanted.iter().map(|&view| 4 * pixels(self.kept_size(view))).sum::<u64>() > MOST_KEPT_BYTES {
+            return Ok(self);
+        }
+        progress.expect(wanted.len());
+        let mut rest = &wanted[..];
+        while !rest.is_empty() {
+            // As many as fit, and at least one.
+            let mut bytes = 0;
+            let fits = |&&view: &&usize| {
+                let pinhole = &self.scene.views[view].camera.pinhole;
+                bytes += DECODING_BYTES * pixels((pinhole.width(), pinhole.height()));
+                bytes <= MOST_DECODING_BYTES
+            };
+            let count = rest.iter().take_while(fits).count().max(1);
+            let (now, later) = rest.split_at(count);
+            let read = |&view: &usize| {
                 progress.check()?;
-                let photograph = scene.photograph(view)?;
+                let photograph = self.read(view)?;
                 progress.step();
                 Ok((view, photograph))
             };
-            let photographs: Vec<_> = wanted.into_par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
+            let photographs: Vec<_> = now.par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
             for (view, photograph) in photographs {
-                kept[view] = Some(photograph);
+                self.kept[view] = Some(photograph);
             }
+            rest = later;
         }
-        Ok(Album { scene, kept })
+        Ok(self)
+    }
+
+    /// The size at which a photograph is kept.
+    fn kept_size(&self, view: usize) -> (u32, u32) {
+        let camera = &self.scene.views[view].camera;
+        match self.side {
+            Some(side) if longest_side(camera) / 2 >= side => reduced_size(camera, side),
+            _ => (camera.pinhole.width(), camera.pinhole.height()),
+        }
+    }
+
+    fn read(&self, view: usize) -> Result<Photograph, SceneError> {
+        let photograph = self.scene.photograph(view)?;
+        let size = self.kept_size(view);
+        Ok(if size == photograph.pixels.dimensions() { photograph } else { resample::reduced(&photograph, size) })
     }
 
     fn photograph(&self, view: usize) -> Result<Cow<'_, Photograph>, SceneError> {
         match self.kept.get(view) {
             Some(Some(photograph)) => Ok(Cow::Borrowed(photograph)),
+            _ if view < self.scene.views.len() => Ok(Cow::Owned(self.read(view)?)),
             _ => Ok(Cow::Owned(self.scene.photograph(view)?)),
         }
     }
@@ -233,7 +297,12 @@ impl<'a> Album<'a> {
             height,
             error,
         })?;
-        let premultiplied = matte::premultiplied(&photograph, border, backdrop);
+        let mut premultiplied = matte::premultiplied(&photograph, border, backdrop);
+        if let Some(seen) = photograph.seen.as_ref().filter(|_| border.is_none() && !must_show) {
+            for (texel, _) in premultiplied.iter_mut().zip(seen.pixels()).filter(|(_, seen)| seen[0] == 0) {
+                *texel = [0.0; 4];
+            }
+        }
         let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
         if must_show && (opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha)) {
             let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());

@@ -1,6 +1,52 @@
 //! Resampling by area: every output pixel is the mean of what it covers, so a silhouette becomes a fractional alpha.
 
+use crate::Photograph;
+use image::{GrayImage, Luma, Rgba, RgbaImage};
 use rayon::prelude::*;
+
+/// A photograph at a smaller size, its colours weighted by their alpha. What of it is not wholly seen counts as not seen.
+pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> Photograph {
+    let (own_width, own_height) = photograph.pixels.dimensions();
+    let (columns, rows) = (spans(own_width, width), spans(own_height, height));
+    let stride = 4 * own_width as usize;
+    let bytes = photograph.pixels.as_raw();
+    let mut averaged = vec![[0_u8; 4]; width as usize * height as usize];
+    averaged.par_chunks_mut(width as usize).zip(&rows).for_each(|(output, row)| {
+        let mut sums = vec![[0.0_f32; 5]; output.len()];
+        for (y, share_y) in row {
+            let line = &bytes[y * stride..(y + 1) * stride];
+            for (sum, column) in sums.iter_mut().zip(&columns) {
+                for (x, share_x) in column {
+                    let [r, g, b, a] = [0, 1, 2, 3].map(|channel| f32::from(line[4 * x + channel]));
+                    let share = share_x * share_y;
+                    let weight = share * a;
+                    sum[0] += weight * r;
+                    sum[1] += weight * g;
+                    sum[2] += weight * b;
+                    sum[3] += weight;
+                    sum[4] += share;
+                }
+            }
+        }
+        for (pixel, [r, g, b, alpha, share]) in output.iter_mut().zip(sums) {
+            let level = |value: f32| (value + 0.5) as u8;
+            if alpha > 0.0 {
+                *pixel = [level(r / alpha), level(g / alpha), level(b / alpha), level(alpha / share)];
+            }
+        }
+    });
+    let at = |x: u32, y: u32| averaged[(y * width + x) as usize];
+    let pixels = RgbaImage::from_fn(width, height, |x, y| Rgba(at(x, y)));
+    let seen = photograph.seen.as_ref().map(|seen| {
+        let is_seen = |x: u32, y: u32| {
+            let mut covered =
+                rows[y as usize].iter().flat_map(|(y, _)| columns[x as usize].iter().map(move |(x, _)| (*x, *y)));
+            covered.all(|(x, y)| seen.get_pixel(x as u32, y as u32)[0] > 0)
+        };
+        GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
+    });
+    Photograph { pixels, has_alpha: photograph.has_alpha, seen }
+}
 
 /// `[row][column]` of `size` = `[width, height]` from an image of `own_size`. Enlarging repeats the nearest pixels.
 pub(super) fn area_average(texels: &[[f32; 4]], own_size: [u32; 2], size: [u32; 2]) -> Vec<[f32; 4]> {
