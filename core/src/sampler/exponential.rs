@@ -11,7 +11,7 @@ use super::Mix;
 use super::interpolation::{Row, exponential_moments, places, weights};
 use crate::math::ln_ratio;
 
-/// What remains of the state, the length of the step, and the integrals over it.
+/// The factor of the state, the length of the step, and the integrals over it.
 fn prepared(from: f32, next: f32) -> (f32, f32, Row) {
     let h = ln_ratio(from, next);
     (next / from, h, exponential_moments(h, (from - next) / from))

@@ -1,4 +1,4 @@
-//! What samplers do to pictures: linear combinations, and noise.
+//! Operations of samplers on pictures: linear combinations, and noise.
 
 use crate::pages::Fetch;
 use crate::random::normal;
@@ -31,7 +31,7 @@ impl Mix {
         mixed_element(self, &[state], &[*a], &[*b], &[*c], &[*d], 0)
     }
 
-    /// The difference between what a corrector and a predictor make of the same state: the corrector's newest result is
+    /// The difference between a corrector's and a predictor's combination of the same state: the corrector's newest result is
     /// one that the predictor does not have.
     pub fn correction_beyond(&self, predictor: &Mix) -> Mix {
         let ([new, a, b, c], [p, q, r, _]) = (self.results, predictor.results);

@@ -11,7 +11,7 @@
 //! any               a field of any kind
 //! options           what a person can say about a learned field
 //! learned           what learned fields share
-//! pixelnerf, genvs  learned fields, a folder each
+//! *                 the learned fields, a folder each
 //! family            one row a learned field
 //! enlarged          small pictures, enlarged
 //! render            the way of the data, from a scene to pictures

@@ -18,12 +18,12 @@ pub enum LoadError {
     Device(#[from] DeviceError),
 }
 
-/// Tensors of a checkpoint whose names begin alike. Their shapes have been checked.
+/// Tensors of a checkpoint whose names have a common prefix. Their shapes have been checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Tensors<'a> {
     /// The checkpoint.
     pub checkpoint: &'a Checkpoint,
-    /// What all names begin with.
+    /// The prefix of the names.
     pub prefix: &'a str,
 }
 
@@ -52,7 +52,7 @@ impl Tensors<'_> {
     }
 
     /// A convolution with the batch norm behind it folded in (see [`BatchNorm::fold`]): `norm` is the norm's name, `epsilon`
-    /// what it adds to variances.
+    /// the number that it adds to variances.
     ///
     /// # Errors
     /// [`CheckpointError`] if a tensor cannot be read.
@@ -123,7 +123,7 @@ impl<'a, D: Device> Loader<'a, D> {
         self.changed_convolution(name, least_side, |weights| weights)
     }
 
-    /// The same, its weights changed on the way.
+    /// The same with weights that `change` modifies.
     ///
     /// # Errors
     /// [`LoadError`].

@@ -4,7 +4,7 @@ use super::convolution::Convolution;
 use super::linear::Linear;
 use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
 
-/// Rows and columns from which on a device may convolve images in its way for large ones.
+/// The fewest rows and columns of images for which a device may use its algorithm for large images.
 const LARGE_IMAGE: u32 = 32;
 
 /// A convolution's weights and bias. Windows are square: those of other shapes lie in the middle of a square of zeros.
@@ -68,7 +68,7 @@ impl ConvolutionWeights {
     }
 
     /// Takes them to a device. It is run with stride 1 and without dilation on images of at least `least_side` rows and
-    /// columns, or `least_side` is 0: a device may convolve large images in a way of its own, which rounds otherwise.
+    /// columns, or `least_side` is 0: a device may have another algorithm for large images, which rounds differently.
     ///
     /// # Errors
     /// If the device has no memory left.
@@ -98,12 +98,12 @@ impl LinearWeights {
         LinearWeights { values: transposed(weights, bias.len()), bias }
     }
 
-    /// How many numbers go in.
+    /// The number of inputs.
     pub fn in_count(&self) -> usize {
         self.values.len() / self.bias.len()
     }
 
-    /// Layers that read the same inputs as one, their outputs one behind the other. `in_count` numbers go into each.
+    /// Layers with the same inputs as one layer, their outputs concatenated. Each has `in_count` inputs.
     pub fn concatenated(layers: &[LinearWeights], in_count: usize) -> LinearWeights {
         let row = |input: usize| {
             layers.iter().flat_map(move |LinearWeights { values, bias }| {
@@ -140,7 +140,7 @@ impl LinearWeights {
 /// A batch norm with the statistics of training: a factor and a shift for each channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchNorm {
-    /// `[channel]`: what outputs are multiplied by.
+    /// `[channel]`: factors of the outputs.
     factors: Vec<f64>,
     mean: Vec<f32>,
     shift: Vec<f32>,

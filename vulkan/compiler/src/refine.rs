@@ -1,6 +1,6 @@
-//! A module becomes one whose bytes depend on the sources only, and whose arithmetic is what they say.
+//! Makes a module's bytes depend on the sources only, and its arithmetic exactly that of the sources.
 //!
-//! - Names, lines and files are left out: they hold paths.
+//! - Names, lines and files are removed: they hold paths.
 //! - The result of every float operation that a device could fuse with another is decorated `NoContraction`: sums and
 //!   products with their rounding errors (`viewfuse_core::math::two_sum`) mean nothing otherwise.
 
