@@ -122,8 +122,8 @@ pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
 
 /// Depth of fine sample `index` on a ray, limited to the ray's near and far bounds. Importance samples come first: they
 /// lie in the coarse part in which the distribution of `seen[part]` (weight, transmittance) reaches the first random
-/// number, at the fraction that the second one gives. Then depth samples: normally distributed around `depth`, the mean depth of the first pass on a ray
-/// of this `opacity`. Where that is NaN they lie at `near`.
+/// number, at the fraction that the second one gives. Then depth samples: normally distributed around `depth`, the mean
+/// depth of the first pass on a ray of this `opacity`. Where that is NaN they lie at `near`.
 #[inline]
 pub fn fine_depth(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),

@@ -8,8 +8,8 @@ use crate::pages::Fetch;
 /// The largest number in half precision.
 pub const LARGEST: f32 = 65504.0;
 
-/// The f16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below 2^-14
-/// by 2^-25. Larger numbers and infinity become [`LARGEST`]; NaN stays NaN.
+/// The f16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below
+/// 2^-14 by 2^-25. Larger numbers and infinity become [`LARGEST`]; NaN stays NaN.
 #[inline]
 pub fn f16_bits(number: f32) -> u32 {
     let bits = number.to_bits();

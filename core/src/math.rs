@@ -157,8 +157,9 @@ pub fn exact_power_of_two(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// Sine and cosine of an angle in radians: absolute error below 9e-8 for `|x| <= 8192`. Beyond that the argument
-/// itself is too coarse for a meaningful result; the results stay in `[-1, 1]` (to the same error). A non-finite angle gives `(0, 1)`.
+/// Sine and cosine of an angle in radians: absolute error below 9e-8 for `|x| <= 8192`. Beyond that the argument itself
+/// is too coarse for a meaningful result; the results stay in `[-1, 1]` (to the same error). A non-finite angle gives
+/// `(0, 1)`.
 #[inline]
 pub fn sin_cos(x: f32) -> (f32, f32) {
     // pi / 2 in three parts (Cody and Waite); the products with the first two are exact for |k| < 2^13.

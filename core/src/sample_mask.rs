@@ -1,5 +1,5 @@
-//! The sample mask: the samples of a ray at which a network is evaluated. It follows from weights that are known already: of
-//! a coarser pass along the same ray, or of neighbouring rays.
+//! The sample mask: the samples of a ray at which a network is evaluated. It follows from weights that are known
+//! already: of a coarser pass along the same ray, or of neighbouring rays.
 //!
 //! These are a row `[part]` of weight and transmittance in front of it, over equal parts of a ray.
 

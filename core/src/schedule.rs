@@ -1,4 +1,5 @@
-//! The noise schedule of the diffusion denoiser: its noise levels, the network's scaling at a level, and a step between two.
+//! The noise schedule of the diffusion denoiser: its noise levels, the network's scaling at a level, and a step between
+//! two.
 //!
 //! Source: Karras et al., "Elucidating the design space of diffusion-based generative models" (2022), equation 5, table
 //! 1 and algorithm 1 without churn; published GeNVS runs it with 25 levels. The denoiser is
@@ -154,8 +155,8 @@ impl Preconditioning {
     /// `c_in = 1 / sqrt(s^2 + d^2)`, `c_noise = ln(s) / 4` with `s` the level and `d` [`SIGMA_DATA`].
     ///
     /// At 0 (and for negative levels and NaN) `1, 0, 2` and -21.8, the value at the smallest normal number, instead of
-    /// minus infinity; infinity counts as the largest finite number, where the limits are `0, 0.5, 0`. Relative error at most
-    /// 4e-7 each, as long as the results are normal numbers.
+    /// minus infinity; infinity counts as the largest finite number, where the limits are `0, 0.5, 0`. Relative error
+    /// at most 4e-7 each, as long as the results are normal numbers.
     pub fn at(sigma: f32) -> Preconditioning {
         let sigma = clamp(sigma, 0.0, f32::MAX);
         // The scaled norm: squares would overflow from 1.8e19 on.

@@ -6,9 +6,10 @@
 //! underflow of every Gaussian, overflow of squares) these give the limit.
 //!
 //! Accuracy, relative to an `f64` evaluation on the same `f32` poses, in units of `2^-24`. An error `e` with `k`
-//! roundings gives a weight with at most `2 (k + 1) + S + 3`: `k + 1` in the numerator (the offset adds one), as many in
-//! the sum, two quotients, `S - 1` additions, the reciprocal of the sum and the product with it. Counted roundings `k`, and the largest error of a
-//! weight that was measured for up to 32 sources (random poses at scales from 1e-20 to 1e29, rings, near-coincident cameras):
+//! roundings gives a weight with at most `2 (k + 1) + S + 3`: `k + 1` in the numerator (the offset adds one), as many
+//! in the sum, two quotients, `S - 1` additions, the reciprocal of the sum and the product with it. Counted roundings
+//! `k`, and the largest error of a weight that was measured for up to 32 sources (random poses at scales from 1e-20 to
+//! 1e29, rings, near-coincident cameras):
 //!
 //! | scheme | `k` | measured |
 //! |---|---|---|

@@ -35,7 +35,10 @@ fn uses(code: &str, name: &str) -> bool {
 /// The form of this name: its function, from the name to the brace that ends it.
 fn form<'a>(sources: &'a [Source], name: &str) -> Option<&'a str> {
     let head = format!("\npub(super) fn {name}(");
-    sources.iter().find_map(|source| source.code.split(&head).nth(1)).map(|rest| rest.split("\n}\n").next().unwrap_or(rest))
+    sources
+        .iter()
+        .find_map(|source| source.code.split(&head).nth(1))
+        .map(|rest| rest.split("\n}\n").next().unwrap_or(rest))
 }
 
 /// What is wrong with the mark of a kernel.
@@ -66,7 +69,9 @@ fn forms_of_the_cpu_are_as_their_rows_say() {
 #[test]
 fn a_wrong_mark_is_found() {
     let source = |body: &str| {
-        let text = format!("use x::y;\n\npub(super) fn add(block: &Block) {{\n    {body}\n}}\n\nfn other() {{ subtract() }}\n");
+        let text = format!(
+            "use x::y;\n\npub(super) fn add(block: &Block) {{\n    {body}\n}}\n\nfn other() {{ subtract() }}\n"
+        );
         [Source::new(&text)]
     };
     for (body, has_twin, is_right) in [

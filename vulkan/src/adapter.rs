@@ -83,8 +83,8 @@ pub struct Adapter {
 }
 
 impl Instance {
-    /// Every device, the preferred ones first: discrete, integrated, virtual, other, software; among equals the one with more
-    /// memory, then in the order of the loader.
+    /// Every device, the preferred ones first: discrete, integrated, virtual, other, software; among equals the one
+    /// with more memory, then in the order of the loader.
     ///
     /// # Errors
     /// [`VulkanError::NoDevice`] if there is none.

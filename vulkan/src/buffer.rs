@@ -9,8 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use viewfuse_core::pages::MOST_PAGES;
 
-/// An array of `T` in a device's memory. An array that is too large for one allocation is stored in several chunks of a page
-/// each.
+/// An array of `T` in a device's memory. An array that is too large for one allocation is stored in several chunks of a
+/// page each.
 pub struct Buffer<T> {
     pub(crate) array: Arc<Array>,
     kind: PhantomData<fn(T) -> T>,

@@ -145,8 +145,8 @@ impl Gpu {
         usize::try_from(most).unwrap_or(usize::MAX) / bytes
     }
 
-    /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its bindings,
-    /// both as in its row.
+    /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its
+    /// bindings, both as in its row.
     ///
     /// # Errors
     /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array cannot
@@ -183,8 +183,8 @@ impl Gpu {
                         let piece = Piece { first, count: per_piece.min(elements.end - first) };
                         let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
                         let stage = vk::ShaderStageFlags::COMPUTE;
-                        // Pieces write elements of their own, but nobody sees that who looks at whole arrays, as the
-                        // validation layers do. Pieces are large: waiting between them costs nothing.
+                        // Pieces write different elements, but the validation layers only see whole arrays. Pieces are
+                        // large, so a barrier between them costs nothing.
                         if dispatches > 0 && gpu.barriers {
                             barrier(device, commands);
                         }

@@ -149,8 +149,8 @@ impl Handle {
         VulkanError::OutOfMemory { device, asked, available, total }
     }
 
-    /// A failed call as an error; a lost device has its own. After each of them the content of the device's memory is undefined,
-    /// also after lack of memory: recorded commands that never ran may be dependencies of others.
+    /// A failed call as an error; a lost device has its own. After each of them the content of the device's memory is
+    /// undefined, also after lack of memory: recorded commands that never ran may be dependencies of others.
     pub(crate) fn failure(&self, call: &'static str, result: vk::Result) -> VulkanError {
         match result {
             vk::Result::ERROR_DEVICE_LOST => VulkanError::DeviceLost { device: self.name.clone(), call },

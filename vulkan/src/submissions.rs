@@ -88,7 +88,7 @@ impl Submissions {
             None => self.create()?,
         };
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the commands are not on their way; the pool allows to record them again.
+        // SAFETY: the commands are not in flight; the pool allows to record them again.
         let begun = unsafe { self.handle.device.begin_command_buffer(submission.commands, &info) };
         match begun {
             Ok(()) => Ok(submission),
@@ -102,9 +102,9 @@ impl Submissions {
     /// Takes back a submission whose recording failed.
     pub(crate) fn discard(&mut self, mut submission: Submission) {
         let no_flags = vk::DescriptorPoolResetFlags::empty();
-        // A set that was allocated before the failure would leave no room for the next one. By the letter this call cannot
-        // fail; if it does, the next allocation says so.
-        // SAFETY: the submission is not on its way.
+        // A set that was allocated before the failure would leave no space for the next one. By the specification this call
+        // cannot fail; if it does, the next allocation reports it.
+        // SAFETY: the submission is not in flight.
         let _ = unsafe { self.handle.device.reset_descriptor_pool(submission.descriptors, no_flags) };
         submission.held.clear();
         submission.kernel = None;
@@ -148,7 +148,7 @@ impl Submissions {
         let nanoseconds = |limit: Duration| u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
         let nanoseconds = self.time_limit.map_or(u64::MAX, nanoseconds);
         let Handle { device, .. } = &*self.handle;
-        // SAFETY: the fence belongs to a submission that is on its way.
+        // SAFETY: the fence belongs to a submission that is in flight.
         let waited = unsafe { device.wait_for_fences(&[oldest.fence], true, nanoseconds) };
         self.is_late |= waited == Err(vk::Result::TIMEOUT);
         waited.map_err(|result| match result {
@@ -262,7 +262,7 @@ impl Submissions {
 
     fn destroy(&self, submission: &Submission) {
         let Handle { device, .. } = &*self.handle;
-        // SAFETY: the submission is not on its way; null handles are ignored. Commands go with their pool.
+        // SAFETY: the submission is not in flight; null handles are ignored. Commands go with their pool.
         unsafe {
             device.destroy_query_pool(submission.queries, None);
             device.destroy_fence(submission.fence, None);
@@ -289,7 +289,7 @@ impl Drop for Submissions {
             }
         }
         self.free.iter().for_each(|submission| self.destroy(submission));
-        // SAFETY: no commands of the pool are on their way.
+        // SAFETY: no commands of the pool are in flight.
         unsafe { self.handle.device.destroy_command_pool(self.pool, None) };
     }
 }

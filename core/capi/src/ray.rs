@@ -71,9 +71,9 @@ pub unsafe extern "C" fn viewfuse_ray_add(ray: *mut Ray, rgb: *const f32, optica
     })
 }
 
-/// Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy from 0 to 1 (NaN
-/// counts as 0), which is a lower bound of the ray's opacity, and its distance along the ray. For one ray use either this or
-/// viewfuse_ray_add.
+/// Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy from 0 to 1
+/// (NaN counts as 0), which is a lower bound of the ray's opacity, and its distance along the ray. For one ray use
+/// either this or viewfuse_ray_add.
 ///
 /// # Safety
 /// Pointers are null or valid.

@@ -16,8 +16,8 @@ pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
     row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
 }
 
-/// The elements of one dispatch; large work is split into several dispatches. Invocation `i` works on element `first + i` if
-/// `i < count`.
+/// The elements of one dispatch; large work is split into several dispatches. Invocation `i` works on element
+/// `first + i` if `i < count`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Piece {

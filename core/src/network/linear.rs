@@ -62,7 +62,8 @@ pub fn first_of_sum(
     if has_residual != 0 { first + residual.fetch(element) } else { first }
 }
 
-/// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays NaN: an overflow in one layer is reported behind the last.
+/// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays NaN: an overflow in one layer is reported behind
+/// the last.
 #[inline]
 pub fn rectified(x: f32, relu: u32) -> f32 {
     if relu != 0 && x <= 0.0 { 0.0 } else { x }

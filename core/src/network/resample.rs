@@ -26,8 +26,8 @@ pub struct PoolBlock {
     pub padding: u32,
 }
 
-/// Output number `element` of `[row][column][channel]`: the largest input of its channel in its window (max pool). A window that
-/// holds no pixel gives `-f32::MAX`.
+/// Output number `element` of `[row][column][channel]`: the largest input of its channel in its window (max pool). A
+/// window that holds no pixel gives `-f32::MAX`.
 #[inline]
 pub fn pooled_element(inputs: &(impl Fetch<f32> + ?Sized), block: &PoolBlock, element: usize) -> f32 {
     let (channels, out_width) = (block.channels, block.out_width);

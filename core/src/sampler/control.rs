@@ -56,8 +56,8 @@ pub fn reached(sigma: f32, step: f32, smallest: f32) -> f32 {
 }
 
 /// Estimate of a picture's remaining change: between two calls, at levels `before` and `sigma` below it, it changed by
-/// `change`. Towards small noise it approaches the final picture in proportion to the level. Infinite above [`UNDECIDED_ABOVE`], and
-/// where the level did not fall.
+/// `change`. Towards small noise it approaches the final picture in proportion to the level. Infinite above
+/// [`UNDECIDED_ABOVE`], and where the level did not fall.
 pub fn change_to_come(change: f32, before: f32, sigma: f32) -> f32 {
     if sigma > UNDECIDED_ABOVE || !(sigma < before) { f32::INFINITY } else { change * (sigma / (before - sigma)) }
 }

@@ -31,8 +31,8 @@ impl Mix {
         mixed_element(self, &[state], &[*a], &[*b], &[*c], &[*d], 0)
     }
 
-    /// The difference between a corrector's and a predictor's combination of the same state: the corrector's newest result is
-    /// one that the predictor does not have.
+    /// The difference between a corrector's and a predictor's combination of the same state: the corrector's newest
+    /// result is one that the predictor does not have.
     pub fn correction_beyond(&self, predictor: &Mix) -> Mix {
         let ([new, a, b, c], [p, q, r, _]) = (self.results, predictor.results);
         Mix { state: self.state - predictor.state, results: [new, a - p, b - q, c - r] }

@@ -1,8 +1,8 @@
 //! PixelNeRF with weighted views, on any device; the mathematics is in [`viewfuse_core::pixelnerf`] and
 //! [`viewfuse_core::network`].
 //!
-//! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined by weights
-//! where the published network takes their mean.
+//! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined with weights;
+//! the published network takes their mean.
 
 pub mod architecture;
 mod encoder;
@@ -35,7 +35,7 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
-/// Longest side of the photographs that a network is shown: the size that the published ones were trained on.
+/// Longest side of a network's source photographs: the size at which the published ones were trained.
 pub const SOURCE_SIDE: u32 = 128;
 
 /// A PixelNeRF with its parameters, ready for any device.
@@ -60,7 +60,7 @@ struct Views<'a, D: Device> {
     counts: Counts,
 }
 
-/// What was done and what was left out so far.
+/// Counts of computed and omitted work so far.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     latent_rows: u64,
@@ -96,7 +96,7 @@ impl PixelNerf {
         PixelNerf { architecture, parameters, options: options.checked() }
     }
 
-    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures.
+    /// The most bytes that a run from sources of these widths and heights takes, beside photographs and pictures.
     pub fn memory_estimate<D: Device>(&self, device: &D, source_sizes: &[[u32; 2]]) -> u64 {
         memory::estimate(device, &self.architecture, &self.options, source_sizes)
     }
@@ -236,14 +236,14 @@ impl<D: Device> Prepared for Views<'_, D> {
                 empty_space > 1,
                 unasked(coarse),
                 coarse.samples,
-                "objects that pass between the probes; see `viewfuse pareto`",
+                "objects between the probes; see `viewfuse pareto`",
             ),
             line(
                 "second-pass samples",
                 empty_rays || empty_parts || hidden_samples,
                 unasked(fine),
                 fine.samples,
-                "what the first pass missed; the light behind is at most the transmittance at which rays end",
+                "surfaces that the first pass missed; those behind have at most the transmittance of early termination",
             ),
         ];
         let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
@@ -252,7 +252,7 @@ impl<D: Device> Prepared for Views<'_, D> {
 }
 
 impl Counts {
-    /// Adds a picture whose samples each took so many rows of latent layers.
+    /// Adds a picture whose samples each took this many rows of latent layers.
     fn add(&mut self, rows_a_sample: usize, maps: bool, asked: &[Asked; 2]) {
         let rows = rows_a_sample as u64 * (asked[0].asked + asked[1].asked);
         self.latent_rows += rows;
@@ -273,7 +273,7 @@ fn upload_image<D: Device>(device: &D, image: &SourceImage) -> Result<Image<D>, 
     Image::upload(device, Size { height, width, channels: 3 }, &values)
 }
 
-/// Depths along the rays become depths along the principal axis; rays that meet nothing get 0.
+/// Depths along the rays become depths along the principal axis; rays without a surface get 0.
 fn along_axis(rendered: &mut Rendered, cast: &CastBlock) {
     let forward = cast.camera.pose.rotate_to_world(0.0, 0.0, 1.0);
     for (pixel, (depth, colour)) in (0..).zip(rendered.depths.iter_mut().zip(&rendered.colours)) {

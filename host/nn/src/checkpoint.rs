@@ -181,8 +181,8 @@ impl Checkpoint {
         }
     }
 
-    /// Other values of the file: the metadata of safetensors, the numbers and short texts beside the `state_dict` of PyTorch's
-    /// files.
+    /// Other values of the file: the metadata of safetensors, the numbers and short texts beside the `state_dict` of
+    /// PyTorch's files.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
     }

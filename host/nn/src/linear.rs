@@ -28,8 +28,8 @@ impl LinearOptions {
 }
 
 impl<D: Device> Linear<D> {
-    /// Runs it on the first `row_count` rows of buffers: `inputs[row][input]`, `outputs[row][output]`, and a `residual` of the
-    /// outputs' shape that is added before the outputs are rectified.
+    /// Runs it on the first `row_count` rows of buffers: `inputs[row][input]`, `outputs[row][output]`, and a `residual`
+    /// of the outputs' shape that is added before the outputs are rectified.
     ///
     /// # Errors
     /// If the device is lost.

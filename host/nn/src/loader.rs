@@ -51,8 +51,8 @@ impl Tensors<'_> {
         Ok(ConvolutionWeights::new(shape, &weights, self.bias(name, shape[0])?))
     }
 
-    /// A convolution with the batch norm behind it folded in (see [`BatchNorm::fold`]): `norm` is the norm's name, `epsilon`
-    /// the number that it adds to variances.
+    /// A convolution with the batch norm behind it folded in (see [`BatchNorm::fold`]): `norm` is the norm's name,
+    /// `epsilon` the number that it adds to variances.
     ///
     /// # Errors
     /// [`CheckpointError`] if a tensor cannot be read.
@@ -171,7 +171,8 @@ impl<'a, D: Device> Loader<'a, D> {
         Ok(self.tensors.linear(name)?.load(self.device)?)
     }
 
-    /// A group norm, from `weight[channel]` and `bias[channel]`: `group_count(channels)` groups, `epsilon` added to variances.
+    /// A group norm, from `weight[channel]` and `bias[channel]`: `group_count(channels)` groups, `epsilon` added to
+    /// variances.
     ///
     /// # Errors
     /// [`LoadError`].

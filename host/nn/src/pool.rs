@@ -1,5 +1,5 @@
-//! Pools: max pool and global average pool as kernels; the 3x3 average pool and DISTS' L2 pool on the host, in `f64`, because
-//! no kernel computes them: their images are downloaded and uploaded again.
+//! Pools: max pool and global average pool as kernels; the 3x3 average pool and DISTS' L2 pool on the host, in `f64`,
+//! because no kernel computes them: their images are downloaded and uploaded again.
 
 use super::image::{HostImage, Image, Size};
 use super::scratch::Scratch;

@@ -136,8 +136,8 @@ pub fn batch_norm_tensors(tensors: &mut Vec<TensorShape>, name: &str, channels: 
 }
 
 impl<D: Device> ResNet<Convolution<D>> {
-    /// The stem's output for an image of three channels, then each level's output. Each level halves rows and columns until the
-    /// output stride is `output_stride`; further levels have dilated windows instead.
+    /// The stem's output for an image of three channels, then each level's output. Each level halves rows and columns
+    /// until the output stride is `output_stride`; further levels have dilated windows instead.
     ///
     /// # Errors
     /// If the device is lost or has no memory left.

@@ -3,8 +3,8 @@
 use super::image::{Image, Size};
 use viewfuse_device::{Device, DeviceError};
 
-/// A device and its free buffers. Every kernel writes all of its output: earlier content of a buffer is never read. Dropping
-/// it frees them.
+/// A device and its free buffers. Every kernel writes all of its output: earlier content of a buffer is never read.
+/// Dropping it frees them.
 pub struct Scratch<'a, D: Device> {
     device: &'a D,
     free: Vec<(usize, D::Buffer<f32>)>,

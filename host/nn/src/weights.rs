@@ -147,16 +147,16 @@ pub struct BatchNorm {
 }
 
 impl BatchNorm {
-    /// From PyTorch's `weight`, `bias`, `running_mean` and `running_var`; `epsilon` is added to variances. Negative variances
-    /// count as 0.
+    /// From PyTorch's `weight`, `bias`, `running_mean` and `running_var`; `epsilon` is added to variances. Negative
+    /// variances count as 0.
     pub fn new(weight: &[f32], bias: Vec<f32>, mean: Vec<f32>, variance: &[f32], epsilon: f64) -> BatchNorm {
         let factor =
             |(weight, variance): (&f32, &f32)| f64::from(*weight) / (f64::from(*variance).max(0.0) + epsilon).sqrt();
         BatchNorm { factors: weight.iter().zip(variance).map(factor).collect(), mean, shift: bias }
     }
 
-    /// Folds it into the convolution before it, in `f64`: multiplies `weights[output channel][...]` and returns the bias, from
-    /// the convolution's own.
+    /// Folds it into the convolution before it, in `f64`: multiplies `weights[output channel][...]` and returns the
+    /// bias, from the convolution's own.
     pub fn fold(&self, weights: &mut [f32], bias: &[f32]) -> Vec<f32> {
         let per_channel = (weights.len() / self.factors.len().max(1)).max(1);
         for (weights, factor) in weights.chunks_exact_mut(per_channel).zip(&self.factors) {

@@ -1,5 +1,5 @@
-//! GeNVS as a graph that can be differentiated: the family of [`viewfuse_field::genvs`]. From pictures to volumes, from volumes
-//! to the features that a target sees, from features and noise to a picture.
+//! GeNVS as a differentiable graph: the family of [`viewfuse_field::genvs`]. Volumes from pictures, feature images from
+//! volumes, pictures from features and noise.
 
 mod denoiser;
 mod encoder;
@@ -51,8 +51,8 @@ fn unused(tensors: &[TensorShape]) -> BTreeSet<String> {
 }
 
 impl Genvs {
-    /// At the beginning of training: He's initialisation where rectification follows, layers behind which something is added
-    /// zero, as published for the denoiser, whose other layers without a norm in front hand on what they get.
+    /// At the beginning of training: He's initialisation where rectification follows, layers behind which something is
+    /// added zero, as published for the denoiser, whose other layers without a norm in front hand on what they get.
     pub(crate) fn new(architecture: Architecture, dtype: DType, seed: u64) -> std::result::Result<Genvs, TrainError> {
         let parameters = Parameters::new(&used(&architecture), dtype, |tensor| {
             Ok(denoiser::handed_on(&architecture, tensor).unwrap_or_else(|| first_values(tensor, seed)))
@@ -99,8 +99,8 @@ impl Genvs {
         encoder::volumes(self.layers(ENCODER), &self.architecture.encoder, pictures)
     }
 
-    /// The features `[object and target][row][column][feature]` that targets see with weights `[object][view]` of the views,
-    /// from volumes `[object and view]`; samples lie on rays as the block says.
+    /// The features `[object and target][row][column][feature]` that targets see with weights `[object][view]` of the
+    /// views, from volumes `[object and view]`; samples lie on rays as the block says.
     pub(crate) fn features(
         &self,
         volumes: &Tensor,

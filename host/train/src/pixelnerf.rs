@@ -1,6 +1,6 @@
-//! PixelNeRF as a graph that can be differentiated: the family of [`viewfuse_field::pixelnerf`], with batch norms that keep
-//! the statistics they begin with (mean 0, variance 1), so that training and rendering compute the same, and one point
-//! network for both passes.
+//! PixelNeRF as a differentiable graph: the family of [`viewfuse_field::pixelnerf`], with batch norms of constant
+//! statistics (mean 0, variance 1), so that training and rendering compute the same, and one point network for both
+//! passes.
 
 #[cfg(test)]
 mod tests;

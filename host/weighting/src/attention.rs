@@ -211,7 +211,12 @@ fn assemble<const I: usize, const O: usize>(weight: &[f32], bias: &[f32]) -> Lin
     layer
 }
 
-fn read_tensor(path: &Path, file: &SafeTensors<'_>, name: &str, expected: &[usize]) -> Result<Vec<f32>, AttentionError> {
+fn read_tensor(
+    path: &Path,
+    file: &SafeTensors<'_>,
+    name: &str,
+    expected: &[usize],
+) -> Result<Vec<f32>, AttentionError> {
     let path = || path.to_path_buf();
     let view = file.tensor(name).map_err(|_| AttentionError::Missing { path: path(), tensor: name.to_owned() })?;
     if view.dtype() != Dtype::F32 || view.shape() != expected {

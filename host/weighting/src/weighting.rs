@@ -44,8 +44,8 @@ impl Weighting {
         Ok(text.parse::<WeightingSpec>()?.open()?)
     }
 
-    /// A weighting of another crate. If it returns weights for another number of sources, which it must not, they are truncated
-    /// or filled with 0 and normalised to the sum 1.
+    /// A weighting of another crate. If it returns weights for another number of sources, which it must not, they are
+    /// truncated or filled with 0 and normalised to the sum 1.
     pub fn custom(weigh: impl Weigh + 'static) -> Weighting {
         Weighting { name: weigh.name(), weighs: Weighs::Custom(Arc::new(weigh)) }
     }

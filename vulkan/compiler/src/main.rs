@@ -58,7 +58,8 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     }
     let inputs = Inputs::read(&root)?;
     let program = env::current_exe()?;
-    let target = program.parent().and_then(Path::parent).ok_or("the program is not in a target folder")?.join("shaders");
+    let target =
+        program.parent().and_then(Path::parent).ok_or("the program is not in a target folder")?.join("shaders");
     let module = compile(&backend, &root, &target)?;
     let validated = validate(&module, &target)?;
     let stamp = Stamp { compiler: backend.version()?, module: sha256(&module), inputs };

@@ -1,11 +1,11 @@
 //! Entry points of the kernels on Vulkan devices.
 //!
 //! An entry point has the name of its kernel and takes its arrays in the order of the kernel's row
-//! ([`viewfuse_core::kernels`]), its parameters and the [`Piece`] as push constants. It checks whether its element exists,
-//! calls the kernel's body in `viewfuse-core` or the parts of that body, and stores the result. Arrays
-//! that may be longer than a device can bind at once come as four pages. Two things are computed here: the matrix products of tiled
-//! kernels are summed in workgroup memory (`tile`), and a few short loops over a ray's samples or a row's
-//! columns are in the entry point.
+//! ([`viewfuse_core::kernels`]), its parameters and the [`Piece`] as push constants. It checks whether its element
+//! exists, calls the kernel's body in `viewfuse-core` or the parts of that body, and stores the result. Arrays that may
+//! be longer than a device can bind at once come as four pages. Two things are computed here: the matrix products of
+//! tiled kernels are summed in workgroup memory (`tile`), and a few short loops over a ray's samples or a row's columns
+//! are in the entry point.
 //!
 //! On the host the same entry points are plain functions, which tests call.
 #![cfg_attr(target_arch = "spirv", no_std)]

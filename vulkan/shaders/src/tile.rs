@@ -1,7 +1,7 @@
 //! A matrix product by workgroups, each of which computes a tile of the outputs.
 //!
-//! The workgroup proceeds along the inner index in steps: it fetches its rows of the left matrix and its columns of the right
-//! one into workgroup memory, each number once, and sums the products from there.
+//! The workgroup proceeds along the inner index in steps: it fetches its rows of the left matrix and its columns of the
+//! right one into workgroup memory, each number once, and sums the products from there.
 //!
 //! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing cannot
 //! hold references to references.

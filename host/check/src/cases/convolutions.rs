@@ -1,6 +1,6 @@
 //! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, residuals and outputs that are
-//! some of the channels of wider images, all that a convolution can be told. Behind what is read lies NaN, beside what is
-//! written nothing may change.
+//! some of the channels of wider images, every parameter of a convolution. Behind the inputs there is NaN, and beside the
+//! outputs no number may change.
 
 use super::linear::{Counts, Job, Linear, LoadedJob, read, spoil};
 use crate::agreement::Limits;
@@ -14,7 +14,7 @@ use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
-/// What a layer of convolutions is like.
+/// A layer of convolutions.
 #[derive(Clone, Copy)]
 struct Window {
     size: u32,

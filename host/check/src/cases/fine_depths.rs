@@ -1,4 +1,5 @@
-//! [`Kernel::FineDepths`] and [`Kernel::MergeDepths`]: rays that saw nothing, mist, a wall, a few thin things.
+//! [`Kernel::FineDepths`] and [`Kernel::MergeDepths`]: empty rays, low optical depths, an opaque surface, a few thin
+//! surfaces.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;

@@ -12,7 +12,7 @@ use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_vulkan::kernel::Kernel;
 
-/// Weights below this may be cut off: the exponential knows no subnormals, and devices may flush them.
+/// Weights below this may be 0: the exponential has no subnormal results, and devices may flush them.
 const NEGLIGIBLE: f64 = 4.0e-38;
 
 /// A dispatch.
@@ -24,7 +24,7 @@ pub struct Job {
     targets: Vec<PoseBlock>,
 }
 
-/// Where cameras stand; the number says which of the arrangements.
+/// The arrangement of cameras with this number.
 fn cameras(random: &mut Random, arrangement: u32, source_count: usize, target_count: usize) -> (Vec<Pose>, Vec<Pose>) {
     let scale = [1.0, 1.0e18, 1.0e-20, 1.0, 1.2, 1.0][arrangement as usize % 6];
     let mut sources: Vec<Pose> = (0..source_count).map(|_| random.pose(scale)).collect();

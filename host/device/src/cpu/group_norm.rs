@@ -86,8 +86,8 @@ impl WithSimd for Normalised<'_> {
     }
 }
 
-/// [`viewfuse_core::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the channels of
-/// a group then summed.
+/// [`viewfuse_core::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the
+/// channels of a group then summed.
 struct GroupNormPartials<'a> {
     block: &'a GroupNormBlock,
     inputs: &'a [f32],

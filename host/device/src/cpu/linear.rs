@@ -24,8 +24,8 @@ const GAP: usize = 16;
 #[repr(C, align(64))]
 struct Line([f32; 16]);
 
-/// Packed weights, in the order in which they are read: `[panel][inner][column of the panel]`, two vectors wide, zeros behind
-/// the last column.
+/// Packed weights, in the order in which they are read: `[panel][inner][column of the panel]`, two vectors wide, zeros
+/// behind the last column.
 pub struct Panels {
     lines: Vec<Line>,
     inner: usize,

@@ -13,8 +13,8 @@ use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_core::network::transpose::TransposedBlock;
 
-/// The most rows that a core computes at once: their inputs and outputs (512 columns) stay in its second-level cache, beside
-/// the weights, and the cores finish at about the same time.
+/// The most rows that a core computes at once: their inputs and outputs (512 columns) stay in its second-level cache,
+/// beside the weights, and the cores finish at about the same time.
 const MOST_ROWS: usize = 96;
 /// Rows of a product's tile (or a multiple): fewer at once are wasted.
 const ROW_STEP: usize = 12;
@@ -207,7 +207,8 @@ fn chunk_rows(row_count: usize) -> usize {
     share.clamp(ROW_STEP, MOST_ROWS)
 }
 
-/// The patch of output pixel `pixel`, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at a time.
+/// The patch of output pixel `pixel`, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at
+/// a time.
 fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f32]) {
     let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
     for (place, values) in (0..).zip(patch.chunks_exact_mut(block.in_channels as usize)) {

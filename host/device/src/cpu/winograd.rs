@@ -112,7 +112,8 @@ impl Winograd {
     }
 }
 
-/// Rows of tiles that a core computes at once: the number that leaves the least of the cores and of the products' rows unused.
+/// Rows of tiles that a core computes at once: the number that leaves the least of the cores and of the products' rows
+/// unused.
 fn tile_rows_at_once(row_count: usize, tiles_across: usize) -> usize {
     let cost = |rows: &usize| {
         let rounds = row_count.div_ceil(*rows).div_ceil(rayon::current_num_threads());

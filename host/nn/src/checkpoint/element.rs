@@ -84,8 +84,8 @@ impl Element {
         &ALL[self as usize]
     }
 
-    /// The elements of these bytes in `f64`, which is exact for all types but large 64-bit integers. An incomplete last element
-    /// is left out.
+    /// The elements of these bytes in `f64`, which is exact for all types but large 64-bit integers. An incomplete last
+    /// element is left out.
     pub(super) fn values(self, bytes: &[u8]) -> impl Iterator<Item = f64> {
         bytes.chunks_exact(self.size()).map(move |element| self.value(element))
     }

@@ -1,13 +1,13 @@
 //! Python pickles as data: a pickle is a program for a stack machine, and this machine only builds values.
 //!
 //! Imports, calls and object states are kept as descriptions: a [`Value::Global`] is a name, and every call of one is a
-//! [`Value::Object`] with the function's name and its arguments. No name is resolved, so no code can be executed; the reader
-//! of the values interprets the few names that it knows.
+//! [`Value::Object`] with the function's name and its arguments. No name is resolved, so no code can be executed; the
+//! reader of the values interprets the few names that it knows.
 //!
 //! The supported opcodes are those that Python writes at protocols 2 to 5, without out-of-band buffers and without the
-//! registry of extensions. Values are in one list and refer to each other by index, as Python's do by address: shared values
-//! are shared here, cycles are allowed, and neither reading nor dropping recurses. Texts are copied from the file once; the
-//! contents of `bytes`, which can be large, stay in the file. The constants below limit the rest.
+//! registry of extensions. Values are in one list and refer to each other by index, as Python's do by address: shared
+//! values are shared here, cycles are allowed, and neither reading nor dropping recurses. Texts are copied from the
+//! file once; the contents of `bytes`, which can be large, stay in the file. The constants below limit the rest.
 //!
 //! Source: CPython's `Lib/pickletools.py` and `Lib/pickle.py`.
 

@@ -25,7 +25,7 @@ impl<'a> Sizes<'a> {
 
     /// The error that it is not of the family, for this reason.
     pub fn refuse(&self, detail: String) -> CheckpointError {
-        let detail = format!("is not a {}: {detail}", self.family);
+        let detail = format!("is no {}: {detail}", self.family);
         CheckpointError::Tensors { path: self.checkpoint.path().to_path_buf(), detail }
     }
 
@@ -47,9 +47,9 @@ impl<'a> Sizes<'a> {
         }
         match shape.get(axis).copied().unwrap_or(0) {
             size @ 1..=LARGEST_SIZE => Ok(size),
-            size => {
-                Err(self.refuse(format!("{name} has the size {size} on axis {axis}; sizes from 1 to {LARGEST_SIZE} are supported")))
-            }
+            size => Err(self.refuse(format!(
+                "{name} has the size {size} on axis {axis}; sizes from 1 to {LARGEST_SIZE} are supported"
+            ))),
         }
     }
 

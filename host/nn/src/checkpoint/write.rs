@@ -131,7 +131,7 @@ impl Checkpoint {
                     tensor: shortened(name),
                     index: done + at as u64,
                     value,
-                    problem: "out of the range of f16 (at most 65504); convert without rounding to it",
+                    problem: "which f16 cannot hold (at most 65504); convert without rounding to it",
                 });
             }
             let error = (rounded.to_f64() - value).abs();
