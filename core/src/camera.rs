@@ -147,9 +147,9 @@ pub struct Projection {
 /// A pinhole camera with its pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where the camera stands and how it is turned.
+    /// The camera's centre and orientation.
     pub pose: Pose,
-    /// How it maps directions to pixels.
+    /// The intrinsics.
     pub pinhole: Pinhole,
 }
 
@@ -186,7 +186,7 @@ impl Camera {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CameraBlock {
-    /// Where the camera stands and how it is turned.
+    /// The camera's centre and orientation.
     pub pose: PoseBlock,
     /// Focal lengths x, y and principal point x, y, in pixels.
     pub intrinsics: [f32; 4],

@@ -83,7 +83,7 @@ impl<const C: usize> Compositor<C> {
     /// sample's occupancy in `[0, 1]` (NaN counts as 0). Returns the sample's weight.
     ///
     /// This is the volume rendering of nested solids, one for each level of occupancy: the transmittance is 1 minus
-    /// the largest occupancy met, whatever the step, where a density would depend on it. For one ray use either this
+    /// the largest occupancy so far, for any step, while a density would depend on the step. For one ray use either this
     /// or [`Compositor::add`].
     #[inline]
     pub fn add_solid(&mut self, channels: &[f32; C], occupancy: f32, depth: f32) -> f32 {

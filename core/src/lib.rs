@@ -2,7 +2,7 @@
 //!
 //! Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32` and 32-bit integers (only the
 //! metrics, which never run on a device, in `f64`), so that one body serves as the definition on a workstation, as the
-//! source of a GPU kernel and as firmware. The modules stand in the order of the data:
+//! source of a GPU kernel and as firmware. The modules are listed in the order of the data:
 //!
 //! ```text
 //! math              one result on every target                     sqrt, exp, sin_cos, angles, norms

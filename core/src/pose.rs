@@ -2,7 +2,7 @@
 //!
 //! A pose is the rigid map from camera coordinates to world coordinates. Inside, axes are always OpenCV's: x to the
 //! right of the image, y down, z forward into the scene. Data in OpenGL axes (x right, y up, z backward; NeRF and
-//! Blender) comes in through its own constructor, so that a frame cannot be confused silently.
+//! Blender) has its own constructor, so that frames cannot be confused silently.
 
 use crate::math::{abs, angle_from_components, angle_from_squares, max, norm3};
 use bytemuck::{Pod, Zeroable};

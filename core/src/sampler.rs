@@ -59,7 +59,7 @@ pub enum Corrected {
     ByTheNextCall,
 }
 
-/// Makes [`Sampler`] and what is known of each from one row a sampler:
+/// Makes [`Sampler`] and its properties from one row a sampler:
 ///
 /// - `name`: its name in commands and records,
 /// - `order`: the power of the step with which its error shrinks on the published levels,

@@ -208,7 +208,7 @@ impl HeunStep {
         self.correction != 0.0
     }
 
-    /// The first-order step of a value: `noisy` at the level before and what the denoiser makes of it.
+    /// The first-order step of a value: `noisy` at the level before, and its denoised value.
     #[inline]
     pub fn euler(&self, noisy: f32, denoised: f32) -> f32 {
         denoised + self.remaining * (noisy - denoised)

@@ -48,12 +48,12 @@ pub enum VulkanError {
         available: u64,
     },
     /// The device has not enough free memory.
-    #[error("{device} is out of memory: {asked} bytes were requested, {available} of {total} are free")]
+    #[error("{device} is out of memory: {requested} bytes were requested, {available} of {total} are free")]
     OutOfMemory {
         /// The device.
         device: String,
         /// Requested bytes.
-        asked: u64,
+        requested: u64,
         /// Free bytes, as reported by the device.
         available: u64,
         /// All bytes.

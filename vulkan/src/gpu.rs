@@ -25,7 +25,7 @@ pub struct GpuOptions {
     /// Whether barriers separate dependent commands. Without them results are wrong; tests use that to show that the
     /// validation layers report it.
     pub barriers: bool,
-    /// The least time that closing a device waits for its work. If the work goes on after that, its resources are not
+    /// The least time that closing a device waits for its work. If the work continues after that, its resources are not
     /// freed.
     pub closing: Duration,
     /// Limits that apply where they are lower than the device's own, so that tests can split work on any device.
@@ -102,12 +102,12 @@ impl Gpu {
             let (device, missing) = (adapter.name.clone(), adapter.missing.clone());
             return Err(VulkanError::Missing { device, missing });
         }
-        let (own, asked) = (adapter.limits, options.limits);
+        let (own, lower) = (adapter.limits, options.limits);
         let limits = Limits {
-            buffer_range: own.buffer_range.min(asked.buffer_range),
-            allocation: own.allocation.min(asked.allocation),
-            workgroup_count: own.workgroup_count.min(asked.workgroup_count).max(1),
-            memory: own.memory.min(asked.memory),
+            buffer_range: own.buffer_range.min(lower.buffer_range),
+            allocation: own.allocation.min(lower.allocation),
+            workgroup_count: own.workgroup_count.min(lower.workgroup_count).max(1),
+            memory: own.memory.min(lower.memory),
         };
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));

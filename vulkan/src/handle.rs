@@ -129,7 +129,7 @@ impl Handle {
         self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(crate) fn out_of_memory(&self, asked: u64) -> VulkanError {
+    pub(crate) fn out_of_memory(&self, requested: u64) -> VulkanError {
         let total = self.limits.memory;
         let mut available = total.saturating_sub(self.used.load(Ordering::Relaxed));
         if self.adapter.has_memory_budget {
@@ -146,7 +146,7 @@ impl Handle {
             available = available.min(free.unwrap_or(available));
         }
         let device = self.name.clone();
-        VulkanError::OutOfMemory { device, asked, available, total }
+        VulkanError::OutOfMemory { device, requested, available, total }
     }
 
     /// A failed call as an error; a lost device has its own. After each of them the content of the device's memory is

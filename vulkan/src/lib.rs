@@ -1,7 +1,7 @@
 //! The kernels of viewfuse on any Vulkan device.
 //!
 //! The kernels are functions of `viewfuse-core`; rust-gpu makes them into SPIR-V (`shaders/`, `cargo shaders`), which
-//! is part of this crate. Vulkan is loaded at run time. The modules stand in the order of the data:
+//! is part of this crate. Vulkan is loaded at run time. The modules are listed in the order of the data:
 //!
 //! ```text
 //! error                          the errors, with numbers

@@ -206,14 +206,14 @@ unsafe fn each<const N: usize>(
         return Err(Status::Count);
     }
     for input in inputs {
-        // SAFETY: the caller's promise; only to look at the pointer.
+        // SAFETY: the caller's promise; only to check the pointer.
         unsafe { Input::new(input, count as usize) }?;
     }
     // SAFETY: the caller's promise.
     let mut results = unsafe { Output::new(results, count as usize) }?;
     let mut index = 0;
     while index < count as usize {
-        // SAFETY: the pointers were looked at above, and `index` is one of their floats.
+        // SAFETY: the pointers were checked above, and `index` is one of their floats.
         results.store(index, of(inputs.map(|input| unsafe { input.add(index).read() })));
         index += 1;
     }

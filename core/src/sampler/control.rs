@@ -12,7 +12,7 @@ use crate::schedule::SIGMA_DATA;
 pub const FIRST_STEP: f32 = core::f32::consts::LN_2;
 /// The longest step: a factor of 4.5. Beyond that a polynomial through results is not accurate.
 pub const LONGEST_STEP: f32 = 1.5;
-/// Steps of this length (and up to half as long again) are taken whatever the estimate says.
+/// Steps of this length (and up to half as long again) are taken for any estimate.
 pub const SHORTEST_STEP: f32 = 0.05;
 
 /// A picture counts as finished when its largest remaining change is below this: half of one of the 255 steps between -1
@@ -42,7 +42,7 @@ pub fn verdict(error: f32, tolerance: f32, step: f32, local_order: u32) -> Verdi
     let factor = 0.9 * exp(clamp(ln(ratio) / local_order as f32, -5.0, 5.0));
     let factor = if error <= f32::MAX { clamp(factor, 0.3, 2.0) } else { 0.3 };
     Verdict {
-        // The last step may be a little longer than asked for, and a length measured between two levels is rounded.
+        // The last step may be a little longer than requested, and a length measured between two levels is rounded.
         is_accepted: error <= REFUSED_FROM * tolerance || step <= 1.5 * SHORTEST_STEP,
         step: clamp(step * factor, SHORTEST_STEP, LONGEST_STEP),
     }

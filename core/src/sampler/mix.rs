@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// How many results a step combines at most.
 pub const MOST_RESULTS: usize = 4;
 
-/// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. What has
+/// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. A picture with
 /// coefficient 0 is not read. Also the block of the kernel `mix_pictures`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -24,7 +24,7 @@ impl Mix {
     /// The newest result as it is.
     pub const NEWEST: Mix = Mix { state: 0.0, results: [1.0, 0.0, 0.0, 0.0] };
 
-    /// The combination of numbers; what has coefficient 0 counts nothing, whatever it is.
+    /// The combination of numbers; a number with coefficient 0 is ignored, also NaN.
     #[inline]
     pub fn of(&self, state: f32, results: &[f32; MOST_RESULTS]) -> f32 {
         let [a, b, c, d] = results;

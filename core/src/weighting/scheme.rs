@@ -20,7 +20,7 @@ pub struct Row {
     pub choice: Option<Choice>,
     /// Its entries in tables over all schemes, in text form.
     pub tables: &'static [&'static str],
-    /// The formula's documentation, a line each, as it stands in the C header.
+    /// The formula's documentation, a line each, as in the C header.
     pub doc: &'static str,
 }
 

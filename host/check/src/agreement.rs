@@ -1,7 +1,7 @@
 //! Agreement of numbers with expected ones, each within its own bound.
 //!
 //! A check must be able to fail: NaN, another length, no elements, the same number everywhere and too many undecided
-//! elements (those that depend on rounding) are disagreements, whatever the bounds.
+//! elements (those that depend on rounding) are disagreements, for any bounds.
 
 use super::bounded::Bounded;
 use super::compare::unit_in_last_place;

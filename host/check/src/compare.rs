@@ -1,7 +1,7 @@
 //! Comparison of computed with expected numbers.
 //!
 //! A check must be able to fail: NaN, a missing element, an empty result and a constant where the expectation varies
-//! are failures, whatever the tolerance.
+//! are failures, for any tolerance.
 
 use std::fmt;
 

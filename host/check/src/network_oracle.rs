@@ -124,7 +124,7 @@ fn ended(block: &ConvolveBlock, sum: Bounded) -> Bounded {
     relu(sum * Bounded::from(block.scale), block.relu_outputs)
 }
 
-/// Channel `channel` of output pixel `pixel` of a convolution of every channel by itself.
+/// Channel `channel` of output pixel `pixel` of a depthwise convolution.
 pub fn depthwise(inputs: &[f32], weights: &[f32], block: &DepthwiseBlock, pixel: usize, channel: usize) -> Bounded {
     let size = [block.in_height, block.in_width];
     let windows = Windows { size, stride: block.stride, dilation: block.dilation, padding: block.padding };

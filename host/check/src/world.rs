@@ -54,7 +54,7 @@ impl Numbers {
     }
 }
 
-/// A camera on a wobbly ring. Its numbers are sound whatever the random ones are.
+/// A camera on a wobbly ring. It is valid for all random draws.
 fn camera(numbers: &mut Numbers, index: usize, size: [u32; 2]) -> Camera {
     let azimuth = 1.1 * index as f32 + numbers.between(-0.2, 0.2);
     let distance = numbers.between(2.2, 2.8);

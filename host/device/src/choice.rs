@@ -122,10 +122,10 @@ pub struct Several {
 ///
 /// # Errors
 /// [`VulkanError`] if a device was requested and cannot be opened.
-pub fn open_several(asked: &[DeviceChoice], options: &DeviceOptions) -> Result<Several, VulkanError> {
+pub fn open_several(requested: &[DeviceChoice], options: &DeviceOptions) -> Result<Several, VulkanError> {
     let mut several = Several::default();
-    if !asked.is_empty() {
-        several.devices = asked.iter().map(|choice| Ok(open(choice, options)?.device)).collect::<Result<_, _>>()?;
+    if !requested.is_empty() {
+        several.devices = requested.iter().map(|choice| Ok(open(choice, options)?.device)).collect::<Result<_, _>>()?;
         return Ok(several);
     }
     several.devices.push(AnyDevice::Cpu(Cpu));

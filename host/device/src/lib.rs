@@ -4,7 +4,7 @@
 //! [`viewfuse_core::kernels`], so that a kernel that exists on one device only does not compile. The body of every kernel
 //! is a function in `viewfuse-core`; a device decides how its elements are spread over cores or invocations.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! error         the errors of any device                                DeviceError

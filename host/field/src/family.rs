@@ -116,7 +116,7 @@ impl Family {
     }
 }
 
-/// The learned field of a checkpoint, whatever its family.
+/// Opens the learned field of a checkpoint of any family.
 ///
 /// # Errors
 /// [`OpenError`] if the checkpoint is of no family or cannot be read, or if the family does not accept an option.

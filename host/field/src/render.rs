@@ -8,7 +8,7 @@ use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_core::weights::{Omission, Weights};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{
     Album, BackgroundChoice, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8,
@@ -392,6 +392,25 @@ pub fn render<X: From<RenderError>>(
         deliver(&stage.images, frame)?;
     }
     Ok(Finished { costs: stage.costs, record: stage.record() })
+}
+
+/// As [`render`] without progress reports: returns the frames of all target views, which stay in memory.
+///
+/// # Errors
+/// [`RenderError`].
+pub fn render_all(
+    scene: &Scene,
+    job: &FewShot,
+    weighting: &Weighting,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+) -> Result<Vec<Frame>, RenderError> {
+    let mut frames = Vec::with_capacity(job.targets.len());
+    render(scene, job, weighting, renderer, options, &Silent, |_sources, frame| {
+        frames.push(frame);
+        Ok::<(), RenderError>(())
+    })?;
+    Ok(frames)
 }
 
 /// Runs `work` and adds its time.

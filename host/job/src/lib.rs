@@ -1,7 +1,7 @@
 //! Common parts of long jobs: progress and cancellation through one trait, output files that are written completely or not
 //! at all, digests of inputs.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted

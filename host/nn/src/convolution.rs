@@ -1,4 +1,4 @@
-//! Convolutions: of all channels, of each channel by itself, and transposed.
+//! Convolutions: full, depthwise and transposed.
 
 use super::image::{Image, Size};
 use super::scratch::Scratch;
@@ -179,7 +179,7 @@ impl<D: Device> Convolution<D> {
     }
 }
 
-/// A depthwise convolution (of every channel by itself) without bias, on a device.
+/// A depthwise convolution without bias, on a device.
 pub struct DepthwiseConvolution<D: Device> {
     pub(crate) weights: D::Buffer<f32>,
     pub(crate) size: u32,

@@ -1,6 +1,6 @@
 //! The output of a run: pictures, depth maps, contact sheets, and the run record ([`run`]).
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! png      pictures as files

@@ -101,7 +101,7 @@ pub(crate) fn multiply(
     }
 }
 
-/// Where a four of a step lies: within its array, whatever the indices.
+/// The place of a four of a step: within its array for all indices.
 #[inline(always)]
 fn place(inner: u32, four: u32) -> usize {
     (inner % STEP * STRIDE + four % FOURS) as usize

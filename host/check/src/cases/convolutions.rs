@@ -98,7 +98,7 @@ impl Case for Convolve {
         let job = |(index, window): (usize, Window)| {
             let Window { size: side, stride, padding, dilation, enlarge, channels, is_part, is_wide } = window;
             let [in_channels, out_channels] = channels;
-            // About as many output numbers as asked for; the window is never larger than image and border.
+            // About as many output numbers as requested; the window is never larger than image and border.
             let pixel_count = f64::from(size * stride * stride) / f64::from(out_channels * enlarge * enlarge);
             let reach = (side - 1) * dilation + 1;
             let least = reach.saturating_sub(2 * padding).max(1).div_ceil(enlarge);

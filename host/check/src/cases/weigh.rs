@@ -30,7 +30,7 @@ fn cameras(random: &mut Random, arrangement: u32, source_count: usize, target_co
     let mut sources: Vec<Pose> = (0..source_count).map(|_| random.pose(scale)).collect();
     let mut targets: Vec<Pose> = (0..target_count).map(|_| random.pose(scale)).collect();
     match arrangement % 6 {
-        // Every other target stands where a source does.
+        // Every other target is at a source's centre.
         3 => targets.iter_mut().step_by(2).enumerate().for_each(|(i, target)| *target = sources[i % source_count]),
         4 => {
             sources = ring(source_count, scale, 0.5, random.range(0.0, 1.0));

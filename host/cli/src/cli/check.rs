@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         match checked {
             Ok(checked) => report.devices.push(checked),
             Err(error @ CheckError::Interrupted(_)) => return Err(error.into()),
-            // One device that fails is no reason to lose what is known of the others.
+            // The results of the other devices are kept if one fails.
             Err(error) => report.failures.push(format!("{}: {:#}", device.name(), anyhow::Error::from(error))),
         }
     }

@@ -76,7 +76,7 @@ impl Arguments {
     }
 }
 
-/// `values` are all options and their values as a person would write them.
+/// `values` are all options and their values as on the command line.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
     let mut specs = or_every_scheme(&arguments.weights)?;

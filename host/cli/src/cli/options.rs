@@ -82,7 +82,7 @@ impl SourceOptions {
     }
 }
 
-/// Every option of the command that was given, by its long name, with its values as a person would write them, defaults
+/// Every option of the command that was given, by its long name, with its values as on the command line, defaults
 /// included.
 pub(crate) fn values(command: &Command, matches: &ArgMatches) -> BTreeMap<String, String> {
     let Some((name, matches)) = matches.subcommand() else { return BTreeMap::new() };

@@ -37,7 +37,7 @@ pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, 
     };
     let field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options), omissions })?;
     match (options.given().first(), &field.architecture().denoiser) {
-        // All that only this family knows is about the denoiser, or about pictures one after another.
+        // All options of this family alone concern the denoiser or sequences of pictures.
         (Some(option), None) => Err(OpenError::cannot(*option, "has no denoiser")),
         _ => Ok(AnyField::new(field)),
     }

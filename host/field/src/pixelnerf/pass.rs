@@ -31,9 +31,9 @@ pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
 
 /// The samples of a pass, and those at which the network was evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Asked {
+pub(super) struct Evaluated {
     pub(super) samples: u64,
-    pub(super) asked: u64,
+    pub(super) evaluated: u64,
 }
 
 /// The weights of a first pass along some rays.
@@ -90,11 +90,11 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         pixels: &[u32],
         seen: Option<&Seen<D>>,
-        asked: &mut [Asked; 2],
+        evaluated: &mut [Evaluated; 2],
     ) -> Result<Pixels<D>, FieldError> {
         let device = self.device;
         let rays = self.rays(pixels)?;
-        let coarse = self.first_pass(workspace, &rays, seen, &mut asked[0])?;
+        let coarse = self.first_pass(workspace, &rays, seen, &mut evaluated[0])?;
         let mut found = self.pixels(pixels.len())?;
         self.composite(&coarse, rays.count, &mut found)?;
         let block = self.fine_block();
@@ -123,7 +123,7 @@ impl<D: Device> Renderer<'_, D> {
             ..SampleMaskBlock::default()
         });
         let list = self.list(&rays, &fine, mask.as_ref().map(|block| (block, &parts)))?;
-        self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut asked[1])?;
+        self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut evaluated[1])?;
         self.composite(&fine, rays.count, &mut found)?;
         Ok(found)
     }
@@ -134,7 +134,7 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         rays: &Rays<D>,
         seen: Option<&Seen<D>>,
-        asked: &mut Asked,
+        evaluated: &mut Evaluated,
     ) -> Result<Samples<D>, FieldError> {
         let block = self.coarse_block();
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
@@ -155,7 +155,7 @@ impl<D: Device> Renderer<'_, D> {
             (block, &seen.values)
         });
         let list = self.list(rays, &samples, mask.as_ref().map(|(block, seen)| (block, *seen)))?;
-        self.ask(&self.coarse, workspace, rays, &mut samples, &list, asked)?;
+        self.ask(&self.coarse, workspace, rays, &mut samples, &list, evaluated)?;
         Ok(samples)
     }
 
@@ -189,11 +189,11 @@ impl<D: Device> Renderer<'_, D> {
         rays: &Rays<D>,
         samples: &mut Samples<D>,
         list: &List<D>,
-        asked: &mut Asked,
+        evaluated: &mut Evaluated,
     ) -> Result<(), FieldError> {
         let device = self.device;
-        asked.samples += u64::from(rays.count * samples.count);
-        asked.asked += u64::from(list.count);
+        evaluated.samples += u64::from(rays.count * samples.count);
+        evaluated.evaluated += u64::from(list.count);
         for first in (0..list.count).step_by(workspace.point_count as usize) {
             self.progress.check()?;
             let count = workspace.point_count.min(list.count - first);

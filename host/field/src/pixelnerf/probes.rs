@@ -2,7 +2,7 @@
 
 use super::network::Workspace;
 use super::options::LEAST_SHARE;
-use super::pass::{Asked, Renderer, Seen, rays_at_once};
+use super::pass::{Evaluated, Renderer, Seen, rays_at_once};
 use crate::FieldError;
 use viewfuse_core::composite::Compositor;
 use viewfuse_device::Device;
@@ -17,7 +17,7 @@ impl<D: Device> Renderer<'_, D> {
         &self,
         workspace: &mut Workspace<D>,
         step: u32,
-        asked: &mut Asked,
+        evaluated: &mut Evaluated,
     ) -> Result<Seen<D>, FieldError> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
         let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
@@ -30,7 +30,7 @@ impl<D: Device> Renderer<'_, D> {
         let mut changes = [0.0; SHARES.len()];
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
-            let samples = self.first_pass(workspace, &rays, None, asked)?;
+            let samples = self.first_pass(workspace, &rays, None, evaluated)?;
             self.device.weigh_samples(&samples.block(first_ray), rays.count, &samples.values, &mut values)?;
             first_ray += rays.count;
             if self.omissions.probe_error > 0.0 {

@@ -62,7 +62,7 @@ fn check_machine(machine: &Pickle) -> Result<(), Problem> {
     }
 }
 
-/// Offset and length in the file of each storage that a description names. `input` stands behind the description, in
+/// Offset and length in the file of each storage that a description names. `input` is behind the description, in
 /// front of the list of the storages' keys; the storages end at offset `end`.
 pub(super) fn lay_out<'a>(
     pickle: &'a Pickle,

@@ -1,6 +1,6 @@
 //! Networks that a pickle holds as objects: the tensors that their `state_dict` would have.
 //!
-//! An object of PyTorch's modules, whatever its class, has among its attributes the tables `_parameters`, `_buffers` and
+//! An object of any class of PyTorch's modules has among its attributes the tables `_parameters`, `_buffers` and
 //! `_modules`; the names in a `state_dict` are the paths through these. The attributes are the object's state, or, for
 //! classes with their source text (`torch_utils.persistence` of NVIDIA's projects), the `state` of the
 //! description from which the object would be created. The source text is not read.

@@ -105,7 +105,7 @@ pub enum Value {
     Float(f64),
     /// `str`: see [`Pickle::text`].
     Text(Span),
-    /// `bytes`, `bytearray`, or a `str` of Python 2 that is no text: where they stand in the file.
+    /// `bytes`, `bytearray`, or a `str` of Python 2 that is not a text: its range in the file.
     Bytes {
         /// Offset of the first byte in the file.
         start: u64,

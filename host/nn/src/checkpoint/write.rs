@@ -1,6 +1,6 @@
 //! Writing safetensors, one tensor after another.
 //!
-//! Format: <https://github.com/huggingface/safetensors>. Tensors stand in the order of falling element size, then of
+//! Format: <https://github.com/huggingface/safetensors>. Tensors are in the order of decreasing element size, then of
 //! their names, as the crate of that name writes them, so that every element is aligned.
 
 use super::error::shortened;

@@ -157,7 +157,7 @@ impl Jobs<'_> {
     fn run(&self, device: &AnyDevice, field: &AnyField) -> anyhow::Result<(RunFolder, usize)> {
         let Jobs { path, settings, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
         let (renderer, scorer) = (field.on(device), metrics.on(device)?);
-        // Only now, that nothing which a person gave can be wrong: a folder keeps its settings.
+        // Only after all arguments are checked: a folder keeps its settings.
         let folder = RunFolder::begin(path, settings.clone())?;
         let mut journal = folder.journal(shard)?;
         let finished = folder.finished()?;

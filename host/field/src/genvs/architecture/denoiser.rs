@@ -20,7 +20,7 @@ pub fn group_count(channels: usize) -> usize {
 pub struct DenoiserLevel {
     /// Its channels.
     pub channels: usize,
-    /// Whether its blocks attend to the whole image: all on the way down, the last on the way up.
+    /// Whether it has self-attention: in all blocks of the encoder, in the last block of the decoder.
     pub has_attention: bool,
 }
 
@@ -39,7 +39,7 @@ pub struct Denoiser {
     pub embedding_channels: usize,
     /// The levels.
     pub levels: Vec<DenoiserLevel>,
-    /// Blocks of a level on the way down. On the way up there is one more.
+    /// Blocks of a level in the encoder. The decoder has one more.
     pub block_count: usize,
 }
 

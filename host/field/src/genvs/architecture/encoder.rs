@@ -17,7 +17,7 @@ pub(in crate::genvs) const PREFIX: &str = "pixel_nerf_net.encoder";
 /// the ASPP module. Three stages of convolutions lead up again, to `s / 4`: each sees the levels of its side (the last
 /// two levels and ASPP's result, the second level, the first). Their result and the first level's high-resolution
 /// channels are fused, two more stages lead up to `s` beside the stem's channels and the image's own, and a 1x1
-/// convolution makes of every pixel the features of a row of voxels. Norms are all switched off.
+/// convolution maps every pixel to the features of a row of voxels. All norms are switched off.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Encoder {
     /// Channels after the first convolution.
@@ -143,7 +143,7 @@ fn pointwise(tensors: &mut Vec<TensorShape>, name: &str, out_channels: usize, in
     tensors.push(TensorShape { name: format!("{name}.weight"), shape: vec![out_channels, in_channels, 1, 1] });
 }
 
-/// A 3x3 convolution of each channel by itself, then a 1x1 convolution, both without bias.
+/// A 3x3 depthwise convolution, then a 1x1 convolution, both without bias.
 fn separable(tensors: &mut Vec<TensorShape>, name: &str, out_channels: usize, in_channels: usize) {
     tensors.push(TensorShape { name: format!("{name}.0.weight"), shape: vec![in_channels, 1, 3, 3] });
     pointwise(tensors, &format!("{name}.1"), out_channels, in_channels);

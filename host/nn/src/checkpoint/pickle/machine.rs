@@ -270,7 +270,7 @@ impl Machine {
     fn take(&self, input: &mut Input<'_>, length: u64) -> Result<Vec<u8>, Fault> {
         let room = LONGEST_TEXTS - self.texts.len() - self.wide.len();
         if length > room as u64 {
-            // A length that the file cannot hold tells of damage, whatever it is.
+            // A length beyond the end of the file is damage.
             input.check(length)?;
             return Err(Fault::TooMany { what: "bytes of text", limit: LONGEST_TEXTS as u64 });
         }
