@@ -11,7 +11,7 @@
 //! batch        sources and target rays of a step         Batch
 //! operations   gradients of our own kernels              Convolution, PointNetwork, Look
 //! parameters   trained parameters                        Parameters
-//!
+//! images, compositing     parts of the graphs
 //! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
 //! attention    weighting of views as a graph             Attention
 //! adam, average           the optimiser
