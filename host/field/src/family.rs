@@ -3,7 +3,6 @@
 use super::any::AnyField;
 pub use super::options::Computable;
 use super::options::{FieldOptions, OpenError};
-use super::{genvs, pixelnerf};
 use std::fmt;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 
@@ -62,20 +61,20 @@ macro_rules! families {
 families! {
     /// [`super::pixelnerf`].
     PixelNerf {
-        title: "PixelNeRF", prefix: "encoder.model.", open: pixelnerf::open,
+        title: "PixelNeRF", prefix: "encoder.model.", open: super::pixelnerf::open,
         options: &["published-depth", "probe-step", "probe-error"],
-        computable: pixelnerf::COMPUTABLE,
+        computable: super::pixelnerf::COMPUTABLE,
         test_networks: &[
-            TestNetwork { name: "formula", small: Small::Width, checkpoint: pixelnerf::test_networks::deterministic_of_width },
-            TestNetwork { name: "body", small: Small::Width, checkpoint: pixelnerf::test_networks::body_of_width },
+            TestNetwork { name: "formula", small: Small::Width, checkpoint: super::pixelnerf::test_networks::deterministic_of_width },
+            TestNetwork { name: "body", small: Small::Width, checkpoint: super::pixelnerf::test_networks::body_of_width },
         ],
     }
     /// [`super::genvs`].
     Genvs {
-        title: "GeNVS", prefix: "pixel_nerf_net.", open: genvs::open,
+        title: "GeNVS", prefix: "pixel_nerf_net.", open: super::genvs::open,
         options: &["sampler", "steps", "tolerance", "churn", "half-volumes", "reuse", "noise"],
-        computable: genvs::COMPUTABLE,
-        test_networks: &[TestNetwork { name: "genvs", small: Small::One, checkpoint: genvs::test_networks::deterministic_of_size }],
+        computable: super::genvs::COMPUTABLE,
+        test_networks: &[TestNetwork { name: "genvs", small: Small::One, checkpoint: super::genvs::test_networks::deterministic_of_size }],
     }
 }
 
