@@ -87,7 +87,8 @@ pub fn census_cost(
         let census = sum[plane] / max(count[plane], 1.0e-6);
         let matched = COLOUR_SHARE * colour + CENSUS_SHARE * census + frustum.dissent_share * dissent[plane];
         let inside = hull[plane];
-        let told = LEAST_TOLD + (1.0 - LEAST_TOLD) * min(texture[plane] / max(count[plane], 1.0e-6) * (1.0 / FULL_TEXTURE), 1.0);
+        let told = LEAST_TOLD
+            + (1.0 - LEAST_TOLD) * min(texture[plane] / max(count[plane], 1.0e-6) * (1.0 / FULL_TEXTURE), 1.0);
         let weight = weight[plane] * told;
         share[plane] = weight * inside + (1.0 - inside);
         cost[plane] = matched * weight * inside + OUTSIDE_COST * (1.0 - inside);

@@ -21,7 +21,9 @@ impl Space {
         Space { points }
     }
 
-    pub(super) fn count(&self) -> usize { self.points.len() }
+    pub(super) fn count(&self) -> usize {
+        self.points.len()
+    }
 
     /// Least and greatest disparity in a camera's frustum, from the points that it sees; `None` if it sees too few.
     pub(super) fn disparities(&self, camera: &CameraBlock) -> Option<[f32; 2]> {

@@ -140,7 +140,8 @@ impl<D: Device> Views<'_, D> {
                 .collect();
             near.sort_by(|a, b| a.1.total_cmp(&b.1));
             near.truncate(RANGE_NEIGHBOURS);
-            let mut weights: Vec<(usize, f32)> = near.iter().map(|(other, gap)| (*other, 1.0 / (gap * gap + 1.0e-12))).collect();
+            let mut weights: Vec<(usize, f32)> =
+                near.iter().map(|(other, gap)| (*other, 1.0 / (gap * gap + 1.0e-12))).collect();
             let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
             weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
             weights.push((view, 1.0));
@@ -248,8 +249,17 @@ impl<D: Device> Views<'_, D> {
             cameras.filter_map(|camera| self.space.disparities(camera)).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
         };
         let bounds = self.space.disparities(camera).or_else(all).unwrap_or([0.0, 1.0]);
-        let bounds = std::env::var("VF_NF").ok().map_or(bounds, |v| { let v: Vec<f32> = v.split(',').map(|v| v.parse().unwrap()).collect(); [1.0 / v[1], 1.0 / v[0]] });
-        if std::env::var("T").is_ok() { eprintln!("bounds {bounds:?} depths {:?} points {}", [1.0/bounds[1],1.0/bounds[0]], self.space.count()); }
+        let bounds = std::env::var("VF_NF").ok().map_or(bounds, |v| {
+            let v: Vec<f32> = v.split(',').map(|v| v.parse().unwrap()).collect();
+            [1.0 / v[1], 1.0 / v[0]]
+        });
+        if std::env::var("T").is_ok() {
+            eprintln!(
+                "bounds {bounds:?} depths {:?} points {}",
+                [1.0 / bounds[1], 1.0 / bounds[0]],
+                self.space.count()
+            );
+        }
         Range::new(bounds, self.settings.plane_count)
     }
 }
@@ -370,4 +380,6 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 }
 
-fn ef(n: &str, d: f32) -> f32 { std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }
+fn ef(n: &str, d: f32) -> f32 {
+    std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d)
+}
