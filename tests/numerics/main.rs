@@ -8,6 +8,7 @@ mod compositing;
 mod group_norm;
 mod half_precision;
 mod layers;
+mod lens;
 mod math;
 mod metrics;
 mod network;

@@ -52,7 +52,8 @@ fn nothing_to_read() {
     let folder = Folder::new();
     let missing = Scene::open(folder.path().join("nowhere")).expect_err("no such path");
     assert_message(&missing, &folder, "nowhere: no such file or folder", &[]);
-    assert_refused(&folder, ": no scene here; looked for", &["transforms.json", "*_par.txt", "rgb/", "intrinsics.txt"]);
+    let forms = ["transforms.json", "*_par.txt", "rgb/", "intrinsics.txt", "poses_bounds.npy", "cameras.bin", ".npz"];
+    assert_refused(&folder, ": no scene here; looked for", &forms);
     folder.write("notes.txt", "hello");
     let text = Scene::open(folder.path().join("notes.txt")).expect_err("not a scene");
     assert_message(&text, &folder, "notes.txt: no scene here", &[]);
@@ -205,16 +206,20 @@ fn short_row() -> Value {
 }
 
 #[test]
-fn lenses_that_are_not_a_pinhole() {
-    let advice = ["lens distortion", "image_undistorter"];
+fn lenses_that_are_not_read() {
+    let advice = ["this lens is not supported", "image_undistorter"];
     for (object, key, value, said) in [
-        ("", "k1", json!(0.05), "k1 is 0.05:"),
-        ("/frames/0", "p2", json!(-1e-4), "frames[0].p2 is -0.0001:"),
-        ("", "is_fisheye", json!(true), "is_fisheye is true:"),
-        ("", "camera_model", json!("OPENCV_FISHEYE"), "camera_model is \"OPENCV_FISHEYE\":"),
+        ("", "s1", json!(0.05), "s1 is 0.05:"),
+        ("/frames/0", "s4", json!(-1e-4), "frames[0].s4 is -0.0001:"),
+        ("", "equirectangular", json!(true), "equirectangular is true:"),
+        ("", "is_fisheye", json!("yes"), "is_fisheye is \"yes\":"),
     ] {
         assert_transforms_refused(object, key, value, &[said, advice[0], advice[1]]);
     }
+    let said = ["camera_model: camera model \"EQUIRECTANGULAR\" is not supported", "OPENCV_FISHEYE"];
+    assert_transforms_refused("", "camera_model", json!("EQUIRECTANGULAR"), &said);
+    assert_transforms_refused("/frames/0", "k2", json!(1e9), &["frames[0]: the lens's coefficient k2 is not"]);
+    assert_transforms_refused("", "k1", json!("strong"), &["k1 must be a number"]);
 }
 
 #[test]

@@ -1,7 +1,16 @@
 //! Scenes: how they lie on the disk, what is refused with which words, and those that are generated.
 
+mod arrays;
+mod colmap;
+mod damaged;
 mod datasets;
 mod errors;
+mod formats;
 mod layouts;
+mod lenses;
+mod made;
 mod photographs;
 mod synthetic;
+mod transforms;
+mod world;
+mod written;

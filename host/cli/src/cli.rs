@@ -6,6 +6,7 @@ mod convert;
 mod devices;
 mod environment;
 mod evaluate;
+mod export;
 mod hints;
 mod inspect;
 mod left_out;
@@ -76,6 +77,8 @@ enum Command {
     Report(report::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
+    /// Write a scene in another layout.
+    Export(export::Arguments),
     /// List the devices, and the missing requirements of those that cannot be used.
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
@@ -112,6 +115,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Scenes(arguments) => scenes::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

@@ -26,12 +26,22 @@ const USUAL_DISTANCES: (f32, f32) = (0.1, 100.0);
 pub struct Inspection {
     /// The path it was opened from.
     pub path: String,
-    /// `srn`, `transforms` or `middlebury`.
+    /// `srn`, `transforms`, `colmap` and so on: the name of its reader.
     pub layout: &'static str,
     /// Views with a photograph.
     pub photograph_count: usize,
     /// Target poses without one.
     pub target_count: usize,
+    /// Views whose photograph was taken through a lens that is undone when it is read.
+    pub lens_count: usize,
+    /// Views with a mask.
+    pub mask_count: usize,
+    /// Reconstructed points.
+    pub point_count: usize,
+    /// What was subtracted from the coordinates of the files: `file = origin + unit * world`.
+    pub origin: [f64; 3],
+    /// The world's unit in the file's units.
+    pub unit: f64,
     /// Width and height of the first view's image.
     pub size: [u32; 2],
     /// Focal lengths of the first view in pixels.
@@ -67,7 +77,8 @@ pub fn inspect(
 ) -> Result<Inspection, Interrupted> {
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
     let rig = Rig::of(&cameras);
-    let mut warnings = rig_warnings(scene, &rig);
+    let mut warnings = scene.warnings.clone();
+    warnings.extend(rig_warnings(scene, &rig));
     let object = match object_of(scene, background, progress, &mut warnings) {
         Ok(object) => Some(object),
         Err(reason) => {
@@ -85,6 +96,11 @@ pub fn inspect(
         layout: scene.layout,
         photograph_count,
         target_count: scene.views.len() - photograph_count,
+        lens_count: scene.views.iter().filter(|view| view.lens.is_some()).count(),
+        mask_count: scene.views.iter().filter(|view| view.mask.is_some()).count(),
+        point_count: scene.points.len(),
+        origin: scene.frame.origin.to_array(),
+        unit: scene.frame.scale,
         size: [pinhole.width(), pinhole.height()],
         focal: pinhole.focal(),
         principal: pinhole.principal(),

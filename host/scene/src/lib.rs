@@ -9,6 +9,7 @@
 //! rig           the cameras as a whole: focus, up, orbits
 //! few_shot      which views are sources, which cameras are targets: FewShot
 //! photographs   sources at working size without their background: SourceImages
+//! write         a scene written out, in each layout that can hold it: Layout
 //! ```
 #![forbid(unsafe_code)]
 
@@ -17,10 +18,11 @@ pub mod few_shot;
 pub mod photographs;
 pub mod rig;
 mod scene;
+pub mod write;
 
 pub use scene::{
-    IntrinsicsFault, LARGEST_SIDE, Photograph, Place, READERS, Scene, SceneError, SceneFrame, ScenePoint, Split, View,
-    looked_for, reader,
+    IntrinsicsFault, LARGEST_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame, ScenePoint,
+    Split, View, looked_for, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -9,18 +9,26 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use image::metadata::Orientation;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::lens::Lens;
 
+mod bytes;
+mod camera_models;
 mod check;
+mod colmap;
 mod error;
 mod fault;
 mod files;
 mod images;
 mod json;
+mod llff;
 mod masks;
 mod middlebury;
+mod missing;
+mod neus;
+mod numpy;
 pub mod reader;
 mod split;
 mod srn;
@@ -29,12 +37,13 @@ mod undistort;
 
 use check::Checked;
 pub use error::SceneError;
-pub use fault::{IntrinsicsFault, Place};
+pub use fault::{IntrinsicsFault, NumpyFault, Place};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
 /// The readers of all layouts, in the order in which they are asked: a path is taken for the first that fits.
-pub const READERS: [&dyn Reader; 3] = [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn];
+pub const READERS: [&dyn Reader; 6] =
+    [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn, &neus::Neus, &llff::Llff, &colmap::Colmap];
 
 /// What readers look for, for help texts and messages.
 pub fn looked_for(readers: &[&dyn Reader]) -> String {
@@ -160,6 +169,7 @@ impl Scene {
             let Some(found) = reader.recognise(path)? else { continue };
             let mut checked = check::scene(&found, reader.form(), reader.read(&found)?)?;
             distinguish(&mut checked.views);
+            checked.warnings.extend(masks::find(path, &mut checked.views));
             let mut names = HashSet::new();
             for view in &checked.views {
                 if !names.insert(view.name.as_str()) {
@@ -188,22 +198,40 @@ impl Scene {
     /// [`SceneError`] if there is no such view, if it has no photograph, if a file cannot be decoded, or if its size
     /// is no longer what it was when the scene was opened.
     pub fn photograph(&self, view: usize) -> Result<Photograph, SceneError> {
-        let Some(view) = self.views.get(view) else {
-            let (path, view_count) = (self.path.clone(), self.views.len());
-            return Err(SceneError::NoSuchView { path, view, view_count });
-        };
-        let Some(path) = &view.image else {
-            return Err(SceneError::NoPhotograph { path: self.path.clone(), name: view.name.clone() });
-        };
-        let pinhole = &view.camera.pinhole;
-        let mut photograph = images::decode(path, [pinhole.width(), pinhole.height()])?;
-        if let Some(mask) = &view.mask {
+        let mut photograph = self.stored_photograph(view)?;
+        let View { camera, lens, mask, .. } = &self.views[view];
+        if let Some(mask) = mask {
             masks::apply(mask, &mut photograph)?;
         }
-        Ok(match &view.lens {
-            Some(lens) => undistort::undistorted(&photograph, lens, pinhole),
+        Ok(match lens {
+            Some(lens) => undistort::undistorted(&photograph, lens, &camera.pinhole),
             None => photograph,
         })
+    }
+
+    /// The photograph of a view upright, and otherwise as it is stored: without its mask, not undistorted.
+    pub(crate) fn stored_photograph(&self, view: usize) -> Result<Photograph, SceneError> {
+        let pinhole = self.view(view)?.camera.pinhole;
+        images::decode(self.photograph_file(view)?, [pinhole.width(), pinhole.height()])
+    }
+
+    /// The file of a view's photograph if its pixels are upright as they are stored.
+    pub(crate) fn upright_file(&self, view: usize) -> Result<Option<&Path>, SceneError> {
+        let file = self.photograph_file(view)?;
+        Ok((images::header(file)?.orientation == Orientation::NoTransforms).then_some(file))
+    }
+
+    fn view(&self, view: usize) -> Result<&View, SceneError> {
+        self.views.get(view).ok_or_else(|| {
+            let (path, view_count) = (self.path.clone(), self.views.len());
+            SceneError::NoSuchView { path, view, view_count }
+        })
+    }
+
+    fn photograph_file(&self, view: usize) -> Result<&Path, SceneError> {
+        let View { name, image, .. } = self.view(view)?;
+        let missing = || SceneError::NoPhotograph { path: self.path.clone(), name: name.clone() };
+        image.as_deref().ok_or_else(missing)
     }
 
     /// The index of the view that a person means by `text`: the view of exactly this name; otherwise, if `text` is a

@@ -60,6 +60,14 @@ fn print_text(inspection: &Inspection) -> std::io::Result<()> {
         "image      {}x{}, focal {:.2} {:.2}, principal point {:.2} {:.2}",
         i.size[0], i.size[1], i.focal[0], i.focal[1], i.principal[0], i.principal[1]
     ))?;
+    if i.lens_count + i.mask_count + i.point_count > 0 {
+        let (lenses, masks, points) = (i.lens_count, i.mask_count, i.point_count);
+        say(format_args!("with       {lenses} lenses to undo, {masks} masks, {points} reconstructed points"))?;
+    }
+    if i.origin != [0.0; 3] || i.unit != 1.0 {
+        let [x, y, z] = i.origin;
+        say(format_args!("frame      the file's ({x}, {y}, {z}) is the origin, its {} the unit", i.unit))?;
+    }
     let miss = number(i.axis_miss);
     say(format_args!("focus      {}, missed by the axes by {miss} (root mean square)", point(i.focus)))?;
     say(format_args!("distance   {} to {}", number(i.distances[0]), number(i.distances[1])))?;

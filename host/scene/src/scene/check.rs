@@ -18,6 +18,9 @@ use super::{SceneFrame, ScenePoint, View};
 /// The centroid of the cameras may be so many times their spread away from the origin.
 const FAR_FROM_ORIGIN: f64 = 16.0;
 
+/// Spreads of cameras below this share of their distance from the origin are rounding errors of f64.
+const LEAST_SPREAD: f64 = 1.0e-12;
+
 /// Spreads of cameras, in units of the file, that need no other unit.
 const USUAL_SPREADS: std::ops::RangeInclusive<f64> = 1.0e-3..=1.0e4;
 
@@ -82,8 +85,8 @@ fn frame_of(views: &[RawView]) -> SceneFrame {
     let count = centres.len().max(1) as f64;
     let centroid = centres.iter().map(|centre| *centre / count).sum::<DVec3>();
     let spread = (centres.iter().map(|centre| centre.distance_squared(centroid) / count).sum::<f64>()).sqrt();
-    // One camera, or several in one place: there is nothing between them to lose.
-    if !(spread > 0.0 && spread.is_finite()) {
+    // One camera, or several in one place but for rounding: there is nothing between them to lose.
+    if !(spread > LEAST_SPREAD * centroid.length() && spread.is_finite()) {
         return SceneFrame::FILE;
     }
     SceneFrame {

@@ -1,0 +1,42 @@
+//! `viewfuse export`.
+
+use super::say;
+use super::terminal::Terminal;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_scene::Scene;
+use viewfuse_scene::write::{Layout, write};
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  viewfuse export photos/ --layout colmap -o photos_colmap\n  \
+    viewfuse export fern/ --layout transforms -o fern_nerfstudio\n\n\
+    Photographs are copied as they are where the layout holds their lens and mask, otherwise written as the pinhole's \
+    pictures. A layout that cannot hold the scene refuses it with the reason.")]
+pub(crate) struct Arguments {
+    /// The scene
+    scene: PathBuf,
+    /// How to lay it out: transforms, colmap, srn, middlebury or llff
+    #[arg(long)]
+    layout: Layout,
+    /// Folder to write; must not be there yet, or be empty
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let scene = Scene::open(&arguments.scene)?;
+    let progress = Terminal::new("writing");
+    let written = write(&scene, arguments.layout, &arguments.output, &progress)?;
+    drop(progress);
+    say(format_args!("read       {} ({})", scene.path.display(), scene.layout))?;
+    scene.warnings.iter().try_for_each(|warning| say(format_args!("warning    {warning}")))?;
+    say(format_args!(
+        "written    {} ({}): {} photographs",
+        written.folder.display(),
+        arguments.layout,
+        written.photograph_count
+    ))?;
+    written.left_out.iter().try_for_each(|line| say(format_args!("left out   {line}")))?;
+    Ok(ExitCode::SUCCESS)
+}

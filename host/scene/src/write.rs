@@ -1,0 +1,260 @@
+//! Writing a scene out, in each layout that can hold it.
+//!
+//! Poses are written in the coordinates of the scene's own files ([`crate::SceneFrame`]). Photographs are copied as they are where
+//! the layout holds their lens and their mask; otherwise they are written as the pinhole's pictures, with the mask as the
+//! alpha channel. A layout that cannot hold a scene refuses it with the reason; what is lost on the way without changing
+//! what the cameras see (points, near and far, parts) is listed in [`Written::left_out`].
+//!
+//! The folder appears whole or not at all: it is filled under another name beside its place, and renamed.
+
+mod colmap;
+mod llff;
+mod middlebury;
+mod photographs;
+mod srn;
+mod transforms;
+
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use viewfuse_job::progress::{Interrupted, Progress};
+
+use crate::{Scene, SceneError, View};
+
+/// A layout that scenes are written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// `transforms.json`, `images/`, `masks/`, as nerfstudio reads them.
+    Transforms,
+    /// `sparse/0/*.txt`, `images/`, `masks/`.
+    Colmap,
+    /// `rgb/`, `pose/`, `target_pose/`, `intrinsics.txt`.
+    Srn,
+    /// `scene_par.txt` beside the photographs.
+    Middlebury,
+    /// `poses_bounds.npy`, `images/`.
+    Llff,
+}
+
+impl Layout {
+    /// All of them.
+    pub const ALL: [Layout; 5] = [Layout::Transforms, Layout::Colmap, Layout::Srn, Layout::Middlebury, Layout::Llff];
+}
+
+impl fmt::Display for Layout {
+    /// The name of the layout's reader.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Layout::Transforms => "transforms",
+            Layout::Colmap => "colmap",
+            Layout::Srn => "srn",
+            Layout::Middlebury => "middlebury",
+            Layout::Llff => "llff",
+        })
+    }
+}
+
+/// The name is none of a layout that is written.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a layout that is written: transforms, colmap, srn, middlebury or llff")]
+pub struct UnknownLayout(String);
+
+impl FromStr for Layout {
+    type Err = UnknownLayout;
+
+    fn from_str(name: &str) -> Result<Layout, UnknownLayout> {
+        Layout::ALL.into_iter().find(|layout| layout.to_string() == name).ok_or_else(|| UnknownLayout(name.to_owned()))
+    }
+}
+
+/// Why a scene was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteSceneError {
+    /// The layout cannot hold it.
+    #[error("{}: the layout {layout} cannot hold this scene: {reason}", scene.display())]
+    Unfit {
+        /// The scene.
+        scene: PathBuf,
+        /// The layout.
+        layout: Layout,
+        /// What it cannot hold.
+        reason: String,
+    },
+    /// There is something at the place already.
+    #[error("{}: is there already and not an empty folder; give another name", folder.display())]
+    Occupied {
+        /// The folder that was to be written.
+        folder: PathBuf,
+    },
+    /// The operating system refused.
+    #[error("{}: cannot be written: {cause}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        cause: std::io::Error,
+    },
+    /// A photograph could not be read.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A photograph could not be encoded.
+    #[error("{}: cannot be encoded: {cause}", path.display())]
+    Encode {
+        /// The file that was to appear.
+        path: PathBuf,
+        /// What the encoder said.
+        cause: image::ImageError,
+    },
+    /// The person stopped the work.
+    #[error("interrupted")]
+    Interrupted(#[from] Interrupted),
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The folder.
+    pub folder: PathBuf,
+    /// How many photographs it has.
+    pub photograph_count: usize,
+    /// What of the scene the layout does not hold, a line each.
+    pub left_out: Vec<String>,
+}
+
+/// Writes a scene in a layout to a folder that is not there yet, or is empty.
+///
+/// # Errors
+/// [`WriteSceneError`]; nothing is left behind then.
+pub fn write(
+    scene: &Scene,
+    layout: Layout,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<Written, WriteSceneError> {
+    let failed = |cause| WriteSceneError::Io { path: folder.to_path_buf(), cause };
+    let is_empty = || fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
+    if folder.exists() && !is_empty() {
+        return Err(WriteSceneError::Occupied { folder: folder.to_path_buf() });
+    }
+    let unfit = |reason| WriteSceneError::Unfit { scene: scene.path.clone(), layout, reason };
+    match layout {
+        Layout::Transforms => all_photographed(scene),
+        Layout::Colmap => all_photographed(scene),
+        Layout::Srn => srn::fits(scene),
+        Layout::Middlebury => all_photographed(scene).and_then(|()| middlebury::fits(scene)),
+        Layout::Llff => all_photographed(scene).and_then(|()| llff::fits(scene)),
+    }
+    .map_err(unfit)?;
+
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::create_dir_all(parent).map_err(failed)?;
+    let draft = tempfile::Builder::new().prefix(".viewfuse-").tempdir_in(parent).map_err(failed)?;
+    let mut out = Draft { folder: draft.path(), scene, progress };
+    progress.expect(scene.views.iter().filter(|view| view.image.is_some()).count());
+    let photograph_count = match layout {
+        Layout::Transforms => transforms::write(&mut out)?,
+        Layout::Colmap => colmap::write(&mut out)?,
+        Layout::Srn => srn::write(&mut out)?,
+        Layout::Middlebury => middlebury::write(&mut out)?,
+        Layout::Llff => llff::write(&mut out)?,
+    };
+    open_to_all(draft.path()).map_err(failed)?;
+    if folder.exists() {
+        fs::remove_dir(folder).map_err(failed)?;
+    }
+    fs::rename(draft.path(), folder).map_err(failed)?;
+    Ok(Written { folder: folder.to_path_buf(), photograph_count, left_out: left_out(scene, layout) })
+}
+
+/// Temporary folders are their owner's only, which is wrong for a result.
+fn open_to_all(folder: &Path) -> std::io::Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        fs::set_permissions(folder, fs::Permissions::from_mode(0o755))?;
+    }
+    Ok(())
+}
+
+/// A folder that is being filled.
+struct Draft<'a> {
+    folder: &'a Path,
+    scene: &'a Scene,
+    progress: &'a dyn Progress,
+}
+
+impl Draft<'_> {
+    /// The path of a file in it, whose folder is made.
+    fn file(&self, name: &str) -> Result<PathBuf, WriteSceneError> {
+        let path = self.folder.join(name);
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(|cause| WriteSceneError::Io { path: folder.to_path_buf(), cause })?;
+        }
+        Ok(path)
+    }
+
+    /// Writes a file.
+    fn put(&self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), WriteSceneError> {
+        let path = self.file(name)?;
+        fs::write(&path, contents).map_err(|cause| WriteSceneError::Io { path, cause })
+    }
+}
+
+/// Refuses poses without a photograph.
+fn all_photographed(scene: &Scene) -> Result<(), String> {
+    match scene.views.iter().find(|view| view.image.is_none()) {
+        Some(view) => Err(format!("view {:?} is a pose without a photograph", view.name)),
+        None => Ok(()),
+    }
+}
+
+/// What a layout does not hold.
+fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
+    let views = |has: fn(&View) -> bool| scene.views.iter().filter(|view| has(view)).count();
+    let mut lines = Vec::new();
+    if layout != Layout::Colmap && !scene.points.is_empty() {
+        lines.push(format!("{} reconstructed points", scene.points.len()));
+    }
+    let depths = views(|view| view.near_far.is_some());
+    if layout != Layout::Llff && depths > 0 {
+        lines.push(format!("near and far depths of {depths} views"));
+    }
+    let parts = views(|view| view.split.is_some());
+    if layout != Layout::Transforms && parts > 0 {
+        lines.push(format!("the part of the scene that {parts} views belong to"));
+    }
+    let lenses = views(|view| view.lens.is_some());
+    if !matches!(layout, Layout::Transforms | Layout::Colmap) && lenses > 0 {
+        lines.push(format!(
+            "the lens of {lenses} photographs: they are undistorted, and what the lens did not see is not marked"
+        ));
+    }
+    lines
+}
+
+/// A view's world-from-camera matrix in OpenCV axes, row-major, in the coordinates of the scene's files.
+fn world_from_camera(scene: &Scene, view: &View) -> [[f64; 4]; 4] {
+    let mut matrix = view.camera.pose.to_opencv().map(|row| row.map(f64::from));
+    let centre = scene.frame.file(view.camera.pose.centre_world().as_dvec3());
+    for (row, coordinate) in matrix.iter_mut().zip(centre.to_array()) {
+        row[3] = coordinate;
+    }
+    matrix
+}
+
+/// `[R | t]` of the inverse: world-to-camera, row-major.
+fn camera_from_world(scene: &Scene, view: &View) -> [[f64; 4]; 3] {
+    let m = world_from_camera(scene, view);
+    let row = |row: usize| {
+        let [a, b, c] = [m[0][row], m[1][row], m[2][row]];
+        [a, b, c, -(a * m[0][3] + b * m[1][3] + c * m[2][3])]
+    };
+    [row(0), row(1), row(2)]
+}
+
+/// Numbers with blanks between them, as many digits as they need to be read back the same.
+fn words(numbers: impl IntoIterator<Item = f64>) -> String {
+    numbers.into_iter().map(|number| number.to_string()).collect::<Vec<_>>().join(" ")
+}

@@ -1,0 +1,57 @@
+//! LLFF's `poses_bounds.npy`: one focal length a view, the principal point in the centre, near and far.
+
+use super::{Draft, WriteSceneError, world_from_camera};
+use crate::Scene;
+
+/// How far from the centre of the photograph a principal point may be, in pixels.
+const CENTRED: f32 = 1.0e-3;
+
+pub(super) fn fits(scene: &Scene) -> Result<(), String> {
+    let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
+    if !names.is_sorted() {
+        return Err("its views are not in the order of their names, which the layout is read in".to_owned());
+    }
+    for view in &scene.views {
+        let pinhole = &view.camera.pinhole;
+        let ([fx, fy], [cx, cy]) = (pinhole.focal(), pinhole.principal());
+        let reason = if fx != fy {
+            format!("two focal lengths, {fx} and {fy}")
+        } else if (cx - pinhole.width() as f32 / 2.0).abs() > CENTRED
+            || (cy - pinhole.height() as f32 / 2.0).abs() > CENTRED
+        {
+            format!("its principal point at ({cx}, {cy}), not in the centre of the photograph")
+        } else if view.near_far.is_none() {
+            "no near and far depth".to_owned()
+        } else {
+            continue;
+        };
+        return Err(format!("view {:?} has {reason}", view.name));
+    }
+    Ok(())
+}
+
+pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
+    let count = out.scene.views.len();
+    let mut numbers: Vec<f64> = Vec::with_capacity(17 * count);
+    for (index, view) in out.scene.views.iter().enumerate() {
+        out.pinhole_photograph(index, "images")?;
+        let matrix = world_from_camera(out.scene, view);
+        let pinhole = &view.camera.pinhole;
+        let size_and_focal = [pinhole.height().into(), pinhole.width().into(), pinhole.focal()[0].into()];
+        for (row, last) in matrix.iter().zip(size_and_focal) {
+            let [right, down, forward, centre] = *row;
+            numbers.extend([down, right, -forward, centre, last]);
+        }
+        let [near, far] = view.near_far.unwrap_or_default();
+        numbers.extend([near, far].map(|depth| f64::from(depth) * out.scene.frame.scale));
+    }
+    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, 17), }}");
+    // Magic, version and length take 10 bytes; with a line's end the header fills a multiple of 64.
+    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((length as u16).to_le_bytes());
+    bytes.extend(format!("{header:<width$}\n", width = length - 1).into_bytes());
+    bytes.extend(numbers.into_iter().flat_map(f64::to_le_bytes));
+    out.put("poses_bounds.npy", bytes)?;
+    Ok(count)
+}

@@ -1,0 +1,194 @@
+//! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`), and that
+//! what is distorted is undistorted, over whole pictures.
+
+use viewfuse_core::lens::{LARGEST_COEFFICIENT, Lens, LensBlock, LensError, Projection};
+
+/// Points before the camera, at depth 1.
+const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [0.1, 0.7], [-0.8, -0.6]];
+
+/// A camera model with coefficients `k1 .. k6 p1 p2`, and where OpenCV projects [`POINTS`] with a focal length of 1:
+/// `cv2.projectPoints(points, 0, 0, I, [k1, k2, p1, p2, k3, k4, k5, k6])`, `cv2.fisheye.projectPoints(..., [k1, k2, k3, k4])`.
+struct Case {
+    model: &'static str,
+    projection: Projection,
+    coefficients: [f64; 8],
+    expected: [[f64; 2]; 5],
+}
+
+const CASES: [Case; 7] = [
+    Case {
+        model: "SIMPLE_RADIAL",
+        projection: Projection::Perspective,
+        coefficients: [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        expected: [[0.0, 0.0], [0.29532, -0.19688], [-0.519475, 0.3778], [0.094, 0.658], [-0.704, -0.528]],
+    },
+    Case {
+        model: "RADIAL",
+        projection: Projection::Perspective,
+        coefficients: [-0.21, 0.07, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        expected: [
+            [0.0, 0.0],
+            [0.2921649, -0.1947766],
+            [-0.504816640625, 0.367139375],
+            [0.09125, 0.63875],
+            [-0.688, -0.516],
+        ],
+    },
+    Case {
+        model: "OPENCV",
+        projection: Projection::Perspective,
+        coefficients: [0.0578421, -0.0805099, 0.0, 0.0, 0.0, 0.0, -0.000980296, 0.00015575],
+        expected: [
+            [0.0, 0.0],
+            [0.302013574727, -0.201456323298],
+            [-0.554644126884219, 0.40297654856125],
+            [0.10082310606, 0.70472646942],
+            [-0.78245173416, -0.58793590912],
+        ],
+    },
+    Case {
+        model: "FULL_OPENCV",
+        projection: Projection::Perspective,
+        coefficients: [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021],
+        expected: [
+            [0.0, 0.0],
+            [0.300364400809319, -0.200255933872879],
+            [-0.554967605352231, 0.403507690256168],
+            [0.0994055640707766, 0.703838948495436],
+            [-0.788535737425405, -0.588526803069054],
+        ],
+    },
+    Case {
+        model: "SIMPLE_RADIAL_FISHEYE",
+        projection: Projection::Fisheye,
+        coefficients: [-0.04, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        expected: [
+            [0.0, 0.0],
+            [0.286549290946965, -0.19103286063131],
+            [-0.476107928604545, 0.346260311712396],
+            [0.0857230619579857, 0.6000614337059],
+            [-0.612815392377809, -0.459611544283356],
+        ],
+    },
+    Case {
+        model: "RADIAL_FISHEYE",
+        projection: Projection::Fisheye,
+        coefficients: [0.05, -0.013, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        expected: [
+            [0.0, 0.0],
+            [0.2895987259021, -0.193065817268067],
+            [-0.490813959007523, 0.356955606550926],
+            [0.0885282386624818, 0.619697670637372],
+            [-0.644589441219546, -0.483442080914659],
+        ],
+    },
+    Case {
+        model: "OPENCV_FISHEYE",
+        projection: Projection::Fisheye,
+        coefficients: [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0],
+        expected: [
+            [0.0, 0.0],
+            [0.289996861286025, -0.19333124085735],
+            [-0.492735661444777, 0.358353208323474],
+            [0.0888962535414082, 0.622273774789857],
+            [-0.649096879213847, -0.486822659410385],
+        ],
+    },
+];
+
+impl Case {
+    fn lens(&self) -> Lens {
+        Lens::new(self.projection, self.coefficients).expect("a lens")
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// A picture of 1600 x 1200 pixels with this focal length: its pixels' normalised coordinates, every 20th of them, the
+/// corners among them.
+fn picture(focal: f64) -> impl Iterator<Item = [f64; 2]> {
+    let rows = (0..=1200).step_by(20);
+    rows.flat_map(move |y| (0..=1600).step_by(20).map(move |x| [f64::from(x) - 800.0, f64::from(y) - 600.0]))
+        .map(move |pixel| pixel.map(|value| value / focal))
+}
+
+#[test]
+fn each_model_is_that_of_opencv() {
+    for case in &CASES {
+        for (point, expected) in POINTS.into_iter().zip(case.expected) {
+            let found = case.lens().distort(point);
+            assert!(distance(found, expected) < 1e-14, "{}: {found:?} instead of {expected:?}", case.model);
+        }
+    }
+}
+
+#[test]
+fn what_is_distorted_is_undistorted_over_the_whole_picture() {
+    let focal = 1100.0;
+    for case in &CASES {
+        let lens = case.lens();
+        let mut worst = (0.0_f64, 0.0_f64);
+        for point in picture(focal) {
+            assert!(point[0].hypot(point[1]) <= lens.reach(2.0), "{}", case.model);
+            let back = lens.undistort(lens.distort(point));
+            worst = (worst.0.max(distance(back.point, point) * focal), worst.1.max(back.residual * focal));
+        }
+        // The promise is 1e-6 pixels.
+        assert!(worst.0 < 1e-9 && worst.1 < 1e-9, "{}: {worst:?} pixels", case.model);
+    }
+}
+
+#[test]
+fn the_same_in_single_precision() {
+    let focal = 1100.0;
+    for case in &CASES {
+        let (lens, block) = (case.lens(), case.lens().block());
+        let mut worst = (0.0_f64, 0.0_f64);
+        for point in picture(focal) {
+            let exact = lens.distort(point);
+            let found = block.distort(point.map(|value| value as f32)).map(f64::from);
+            let back = block.undistort(exact.map(|value| value as f32));
+            worst.0 = worst.0.max(distance(found, exact) * focal);
+            worst.1 = worst.1.max(distance(back.point.map(f64::from), point) * focal);
+            assert!(f64::from(back.residual) * focal < 2e-3, "{}: {back:?}", case.model);
+        }
+        assert!(worst.0 < 1e-3 && worst.1 < 5e-3, "{}: {worst:?} pixels", case.model);
+    }
+}
+
+#[test]
+fn what_no_ideal_point_maps_to_is_told() {
+    // This barrel folds at a radius of sqrt(1 / 0.9), where the photograph's is 0.703.
+    let barrel = Lens::new(Projection::Perspective, [-0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let fold = (1.0_f64 / 0.9).sqrt();
+    assert!((barrel.reach(2.0) - fold).abs() < 1e-3, "{}", barrel.reach(2.0));
+    let inside = barrel.undistort([0.69, 0.0]);
+    assert!(inside.residual < 1e-12 && inside.point[0] < fold, "{inside:?}");
+    assert!(barrel.undistort([0.8, 0.0]).residual > 0.09);
+    // A fisheye's picture is wider than any ideal one.
+    let fisheye = Lens::new(Projection::Fisheye, [0.0; 8]).expect("a lens");
+    assert!(fisheye.undistort([1.5, 0.0]).residual < 1e-12);
+    assert!(fisheye.undistort([1.8, 0.0]).residual > 0.2);
+    for lens in [barrel, fisheye] {
+        for point in [[f64::NAN, 0.0], [f64::INFINITY, 1.0], [1e300, -1e300]] {
+            let found = lens.undistort(point);
+            assert!(!(found.residual < 1.0), "{found:?}");
+        }
+    }
+}
+
+#[test]
+fn coefficients_are_checked() {
+    for (index, value) in [(0, f64::NAN), (3, f64::INFINITY), (7, 2.0 * LARGEST_COEFFICIENT)] {
+        let mut coefficients = [0.0; 8];
+        coefficients[index] = value;
+        let error = Lens::new(Projection::Perspective, coefficients).expect_err("no lens");
+        assert_eq!(error, LensError::Coefficient(index));
+        assert!(error.to_string().contains(["k1", "", "", "k4", "", "", "", "p2"][index]), "{error}");
+    }
+    let pinhole = Lens::new(Projection::Perspective, [0.0; 8]).expect("a pinhole");
+    assert!(pinhole.is_pinhole() && !Lens::new(Projection::Fisheye, [0.0; 8]).expect("a lens").is_pinhole());
+    assert_eq!((pinhole.block(), pinhole.distort([0.3, 0.4])), (LensBlock::default(), [0.3, 0.4]));
+}

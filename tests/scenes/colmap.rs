@@ -1,0 +1,204 @@
+//! COLMAP's models: both forms, where they stand, what is left out and what is refused.
+
+use super::made::*;
+use viewfuse::scene::Scene;
+use viewfuse_core::Vec3;
+use viewfuse_core::lens::Projection;
+use viewfuse_tests::scenes::{Folder, POINT_WORLD};
+
+#[test]
+fn both_forms_are_the_same_scene() {
+    for folder in [colmap_text(), colmap_binary()] {
+        let scene = open(&folder);
+        assert_eq!((scene.layout, names(&scene)), ("colmap", vec!["b 2", "b 10"]));
+        for view in 0..2 {
+            assert_pixel(&scene, view, [7.5 + 5.0, 6.5 - 3.0]);
+        }
+        assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+        let [point, other] = &scene.points[..] else { panic!("{:?}", scene.points) };
+        assert_eq!(point.position_world, Vec3::from_array(POINT_WORLD));
+        assert_eq!((point.error, point.colour, &point.views[..]), (Some(0.25), [10, 20, 30], &[0, 1][..]));
+        assert_eq!((other.error, &other.views[..]), (None, &[][..]));
+    }
+}
+
+#[test]
+fn a_model_may_stand_in_several_places() {
+    let files = [
+        ("cameras.bin", cameras_binary(&[pinhole()])),
+        ("images.bin", images_binary(&IMAGES)),
+        ("points3D.bin", points_binary()),
+    ];
+    let places = [
+        ("sparse/0/", "images/"),
+        ("sparse/", "images_4/"),
+        ("dense/0/sparse/", "dense/0/images/"),
+        ("dense/0/sparse/", "images_8/"),
+        ("colmap/sparse/0/", "images/"),
+        ("", "images/"),
+        ("", ""),
+    ];
+    for (model, images) in places {
+        let folder = Folder::new();
+        files.iter().for_each(|(name, bytes)| _ = folder.write(&format!("{model}{name}"), bytes));
+        IMAGES.iter().for_each(|(_, _, name)| _ = folder.image(&format!("{images}{name}"), 16, 12));
+        let scene = open(&folder);
+        assert_pixel(&scene, 1, [7.5 + 5.0, 6.5 - 3.0]);
+        // The model's folder may be named itself.
+        let inner = Scene::open(folder.path().join(model)).expect("the model");
+        assert_eq!(inner.views.len(), 2);
+    }
+}
+
+#[test]
+fn extensions_may_have_changed_and_points_may_be_missing() {
+    let folder = colmap_binary();
+    folder.remove("images/b 2.png").image("images/b 2.jpg", 16, 12).remove("sparse/0/points3D.bin");
+    let scene = open(&folder);
+    assert_eq!((names(&scene), scene.points.len(), scene.warnings.len()), (vec!["b 2", "b 10"], 0, 0));
+}
+
+#[test]
+fn missing_photographs_are_left_out_and_counted_once() {
+    for folder in [colmap_text(), colmap_binary()] {
+        folder.remove("images/b 2.png");
+        let scene = open(&folder);
+        assert_eq!(names(&scene), ["b 10"]);
+        assert_eq!(scene.points[0].views, [0]);
+        let [warning] = &scene.warnings[..] else { panic!("{:?}", scene.warnings) };
+        assert!(warning.contains("1 of 2 photographs") && warning.contains("b 2.png"), "{warning}");
+        folder.remove("images/b 10.png");
+        let begins = if folder.path().join("sparse/0/images.txt").is_file() {
+            "sparse/0/images.txt:4: this pose has no photograph"
+        } else {
+            "sparse/0/images.bin: byte"
+        };
+        assert_refused(&folder, begins, &["this pose has no photograph", "b 2.png"]);
+    }
+}
+
+#[test]
+fn text_without_the_lines_of_points_is_read() {
+    let folder = colmap_text();
+    let text = images_text(&IMAGES).replace("1.5 2.5 -1 3 4 1\n", "");
+    folder.write("sparse/0/images.txt", &text);
+    assert_eq!(open(&folder).views.len(), 2);
+    // As COLMAP writes an image in which nothing was found.
+    folder.write("sparse/0/images.txt", images_text(&IMAGES).replace("1.5 2.5 -1 3 4 1\n", "\n"));
+    assert_eq!(open(&folder).views.len(), 2);
+}
+
+#[test]
+fn every_camera_model_is_read() {
+    // Parameters count from 1 after focal lengths and principal point, so that each coefficient shows where it went.
+    let perspective = Projection::Perspective;
+    let cases: [(u32, &str, usize, usize, Projection, [f64; 8]); 9] = [
+        (0, "SIMPLE_PINHOLE", 1, 0, perspective, [0.0; 8]),
+        (1, "PINHOLE", 2, 0, perspective, [0.0; 8]),
+        (2, "SIMPLE_RADIAL", 1, 1, perspective, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (3, "RADIAL", 1, 2, perspective, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (4, "OPENCV", 2, 4, perspective, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.3, 0.4]),
+        (5, "OPENCV_FISHEYE", 2, 4, Projection::Fisheye, [0.1, 0.2, 0.3, 0.4, 0.0, 0.0, 0.0, 0.0]),
+        (6, "FULL_OPENCV", 2, 8, perspective, [0.1, 0.2, 0.5, 0.6, 0.7, 0.8, 0.3, 0.4]),
+        (8, "SIMPLE_RADIAL_FISHEYE", 1, 1, Projection::Fisheye, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        (9, "RADIAL_FISHEYE", 1, 2, Projection::Fisheye, [0.1, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+    ];
+    for (id, name, focal_count, coefficient_count, projection, expected) in cases {
+        let mut parameters = vec![40.0, 48.0][..focal_count].to_vec();
+        parameters.extend([15.0, 13.0]);
+        parameters.extend((1..=coefficient_count).map(|index| f64::from(index as u32) / 10.0));
+        let camera = Camera(7, id, name, parameters);
+        let (text, binary) = (colmap_text(), colmap_binary());
+        text.write("sparse/0/cameras.txt", cameras_text(std::slice::from_ref(&camera)));
+        binary.write("sparse/0/cameras.bin", cameras_binary(&[camera]));
+        for folder in [text, binary] {
+            let scene = open(&folder);
+            let view = &scene.views[0];
+            let focal_y = if focal_count == 1 { 20.0 } else { 24.0 };
+            assert_eq!((view.camera.pinhole.focal(), view.camera.pinhole.principal()), ([20.0, focal_y], [7.5, 6.5]));
+            match view.lens {
+                None => assert_eq!(coefficient_count, 0, "{name}"),
+                Some(lens) => {
+                    assert_eq!(lens.projection(), projection, "{name}");
+                    let found = lens.coefficients();
+                    assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{name}: {found:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn models_that_are_not_read_are_named() {
+    for (id, name) in [(7, "FOV"), (10, "THIN_PRISM_FISHEYE"), (4711, "NONSENSE")] {
+        let camera = Camera(7, id, name, vec![40.0, 48.0, 15.0, 13.0, 0.1]);
+        let (text, binary) = (colmap_text(), colmap_binary());
+        text.write("sparse/0/cameras.txt", cameras_text(std::slice::from_ref(&camera)));
+        binary.write("sparse/0/cameras.bin", cameras_binary(&[camera]));
+        let said = format!("camera model {name} is not supported");
+        assert_refused(&text, "sparse/0/cameras.txt:2: ", &[&said, "OPENCV_FISHEYE"]);
+        assert_refused(&binary, "sparse/0/cameras.bin: byte 8: ", &[&format!("camera model {id} is not"), "PINHOLE"]);
+    }
+}
+
+#[test]
+fn damaged_text_is_told_by_its_line() {
+    let refused = |name: &str, text: String, begins: &str, parts: &[&str]| {
+        let folder = colmap_text();
+        folder.write(&format!("sparse/0/{name}"), text);
+        assert_refused(&folder, &format!("sparse/0/{name}{begins}"), parts);
+    };
+    let cameras = cameras_text(&[pinhole()]);
+    refused("cameras.txt", cameras.replace("48", "forty"), ":2: \"forty\" is not a number", &[]);
+    refused("cameras.txt", cameras.replace("48", "NaN"), ":2: \"NaN\" is not a finite number", &[]);
+    refused("cameras.txt", cameras.replace(" 48", ""), ":2: found 3 parameters", &["instead of 4"]);
+    refused("cameras.txt", cameras.replace("7 PIN", "-7 PIN"), ":2: \"-7\" is not a whole number", &[]);
+    refused("cameras.txt", cameras.replace("32 24", "32 0"), ":2: image size 32 x 0", &[]);
+    refused("cameras.txt", format!("{cameras}{}", &cameras[12..]), ":3: there are two cameras with the number 7", &[]);
+    let images = images_text(&IMAGES);
+    refused("images.txt", images.replace(" 7 b", " 8 b"), ":4: there is no camera with the number 8", &[]);
+    refused("images.txt", images.replace("12 0.5", "11 0.5"), ":2: there are two images with the number 11", &[]);
+    refused("images.txt", images.replace("12 0.5 -0.5", "12 0.9 -0.5"), ":4: not a camera pose", &["scaled"]);
+    refused("images.txt", images.replace(" 7 b 2.png", ""), ":4: found 8 words of an image instead of 10", &[]);
+    refused("images.txt", "# nothing\n".to_owned(), ": the scene has no photographs", &[]);
+    let twice = images.replace("b 10.png", "c/b 2.png");
+    let folder = colmap_text();
+    folder.image("images/c/b 2.png", 16, 12).write("sparse/0/images.txt", &twice);
+    assert_eq!(names(&open(&folder)), ["images_b 2", "c_b 2"]);
+    refused("points3D.txt", points_text().replace("0.25 12", "0.25"), ":2: found 13 words", &[]);
+    refused(
+        "points3D.txt",
+        points_text().replace("1 0 0 0", "1 0 inf 0").replace("5 0 0 0", "5 0 inf 0"),
+        ":3: \"inf\"",
+        &[],
+    );
+}
+
+#[test]
+fn damaged_binaries_are_told_by_their_byte() {
+    let refused = |name: &str, bytes: Vec<u8>, parts: &[&str]| {
+        let folder = colmap_binary();
+        folder.write(&format!("sparse/0/{name}"), bytes);
+        assert_refused(&folder, &format!("sparse/0/{name}: "), parts);
+    };
+    let cameras = cameras_binary(&[pinhole()]);
+    refused("cameras.bin", cameras[..40].to_vec(), &["ends after 40 bytes, inside the parameters of a camera"]);
+    refused("cameras.bin", [&cameras[..], b"x"].concat(), &["1 bytes are left over"]);
+    let mut many = cameras.clone();
+    many[..8].copy_from_slice(&u64::MAX.to_le_bytes());
+    refused("cameras.bin", many, &["byte 0: announces 18446744073709551615 cameras; the file has room for 2"]);
+    let mut nan = cameras.clone();
+    nan[32..40].copy_from_slice(&f64::NAN.to_le_bytes());
+    refused("cameras.bin", nan, &["byte 32: \"NaN\" is not a finite number"]);
+    refused("cameras.bin", cameras_binary(&[pinhole(), pinhole()]), &["two cameras with the number 7"]);
+    refused("images.bin", images_binary(&[(1, 8, "b 2.png")]), &["there is no camera with the number 8"]);
+    refused("images.bin", images_binary(&[]), &["no photographs"]);
+    let images = images_binary(&IMAGES);
+    refused("images.bin", images[..images.len() - 5].to_vec(), &["announces 1 points in an image", "room for 0"]);
+    refused("images.bin", images[..20].to_vec(), &["byte 0: announces 2 images", "room for 0"]);
+    let mut name = images.clone();
+    name[8 + 4 + 56 + 4] = 0xff;
+    refused("images.bin", name, &["the name of an image is not UTF-8"]);
+    let points = points_binary();
+    refused("points3D.bin", points[..points.len() - 1].to_vec(), &["room for 0"]);
+}

@@ -1,0 +1,99 @@
+//! Photographs taken through lenses, undistorted when they are read: a smooth picture in the world must come out where the
+//! pinhole sees it, and what the lens did not see is marked.
+
+use super::made::open;
+use serde_json::{Value, json};
+use viewfuse_core::lens::{Lens, Projection};
+use viewfuse_tests::scenes::{self, Folder};
+
+const SIZE: [u32; 2] = [96, 64];
+const FOCAL: f64 = 60.0;
+const CENTRE: [f64; 2] = [47.0, 33.0];
+
+/// A smooth picture of directions: red follows x, green y.
+fn colour(ideal: [f64; 2]) -> [f64; 3] {
+    [127.5 + 90.0 * (3.0 * ideal[0]).sin(), 127.5 + 90.0 * (3.0 * ideal[1]).sin(), 60.0]
+}
+
+fn pixel_centre(column: u32, row: u32) -> [f64; 2] {
+    [(f64::from(column) + 0.5 - CENTRE[0]) / FOCAL, (f64::from(row) + 0.5 - CENTRE[1]) / FOCAL]
+}
+
+/// The photograph that the lens takes of the directions, with `transforms.json`.
+fn folder(model: &str, lens: &Lens) -> Folder {
+    let photograph = image::RgbImage::from_fn(SIZE[0], SIZE[1], |column, row| {
+        let ideal = lens.undistort(pixel_centre(column, row)).point;
+        image::Rgb(colour(ideal).map(|value| value.round() as u8))
+    });
+    let folder = Folder::new();
+    photograph.save(folder.file("images/1.png")).expect("a photograph");
+    let mut transforms = json!({
+        "camera_model": model, "fl_x": FOCAL, "fl_y": FOCAL, "cx": CENTRE[0], "cy": CENTRE[1], "w": SIZE[0], "h": SIZE[1],
+        "frames": [{ "file_path": "images/1.png", "transform_matrix": scenes::opengl_matrix() }],
+    });
+    for (key, value) in ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"].into_iter().zip(lens.coefficients()) {
+        transforms[key] = Value::from(value);
+    }
+    folder.write("transforms.json", transforms.to_string());
+    folder
+}
+
+#[test]
+fn photographs_are_those_of_the_pinhole() {
+    let perspective = Projection::Perspective;
+    for (model, projection, coefficients) in [
+        ("SIMPLE_RADIAL", perspective, [-0.12, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ("RADIAL", perspective, [0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        ("OPENCV", perspective, [-0.1, 0.02, 0.0, 0.0, 0.0, 0.0, 0.004, -0.006]),
+        ("FULL_OPENCV", perspective, [0.31, -0.18, 0.021, 0.27, -0.11, 0.013, 0.0013, -0.0021]),
+        ("OPENCV_FISHEYE", Projection::Fisheye, [0.0621, -0.0187, 0.0093, -0.0021, 0.0, 0.0, 0.0, 0.0]),
+    ] {
+        let lens = Lens::new(projection, coefficients).expect("a lens");
+        let folder = folder(model, &lens);
+        let scene = open(&folder);
+        assert_eq!(scene.views[0].lens, Some(lens), "{model}");
+        let photograph = scene.photograph(0).expect("a photograph");
+        assert!(!photograph.has_alpha);
+        let (mut compared, mut worst) = (0, 0.0_f64);
+        for (column, row, pixel) in photograph.pixels.enumerate_pixels() {
+            let ideal = pixel_centre(column, row);
+            let at = lens.distort(ideal);
+            let place = [at[0] * FOCAL + CENTRE[0], at[1] * FOCAL + CENTRE[1]];
+            let inside = |margin: f64| {
+                place.into_iter().zip(SIZE).all(|(at, side)| at >= margin && at <= f64::from(side) - margin)
+            };
+            let seen = photograph.seen.as_ref().is_none_or(|seen| seen.get_pixel(column, row)[0] == 255);
+            assert_eq!(seen, inside(0.0), "{model}: {column}, {row}");
+            // Nearer than half a pixel to the border there is nothing to interpolate with.
+            if inside(0.5) {
+                compared += 1;
+                let expected = colour(ideal);
+                let error = (0..3).map(|c| (f64::from(pixel[c]) - expected[c]).abs()).fold(0.0, f64::max);
+                worst = worst.max(error);
+            }
+        }
+        // Two roundings to 8 bits and the curvature between neighbours.
+        assert!(compared > 4000 && worst < 2.0, "{model}: {worst} over {compared}");
+    }
+}
+
+#[test]
+fn what_the_lens_did_not_see_is_marked_and_not_black() {
+    // Stronger at the border than the photograph is wide: the corners of the pinhole's picture lie outside.
+    let lens = Lens::new(Projection::Perspective, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let read = |lens: &Lens| {
+        let folder = folder("RADIAL", lens);
+        open(&folder).photograph(0).expect("a photograph")
+    };
+    let photograph = read(&lens);
+    let seen = photograph.seen.expect("unseen corners");
+    assert_eq!((seen.get_pixel(0, 0)[0], seen.get_pixel(47, 33)[0]), (0, 255));
+    assert!(photograph.pixels.pixels().all(|pixel| pixel[2] == 60 && pixel[3] == 255));
+    // One that sees more than the pinhole marks nothing.
+    let barrel = Lens::new(Projection::Perspective, [-0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    assert_eq!(read(&barrel).seen, None);
+    // Where the polynomial folds over, the photograph shows nothing either.
+    let folded = Lens::new(Projection::Perspective, [-0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let seen = read(&folded).seen.expect("a fold");
+    assert_eq!((seen.get_pixel(0, 0)[0], seen.get_pixel(47, 33)[0]), (0, 255));
+}
