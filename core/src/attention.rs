@@ -213,8 +213,8 @@ pub fn attend<const S: usize>(
     softmax_of_products(&sums, &rests, count)
 }
 
-/// The scalar product of a query with a key, and what rounding took from it: an error of a logit is a relative error of
-/// its weight, and 128 roundings of sums of 50 would cost 1e-5. The sum runs in order.
+/// The dot product of a query and a key, and its rounding error: an error of a logit is a relative error of its weight,
+/// and 128 roundings of sums of 50 would cost 1e-5. The sum runs in order.
 #[inline]
 fn product(query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized)) -> (f32, f32) {
     let (mut sum, mut rest) = (0.0, 0.0);
@@ -230,7 +230,7 @@ fn product(query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized))
     (sum, if abs(rest) <= f32::MAX { rest } else { 0.0 })
 }
 
-/// `softmax(products / sqrt(A))`. Differences from the largest are taken before anything is rounded again.
+/// `softmax(products / sqrt(A))`. The largest is subtracted before anything is rounded again.
 #[inline]
 fn softmax_of_products<const S: usize>(sums: &[f32; S], rests: &[f32; S], count: u32) -> Weights<S> {
     // 1 / sqrt(128) = sqrt(2) / 16

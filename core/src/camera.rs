@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use core::fmt;
 use glam::Vec3;
 
-/// Why numbers are not a pinhole camera.
+/// Why intrinsics are not those of a pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PinholeError {
     /// A focal length is not a number from [`SHORTEST_FOCAL`] to [`LONGEST_FOCAL`].
@@ -51,7 +51,7 @@ impl Pinhole {
     /// Focal lengths `[x, y]` and principal point `[x, y]` in pixels of an image of `width` x `height`.
     ///
     /// # Errors
-    /// [`PinholeError`] names the first quantity that is not usable.
+    /// [`PinholeError`] names the first invalid quantity.
     pub fn new(focal: [f32; 2], principal: [f32; 2], width: u32, height: u32) -> Result<Pinhole, PinholeError> {
         // Wide enough for any lens on any image, narrow enough that no quotient of coordinates overflows.
         let usable = |f: f32| (SHORTEST_FOCAL..=LONGEST_FOCAL).contains(&f);
@@ -95,7 +95,7 @@ impl Pinhole {
     /// scale with their axis.
     ///
     /// # Errors
-    /// [`PinholeError::Size`] for an unusable size.
+    /// [`PinholeError::Size`] for an invalid size.
     pub fn resized(&self, width: u32, height: u32) -> Result<Pinhole, PinholeError> {
         // A width of 0 would otherwise be found in the focal length that it scales.
         if width == 0 || height == 0 {
@@ -138,7 +138,7 @@ pub struct Projection {
     pub y: f32,
     /// Distance along the principal axis, in world units; not positive for points behind the camera.
     pub depth: f32,
-    /// The point is in front of the camera: `x` and `y` mean something.
+    /// The point is in front of the camera: `x` and `y` are defined.
     pub in_front: bool,
     /// The point is in front of the camera and inside the image.
     pub in_image: bool,
@@ -147,9 +147,9 @@ pub struct Projection {
 /// A pinhole camera with its pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where the camera stands and how it is turned.
+    /// The camera's centre and orientation.
     pub pose: Pose,
-    /// How it maps directions to pixels.
+    /// The intrinsics.
     pub pinhole: Pinhole,
 }
 
@@ -186,7 +186,7 @@ impl Camera {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CameraBlock {
-    /// Where the camera stands and how it is turned.
+    /// The camera's centre and orientation.
     pub pose: PoseBlock,
     /// Focal lengths x, y and principal point x, y, in pixels.
     pub intrinsics: [f32; 4],
@@ -225,7 +225,7 @@ impl CameraBlock {
         let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;
         let place = self.pose.rotate_to_camera(point_world - self.centre_world());
         let depth = place.z;
-        // The smallest depth whose reciprocal and products stay finite for any point that is worth looking at.
+        // The smallest depth whose reciprocal and products stay finite for every coordinate in range.
         if !(depth > 1.0e-20) {
             return Projection { x: 0.0, y: 0.0, depth, in_front: false, in_image: false };
         }

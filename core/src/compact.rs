@@ -3,7 +3,7 @@
 
 use crate::pages::Fetch;
 
-/// Elements of a run: one invocation goes through it.
+/// Elements of a run, which one invocation processes.
 pub const RUN: u32 = 256;
 
 /// The first element of a run, and the one behind its last.
@@ -12,7 +12,7 @@ fn ends(element_count: u32, run: u32) -> (u32, u32) {
     (run * RUN, (run * RUN + RUN).min(element_count))
 }
 
-/// How many elements of a run `mask[element]` marks: everything but 0 does. The last run may be shorter than [`RUN`].
+/// How many elements of a run `mask[element]` marks: every value but 0 marks. The last run may be shorter than [`RUN`].
 #[inline]
 pub fn marked_in_run(mask: &(impl Fetch<u32> + ?Sized), element_count: u32, run: u32) -> u32 {
     let (mut element, end) = ends(element_count, run);

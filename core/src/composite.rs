@@ -1,4 +1,4 @@
-//! Samples along a ray become a pixel: emission-absorption compositing as a stream.
+//! Compositing: samples along a ray become a pixel, by emission and absorption, one sample at a time.
 //!
 //! Source: NeRF, equation 3, in transmittance form. With the optical depth `o_i = density_i * length_i` of sample `i`,
 //! the transmittance in front of it is `T_i = exp(-(o_0 + ... + o_(i-1)))` and its weight is `T_i - T_(i+1)`. The optical
@@ -10,7 +10,7 @@ use crate::math::{exp, max};
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
-/// A ray on its way from the camera: accumulates `C` channels and the depth.
+/// The state of compositing along a ray: `C` accumulated channels and the depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compositor<const C: usize> {
     accumulated: [f32; C],
@@ -23,13 +23,13 @@ pub struct Compositor<const C: usize> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RayBlock {
-    /// Channels gathered so far.
+    /// Weighted sums of the channels so far.
     pub accumulated: [f32; 3],
-    /// Depths gathered so far, by weight.
+    /// Weighted sum of the depths so far.
     pub weighted_depth: f32,
     /// Sum of the optical depths.
     pub optical_depth: f32,
-    /// How much light passes what was met so far.
+    /// Transmittance of the samples so far.
     pub transmittance: f32,
 }
 
@@ -43,7 +43,7 @@ impl Compositor<3> {
 }
 
 impl RayBlock {
-    /// The ray that goes on from this state.
+    /// The compositor that continues from this state.
     #[inline]
     pub fn compositor(&self) -> Compositor<3> {
         let RayBlock { accumulated, weighted_depth, optical_depth, transmittance } = *self;
@@ -51,19 +51,19 @@ impl RayBlock {
     }
 }
 
-/// What a ray saw.
+/// The composited pixel of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Composite<const C: usize> {
-    /// Accumulated channels with the background behind.
+    /// Accumulated channels, composited over the background.
     pub channels: [f32; C],
     /// Mean depth of what was hit, divided by the accumulated weight; `empty_depth` for a ray that hit nothing.
     pub depth: f32,
-    /// `1 - transmittance`: how much of the background is hidden, in `[0, 1]`.
+    /// Opacity: `1 - transmittance`, in `[0, 1]`.
     pub opacity: f32,
 }
 
 impl<const C: usize> Compositor<C> {
-    /// A ray that has met nothing yet.
+    /// No samples yet: transmittance 1.
     pub const START: Compositor<C> =
         Compositor { accumulated: [0.0; C], weighted_depth: 0.0, optical_depth: 0.0, transmittance: 1.0 };
 
@@ -83,7 +83,7 @@ impl<const C: usize> Compositor<C> {
     /// sample's occupancy in `[0, 1]` (NaN counts as 0). Returns the sample's weight.
     ///
     /// This is the volume rendering of nested solids, one for each level of occupancy: the transmittance is 1 minus
-    /// the largest occupancy met, whatever the step, where a density would depend on it. For one ray use either this
+    /// the largest occupancy so far, for any step, while a density would depend on the step. For one ray use either this
     /// or [`Compositor::add`].
     #[inline]
     pub fn add_solid(&mut self, channels: &[f32; C], occupancy: f32, depth: f32) -> f32 {
@@ -107,14 +107,14 @@ impl<const C: usize> Compositor<C> {
         weight
     }
 
-    /// How much light passes what was met so far, in `[0, 1]`.
+    /// Transmittance of the samples so far, in `[0, 1]`.
     #[inline]
     pub fn transmittance(&self) -> f32 {
         self.transmittance
     }
 
-    /// Whether the ray may end here: nothing behind can change a channel whose values span `range` by more than
-    /// `threshold * range`, because all that is behind together has the weight `transmittance <= threshold`.
+    /// Early termination: whether the samples behind can be left out. Together they have the weight
+    /// `transmittance <= threshold`, so they change a channel whose values span `range` by at most `threshold * range`.
     #[inline]
     pub fn is_terminated(&self, threshold: f32) -> bool {
         self.transmittance <= threshold
@@ -139,7 +139,7 @@ impl<const C: usize> Compositor<C> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct CompositeBlock {
-    /// What is behind everything, red green blue.
+    /// Background colour: red, green, blue.
     pub background: [f32; 3],
     /// Depth of a ray that hits nothing.
     pub empty_depth: f32,

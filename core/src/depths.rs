@@ -1,4 +1,4 @@
-//! Where along a ray to look: depth samples.
+//! Depth samples along rays.
 //!
 //! Depths are distances along the ray in world units. NeRF's two kinds: stratified (one jittered sample in each of `N`
 //! equal parts of the interval) and importance samples by inverting the distribution that a first pass found; and
@@ -23,9 +23,9 @@ pub const PROBABILITY_FLOOR: f32 = 1.0e-5;
 
 /// The depth at which the distribution given by `weights` over `N` equal parts of `[near, far]` reaches `u`.
 ///
-/// Within a part the distribution is uniform. Negative and NaN weights count as 0, those above 1e30 as that. `u` is limited to `[0, 1]`. The
-/// cumulative sum is compared with `u` times its own total, so that it cannot end below 1 and the result never leaves
-/// `[near, far]` (in the published code a sum that rounds below 1 puts samples beyond the end). Increasing in `u`.
+/// Within a part the distribution is uniform. Negative and NaN weights count as 0, weights above 1e30 as 1e30. `u` is
+/// limited to `[0, 1]`. The cumulative sum is compared with `u` times its own total, so the result never leaves
+/// `[near, far]` (in the published code a sum that rounds below 1 puts samples beyond `far`). Increasing in `u`.
 #[inline]
 pub fn inverse_cdf<const N: usize>(near: f32, far: f32, weights: &[f32; N], u: f32) -> f32 {
     const { assert!(N > 0) };
@@ -68,7 +68,7 @@ pub struct CoarseBlock {
     pub seed: [u32; 2],
     /// Samples on each ray.
     pub sample_count: u32,
-    /// How far samples stray from the middle of their part: 0 not at all, 1 all over it.
+    /// Jitter of a sample in its part: 0 puts it at the middle, 1 anywhere in the part.
     pub jitter: f32,
 }
 
@@ -120,10 +120,10 @@ pub fn random_draw(pixel: u32, index: u32, block: &FineBlock) -> [f32; 2] {
     }
 }
 
-/// Depth of fine sample `index` on a ray, limited to its part that is looked at. Importance samples first: anywhere in the
-/// coarse part (as the second random number says) in which the distribution of `seen[part]` (weight, transmittance)
-/// reaches the first. Then depth samples: normally distributed around `depth`, the mean depth of the first pass on a ray
-/// of this `opacity`. Where that is NaN they lie at `near`.
+/// Depth of fine sample `index` on a ray, limited to the ray's near and far bounds. Importance samples come first: they
+/// lie in the coarse part in which the distribution of `seen[part]` (weight, transmittance) reaches the first random
+/// number, at the fraction that the second one gives. Then depth samples: normally distributed around `depth`, the mean
+/// depth of the first pass on a ray of this `opacity`. Where that is NaN they lie at `near`.
 #[inline]
 pub fn fine_depth(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),

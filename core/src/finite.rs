@@ -1,11 +1,11 @@
-//! Whether computed numbers are finite, told where they are: what leaves the device is one index for many numbers.
+//! Finds the first NaN or infinity among computed numbers on the device: it returns one index for a run of numbers.
 
 use crate::pages::Fetch;
 
-/// Numbers of a run: one invocation goes through it.
+/// Numbers of a run, which one invocation processes.
 pub const FINITE_RUN: u32 = 1024;
 
-/// What a run without infinity and NaN gives in place of an index.
+/// The result for a run without infinity and NaN, in place of an index.
 pub const ALL_FINITE: u32 = u32::MAX;
 
 /// The index of the first infinite or NaN number of run `run` of `values`, of which there are `value_count`;

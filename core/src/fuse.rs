@@ -1,4 +1,4 @@
-//! The views' latents become one: weighted sums over the source views.
+//! Fusion of latents: weighted sums over the source views.
 //!
 //! Sums run in view order. Source: PixelNeRF's and GeNVS's combine step, with the mean replaced by [`Weights`].
 
@@ -66,7 +66,7 @@ pub struct VisibleFusion<const C: usize> {
 }
 
 impl<const C: usize> VisibleFusion<C> {
-    /// Nothing seen yet.
+    /// No views yet.
     pub const EMPTY: VisibleFusion<C> = VisibleFusion { sum: [0.0; C], seen_weight: 0.0 };
 
     /// Adds a view's latent with `weight * visibility` as its share; both at least 0.

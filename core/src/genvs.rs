@@ -52,8 +52,8 @@ pub struct VolumePlace {
 }
 
 impl VolumePlace {
-    /// Where a point lies in a view's volume. Nodes' centres lie at halves. What is not in front of the view, or not
-    /// within a node of the volume, gets a place outside.
+    /// Where a point lies in a view's volume. Nodes' centres lie at halves. A point that is not in front of the view,
+    /// or not within a node of the volume, gets a place outside.
     #[inline]
     pub fn of(camera: &CameraBlock, point: &RayPoint, block: &VolumeBlock) -> VolumePlace {
         let seen = camera.project(Vec3::from_array(point.position));
@@ -156,19 +156,19 @@ pub struct FeatureBlock {
     pub sample_count: u32,
     /// Features of a sample.
     pub feature_count: u32,
-    /// What the length of a point is multiplied by, to have it in the lengths that the network's densities are for.
+    /// Factor from world units to the unit of length of the network's densities.
     pub length_scale: f32,
-    /// Length of the last sample, which has none behind it; 1e10 as published.
+    /// Length of the last sample of a ray; 1e10 as published.
     pub last_length: f32,
-    /// Whether a sample shades itself, as in published checkpoints: its weight is multiplied by the transmittance behind
-    /// it, not in front of it.
+    /// Inclusive weights, as in published checkpoints: a sample's weight is multiplied by the transmittance behind it,
+    /// not in front of it.
     pub inclusive: u32,
     /// Where the first ray's sums go, counted in rays.
     pub first_ray: u32,
 }
 
 /// Weights of a ray's samples, one at a time and front to back: `weigh(sample, weight)`. `raw[sample][0]` is the network's
-/// density (rectified; NaN, as an optical depth that is none, makes the weights from there on NaN), `points[sample]` has its
+/// density (rectified; a density or optical depth of NaN makes all weights from there on NaN), `points[sample]` has its
 /// length.
 ///
 /// With the optical depth `o_i` and the transmittance `T_i` in front of a sample, exclusive weights are `T_i - T_(i+1)` as
@@ -203,7 +203,7 @@ pub fn weigh_features(
 }
 
 /// Number `element` of `[ray][feature]`: the sum over the ray's samples of `weights[sample]` times the feature, which is
-/// what was looked up plus what the network makes of it: `fused[sample][feature] + raw[sample][1 + feature]`.
+/// the fused feature plus the network's output: `fused[sample][feature] + raw[sample][1 + feature]`.
 #[inline]
 pub fn summed_feature(
     weights: &(impl Fetch<f32> + ?Sized),

@@ -1,15 +1,15 @@
 //! Numbers in half precision (f16, IEEE 754 binary16), two in a word, the lower half first: half the memory at 11
 //! significant bits.
 //!
-//! Made from bits and whole numbers: devices without such a type, and those that round in another way, get the same bits.
+//! Conversions use integer arithmetic only: devices without an f16 type, or with another rounding, get the same bits.
 
 use crate::pages::Fetch;
 
-/// The largest number in half precision; larger ones become this.
+/// The largest number in half precision.
 pub const LARGEST: f32 = 65504.0;
 
-/// The f16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below 2^-14
-/// by 2^-25. What is larger than [`LARGEST`], infinity too, becomes that; NaN stays NaN.
+/// The f16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below
+/// 2^-14 by 2^-25. Larger numbers and infinity become [`LARGEST`]; NaN stays NaN.
 #[inline]
 pub fn f16_bits(number: f32) -> u32 {
     let bits = number.to_bits();
@@ -62,7 +62,7 @@ pub fn packed_f16(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, eleme
     if 2 * element + 1 < number_count as usize { lower | f16_bits(numbers.fetch(2 * element + 1)) << 16 } else { lower }
 }
 
-/// How many words so many numbers take.
+/// Words that this many numbers take.
 #[inline]
 pub const fn word_count(number_count: u32) -> u32 {
     number_count.div_ceil(2)

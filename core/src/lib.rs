@@ -2,35 +2,35 @@
 //!
 //! Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32` and 32-bit integers (only the
 //! metrics, which never run on a device, in `f64`; lenses in either), so that one body serves as the definition on a workstation, as the
-//! source of a GPU kernel and as firmware. The modules stand in the order of the data:
+//! source of a GPU kernel and as firmware. The modules are listed in the order of the data:
 //!
 //! ```text
-//! math              one result on every target                    sqrt, exp, sin_cos, angles, norms
-//! pages             reading elements wherever they lie             Fetch, Pages
+//! math              one result on every target                     sqrt, exp, sin_cos, angles, norms
+//! pages             buffers in one piece or in pages               Fetch, Pages
 //! compact           which elements a mask marks, as a list         marked_in_run, run_offsets, list_run
 //! finite            where the first NaN or infinity is             first_non_finite
 //! half_precision    two numbers in a word (f16)                    f16_bits, f16_value, packed_f16
-//! pose, camera      where the photographs were taken              Pose, Pinhole, Camera, Ray, Projection
-//! lens              what a lens does to a pinhole's image          Lens, LensBlock: distort, undistort
-//! sources           the poses of the source views                 Sources<S>
-//! weights           how much each source counts                   Weights<S>: finite, >= 0, sum 1; leaving views out
-//! weighting         pose -> weight, by formula                    Scheme, weigh
-//! attention         pose -> weight, by (learned) attention        CrossAttention, PoseSelfAttention, ...
-//! random            numbers for (seed, pixel, sample)             uniform, normal
-//! rays, depths      where along which ray to look                 TargetRay, RayPoint, stratified_depth, inverse_cdf
-//! lookup            what a view shows there                       bilinear, trilinear
-//! fuse              the views' latents become one                 fuse_views, fuse_visible
-//! composite         samples along a ray become a pixel            Compositor<C>
-//! sample_mask       which samples can be left out                 is_sampled
-//! network           layers                                        linear, convolve, group_norm, attend, resample
-//! pixelnerf         a point in, radiance out                      embedded_value, gathered_value, radiance
-//! genvs             volumes of features become a feature image    VolumePlace, weigh_features, denoiser_input
-//! schedule          from noise to a picture                       NoiseSchedule, Preconditioning, HeunStep
-//! sampler           ... with few calls of the denoiser            Sampler, Mix, History, Churn, verdict
-//! visual_hull       the training-free field in silhouettes     matched depth, signed distance, density and colour
-//! plane_sweep       ... and for any scene                      evidence, census, paths, disparity, blend
-//! metrics           how good is the picture                       psnr, ssim
-//! kernels           the list of kernels, one row each             Kernel, for_each_kernel
+//! pose, camera      camera poses and intrinsics                    Pose, Pinhole, Camera, Ray, Projection
+//! lens              lens distortion                                Lens, LensBlock: distort, undistort
+//! sources           the poses of the source views                  Sources<S>
+//! weights           weights of the source views                    Weights<S>: finite, >= 0, sum 1; leaving views out
+//! weighting         pose -> weight, by formula                     Scheme, weigh
+//! attention         pose -> weight, by (learned) attention         CrossAttention, PoseSelfAttention, ...
+//! random            random draws for (seed, pixel, sample)         uniform, normal
+//! rays, depths      target rays and samples along them             TargetRay, RayPoint, stratified_depth, inverse_cdf
+//! lookup            interpolation in grids                         bilinear, trilinear
+//! fuse              weighted sums of the views' latents            fuse_views, fuse_visible
+//! composite         compositing of the samples along a ray         Compositor<C>
+//! sample_mask       which samples can be left out                  is_sampled
+//! network           layers                                         linear, convolve, group_norm, attend, resample
+//! pixelnerf         point embedding, latents, radiance             embedded_value, gathered_value, radiance
+//! genvs             volumes of features become a feature image     VolumePlace, weigh_features, denoiser_input
+//! schedule          noise levels of the diffusion denoiser         NoiseSchedule, Preconditioning, HeunStep
+//! sampler           samplers with few calls of the denoiser        Sampler, Mix, History, Churn, verdict
+//! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
+//! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend
+//! metrics           picture quality                                psnr, ssim
+//! kernels           the list of kernels, one row each              Kernel, for_each_kernel
 //! ```
 //!
 //! A module uses only modules listed above it. Types that are checked when they are built ([`pose::Pose`],

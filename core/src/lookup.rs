@@ -1,8 +1,8 @@
-//! Looking up grids of `C` channels between their nodes.
+//! Interpolation in grids of `C` channels.
 //!
 //! Grids are `[row][column]` or `[slice][row][column]`, flat, row-major, one `[f32; C]` a node. Coordinates are continuous
 //! with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres the border
-//! node's value continues; a NaN coordinate is taken as 0. Grids shorter than the stated size are not allowed.
+//! node's value is used; a NaN coordinate counts as 0. Grids shorter than the stated size are not allowed.
 
 use crate::math::clamp;
 use crate::pages::Fetch;

@@ -141,7 +141,7 @@ pub fn ln(x: f32) -> f32 {
 }
 
 /// `ln(a / b)` for positive normal numbers whose quotient is one: relative error at most 4e-7, also where they are almost
-/// equal and the quotient has lost what tells them apart. Otherwise as [`ln`].
+/// equal and the quotient alone has lost their difference. Otherwise as [`ln`].
 #[inline]
 pub fn ln_ratio(a: f32, b: f32) -> f32 {
     // Twice the inverse hyperbolic tangent of z; the difference of numbers within a factor of 2 is exact.
@@ -175,8 +175,9 @@ pub fn exact_power_of_two(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// Sine and cosine of an angle in radians: absolute error below 9e-8 for `|x| <= 8192`. Beyond that the argument
-/// itself is too coarse to mean much; the results stay in `[-1, 1]` (to the same error). A non-finite angle gives `(0, 1)`.
+/// Sine and cosine of an angle in radians: absolute error below 9e-8 for `|x| <= 8192`. Beyond that the argument itself
+/// is too coarse for a meaningful result; the results stay in `[-1, 1]` (to the same error). A non-finite angle gives
+/// `(0, 1)`.
 #[inline]
 pub fn sin_cos(x: f32) -> (f32, f32) {
     // pi / 2 in three parts (Cody and Waite); the products with the first two are exact for |k| < 2^13.

@@ -1,4 +1,4 @@
-//! How good is the picture: PSNR and SSIM of 8-bit images, in `f64`.
+//! Picture quality: PSNR and SSIM of 8-bit images, in `f64`.
 //!
 //! Images are `u8`, `[row][column][channel]`, flat, of equal size. Both metrics are those of scikit-image
 //! (`peak_signal_noise_ratio`, `structural_similarity`), as in the published evaluation.

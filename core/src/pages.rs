@@ -1,4 +1,4 @@
-//! Reading and writing numbered elements, wherever they lie.
+//! Reading and writing elements by index, in one buffer or in several pages.
 //!
 //! Kernels read through [`Fetch`], so that one body serves a slice in memory and a buffer that is longer than a device
 //! can bind at once and therefore lies in up to four [`Pages`] of equal length, a power of two.
@@ -26,8 +26,8 @@ impl<T: Copy, const N: usize> Fetch<T> for [T; N] {
 /// How many pages a buffer can have.
 pub const MOST_PAGES: usize = 4;
 
-/// A buffer in pages of `2^shift` elements; with `shift` 0 everything is on the first page. Pages that are not needed may
-/// be anything, also the first one again.
+/// A buffer in pages of `2^shift` elements; with `shift` 0 everything is on the first page. Unused pages may be any
+/// buffer, also the first one again.
 #[derive(Clone, Copy)]
 pub struct Pages<'a, T> {
     /// Page 0.
@@ -58,7 +58,7 @@ impl<T: Copy> Fetch<T> for Pages<'_, T> {
     }
 }
 
-/// As [`Pages`], to be written.
+/// [`Pages`] that are written.
 pub struct PagesMut<'a, T> {
     /// Page 0.
     pub a: &'a mut [T],

@@ -1,4 +1,4 @@
-//! PixelNeRF's own arithmetic around its network: what goes in for a point, what comes out of it.
+//! PixelNeRF's own arithmetic around its network: the inputs at a point, and radiance from the outputs.
 //!
 //! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, `src/model/models.py`, `encoder.py`, `code.py`. A row of
 //! the network's input is a point as one view has it; rows are `[view][point]`, so that the views of a point can be
@@ -70,8 +70,8 @@ pub fn waves(coordinate: f32, octave: u32, block: &EmbedBlock) -> (f32, f32) {
     sin_cos(coordinate * (block.frequency * exact_power_of_two(octave as i32)))
 }
 
-/// A view's weight at a point, renormalised over the views that have the point in front of them; where none has, its
-/// weight as it is. Views behind which a point lies would see its mirror image.
+/// A view's weight at a point, renormalised over the views that have the point in front of them; if none has, its
+/// weight unchanged. Views behind which a point lies would see its mirror image.
 #[inline]
 pub fn visible_weight(
     views: &(impl Fetch<CameraBlock> + ?Sized),
@@ -148,7 +148,7 @@ pub struct GridPlace {
 
 impl GridPlace {
     /// The place where a point appears in a view. Grid node `i` lies over image column `i * image width / grid width`
-    /// (the published convention); outside the image the border's value continues. A point that is not in front of
+    /// (the published convention); outside the image the border's value is used. A point that is not in front of
     /// the view gets the first node.
     #[inline]
     pub fn of(camera: &CameraBlock, point: &RayPoint, block: &GatherBlock) -> GridPlace {
@@ -196,8 +196,8 @@ pub fn gathered_value(
     if block.has_residual != 0 { residual.fetch(element) + value } else { value }
 }
 
-/// What the network's four outputs `raw[channel]` say of a point: red, green, blue in `[0, 1]` (logistic function, 1 for
-/// NaN), and optical depth: density (rectified; NaN counts as 0) times the length that the point stands for.
+/// Radiance from the network's four outputs `raw[channel]` at a point: red, green, blue in `[0, 1]` (logistic function, 1
+/// for NaN), and optical depth: density (rectified; NaN counts as 0) times the length of ray that the point represents.
 #[inline]
 pub fn radiance(raw: &(impl Fetch<f32> + ?Sized), point: &RayPoint) -> [f32; 4] {
     let colour = |channel: usize| 1.0 / (1.0 + exp(-raw.fetch(channel)));

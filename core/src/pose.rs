@@ -2,7 +2,7 @@
 //!
 //! A pose is the rigid map from camera coordinates to world coordinates. Inside, axes are always OpenCV's: x to the
 //! right of the image, y down, z forward into the scene. Data in OpenGL axes (x right, y up, z backward; NeRF and
-//! Blender) comes in through its own constructor, so that a frame cannot be confused silently.
+//! Blender) has its own constructor, so that frames cannot be confused silently.
 
 use crate::math::{abs, angle_from_components, angle_from_squares, max, norm3};
 use bytemuck::{Pod, Zeroable};
@@ -11,7 +11,7 @@ use glam::Vec3;
 
 /// Largest allowed entry of `R^T R - I` and of the last row's difference from `(0, 0, 0, 1)`.
 ///
-/// Poses are inverted by transposition; a rotation that is off by this much moves a projection by the same fraction
+/// Poses are inverted by transposition; an error of this size in the rotation moves a projection by the same fraction
 /// of the image. Files with four decimals pass, a rotation scaled by 0.1 % does not.
 pub const RIGID_TOLERANCE: f32 = 1.0e-3;
 
@@ -42,7 +42,7 @@ pub enum PoseError {
 }
 
 impl fmt::Display for PoseError {
-    /// In words; rows and columns count from 1 here, as people do.
+    /// As a message, in which rows and columns count from 1.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PoseError::NotFinite { row, column } => {

@@ -1,8 +1,8 @@
-//! Counter-based random numbers: the same on every device, in any order of evaluation.
+//! Counter-based random draws: the same on every device, in any order of evaluation.
 //!
 //! Threefry-2x32 with 20 rounds (Salmon, Moraes, Dror, Shaw: "Parallel random numbers: as easy as 1, 2, 3", SC 2011):
 //! only 32-bit additions, rotations and exclusive-ors, which every GPU and microcontroller has. The key is the run's
-//! seed, the counter says which number it is: `(pixel, sample)`.
+//! seed, the counter is the index of the draw: `(pixel, sample)`.
 
 use crate::math::{ln, sin_cos, sqrt};
 use core::f32::consts::TAU;

@@ -5,18 +5,18 @@ use crate::math::{max, norm3};
 use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
-/// A ray of a target with the part of it that is looked at, as plain data. World coordinates; `near` and `far` are
-/// distances from the origin in lengths of `direction`, `far` at least `near`.
+/// A ray of a target with its near and far bounds, as plain data. World coordinates; `near` and `far` are distances from
+/// the origin in lengths of `direction`, `far` at least `near`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct TargetRay {
-    /// Where it starts.
+    /// The ray's origin.
     pub origin: [f32; 3],
-    /// Where looking begins.
+    /// Near bound.
     pub near: f32,
     /// Vector along it: of length 1, or, where depths are along the principal axis, with 1 along that.
     pub direction: [f32; 3],
-    /// Where looking ends.
+    /// Far bound.
     pub far: f32,
 }
 
@@ -52,13 +52,13 @@ pub fn cast_ray(block: &CastBlock, pixel: u32) -> TargetRay {
     }
 }
 
-/// A point on a ray that a field is asked about, as plain data.
+/// A point on a ray at which a field is evaluated, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RayPoint {
     /// World coordinates.
     pub position: [f32; 3],
-    /// Length of ray that it stands for: up to the next sample, at the last one up to `far`.
+    /// Length of ray that it represents: up to the next sample, for the last one up to `far`.
     pub length: f32,
     /// Vector along its ray, see [`TargetRay::direction`].
     pub direction: [f32; 3],

@@ -1,7 +1,7 @@
-//! The sample mask: which samples of a ray are worth asking a network about, by what was seen before: on the same ray by a coarser pass,
-//! or on rays nearby.
+//! The sample mask: the samples of a ray at which a network is evaluated. It follows from weights that are known
+//! already: of a coarser pass along the same ray, or of neighbouring rays.
 //!
-//! What was seen of a ray is a row `[part]` of weight and transmittance in front of it, over equal parts of the ray.
+//! These are a row `[part]` of weight and transmittance in front of it, over equal parts of a ray.
 
 use crate::math::{clamp, exp, max};
 use crate::pages::Fetch;
@@ -36,28 +36,28 @@ pub struct RaysBlock {
 pub struct SampleMaskBlock {
     /// Samples on each ray.
     pub sample_count: u32,
-    /// Parts of each ray that was seen before, at least 1.
+    /// Parts of each known ray, at least 1.
     pub part_count: u32,
-    /// Samples are in the mask where a sample in the same part or a neighbouring one stopped at least this share of the light
-    /// that reached it. 0: everywhere.
+    /// Samples are in the mask where the same part or a neighbouring one has at least this opacity (its weight over the
+    /// transmittance in front of it). 0: everywhere.
     pub least_share: f32,
     /// Samples are in the mask up to one part behind where the transmittance falls to this. Negative: everywhere.
     pub termination: f32,
     /// Samples are in the mask on rays of at least this opacity. 0: on all.
     pub least_opacity: f32,
-    /// Pixels from one ray that was seen before to the next, in both directions; 0 if every ray was seen itself.
+    /// Pixels from one known ray to the next, in both directions; 0 if every ray is known.
     pub step: u32,
-    /// How many rays were seen before in a row of the picture.
+    /// Known rays in a row of the picture.
     pub seen_columns: u32,
-    /// In how many rows.
+    /// Known rays in a column of the picture.
     pub seen_rows: u32,
     /// Width of the picture.
     pub width: u32,
 }
 
 /// Whether a sample at `depth` on `ray`, which is number `index` of the rays at hand and belongs to pixel `pixel`, is
-/// in the mask: if the ray itself (`step` 0), or one of the four seen before around it, says so by `seen[ray][part]`. A
-/// depth outside the ray's part counts as the nearer end, NaN as `near`.
+/// in the mask: if the ray itself (`step` 0), or one of the four known rays around it, says so by `seen[ray][part]`. A
+/// depth outside the near and far bounds counts as the nearer bound, NaN as `near`.
 #[inline]
 pub fn is_sampled(
     seen: &(impl Fetch<[f32; 2]> + ?Sized),

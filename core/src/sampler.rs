@@ -1,4 +1,4 @@
-//! From noise to a picture with few calls of the denoiser: samplers as linear combinations.
+//! Samplers of the diffusion denoiser with few calls, as linear combinations.
 //!
 //! The picture solves `dx/ds = (x - D(x; s)) / s` in the noise level `s` (Karras et al. 2022, equation 1 with their
 //! choices). Whatever the sampler, a step from one level to the next is a linear combination of the state `x` and of at
@@ -10,7 +10,7 @@
 //! heun        order 2   algorithm 1 of Karras et al.: Euler, then a second call at the level reached
 //! dpm++2m     order 2   Lu et al., "DPM-Solver++" (2022), algorithm 2
 //! dpm++3m     order 3   the same with three results
-//! unipc       order 4   Zhao et al., "UniPC" (2023): the same as a predictor, and a corrector that takes the call at the
+//! unipc       order 4   Zhao et al., "UniPC" (2023): the same as a predictor, and a corrector that uses the call at the
 //!                       level reached, which the next step needs anyway, as a fourth result
 //! ipndm       order 2   Zhang and Chen (2022), as on EDM's levels in Zhou et al. (2024): Adams and Bashforth's four
 //!                       coefficients for even steps, although the steps are not (on even ones it has order 4)
@@ -19,7 +19,7 @@
 //!
 //! Multistep samplers begin with lower orders until they have enough results. What they put a polynomial through is the
 //! denoised picture over the logarithm of the level, for `ipndm` and `ipndm-v` the direction `(x - D) / s` over the level
-//! itself. Nothing that cancels is subtracted: the coefficients are good to a few units of `f32`, so the state may be
+//! itself. No subtraction cancels: the coefficients are accurate to a few units of `f32`, so the state may be
 //! `f32` too.
 //!
 //! A sampler is one row of the list below and the functions that the row names:
@@ -30,8 +30,8 @@
 //! exponential     dpm++2m, dpm++3m, unipc          results are denoised pictures
 //! directions      ipndm, ipndm-v                   results are directions
 //! interpolation   integrals of interpolating polynomials
-//! churn           noise added on the way
-//! control         how far to step, and when to stop
+//! churn           noise added between the steps
+//! control         step size and early stop
 //! ```
 
 pub mod churn;
@@ -59,9 +59,9 @@ pub enum Corrected {
     ByTheNextCall,
 }
 
-/// Makes [`Sampler`] and what is known of each from one row a sampler:
+/// Makes [`Sampler`] and its properties from one row a sampler:
 ///
-/// - `name`: what a person calls it,
+/// - `name`: its name in commands and records,
 /// - `order`: the power of the step with which its error shrinks on the published levels,
 /// - `results`: how many results a step combines, once there are so many,
 /// - `keeps`: what is kept of a call at a level; [`denoised`] or a function from the level to a mix,
@@ -88,7 +88,7 @@ macro_rules! samplers {
             /// All of them.
             pub const ALL: [Sampler; [$($name),+].len()] = [$(Sampler::$sampler),+];
 
-            /// What a person calls it.
+            /// Its name in commands and records.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Sampler::$sampler => $name,)+
@@ -224,7 +224,7 @@ fn none(_: &[f32; MOST_RESULTS], _: u32, _: f32) -> Mix {
 }
 
 impl Sampler {
-    /// Whether it forgets the results before the newest: only then may noise be added on the way.
+    /// Whether it uses the newest result only: a condition for noise between the steps.
     pub const fn is_single_step(self) -> bool {
         self.result_count() == 1
     }
@@ -234,8 +234,8 @@ impl Sampler {
         !matches!(self.corrected(), Corrected::Never)
     }
 
-    /// How many calls of the denoiser a run over so many levels above 0 makes: one a level; where steps are corrected by
-    /// another call another one a step, of which the last, to 0, needs none.
+    /// Calls of the denoiser in a run over this many levels above 0: one a level; where another call corrects each
+    /// step, one more a step but the last, to level 0.
     pub const fn call_count(self, level_count: u32) -> u32 {
         match self.corrected() {
             Corrected::ByAnotherCall => (2 * level_count).saturating_sub(1),
@@ -243,7 +243,7 @@ impl Sampler {
         }
     }
 
-    /// The most levels that a run with at most so many calls can have.
+    /// The most levels that a run with at most this many calls can have.
     pub const fn level_count(self, call_count: u32) -> u32 {
         match self.corrected() {
             Corrected::ByAnotherCall => call_count.div_ceil(2),
@@ -298,7 +298,7 @@ impl core::error::Error for UnknownSampler {}
 impl FromStr for Sampler {
     type Err = UnknownSampler;
 
-    /// The sampler that a person calls by this name.
+    /// The sampler of this name.
     fn from_str(name: &str) -> Result<Sampler, UnknownSampler> {
         Sampler::ALL.into_iter().find(|sampler| sampler.name() == name).ok_or(UnknownSampler)
     }
@@ -312,10 +312,10 @@ pub struct History {
 }
 
 impl History {
-    /// Nothing is known.
+    /// No results.
     pub const NONE: History = History { levels: [0.0; MOST_RESULTS], count: 0 };
 
-    /// A result at level `sigma` becomes known. If that is not below the newest level, everything before is forgotten:
+    /// Adds a result at level `sigma`. If that is not below the newest level, all results before it are dropped:
     /// polynomials need distinct levels.
     pub fn push(&mut self, sigma: f32) {
         if !(sigma < self.levels[0]) {
@@ -326,7 +326,7 @@ impl History {
         self.count = (self.count + 1).min(MOST_RESULTS as u32);
     }
 
-    /// How many results are known.
+    /// The number of results.
     pub fn count(&self) -> u32 {
         self.count
     }

@@ -1,18 +1,19 @@
-//! The noise schedule of the diffusion denoiser: which noise levels, what the network sees at one, and a step between two.
+//! The noise schedule of the diffusion denoiser: its noise levels, the network's scaling at a level, and a step between
+//! two.
 //!
 //! Source: Karras et al., "Elucidating the design space of diffusion-based generative models" (2022), equation 5, table
 //! 1 and algorithm 1 without churn; published GeNVS runs it with 25 levels. The denoiser is
 //! `D(x; s) = c_skip x + c_out F(c_in x; c_noise)` with the network `F`; the picture solves `dx/ds = (x - D) / s`.
 //!
 //! A step from `s` to `n` in the published form is `d = (x - D) / s`, `e = x + (n - s) d`, `d' = (e - D') / n`,
-//! `x + (n - s) (d + d') / 2`. Here it is the same line by line but with what cancels left out:
+//! `x + (n - s) (d + d') / 2`. Here it is the same line by line but without the terms that cancel:
 //!
 //! ```text
 //! e = D + n / s (x - D)                   the first-order (Euler) step; exactly D when n = 0
 //! e + (s / n - 1) / 2 (D' - D)            the second-order (Heun) correction
 //! ```
 //!
-//! so that no difference of large numbers is divided by a small level, `x` may be overwritten by `e`, and the state may
+//! so no difference of large numbers is divided by a small level, `x` may be overwritten by `e`, and the state may
 //! be `f32` (the published one is `f64`). Everything but [`HeunStep`]'s two formulas runs once a step, not once a pixel.
 
 use crate::math::{clamp, ln, min, norm3, seventh_root, two_product, two_sum};
@@ -26,7 +27,7 @@ pub const SMALLEST_LEVEL: f32 = 1.0e-30;
 /// The largest noise level that a schedule takes.
 pub const LARGEST_LEVEL: f32 = 1.0e30;
 
-/// Why two noise levels are not the ends of a schedule.
+/// Why two noise levels do not make a schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
     /// A level lies outside [`SMALLEST_LEVEL`] to [`LARGEST_LEVEL`] or is NaN.
@@ -59,10 +60,10 @@ pub struct NoiseSchedule {
 }
 
 impl NoiseSchedule {
-    /// A schedule with these ends, in the units of the picture's values.
+    /// A schedule between these two levels, in the units of the picture's values.
     ///
     /// # Errors
-    /// [`ScheduleError`] if an end is out of range or they are in the wrong order.
+    /// [`ScheduleError`] if a level is out of range or they are in the wrong order.
     pub fn new(sigma_min: f32, sigma_max: f32) -> Result<NoiseSchedule, ScheduleError> {
         let range = SMALLEST_LEVEL..=LARGEST_LEVEL;
         if !(range.contains(&sigma_min) && range.contains(&sigma_max)) {
@@ -139,13 +140,13 @@ fn add(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Preconditioning {
-    /// `c_skip`: how much of the noisy picture goes past the network, in `[0, 1]`.
+    /// `c_skip`: factor of the noisy picture (the skip connection), in `[0, 1]`.
     pub skip: f32,
     /// `c_out`: factor of the network's output, in `[0, 0.5]`.
     pub output: f32,
     /// `c_in`: factor of the network's input, in `[0, 2]`. Published GeNVS scales the condition channels by it as well.
     pub input: f32,
-    /// `c_noise`: the number that tells the network the level, `ln(sigma) / 4`.
+    /// `c_noise`: the network's noise conditioning, `ln(sigma) / 4`.
     pub noise: f32,
 }
 
@@ -154,8 +155,8 @@ impl Preconditioning {
     /// `c_in = 1 / sqrt(s^2 + d^2)`, `c_noise = ln(s) / 4` with `s` the level and `d` [`SIGMA_DATA`].
     ///
     /// At 0 (and for negative levels and NaN) `1, 0, 2` and -21.8, the value at the smallest normal number, instead of
-    /// minus infinity; infinity counts as the largest finite number, where the limits are `0, 0.5, 0`. Relative error at most
-    /// 4e-7 each, as long as the results are normal numbers.
+    /// minus infinity; infinity counts as the largest finite number, where the limits are `0, 0.5, 0`. Relative error
+    /// at most 4e-7 each, as long as the results are normal numbers.
     pub fn at(sigma: f32) -> Preconditioning {
         let sigma = clamp(sigma, 0.0, f32::MAX);
         // The scaled norm: squares would overflow from 1.8e19 on.
@@ -169,7 +170,7 @@ impl Preconditioning {
         }
     }
 
-    /// What the network is given for a value of the noisy picture.
+    /// The network's input for a value of the noisy picture.
     #[inline]
     pub fn network_input(&self, noisy: f32) -> f32 {
         self.input * noisy
@@ -207,7 +208,7 @@ impl HeunStep {
         self.correction != 0.0
     }
 
-    /// The first-order step of a value: `noisy` at the level before and what the denoiser makes of it.
+    /// The first-order step of a value: `noisy` at the level before, and its denoised value.
     #[inline]
     pub fn euler(&self, noisy: f32, denoised: f32) -> f32 {
         denoised + self.remaining * (noisy - denoised)

@@ -6,13 +6,13 @@ use core::fmt;
 /// Why poses cannot be sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SourcesError {
-    /// There is no source at all.
+    /// There are no sources.
     Empty,
     /// There are more sources than the capacity.
     TooMany {
         /// How many were given.
         count: u32,
-        /// How many fit.
+        /// The capacity.
         capacity: u32,
     },
 }

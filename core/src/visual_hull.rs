@@ -1,13 +1,13 @@
 //! The training-free field inside silhouettes: a solid carved by silhouettes and by photo-consistency, coloured by weighted
-//! fusion of what the views see.
+//! fusion of the views' colours.
 //!
 //! Four stages, each a few data-parallel kernels; a kernel is a function of one output element.
 //!
 //! ```text
-//! hull          where the silhouettes of all views allow matter     hull_alpha, hull_entry
-//! sweep         how deep each source pixel is: planes are swept     match_cost, sum_row, mean_column, pick_depth
+//! hull          the visual hull of the silhouettes                  hull_alpha, hull_entry
+//! sweep         the depth of each source pixel: planes are swept    match_cost, sum_row, mean_column, pick_depth
 //!               through the hull, colours compared across views
-//! shade         a point in, occupancy and colour out                sample
+//! shade         occupancy and colour at a point                     sample
 //! ray_marching  a target pixel's ray through the solid              march_ray
 //! ```
 //!
@@ -29,7 +29,7 @@ pub mod sweep;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// The depth of a pixel that sees nothing: beyond everything, but finite.
+/// The depth of a pixel without a surface: larger than every depth, but finite.
 pub const NO_SURFACE: f32 = 1.0e30;
 
 /// Visibility of what lies behind a surface: 1 at the surface, falling like a bell with the distance behind it in units

@@ -6,9 +6,10 @@
 //! underflow of every Gaussian, overflow of squares) these give the limit.
 //!
 //! Accuracy, relative to an `f64` evaluation on the same `f32` poses, in units of `2^-24`. An error `e` with `k`
-//! roundings gives a weight with at most `2 (k + 1) + S + 3`: `k + 1` in the numerator (the offset adds one), as many in
-//! the sum, two quotients, `S - 1` additions, the reciprocal of the sum and the product with it. Counted roundings `k`, and the largest error of a
-//! weight that was measured for up to 32 sources (random poses at scales from 1e-20 to 1e29, rings, near-coincident cameras):
+//! roundings gives a weight with at most `2 (k + 1) + S + 3`: `k + 1` in the numerator (the offset adds one), as many
+//! in the sum, two quotients, `S - 1` additions, the reciprocal of the sum and the product with it. Counted roundings
+//! `k`, and the largest error of a weight that was measured for up to 32 sources (random poses at scales from 1e-20 to
+//! 1e29, rings, near-coincident cameras):
 //!
 //! | scheme | `k` | measured |
 //! |---|---|---|
@@ -78,7 +79,7 @@ macro_rules! schemes {
                 }
             }
 
-            /// Between what choice and parameter lie.
+            /// The ranges of choice and parameter.
             #[inline]
             const fn limits(self) -> Limits {
                 match self {
@@ -97,7 +98,7 @@ macro_rules! schemes {
 }
 
 schemes! {
-    /// Every source counts the same. Choice and parameter are not used.
+    /// All weights are equal. Choice and parameter are not used.
     Mean = 0 {
         name: "mean",
         parameter: None,
@@ -132,7 +133,7 @@ schemes! {
     /// `exp(-parameter d^2)` with `d` the distance of the centres; the parameter is finite and at least 0.
     Gaussian = 1 {
         name: "gaussian",
-        parameter: Some(Parameter { key: "beta", least: 0.0, most: f32::MAX, default: 1.0, wanted: "finite and at least 0" }),
+        parameter: Some(Parameter { key: "beta", least: 0.0, most: f32::MAX, default: 1.0, range: "finite and at least 0" }),
         choice: None,
         tables: ["gaussian:beta=1"],
         weigh: formulas::gaussian,
@@ -149,7 +150,7 @@ schemes! {
     /// viewfuse_angle. With the parameter 1 and the angle between principal axes the best of the formulas.
     Error = 3 {
         name: "error",
-        parameter: Some(Parameter { key: "alpha", least: 0.0, most: 1.0, default: 1.0, wanted: "between 0 and 1" }),
+        parameter: Some(Parameter { key: "alpha", least: 0.0, most: 1.0, default: 1.0, range: "between 0 and 1" }),
         choice: Some(Choice { key: "angle", first: AngleKind::PrincipalAxis as u32, options: &["axis", "full"] }),
         tables: ["error:alpha=1", "error:alpha=0.5", "error:alpha=1,angle=full"],
         weigh: formulas::error,
@@ -166,7 +167,7 @@ pub enum AngleKind {
     FullRotation = 1,
 }
 
-/// How many sources the kernels that weigh on a device can hold: rows of weights there have this length.
+/// The most sources of the kernels that weigh on a device: rows of weights there have this length.
 pub const MOST_WEIGHED: usize = 32;
 
 /// A dispatch of [`weigh`], as plain data.

@@ -1,7 +1,7 @@
-//! How much each source view counts: a point of the probability simplex.
+//! Weights of the source views: a point of the probability simplex.
 //!
-//! [`Weights`] cannot hold anything but finite, non-negative numbers that sum to 1. Whatever goes in, also NaN,
-//! infinities or all zeros, comes out as such numbers, by rules that every constructor states.
+//! [`Weights`] cannot hold anything but finite, non-negative numbers that sum to 1. Every input, also NaN,
+//! infinity or all zeros, gives such numbers, by rules that every constructor states.
 
 use crate::math::{exp, max, min};
 
@@ -37,13 +37,13 @@ impl<const S: usize> Omission<S> {
 }
 
 impl<const S: usize> Weights<S> {
-    /// Every view counts the same. `count` is limited to `[1, S]`.
+    /// Equal weights. `count` is limited to `[1, S]`.
     pub fn mean(count: u32) -> Weights<S> {
         Weights::from_scores(&[1.0; S], count)
     }
 
     /// Proportional to non-negative scores. A score that is NaN or negative counts as 0, an infinite one as the largest
-    /// finite number; if none is positive, every view counts the same. `count` is limited to `[1, S]`.
+    /// finite number; if none is positive, all weights are equal. `count` is limited to `[1, S]`.
     pub fn from_scores(scores: &[f32; S], count: u32) -> Weights<S> {
         const { assert!(S > 0) };
         let count = count.clamp(1, S as u32);
@@ -68,7 +68,7 @@ impl<const S: usize> Weights<S> {
     /// Inversely proportional to non-negative errors.
     ///
     /// Evaluated as `smallest / error`, which neither overflows nor divides by zero: if some errors are exactly 0,
-    /// those views share all the weight (the limit). An error that is NaN, negative or infinite counts as infinite.
+    /// those views share the whole weight (the limit). An error that is NaN, negative or infinite counts as infinite.
     pub fn from_errors(errors: &[f32; S], count: u32) -> Weights<S> {
         const { assert!(S > 0) };
         let count = count.clamp(1, S as u32);
@@ -112,7 +112,7 @@ impl<const S: usize> Weights<S> {
         Weights::from_scores(&scores, count)
     }
 
-    /// Finite non-negative values with their sum; if the sum is 0, every view counts the same.
+    /// Finite non-negative values with their sum; if the sum is 0, all weights are equal.
     fn from_sum(mut values: [f32; S], sum: f32, count: u32) -> Weights<S> {
         let count = (count as usize).min(S);
         // One reciprocal for all: a rounding more, but a division takes as long as ten products.
@@ -126,7 +126,7 @@ impl<const S: usize> Weights<S> {
         Weights { values, count }
     }
 
-    /// How many views there are, those with weight 0 included.
+    /// The number of views, those with weight 0 included.
     #[inline]
     pub fn count(&self) -> u32 {
         // Never larger as it is, but said here it saves every loop over the views its checks of bounds.

@@ -19,3 +19,15 @@ pub use viewfuse_synthetic as synthetic;
 pub use viewfuse_train as train;
 pub use viewfuse_vulkan as vulkan;
 pub use viewfuse_weighting as weighting;
+
+/// The items of a program that renders: `use viewfuse::prelude::*;`.
+pub mod prelude {
+    pub use crate::device::cpu::Cpu;
+    pub use crate::field::On;
+    pub use crate::field::render::{Frame, RenderOptions, render, render_all};
+    pub use crate::field::training_free::TrainingFree;
+    pub use crate::job::progress::{Progress, Silent};
+    pub use crate::scene::Scene;
+    pub use crate::scene::few_shot::Selection;
+    pub use crate::weighting::Weighting;
+}

@@ -26,10 +26,10 @@ fn cut_off_at_every_byte() {
 
 #[test]
 fn something_else() {
-    assert_refused(b"", &["no checkpoint: the file is empty"]);
+    assert_refused(b"", &["not a checkpoint: the file is empty"]);
     assert_refused(b"version https://git-lfs.github.com/spec/v1\noid", &["git-lfs", "`git lfs pull`"]);
     assert_refused(b"\n <!DOCTYPE html><html>", &["a web page"]);
-    assert_refused(b"just words\n", &["no checkpoint: a text"]);
+    assert_refused(b"just words\n", &["not a checkpoint: a text"]);
     assert_refused(&[0x89, b'H', b'D', b'F', 13, 10, 26, 10, 0], &["it begins with the bytes 89 48 44 46 0d 0a 1a 0a"]);
     let mut tar = vec![0; 1024];
     tar[..8].copy_from_slice(b"sys_info");
@@ -40,7 +40,7 @@ fn something_else() {
     assert_refused(&Pickle::new().raw(b"}").end(), &["a pickle that torch.save did not write"]);
     let folder = tempfile::tempdir().expect("a folder");
     let message = |path| viewfuse::nn::checkpoint::Checkpoint::open(path).expect_err("must be refused").to_string();
-    assert!(message(folder.path()).contains("no checkpoint: not a file"), "{}", message(folder.path()));
+    assert!(message(folder.path()).contains("not a checkpoint: not a file"), "{}", message(folder.path()));
     assert!(message(&folder.path().join("none")).contains("cannot be read: No such file"));
 }
 

@@ -315,7 +315,7 @@ fn what_is_no_member_is_refused() {
     small().with("pixel_nerf_net.mlp.layers.0.weight", &[32]).refused("has the shape [32] instead of 2 dimensions");
     small()
         .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 0])
-        .refused("has the size 0 on axis 1; 1 to 16384 is usable");
+        .refused("has the size 0 on axis 1; sizes from 1 to 16384 are supported");
     small()
         .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 7])
         .refused("makes 512 channels, which are no voxels of 7 features");

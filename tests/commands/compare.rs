@@ -51,7 +51,7 @@ fn what_cannot_be_compared() {
     refused(&format!("{one} --lpips alex=none.pth"), &["none.pth: cannot be read"]);
     let parts = ["--lpips alex", "head.safetensors", "missing: features.0.weight", "unexpected: mlp.weight"];
     refused(&format!("{one} --lpips alex=head.safetensors"), &parts);
-    refused(&format!("{one} --dists toy/rgb/000000.png"), &["toy/rgb/000000.png", "no checkpoint"]);
+    refused(&format!("{one} --dists toy/rgb/000000.png"), &["toy/rgb/000000.png", "not a checkpoint"]);
     refused(&format!("{one} --fid head.safetensors"), &["--fid", "head.safetensors", "fc.weight"]);
     let wrong = |arguments: &str, parts: &[&str]| {
         assert_wrong_arguments(BINARY, folder.path(), &format!("compare {one} {arguments}"), parts);

@@ -53,7 +53,7 @@ fn refusals() {
     refused("convert training.pth out.pth", &["out.pth: only safetensors are written"]);
     refused("convert none.pth out.safetensors", &["none.pth: cannot be read: No such file"]);
     std::fs::write(folder.path().join("page.pth"), "<html>").expect("a file");
-    refused("convert page.pth out.safetensors", &["page.pth: no checkpoint: a web page"]);
+    refused("convert page.pth out.safetensors", &["page.pth: not a checkpoint: a web page"]);
     std::fs::remove_file(folder.path().join("page.pth")).expect("removed");
     assert_eq!(files_below(folder.path()), before, "nothing is left behind");
 }

@@ -89,11 +89,11 @@ fn the_device_is_in_the_record() {
     for (device, name) in [("cpu".to_owned(), "cpu (".to_owned())].into_iter().chain(expected) {
         let arguments = format!("render toy --targets 20 --views 3 --size 16x16 --device {device} -o out");
         let printed = done(scene.path(), &arguments);
-        assert!(printed.lines().any(|line| line.starts_with("device: ") && line.ends_with(", asked for")), "{printed}");
+        assert!(printed.lines().any(|line| line.starts_with("device: ") && line.ends_with(", requested")), "{printed}");
         let text = std::fs::read(scene.path().join("out/run.json")).expect("a run record");
         let record: Value = serde_json::from_slice(&text).expect("JSON");
         assert!(record["device"].as_str().is_some_and(|device| device.starts_with(&name)), "{record}");
-        assert_eq!(record["device_reason"], "asked for");
+        assert_eq!(record["device_reason"], "requested");
         // Devices that count say what their kernels took.
         let kernels = record["kernels"].as_array().map_or(0, Vec::len);
         assert_eq!(kernels > 0, device != "cpu", "{record}");

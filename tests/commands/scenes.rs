@@ -16,24 +16,24 @@ const FEW: &str = "scenes make chairs out --train 2 --val 1 --test 1 --views 2 -
 
 fn scenes_appear_in_their_folders_and_are_read_again() {
     let folder = Folder::new();
-    assert_eq!(done(folder.path(), FEW), "out: 4 new scenes, 0 were there\n");
+    assert_eq!(done(folder.path(), FEW), "out: 4 new scenes, 0 existing\n");
     assert_eq!(names_in(&folder.path().join("out")), ["chairs.json", "chairs_test", "chairs_train", "chairs_val"]);
     assert_eq!(names_in(&folder.path().join("out/chairs_train")), ["000000", "000001"]);
     assert!(done(folder.path(), "inspect out/chairs_train/000001").contains("2"));
-    assert_eq!(done(folder.path(), FEW), "out: 0 new scenes, 4 were there\n");
-    assert_eq!(done(folder.path(), &FEW.replace("--train 2", "--train 3")), "out: 1 new scenes, 4 were there\n");
+    assert_eq!(done(folder.path(), FEW), "out: 0 new scenes, 4 existing\n");
+    assert_eq!(done(folder.path(), &FEW.replace("--train 2", "--train 3")), "out: 1 new scenes, 4 existing\n");
     let other = FEW.replace("--views 2", "--views 4");
     assert_refused(BINARY, folder.path(), &other, &["out/chairs.json: what is there was made with other settings"]);
     // Another kind has files of its own.
     let toys = "scenes make toys out --train 1 --val 0 --test 0 --views 1 --size 64 --threads 1";
-    assert_eq!(done(folder.path(), toys), "out: 1 new scenes, 0 were there\n");
+    assert_eq!(done(folder.path(), toys), "out: 1 new scenes, 0 existing\n");
 }
 
 fn wrong_arguments_are_told() {
     let folder = Folder::new();
     let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
     wrong("scenes make lorries out", &["lorries", "cars, chairs or toys"]);
-    wrong("scenes make cars out --size 100", &["64 or 128 is wanted"]);
+    wrong("scenes make cars out --size 100", &["the size must be 64 or 128"]);
     wrong("scenes make cars out --views 0", &["--views"]);
     wrong("scenes make cars out --train 2000000", &["--train"]);
 }
@@ -66,6 +66,6 @@ fn ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on() {
         assert_eq!(fs::read_dir(scenes.join(name).join("rgb")).expect("pictures").count(), 4);
     }
     let there = names.iter().filter(|name| ["000000", "000001"].contains(&name.as_str())).count();
-    let goes_on = format!("out: {} new scenes, {there} were there\n", 2 - there);
+    let goes_on = format!("out: {} new scenes, {there} existing\n", 2 - there);
     assert_eq!(done(folder.path(), &arguments(2)), goes_on);
 }

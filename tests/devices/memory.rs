@@ -1,4 +1,4 @@
-//! No room: the error says how much was asked for and how much there is, and the device works on.
+//! Out of memory: the error says the requested and the available memory, and the device goes on working.
 
 use crate::candidate::{Candidate, Test, assert_works};
 use libtest_mimic::Failed;
@@ -20,7 +20,7 @@ fn lowered(candidate: &Candidate, allocation: u64, memory: u64) -> Result<Gpu, V
 /// Asked for, available and in all, of what must be a lack of memory.
 fn numbers<T>(outcome: Result<T, VulkanError>) -> Result<[u64; 3], Failed> {
     match outcome {
-        Err(VulkanError::OutOfMemory { asked, available, total, .. }) => Ok([asked, available, total]),
+        Err(VulkanError::OutOfMemory { requested, available, total, .. }) => Ok([requested, available, total]),
         Err(error) => Err(format!("another error: {error}").into()),
         Ok(_) => Err("there was room".into()),
     }
@@ -33,9 +33,9 @@ fn memory_that_is_not_there_is_refused(candidate: &Candidate) -> Result<(), Fail
         assert_works(&gpu)?;
         let kept = gpu.zeros::<u32>(1 << 18)?;
         let first = numbers(gpu.zeros::<u32>(1 << 20))?;
-        let [asked, available, total] = first;
+        let [requested, available, total] = first;
         // The staging buffers and the array that is kept are in use.
-        assert_eq!((asked, total), (4 << 20, 3 << 20));
+        assert_eq!((requested, total), (4 << 20, 3 << 20));
         assert!(available > 1 << 19 && available <= 2 << 20, "{available}");
         // Nothing was taken by the attempt.
         assert_eq!(numbers(gpu.upload(&vec![1_u32; 1 << 20]))?, first);
@@ -45,8 +45,8 @@ fn memory_that_is_not_there_is_refused(candidate: &Candidate) -> Result<(), Fail
     // More than there is, and more than can be counted.
     let gpu = candidate.gpu(&GpuOptions::default())?;
     for length in [1_usize << 45, usize::MAX / 2] {
-        let [asked, available, total] = numbers(gpu.zeros::<[u32; 4]>(length))?;
-        assert_eq!(asked, (length as u64).saturating_mul(16).checked_next_multiple_of(4).unwrap_or(u64::MAX));
+        let [requested, available, total] = numbers(gpu.zeros::<[u32; 4]>(length))?;
+        assert_eq!(requested, (length as u64).saturating_mul(16).checked_next_multiple_of(4).unwrap_or(u64::MAX));
         assert!(available <= total && total == candidate.adapter.memory, "{available} of {total}");
     }
     assert_works(&gpu)?;
@@ -63,8 +63,8 @@ fn memory_that_the_driver_refuses_is_refused(candidate: &Candidate) -> Result<()
     (boastful.limits.allocation, boastful.limits.memory) = (u64::MAX, u64::MAX);
     let gpu = Gpu::open(&instance, &boastful, &GpuOptions::default())?;
     for _ in 0..2 {
-        let [asked, available, _] = numbers(gpu.zeros::<u32>(1 << 50))?;
-        assert!(asked == 1 << 52 && available > 0, "{asked}, {available}");
+        let [requested, available, _] = numbers(gpu.zeros::<u32>(1 << 50))?;
+        assert!(requested == 1 << 52 && available > 0, "{requested}, {available}");
         assert_works(&gpu)?;
     }
     Ok(())

@@ -66,7 +66,7 @@ fn expires_in_the_kernel(candidate: &Candidate, times: u32) -> Result<bool, Fail
     let Err(error) = outcome else { return Err("it was in time".into()) };
     let VulkanError::TimeLimit { device, work, limit } = &error else { return Err(format!("{error}").into()) };
     assert_eq!((device.as_str(), *limit), (gpu.name(), LIMIT));
-    assert!(error.to_string().ends_with(&format!("{work} did not end within 0.005 s")), "{error}");
+    assert!(error.to_string().ends_with(&format!("{work} did not finish within 0.005 s")), "{error}");
     // From now on nothing that it holds can be trusted.
     assert_eq!(gpu.wait().err().as_ref(), Some(&error));
     assert_eq!(gpu.upload(&[1.0_f32]).err().as_ref(), Some(&error));

@@ -1,11 +1,12 @@
 //! The packages as such: which depend on which, in which order their modules stand, what a library must not do, what a
-//! crate outside can add, and how the tests themselves are arranged.
+//! crate outside can add, which kernels have a twin on the CPU, and how the tests themselves are arranged.
 
 mod crates;
 mod libraries;
 mod modules;
 mod outside;
 mod rooms;
+mod twins;
 
 use serde_json::Value;
 use std::process::Command;

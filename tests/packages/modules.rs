@@ -2,6 +2,7 @@
 //!
 //! The list is the first `text` block of the crate's documentation that names a module: a line begins with the names of
 //! modules between commas, and two spaces end them; a line that is further in goes on with the text of the one before.
+//! A line of `*` stands for all modules that are not named: several of one kind, none of which uses another.
 //! What stands in the crate's root itself (types that several modules share) may be used by all.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,9 @@ const CRATES: [&str; 13] = [
     "host/check",
     "host/train",
 ];
+
+/// What stands in a list for all modules that it does not name.
+const OTHERS: &str = "*";
 
 /// A crate's root: modules, and what is reached through it from which module.
 #[derive(Debug, Default)]
@@ -124,11 +128,13 @@ fn list_faults(listed: &[String], modules: &BTreeSet<String>) -> Vec<String> {
     for module in modules {
         match listed.iter().filter(|name| *name == module).count() {
             1 => {}
+            0 if listed.iter().any(|name| name == OTHERS) => {}
             0 => faults.push(format!("{module} is not listed")),
             count => faults.push(format!("{module} is listed {count} times")),
         }
     }
-    faults.extend(listed.iter().filter(|name| !modules.contains(*name)).map(|name| format!("{name} is no module")));
+    let is_none = |name: &&String| *name != OTHERS && !modules.contains(*name);
+    faults.extend(listed.iter().filter(is_none).map(|name| format!("{name} is no module")));
     faults
 }
 
@@ -171,7 +177,8 @@ fn faults(folder: &Path) -> Vec<String> {
     let root = root(&Source::new(text.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or_default()).code);
     let listed = listed(&text, &root.modules);
     let mut faults = list_faults(&listed, &root.modules);
-    let place = |module: &str| listed.iter().position(|name| name == module);
+    let place_of = |name: &str| listed.iter().position(|listed| listed == name);
+    let place = |module: &str| place_of(module).or_else(|| place_of(OTHERS));
     for path in files(&source, "rs") {
         let inside = path.strip_prefix(&source).expect("inside").with_extension("");
         let parts: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
@@ -182,9 +189,10 @@ fn faults(folder: &Path) -> Vec<String> {
         }
         for (line, used) in uses(&Source::read(&path).code, parts.len(), &root) {
             if let (Some(own), Some(other)) = (place(&parts[0]), place(&used))
-                && other > own
+                && (other > own || other == own && used != parts[0])
             {
-                faults.push(format!("{}:{line} uses {used}, which is listed behind {}", inside.display(), parts[0]));
+                let place = if other > own { "listed behind" } else { "of the same kind as" };
+                faults.push(format!("{}:{line} uses {used}, which is {place} {}", inside.display(), parts[0]));
             }
         }
     }
@@ -198,6 +206,24 @@ fn modules_stand_in_the_order_of_the_data() {
         wrong.extend(faults(&repository().join(name)).into_iter().map(|fault| format!("{name}: {fault}")));
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// The list of fields names no learned field: those have a row in `family.rs`, and no other module is left out.
+#[test]
+fn modules_that_are_not_named_are_learned_fields() {
+    let source = repository().join("host/field/src");
+    let text = std::fs::read_to_string(source.join("lib.rs")).expect("the root");
+    let modules = root(&Source::new(&text).code).modules;
+    let named = listed(&text, &modules);
+    let rows = Source::read(&source.join("family.rs")).code;
+    let others: Vec<&String> = modules.iter().filter(|module| !named.contains(module)).collect();
+    assert!(others.len() > 1, "{others:?}");
+    for module in others {
+        assert!(
+            rows.contains(&format!("open: super::{module}::open,")),
+            "{module} is neither listed nor a learned field"
+        );
+    }
 }
 
 #[test]
@@ -233,6 +259,16 @@ fn a_module_that_uses_a_later_one_is_found() {
     write("first/inner.rs", "use super::super::second;");
     assert_eq!(faults(folder.path()), ["first/inner:1 uses second, which is listed behind first"]);
     write("first/inner.rs", "");
+    // Modules that are not named.
+    write("lib.rs", &library.replacen("third ", "* ", 1).replace("mod first;", "mod first;\nmod fourth;"));
+    for (text, fault) in [
+        ("use crate::{first, third};", &[][..]),
+        ("use super::fourth;", &["third:1 uses fourth, which is of the same kind as third"]),
+    ] {
+        write("third.rs", text);
+        assert_eq!(faults(folder.path()), fault, "{text}");
+    }
+    write("third.rs", "");
     // Lists that are wrong.
     for (from, to, fault) in [
         ("third ", "fourth", ["third is not listed", "fourth is no module"].as_slice()),

@@ -104,7 +104,7 @@ fn another_module_is_noticed() {
     let mut module = fs::read(folder.path().join(MODULE)).expect("the module");
     module[100] ^= 1;
     fs::write(folder.path().join(MODULE), module).expect("a file");
-    assert_eq!(stale(folder.path()), [format!("{MODULE} is not the module that {STAMP} speaks of")]);
+    assert_eq!(stale(folder.path()), [format!("{MODULE} is not the module that {STAMP} describes")]);
 }
 
 #[test]

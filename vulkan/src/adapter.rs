@@ -1,4 +1,4 @@
-//! A device before it is opened: what it is, and whether it can do the work.
+//! A device before it is opened: its properties, and whether it fulfils the requirements.
 
 use crate::error::{Missing, VulkanError, failed};
 use crate::instance::Instance;
@@ -6,23 +6,23 @@ use crate::kernel::{Kernel, WORKGROUP};
 use ash::{ext, khr, vk};
 use std::fmt;
 
-/// What kind of device it is, the kinds to prefer first.
+/// The kind of a device, the preferred kinds first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AdapterKind {
-    /// A graphics card.
+    /// A discrete GPU.
     Discrete,
-    /// A GPU that shares the memory of the machine.
+    /// An integrated GPU, which shares the machine's memory.
     Integrated,
-    /// A GPU handed to a virtual machine.
+    /// A virtual GPU.
     Virtual,
-    /// Something else.
+    /// Another kind.
     Other,
-    /// A processor that plays one.
+    /// A software driver on the CPU.
     Software,
 }
 
 impl AdapterKind {
-    /// Whether there is a GPU behind it.
+    /// Whether it is a GPU.
     pub fn is_gpu(self) -> bool {
         self <= AdapterKind::Virtual
     }
@@ -40,7 +40,7 @@ impl fmt::Display for AdapterKind {
     }
 }
 
-/// Limits that work is cut by.
+/// Limits by which work is split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Most bytes of a storage buffer that a kernel can bind (`maxStorageBufferRange`).
@@ -49,7 +49,7 @@ pub struct Limits {
     pub allocation: u64,
     /// Most workgroups of a dispatch (`maxComputeWorkGroupCount[0]`).
     pub workgroup_count: u32,
-    /// Bytes of memory that may be used, those for transfers included.
+    /// Bytes of usable memory, staging included.
     pub memory: u64,
 }
 
@@ -60,19 +60,19 @@ pub struct Adapter {
     pub(crate) instance_number: u64,
     /// Its number in the list of [`Instance::adapters`].
     pub index: usize,
-    /// What its driver calls it.
+    /// The driver's name for it.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub kind: AdapterKind,
     /// The driver and its version.
     pub driver: String,
-    /// The version of Vulkan that it speaks, packed.
+    /// Its version of Vulkan, packed.
     pub api_version: u32,
     /// Bytes of its largest local heap.
     pub memory: u64,
-    /// What work is cut by.
+    /// The limits by which work is split.
     pub limits: Limits,
-    /// What it lacks; if anything, it cannot be opened.
+    /// Missing requirements; if there are any, it cannot be opened.
     pub missing: Vec<Missing>,
     pub(crate) queue_family: u32,
     pub(crate) timestamp_bits: u32,
@@ -83,8 +83,8 @@ pub struct Adapter {
 }
 
 impl Instance {
-    /// Every device, the ones to prefer first: discrete, integrated, virtual, other, software; among equals the one with
-    /// more memory, then in the order of the loader.
+    /// Every device, the preferred ones first: discrete, integrated, virtual, other, software; among equals the one
+    /// with more memory, then in the order of the loader.
     ///
     /// # Errors
     /// [`VulkanError::NoDevice`] if there is none.
@@ -92,7 +92,7 @@ impl Instance {
         // SAFETY: no requirements.
         let devices = unsafe { self.raw.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
         if devices.is_empty() {
-            return Err(VulkanError::NoDevice { detail: "the drivers that are installed have no device".to_owned() });
+            return Err(VulkanError::NoDevice { detail: "the installed drivers have no device".to_owned() });
         }
         let mut adapters: Vec<Adapter> = devices.into_iter().map(|raw| Adapter::new(self, raw)).collect();
         adapters.sort_by_key(|adapter| (adapter.kind, std::cmp::Reverse(adapter.memory)));
@@ -178,10 +178,10 @@ impl Adapter {
     }
 
     /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text, any. Of
-    /// several the first that lacks nothing. A number that no device has may still be part of a name ("4090").
+    /// several, the first usable one. A number that no device has may still be part of a name ("4090").
     ///
     /// # Errors
-    /// [`VulkanError::NoDevice`] if none is meant, [`VulkanError::Missing`] if the one that is meant cannot be used.
+    /// [`VulkanError::NoDevice`] if none matches, [`VulkanError::Missing`] if the matching one cannot be used.
     pub fn choose<'a>(adapters: &'a [Adapter], wanted: &str) -> Result<&'a Adapter, VulkanError> {
         let lower = wanted.to_lowercase();
         let numbered = wanted.parse::<usize>().ok().and_then(|index| adapters.get(index));
@@ -203,7 +203,7 @@ fn text(name: Result<&std::ffi::CStr, std::ffi::FromBytesUntilNulError>) -> Stri
     name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// A queue that computes, rather one that does not draw: it runs beside the desktop's.
+/// A compute queue, preferably one without graphics, which runs beside the desktop's.
 fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     let computes = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::COMPUTE);
     let draws = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::GRAPHICS);

@@ -9,7 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use viewfuse_core::pages::MOST_PAGES;
 
-/// An array of `T` in a device's memory. What no allocation of the device can hold lies in several chunks of a page each.
+/// An array of `T` in a device's memory. An array that is too large for one allocation is stored in several chunks of a
+/// page each.
 pub struct Buffer<T> {
     pub(crate) array: Arc<Array>,
     kind: PhantomData<fn(T) -> T>,
@@ -20,12 +21,12 @@ impl<T> Buffer<T> {
         Buffer { array: Arc::new(array), kind: PhantomData }
     }
 
-    /// How many elements there are.
+    /// The number of elements.
     pub fn len(&self) -> usize {
         self.array.len
     }
 
-    /// Whether there is none.
+    /// Whether it has no elements.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -36,11 +37,11 @@ impl<T> Buffer<T> {
     }
 }
 
-/// An array that is to be bound to a kernel.
+/// An array as an argument of a kernel.
 #[derive(Clone, Copy)]
 pub struct Bound<'a>(pub(crate) &'a Arc<Array>);
 
-/// Memory of an array, and when it was last used.
+/// Memory of an array, and its last use.
 pub(crate) struct Array {
     /// At least one.
     pub(crate) chunks: Vec<Memory>,
@@ -50,14 +51,14 @@ pub(crate) struct Array {
     pub(crate) len: usize,
     /// Bytes of an element.
     pub(crate) stride: usize,
-    /// The stretch between two barriers in which it was last read.
+    /// The interval between two barriers in which it was last read.
     pub(crate) read_in: Stretch,
-    /// The same for writing.
+    /// The interval in which it was last written.
     pub(crate) written_in: Stretch,
 }
 
 impl Array {
-    /// Handles of one device mean nothing to another.
+    /// The array's device: handles are not valid on another one.
     pub(crate) fn check_owner(&self, handle: &Handle) -> Result<(), VulkanError> {
         let owner = self.chunks[0].owner();
         match std::ptr::eq(owner, handle) {
@@ -66,7 +67,7 @@ impl Array {
         }
     }
 
-    /// Where elements from `first` on lie: the chunk, the byte in it, and how many elements follow there.
+    /// The location of the elements from `first` on: the chunk, the byte in it, and how many elements follow there.
     pub(crate) fn place(&self, first: usize) -> (&Memory, u64, usize) {
         let chunk = (first / self.chunk_len).min(self.chunks.len() - 1);
         let start = chunk * self.chunk_len;
@@ -82,7 +83,7 @@ pub(crate) struct Range {
     pub(crate) bytes: u64,
 }
 
-/// The ranges that an array is bound as: itself, or its pages; pages that it does not have are its first one again.
+/// The bound ranges of an array: itself, or its pages; the first page takes the place of missing ones.
 pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Range> {
     let page_len = match (layout, page_shift) {
         (Layout::Whole | Layout::One, _) | (_, 0) => array.len,
@@ -100,7 +101,7 @@ pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Rang
         .collect()
 }
 
-/// A stretch of commands between two barriers, by number; 0 is none.
+/// The number of an interval of commands between two barriers; 0 is none.
 #[derive(Debug, Default)]
 pub(crate) struct Stretch(AtomicU64);
 

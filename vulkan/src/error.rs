@@ -1,4 +1,4 @@
-//! What can go wrong on the way to a picture, each with the numbers that a person needs.
+//! Errors of Vulkan devices, with the numbers that a person needs.
 
 use ash::vk;
 use std::fmt;
@@ -10,7 +10,7 @@ pub enum VulkanError {
     /// There is no Vulkan loader on this machine.
     #[error("no Vulkan loader: {detail}; on Debian it is the package libvulkan1")]
     NoLoader {
-        /// What the system's linker said.
+        /// The error of the system's linker.
         detail: String,
     },
     /// The loader is older than Vulkan 1.1.
@@ -22,95 +22,95 @@ pub enum VulkanError {
     /// No driver, or none with a device.
     #[error("no Vulkan device: {detail}")]
     NoDevice {
-        /// What was looked for and what is there.
+        /// The request, and the devices that exist.
         detail: String,
     },
-    /// The device lacks something.
+    /// The device lacks a requirement.
     #[error("{device} lacks what viewfuse needs: {}", list(.missing))]
     Missing {
         /// The device.
         device: String,
-        /// What it lacks.
+        /// The missing requirements.
         missing: Vec<Missing>,
     },
-    /// The work needs more than a limit of the device allows, and cannot be cut any finer.
+    /// The work exceeds a limit of the device, and cannot be split any finer.
     #[error("{device}: {what} needs {needed} bytes, but {limit} is {available}")]
     Limit {
         /// The device.
         device: String,
-        /// What was to be done.
+        /// The work.
         what: String,
         /// The limit's name in Vulkan.
         limit: &'static str,
-        /// What would be needed.
+        /// The required value.
         needed: u64,
-        /// What the device allows.
+        /// The device's limit.
         available: u64,
     },
-    /// There is not enough memory.
-    #[error("{device} is out of memory: {asked} bytes were asked for, {available} of {total} are free")]
+    /// The device has not enough free memory.
+    #[error("{device} is out of memory: {requested} bytes were requested, {available} of {total} are free")]
     OutOfMemory {
         /// The device.
         device: String,
-        /// How much was asked for.
-        asked: u64,
-        /// How much is free, as far as the device says.
+        /// Requested bytes.
+        requested: u64,
+        /// Free bytes, as reported by the device.
         available: u64,
-        /// How much there is.
+        /// All bytes.
         total: u64,
     },
-    /// The memory's manager failed for another reason than lack of memory.
+    /// The memory allocator failed for another reason than lack of memory.
     #[error("{device}: {detail}")]
     Memory {
         /// The device.
         device: String,
-        /// What it said.
+        /// Its message.
         detail: String,
     },
-    /// The device stopped working: a driver's fault, a reset, a card that was taken out.
+    /// The device was lost: a fault of the driver, a reset, or a removed card.
     #[error("{device} was lost in {call}")]
     DeviceLost {
         /// The device.
         device: String,
-        /// The call that found out.
+        /// The call that reported it.
         call: &'static str,
     },
-    /// A submission took too long.
-    #[error("{device}: {work} did not end within {} s", .limit.as_secs_f64())]
+    /// A submission exceeded its time limit.
+    #[error("{device}: {work} did not finish within {} s", .limit.as_secs_f64())]
     TimeLimit {
         /// The device.
         device: String,
-        /// What was running.
+        /// The work of the submission.
         work: String,
-        /// How long it was given.
+        /// The time limit.
         limit: Duration,
     },
-    /// The validation layers complained.
+    /// The validation layers reported an error.
     #[error("validation: {message}")]
     Validation {
         /// The first message.
         message: String,
     },
-    /// The validation layer was asked for and is not there.
+    /// The requested validation layer is not installed.
     #[error("the layer {layer} is not installed; on Debian it is the package vulkan-validationlayers")]
     NoValidation {
         /// Its name.
         layer: &'static str,
     },
-    /// A kernel was given arrays that are not those of its list.
+    /// A kernel's arguments do not match its row.
     #[error("kernel {kernel}: {detail}")]
     Arguments {
         /// The kernel.
         kernel: &'static str,
-        /// What does not fit.
+        /// The difference.
         detail: String,
     },
-    /// An array lies in the memory of another device.
-    #[error("the array lies in the memory of {owner}, not of {device}")]
+    /// An array is in the memory of another device.
+    #[error("the array is in the memory of {owner}, not of {device}")]
     OtherDevice {
-        /// The device that was to use it.
+        /// The device of the kernel.
         device: String,
-        /// The device that has it.
+        /// The device of the array.
         owner: String,
     },
     /// Any other call that failed.
@@ -118,17 +118,17 @@ pub enum VulkanError {
     Call {
         /// The call.
         call: &'static str,
-        /// Vulkan's answer.
+        /// Vulkan's result code.
         result: vk::Result,
     },
 }
 
-/// Something that a device lacks.
+/// A missing requirement of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Missing {
     /// The version of Vulkan, packed.
     Version {
-        /// What it has.
+        /// The device's value.
         found: u32,
     },
     /// A feature, by Vulkan's name.
@@ -137,12 +137,12 @@ pub enum Missing {
     Limit {
         /// Vulkan's name.
         name: &'static str,
-        /// What is needed.
+        /// The required value.
         needed: u64,
-        /// What it has.
+        /// The device's value.
         found: u64,
     },
-    /// A queue that computes.
+    /// A compute queue.
     ComputeQueue,
 }
 
@@ -152,7 +152,7 @@ impl fmt::Display for Missing {
             Missing::Version { found } => write!(f, "Vulkan 1.1 (it has {})", version(*found)),
             Missing::Feature(name) => write!(f, "the feature {name}"),
             Missing::Limit { name, needed, found } => write!(f, "{name} of {needed} (it has {found})"),
-            Missing::ComputeQueue => write!(f, "a queue that computes"),
+            Missing::ComputeQueue => write!(f, "a compute queue"),
         }
     }
 }
@@ -161,12 +161,12 @@ fn list(missing: &[Missing]) -> String {
     missing.iter().map(Missing::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// A packed version as people write it.
+/// A packed version as text.
 pub fn version(packed: u32) -> String {
     format!("{}.{}.{}", vk::api_version_major(packed), vk::api_version_minor(packed), vk::api_version_patch(packed))
 }
 
-/// Adds the call's name to Vulkan's answer.
+/// Adds the call's name to Vulkan's result code.
 pub(crate) fn failed(call: &'static str) -> impl Fn(vk::Result) -> VulkanError {
     move |result| VulkanError::Call { call, result }
 }

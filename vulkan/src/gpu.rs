@@ -17,23 +17,23 @@ use viewfuse_core::pages::MOST_PAGES;
 /// Bytes of the widest element of an array in pages.
 const WIDEST_PAGED: u64 = 16;
 
-/// How to use a device.
+/// Options of an opened device.
 #[derive(Clone, Copy, Debug)]
 pub struct GpuOptions {
-    /// How long a submission may run; `None` for what is right for the device: see [`GpuOptions::time_limit_on`].
+    /// Time limit of a submission; `None` for the device's default: see [`GpuOptions::time_limit_on`].
     pub time_limit: Option<Duration>,
-    /// Whether what depends on one another is kept apart. Without barriers results are wrong; it is how one shows that the
-    /// validation layers would have said so.
+    /// Whether barriers separate dependent commands. Without them results are wrong; tests use that to show that the
+    /// validation layers report it.
     pub barriers: bool,
-    /// How long, at the least, a device that is closed is waited for. One that still works then is left alone with all
-    /// that it uses.
+    /// The least time that closing a device waits for its work. If the work continues after that, its resources are not
+    /// freed.
     pub closing: Duration,
-    /// Limits to keep to where they are lower than the device's own: so can work that needs cutting be tested anywhere.
+    /// Limits that apply where they are lower than the device's own, so that tests can split work on any device.
     pub limits: Limits,
 }
 
 impl Default for GpuOptions {
-    /// The device's own time limit, ten seconds, and the device's own limits.
+    /// The device's default time limit, a closing time of ten seconds, and the device's own limits.
     fn default() -> GpuOptions {
         let limits =
             Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
@@ -42,11 +42,10 @@ impl Default for GpuOptions {
 }
 
 impl GpuOptions {
-    /// How long a submission may run on a device of this kind; `None` if it may run as long as it takes.
+    /// Time limit of a submission on a device of this kind; `None` without a limit.
     ///
-    /// Without a limit of its own, a GPU has two minutes: it does nothing else meanwhile. A software driver
-    /// has none: its kernels share the processor with everything else that runs on the machine, and a busy machine is no
-    /// failure.
+    /// The default of a GPU is two minutes. A software driver has no limit: its kernels share the processor with all other
+    /// processes of the machine, and a busy machine is not a failure.
     pub fn time_limit_on(&self, kind: AdapterKind) -> Option<Duration> {
         let of_kind = match kind {
             AdapterKind::Software => None,
@@ -56,10 +55,10 @@ impl GpuOptions {
     }
 }
 
-/// What a kernel did so far.
+/// The dispatches of a kernel so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// How many times it was dispatched; cut work counts once a piece.
+    /// How many times it was dispatched; split work counts once a piece.
     pub dispatches: u64,
     /// How many elements it computed.
     pub elements: u64,
@@ -67,10 +66,10 @@ pub struct Tally {
     pub time: Duration,
 }
 
-/// An opened device. Kernels run one after another in the order in which they are dispatched; what does not depend on
-/// one another may overlap.
+/// An opened device. Kernels run in the order in which they are dispatched; independent ones
+/// may overlap.
 pub struct Gpu {
-    // Dropped in this order: submissions are waited for before anything that they use goes.
+    // Dropped in this order: submissions finish before their resources are freed.
     state: Mutex<State>,
     pub(crate) handle: Arc<Handle>,
     pub(crate) page_shift: u32,
@@ -82,10 +81,10 @@ pub(crate) struct State {
     pipelines: Pipelines,
     pub(crate) upload: Option<Memory>,
     pub(crate) download: Option<Memory>,
-    /// The number of the stretch of commands since the last barrier.
+    /// The number of the interval of commands since the last barrier.
     stretch: u64,
     tallies: [Tally; Kernel::ALL.len()],
-    /// Once a device failed, what it holds cannot be trusted.
+    /// Whether the device failed: then the content of its memory is undefined.
     failed: Option<VulkanError>,
 }
 
@@ -93,7 +92,7 @@ impl Gpu {
     /// Opens a device.
     ///
     /// # Errors
-    /// [`VulkanError::Missing`] if it cannot do the work, and others if Vulkan fails.
+    /// [`VulkanError::Missing`] if it lacks a requirement, and others if Vulkan fails.
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Gpu, VulkanError> {
         if adapter.instance_number != instance.number {
             let detail = format!("{} was found by another instance of Vulkan", adapter.name);
@@ -103,12 +102,12 @@ impl Gpu {
             let (device, missing) = (adapter.name.clone(), adapter.missing.clone());
             return Err(VulkanError::Missing { device, missing });
         }
-        let (own, asked) = (adapter.limits, options.limits);
+        let (own, lower) = (adapter.limits, options.limits);
         let limits = Limits {
-            buffer_range: own.buffer_range.min(asked.buffer_range),
-            allocation: own.allocation.min(asked.allocation),
-            workgroup_count: own.workgroup_count.min(asked.workgroup_count).max(1),
-            memory: own.memory.min(asked.memory),
+            buffer_range: own.buffer_range.min(lower.buffer_range),
+            allocation: own.allocation.min(lower.allocation),
+            workgroup_count: own.workgroup_count.min(lower.workgroup_count).max(1),
+            memory: own.memory.min(lower.memory),
         };
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
@@ -130,12 +129,12 @@ impl Gpu {
         Ok(Gpu { state: Mutex::new(state), handle, page_shift: page_len.ilog2().min(31), barriers: options.barriers })
     }
 
-    /// What its driver calls it.
+    /// The driver's name for it.
     pub fn name(&self) -> &str {
         &self.handle.name
     }
 
-    /// The limits that work is cut by.
+    /// The limits by which work is split.
     pub fn limits(&self) -> Limits {
         self.handle.limits
     }
@@ -146,8 +145,8 @@ impl Gpu {
         usize::try_from(most).unwrap_or(usize::MAX) / bytes
     }
 
-    /// Runs a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` what it binds,
-    /// both as in its list.
+    /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its
+    /// bindings, both as in its row.
     ///
     /// # Errors
     /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array cannot
@@ -184,8 +183,8 @@ impl Gpu {
                         let piece = Piece { first, count: per_piece.min(elements.end - first) };
                         let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
                         let stage = vk::ShaderStageFlags::COMPUTE;
-                        // Pieces write elements of their own, but nobody sees that who looks at whole arrays, as the
-                        // validation layers do. Pieces are large: waiting between them costs nothing.
+                        // Pieces write different elements, but the validation layers only see whole arrays. Pieces are
+                        // large, so a barrier between them costs nothing.
                         if dispatches > 0 && gpu.barriers {
                             barrier(device, commands);
                         }
@@ -204,7 +203,7 @@ impl Gpu {
         })
     }
 
-    /// Waits until everything is done.
+    /// Waits until all work is done.
     ///
     /// # Errors
     /// If the device fails, or failed before.
@@ -212,7 +211,7 @@ impl Gpu {
         self.with_state(|_, state| state.wait())
     }
 
-    /// What each kernel did, up to the last thing that was waited for.
+    /// The dispatches of each kernel, up to the last submission that was waited for.
     pub fn tally(&self, kernel: Kernel) -> Tally {
         self.lock().tallies[kernel as usize]
     }
@@ -221,7 +220,7 @@ impl Gpu {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Works on the state; a failure of the device is remembered.
+    /// Accesses the state; a failure of the device is recorded.
     pub(crate) fn with_state<T>(
         &self,
         work: impl FnOnce(&Gpu, &mut State) -> Result<T, VulkanError>,
@@ -241,8 +240,8 @@ impl Gpu {
         outcome
     }
 
-    /// Records commands that use these arrays, after a barrier if they depend on what came since the last one, and sends
-    /// them on their way.
+    /// Records commands that use these arrays, after a barrier if they depend on commands since the last one, and submits
+    /// them.
     pub(crate) fn record(
         &self,
         state: &mut State,
@@ -379,7 +378,7 @@ fn count(tallies: &mut [Tally; Kernel::ALL.len()], done: Done) {
     tallies[done.kernel as usize].time += done.time.unwrap_or_default();
 }
 
-/// Everything before is seen by everything after.
+/// A barrier between all earlier and all later commands.
 fn barrier(device: &ash::Device, commands: vk::CommandBuffer) {
     let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
     let written = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;

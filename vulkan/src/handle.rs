@@ -11,19 +11,19 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Bytes that are taken from the device at once, for many buffers; less than any device must be able to give.
+/// Bytes of one allocation for many buffers; less than every device must support.
 const BLOCK: u64 = 64 << 20;
 
-/// Everything that buffers and submissions share. Dropped last.
+/// The state that buffers and submissions share. Dropped last.
 pub(crate) struct Handle {
     pub(crate) name: String,
     pub(crate) device: ash::Device,
     pub(crate) queue: vk::Queue,
     pub(crate) limits: Limits,
     allocator: ManuallyDrop<Mutex<Allocator>>,
-    /// Bytes of all buffers that live.
+    /// Bytes of all existing buffers.
     used: AtomicU64,
-    /// A submission may still run and will not be waited for any more: nothing that it uses may be given back.
+    /// A submission may still run and is not waited for any more: its resources must not be freed.
     abandoned: AtomicBool,
     adapter: Adapter,
     pub(crate) instance: Arc<Instance>,
@@ -80,7 +80,7 @@ impl Handle {
         })
     }
 
-    /// Whether so many more bytes may be used.
+    /// Whether this many more bytes are available.
     pub(crate) fn has_room(&self, bytes: u64) -> bool {
         self.used.load(Ordering::Relaxed).saturating_add(bytes) <= self.limits.memory
     }
@@ -129,7 +129,7 @@ impl Handle {
         self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    pub(crate) fn out_of_memory(&self, asked: u64) -> VulkanError {
+    pub(crate) fn out_of_memory(&self, requested: u64) -> VulkanError {
         let total = self.limits.memory;
         let mut available = total.saturating_sub(self.used.load(Ordering::Relaxed));
         if self.adapter.has_memory_budget {
@@ -146,11 +146,11 @@ impl Handle {
             available = available.min(free.unwrap_or(available));
         }
         let device = self.name.clone();
-        VulkanError::OutOfMemory { device, asked, available, total }
+        VulkanError::OutOfMemory { device, requested, available, total }
     }
 
-    /// A failed call as an error; a lost device says so. After any of them what the device holds cannot be trusted, also
-    /// for lack of memory: of commands that were recorded and never ran others may have been told.
+    /// A failed call as an error; a lost device has its own. After each of them the content of the device's memory is
+    /// undefined, also after lack of memory: recorded commands that never ran may be dependencies of others.
     pub(crate) fn failure(&self, call: &'static str, result: vk::Result) -> VulkanError {
         match result {
             vk::Result::ERROR_DEVICE_LOST => VulkanError::DeviceLost { device: self.name.clone(), call },
@@ -166,7 +166,7 @@ impl Handle {
         }
     }
 
-    /// From now on nothing is given back to the device.
+    /// From now on no resource is freed.
     pub(crate) fn abandon(&self) {
         self.abandoned.store(true, Ordering::Relaxed);
     }
@@ -202,12 +202,12 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// The device that it is memory of.
+    /// Its device.
     pub(crate) fn owner(&self) -> &Handle {
         &self.handle
     }
 
-    /// What the host sees of it, if it is in a place that the host sees.
+    /// Its mapping on the host, if it is host-visible.
     pub(crate) fn mapped(&mut self) -> Option<&mut [u8]> {
         self.allocation.as_mut().and_then(Allocation::mapped_slice_mut)
     }

@@ -11,22 +11,22 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What to start Vulkan with.
+/// Options for starting Vulkan.
 #[derive(Clone, Debug, Default)]
 pub struct InstanceOptions {
-    /// The loader's file; otherwise the system's.
+    /// The loader's file; the default is the system's.
     pub loader: Option<PathBuf>,
-    /// Validation and synchronization validation: each message fails the work that follows it.
+    /// Validation and synchronization validation: the work after a message fails.
     pub validation: bool,
 }
 
-/// Vulkan itself: loaded at run time, so that a machine without it runs everything else.
+/// Vulkan itself, loaded at run time, so that everything else works on a machine without it.
 pub struct Instance {
     _entry: ash::Entry,
     pub(crate) raw: ash::Instance,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Messages,
-    /// No other instance of this process has it: handles of dropped ones come back.
+    /// A number that is unique in this process, as handles are reused.
     pub(crate) number: u64,
 }
 
@@ -73,7 +73,7 @@ impl Instance {
         Ok(Arc::new(instance))
     }
 
-    /// What the validation layers said.
+    /// The messages of the validation layers.
     pub fn messages(&self) -> &Messages {
         &self.messages
     }
@@ -99,7 +99,7 @@ fn create(entry: &ash::Entry, options: &InstanceOptions, messages: &Messages) ->
     let offered = unsafe { entry.enumerate_instance_extension_properties(None) }
         .map_err(failed("vkEnumerateInstanceExtensionProperties"))?;
     if offered.iter().any(|extension| extension.extension_name_as_c_str() == Ok(khr::portability_enumeration::NAME)) {
-        // Drivers on top of another interface (MoltenVK) show themselves only to those who ask.
+        // Drivers on top of another interface (MoltenVK) are listed only on request.
         extensions.push(khr::portability_enumeration::NAME.as_ptr());
         flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
     }
@@ -138,7 +138,8 @@ fn create(entry: &ash::Entry, options: &InstanceOptions, messages: &Messages) ->
     })
 }
 
-/// Why there is none. The loader does not say which files it could not use; these variables tell it where to look.
+/// The reason why there is no driver. The loader does not report which files it rejected; these variables set its search
+/// path.
 fn no_driver() -> String {
     let told = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"].into_iter().find_map(|name| Some((name, env::var_os(name)?)));
     match told {
@@ -147,7 +148,7 @@ fn no_driver() -> String {
     }
 }
 
-/// What the validation layer brings with it.
+/// The extensions of the validation layer.
 fn layer_extensions(entry: &ash::Entry) -> Result<Vec<vk::ExtensionProperties>, VulkanError> {
     // SAFETY: no requirements.
     let layers =

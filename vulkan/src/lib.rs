@@ -1,19 +1,19 @@
 //! The kernels of viewfuse on any Vulkan device.
 //!
-//! The kernels are functions of `viewfuse-core`; rust-gpu makes them into SPIR-V (`shaders/`, `cargo shaders`), which lies in
-//! this crate. Vulkan is loaded at run time. The modules stand in the order of the data:
+//! The kernels are functions of `viewfuse-core`; rust-gpu makes them into SPIR-V (`shaders/`, `cargo shaders`), which
+//! is part of this crate. Vulkan is loaded at run time. The modules are listed in the order of the data:
 //!
 //! ```text
-//! error                          what can go wrong, with numbers
+//! error                          the errors, with numbers
 //! kernel                         the list of kernels: names, arrays, parameters
-//! messages, instance, adapter    the loader, its drivers, their devices and what those lack
+//! messages, instance, adapter    the loader, its drivers, their devices and missing requirements
 //! handle, buffer                 an opened device, memory in it
-//! pipelines, submissions         kernels made ready, commands on their way
-//! gpu                            dispatches, cut into pieces that fit the device
+//! pipelines, submissions         pipelines of kernels, submitted commands
+//! gpu                            dispatches, split to fit the device
 //! transfers                      arrays between host and device
 //! ```
 //!
-//! Unsafe code is only here, in calls of Vulkan; each says why it is sound.
+//! Unsafe code is only in calls of Vulkan; each has a comment why it is sound.
 
 mod adapter;
 mod buffer;

@@ -1,10 +1,10 @@
-//! What the validation layers say.
+//! Messages of the validation layers.
 
 use ash::vk;
 use std::ffi::{CStr, c_void};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Messages of the validation layers, shared: they can still be read when the instance is gone.
+/// Messages of the validation layers, shared, so that they can be read after the instance is dropped.
 #[derive(Clone, Debug, Default)]
 pub struct Messages(Arc<Mutex<Vec<String>>>);
 
@@ -19,7 +19,7 @@ impl Messages {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).first().cloned()
     }
 
-    /// What a messenger needs to be created: warnings and errors of validation. The messages must outlive it.
+    /// The parameters of a messenger: warnings and errors of validation. The messages must outlive it.
     pub(crate) fn create_info(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'_> {
         vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(

@@ -1,4 +1,4 @@
-//! One pipeline per kernel and specialisation, made when it is first needed.
+//! One pipeline per kernel and specialisation, created at its first use.
 
 use crate::error::VulkanError;
 use crate::handle::Handle;
@@ -8,10 +8,10 @@ use std::collections::HashMap;
 use std::ffi::CString;
 use std::sync::Arc;
 
-/// The kernels, as `cargo shaders` makes them.
+/// The kernels, as `cargo shaders` compiles them.
 const MODULE: &[u8] = include_bytes!("kernels.spv");
 
-/// A kernel that is ready to run.
+/// The pipeline of a kernel.
 #[derive(Clone, Copy)]
 pub(crate) struct Pipeline {
     pub(crate) raw: vk::Pipeline,

@@ -1,7 +1,7 @@
-//! Commands on their way through the queue.
+//! Submissions to the queue.
 //!
-//! Up to [`MOST_IN_FLIGHT`] submissions are on their way at once, so that the device works while the host prepares the next
-//! ones. A submission keeps everything that it uses alive until its fence says that it is done.
+//! Up to [`MOST_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next
+//! ones. A submission keeps its resources alive until its fence is signalled.
 
 use crate::buffer::Array;
 use crate::error::VulkanError;
@@ -12,10 +12,10 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// How many submissions are on their way at once.
+/// The most submissions in flight.
 const MOST_IN_FLIGHT: usize = 8;
 
-/// What a submission did, for whoever counts.
+/// The work of a submission, for statistics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Done {
     pub(crate) kernel: Kernel,
@@ -23,7 +23,7 @@ pub(crate) struct Done {
     pub(crate) time: Option<Duration>,
 }
 
-/// Commands that are being recorded or on their way.
+/// Commands that are being recorded or in flight.
 pub(crate) struct Submission {
     pub(crate) commands: vk::CommandBuffer,
     pub(crate) descriptors: vk::DescriptorPool,
@@ -38,15 +38,15 @@ pub(crate) struct Submissions {
     pool: vk::CommandPool,
     free: Vec<Submission>,
     running: VecDeque<Submission>,
-    /// How long the oldest may run; `None` for as long as it takes.
+    /// Time limit of the oldest; `None` without a limit.
     time_limit: Option<Duration>,
-    /// How long, at the least, what is on its way is waited for when the device is closed.
+    /// The least time that closing the device waits for submissions in flight.
     closing: Duration,
-    /// One did not end in time.
+    /// One exceeded the time limit.
     is_late: bool,
     /// Nanoseconds of a timestamp's unit; `None` without timestamps.
     tick: Option<f32>,
-    /// Bits of a timestamp that mean something.
+    /// Valid bits of a timestamp.
     tick_mask: u64,
     handle: Arc<Handle>,
 }
@@ -78,7 +78,7 @@ impl Submissions {
         })
     }
 
-    /// Starts recording. If all submissions are on their way, the oldest is waited for first.
+    /// Starts recording. If all submissions are in flight, it waits for the oldest first.
     pub(crate) fn begin(&mut self, done: &mut impl FnMut(Done)) -> Result<Submission, VulkanError> {
         if self.running.len() >= MOST_IN_FLIGHT {
             self.wait_for_oldest(done)?;
@@ -88,7 +88,7 @@ impl Submissions {
             None => self.create()?,
         };
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the commands are not on their way; the pool allows to record them again.
+        // SAFETY: the commands are not in flight; the pool allows to record them again.
         let begun = unsafe { self.handle.device.begin_command_buffer(submission.commands, &info) };
         match begun {
             Ok(()) => Ok(submission),
@@ -102,16 +102,16 @@ impl Submissions {
     /// Takes back a submission whose recording failed.
     pub(crate) fn discard(&mut self, mut submission: Submission) {
         let no_flags = vk::DescriptorPoolResetFlags::empty();
-        // A set that was allocated before the failure would leave no room for the next one. By the letter this call cannot
-        // fail; if it does, the next allocation says so.
-        // SAFETY: the submission is not on its way.
+        // A set that was allocated before the failure would leave no space for the next one. By the specification this call
+        // cannot fail; if it does, the next allocation reports it.
+        // SAFETY: the submission is not in flight.
         let _ = unsafe { self.handle.device.reset_descriptor_pool(submission.descriptors, no_flags) };
         submission.held.clear();
         submission.kernel = None;
         self.free.push(submission);
     }
 
-    /// Sends recorded commands on their way.
+    /// Submits recorded commands.
     pub(crate) fn submit(&mut self, submission: Submission) -> Result<(), VulkanError> {
         let commands = [submission.commands];
         let info = [vk::SubmitInfo::default().command_buffers(&commands)];
@@ -133,7 +133,7 @@ impl Submissions {
         submitted
     }
 
-    /// Waits until everything is done.
+    /// Waits until all submissions are done.
     pub(crate) fn wait(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
         while !self.running.is_empty() {
             self.wait_for_oldest(done)?;
@@ -141,14 +141,14 @@ impl Submissions {
         Ok(())
     }
 
-    /// Waits for the oldest submission, but not longer than the time limit: the ones before it are done, so all of that
-    /// time is its own.
+    /// Waits for the oldest submission, at most for the time limit: earlier ones are done, so all of that time is its
+    /// own.
     fn wait_for_oldest(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
         let Some(oldest) = self.running.front() else { return Ok(()) };
         let nanoseconds = |limit: Duration| u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
         let nanoseconds = self.time_limit.map_or(u64::MAX, nanoseconds);
         let Handle { device, .. } = &*self.handle;
-        // SAFETY: the fence belongs to a submission that is on its way.
+        // SAFETY: the fence belongs to a submission that is in flight.
         let waited = unsafe { device.wait_for_fences(&[oldest.fence], true, nanoseconds) };
         self.is_late |= waited == Err(vk::Result::TIMEOUT);
         waited.map_err(|result| match result {
@@ -188,7 +188,7 @@ impl Submissions {
         Ok(Some(Duration::from_nanos((passed as f64 * f64::from(tick)) as u64)))
     }
 
-    /// Starts the clock of a kernel.
+    /// Writes the timestamp before a kernel.
     pub(crate) fn start_clock(&self, submission: &mut Submission, kernel: Kernel) {
         submission.kernel = Some(kernel);
         if self.tick.is_some() {
@@ -196,14 +196,14 @@ impl Submissions {
             // SAFETY: the commands are being recorded; the pool has two queries.
             unsafe {
                 device.cmd_reset_query_pool(submission.commands, submission.queries, 0, 2);
-                // When all that came before is done: a kernel that waits takes no time.
+                // After all earlier commands: waiting for them is not the kernel's time.
                 let before = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
                 device.cmd_write_timestamp(submission.commands, before, submission.queries, 0);
             }
         }
     }
 
-    /// Stops it.
+    /// Writes the timestamp behind it.
     pub(crate) fn stop_clock(&self, submission: &Submission) {
         if self.tick.is_some() {
             let bottom = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
@@ -262,7 +262,7 @@ impl Submissions {
 
     fn destroy(&self, submission: &Submission) {
         let Handle { device, .. } = &*self.handle;
-        // SAFETY: the submission is not on its way; null handles are ignored. Commands go with their pool.
+        // SAFETY: the submission is not in flight; null handles are ignored. Commands go with their pool.
         unsafe {
             device.destroy_query_pool(submission.queries, None);
             device.destroy_fence(submission.fence, None);
@@ -273,7 +273,7 @@ impl Submissions {
 
 impl Drop for Submissions {
     fn drop(&mut self) {
-        // One that ran out of time may still run: it gets a little longer, then it is left alone with all that it uses.
+        // One that exceeded the time limit may still run: it gets a little longer, then its resources are not freed.
         let patience =
             if self.is_late { Some(self.closing) } else { self.time_limit.map(|limit| limit.max(self.closing)) };
         let deadline = patience.map(|patience| Instant::now() + patience);
@@ -289,7 +289,7 @@ impl Drop for Submissions {
             }
         }
         self.free.iter().for_each(|submission| self.destroy(submission));
-        // SAFETY: no commands of the pool are on their way.
+        // SAFETY: no commands of the pool are in flight.
         unsafe { self.handle.device.destroy_command_pool(self.pool, None) };
     }
 }

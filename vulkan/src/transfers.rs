@@ -10,7 +10,7 @@ use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use std::ops::Range;
 
-/// Bytes that go between host and device at once.
+/// Bytes of the staging buffer.
 const STAGING: u64 = 16 << 20;
 
 impl Gpu {
@@ -57,7 +57,7 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// The values of an array, when everything that was dispatched before is done.
+    /// The values of an array after all earlier dispatches.
     ///
     /// # Errors
     /// If the device fails, or failed before; [`VulkanError::OtherDevice`].
@@ -99,7 +99,7 @@ impl Gpu {
         Ok(values)
     }
 
-    /// Memory for an array: one buffer, or one a page where no allocation is large enough.
+    /// Memory for an array: one buffer, or one a page if no allocation is large enough.
     fn array<T: Pod>(&self, len: usize) -> Result<Buffer<T>, VulkanError> {
         const { assert!(size_of::<T>() > 0, "elements without bytes cannot be counted on a device") };
         let stride = size_of::<T>();
@@ -119,7 +119,7 @@ impl Gpu {
         // Pages are short enough for elements that kernels bind in pages; wider ones are never bound so.
         let chunk_len = if len <= affordable { len.max(1) } else { affordable.min(1 << self.page_shift) };
         let chunks = match self.chunks(len, chunk_len, stride) {
-            // What was let go while submissions that use it were on their way is free when they are done.
+            // Memory that was released while submissions in flight used it is free when they are done.
             Err(VulkanError::OutOfMemory { .. }) => {
                 self.wait()?;
                 self.chunks(len, chunk_len, stride)?
@@ -130,8 +130,8 @@ impl Gpu {
         Ok(Buffer::new(Array { chunks, chunk_len, len, stride, read_in, written_in }))
     }
 
-    /// Memory for `len` elements, but at least one, `chunk_len` in each piece. All of it or none: what cannot be had as a
-    /// whole is told before the first piece is taken.
+    /// Memory for `len` elements, but at least one, `chunk_len` in each piece. If the whole does not fit, no piece is
+    /// allocated.
     fn chunks(&self, len: usize, chunk_len: usize, stride: usize) -> Result<Vec<Memory>, VulkanError> {
         // Fills take multiples of four bytes only.
         let bytes = |count: usize| (count as u64).saturating_mul(stride as u64).checked_next_multiple_of(4);
@@ -142,7 +142,7 @@ impl Gpu {
         }
         let chunk = |first: usize| self.handle.memory(bytes(chunk_len.min(len - first)), MemoryLocation::GpuOnly);
         (0..len).step_by(chunk_len).map(chunk).collect::<Result<_, _>>().map_err(|error| match error {
-            // The pieces before it are given back: the array as a whole is what there is no room for.
+            // The pieces before it are freed: the error is about the array as a whole.
             VulkanError::OutOfMemory { .. } => self.handle.out_of_memory(bytes(len)),
             error => error,
         })
@@ -152,12 +152,12 @@ impl Gpu {
         STAGING.min(self.handle.limits.allocation) as usize
     }
 
-    /// The staging buffer and what the host sees of it.
+    /// The staging buffer and its mapping on the host.
     fn mapped<'a>(&self, staging: &'a mut Option<Memory>) -> Result<(vk::Buffer, &'a mut [u8]), VulkanError> {
         let mapped = staging.as_mut().and_then(|memory| Some((memory.buffer, memory.mapped()?)));
         mapped.ok_or_else(|| VulkanError::Memory {
             device: self.handle.name.clone(),
-            detail: "memory for transfers is not seen by the host".to_owned(),
+            detail: "staging memory is not visible to the host".to_owned(),
         })
     }
 
@@ -169,8 +169,8 @@ impl Gpu {
     }
 }
 
-/// Calls with each stretch of at most `most` bytes of an array that lies in one chunk: the chunk, the byte in it, and the
-/// bytes of the whole array.
+/// Calls with each range of at most `most` bytes of an array within one chunk: the chunk, the byte in it, and the bytes of
+/// the whole array.
 fn for_each_stretch(
     array: &Array,
     most: usize,

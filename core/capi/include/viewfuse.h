@@ -23,7 +23,7 @@
 #define VIEWFUSE_ATTENTION_PARAMETERS 15232
 
 /*
- What came of a call.
+ The result of a call.
  */
 enum viewfuse_status
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -43,7 +43,7 @@ enum viewfuse_status
    */
   VIEWFUSE_STATUS_COUNT = 2,
   /*
-   The scheme's formula or choice is none of those listed.
+   The scheme's formula or choice is not one of those listed.
    */
   VIEWFUSE_STATUS_FORMULA = 3,
   /*
@@ -75,7 +75,7 @@ enum viewfuse_status
    */
   VIEWFUSE_STATUS_WEIGHT = 10,
   /*
-   A noise level is negative, NaN or infinite, or the ends of a schedule are not positive levels in order.
+   A noise level is negative, NaN or infinite, or the levels of a schedule are out of range or in the wrong order.
    */
   VIEWFUSE_STATUS_NOISE_LEVEL = 11,
 };
@@ -96,7 +96,7 @@ enum viewfuse_formula
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
   /*
-   Every source counts the same. Choice and parameter are not used.
+   All weights are equal. Choice and parameter are not used.
    */
   VIEWFUSE_FORMULA_MEAN = 0,
   /*
@@ -134,7 +134,7 @@ typedef uint32_t viewfuse_formula;
 #endif // __cplusplus
 
 /*
- Which angle between two cameras counts.
+ The angle between two cameras that error weighting uses.
  */
 enum viewfuse_angle
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -146,7 +146,7 @@ enum viewfuse_angle
    */
   VIEWFUSE_ANGLE_PRINCIPAL_AXIS = 0,
   /*
-   Of the full relative rotation: roll counts.
+   Of the full relative rotation, roll included.
    */
   VIEWFUSE_ANGLE_FULL_ROTATION = 1,
 };
@@ -177,15 +177,15 @@ typedef struct {
 } viewfuse_scheme;
 
 /*
- A ray on its way from the camera. Made by viewfuse_ray_start.
+ The state of compositing along a ray. Initialised by viewfuse_ray_start.
  */
 typedef struct {
   /*
-   Red, green and blue gathered so far.
+   Weighted sums of red, green and blue so far.
    */
   float accumulated[3];
   /*
-   Depth gathered so far, times its weight.
+   Weighted sum of the depths so far.
    */
   float weighted_depth;
   /*
@@ -193,18 +193,18 @@ typedef struct {
    */
   float optical_depth;
   /*
-   How much light passes what was met so far, in 0 to 1. The ray may end where this is so small that nothing behind
-   can matter: a colour changes by at most this much of its range.
+   Transmittance of the samples so far, from 0 to 1. Early termination: stop where it is below a threshold. The samples
+   behind change a colour by at most this fraction of its range.
    */
   float transmittance;
 } viewfuse_ray;
 
 /*
- What a ray saw.
+ The composited pixel of a ray.
  */
 typedef struct {
   /*
-   Red, green, blue, with the background behind.
+   Red, green, blue, composited over the background.
    */
   float rgb[3];
   /*
@@ -212,7 +212,7 @@ typedef struct {
    */
   float depth;
   /*
-   How much of the background is hidden, in 0 to 1.
+   Opacity: 1 minus the transmittance, from 0 to 1.
    */
   float opacity;
 } viewfuse_pixel;
@@ -222,7 +222,7 @@ typedef struct {
  */
 typedef struct {
   /*
-   How much of the noisy picture goes past the network.
+   Factor of the noisy picture in the denoised one (the skip connection).
    */
   float skip;
   /*
@@ -234,7 +234,7 @@ typedef struct {
    */
   float input;
   /*
-   The number that tells the network the level: a quarter of its natural logarithm.
+   The network's noise conditioning: a quarter of the level's natural logarithm.
    */
   float noise;
 } viewfuse_preconditioning;
@@ -248,7 +248,7 @@ typedef struct {
    */
   float remaining;
   /*
-   Factor of the second-order correction; 0 where none is taken, as in the step to level 0.
+   Factor of the second-order correction; 0 without a correction, as in the step to level 0.
    */
   float correction;
 } viewfuse_step;
@@ -258,7 +258,7 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- A status in words, in English, as a string that stays for good. Any number may be asked.
+ The message of a status, in English, as a static string. Every number is valid input.
  */
 const char *viewfuse_status_text(int32_t status);
 
@@ -304,11 +304,11 @@ viewfuse_status viewfuse_weigh_32(const viewfuse_scheme *scheme,
  The weights of up to 8 sources for a target, by learned attention: finite, at least 0, with the sum 1.
 
  `parameters` is `[VIEWFUSE_ATTENTION_PARAMETERS]`: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
- weights `[output][input]`, then the biases `[output]`. They are read where they lie, in flash for instance.
+ weights `[output][input]`, then the biases `[output]`. They are read in place, for example from flash.
  `source_poses` is `[source_count][4][4]`, `target_pose` is `[4][4]`, `weights` is `[source_count]`.
 
  # Safety
- Pointers are null or valid for these shapes; nobody changes the parameters meanwhile.
+ Pointers are null or valid for these shapes; the parameters do not change during the call.
  */
 viewfuse_status viewfuse_attend_8(const float *parameters,
                                   const float *source_poses,
@@ -344,8 +344,8 @@ viewfuse_status viewfuse_attend_32(const float *parameters,
  The weighted sum of the views' latents, in view order.
 
  `weights` is `[view_count]`, each finite and at least 0; `latents` is `[view_count][channel_count]`, `fused` is
- `[channel_count]`. Latents that are not finite give channels that are not. `fused` may be the place of the first
- view's latents, but may not overlap the weights or the latents otherwise.
+ `[channel_count]`. Latents that are not finite give channels that are not. `fused` may be the same memory as the
+ first view's latents, but may not overlap the weights or the latents otherwise.
 
  # Safety
  Pointers are null or valid for these shapes.
@@ -357,7 +357,7 @@ viewfuse_status viewfuse_fuse_views(const float *weights,
                                     float *fused);
 
 /*
- A ray that has met nothing yet.
+ Starts a ray: no samples yet, transmittance 1.
 
  # Safety
  The pointer is null or valid.
@@ -374,9 +374,9 @@ viewfuse_status viewfuse_ray_start(viewfuse_ray *ray);
 viewfuse_status viewfuse_ray_add(viewfuse_ray *ray, const float *rgb, float optical_depth, float depth);
 
 /*
- Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy in 0 to 1 (NaN
- counts as 0), which the ray's opacity will at least be, and its distance along the ray. For one ray use either this or
- viewfuse_ray_add.
+ Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy from 0 to 1
+ (NaN counts as 0), which is a lower bound of the ray's opacity, and its distance along the ray. For one ray use
+ either this or viewfuse_ray_add.
 
  # Safety
  Pointers are null or valid.
@@ -385,7 +385,7 @@ viewfuse_status viewfuse_ray_add_solid(viewfuse_ray *ray, const float *rgb, floa
 
 /*
  The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
- stays as it is.
+ is not changed.
 
  # Safety
  Pointers are null or valid.
@@ -397,7 +397,7 @@ viewfuse_status viewfuse_ray_finish(const viewfuse_ray *ray,
 
 /*
  Noise level `index` of `count` from `sigma_max` (the first) down to `sigma_min` (the last), evenly spaced in the
- seventh root; level `count` and everything behind is 0. The published schedule has the ends 0.002 and 80. The ends
+ seventh root; level `count` and everything behind is 0. The published schedule runs from 80 to 0.002. Both levels
  lie between 1e-30 and 1e30.
 
  # Safety
@@ -423,7 +423,7 @@ viewfuse_status viewfuse_preconditioning_at(float sigma, viewfuse_preconditionin
 viewfuse_status viewfuse_step_between(float sigma, float next, viewfuse_step *step);
 
 /*
- What the network is given: `input * noisy`, for `count` values.
+ The network's input: `input * noisy`, for `count` values.
 
  `noisy` and `given` are `[count]`; they may be the same array, but may not overlap otherwise.
 

@@ -1,4 +1,4 @@
-//! The views' latents become one.
+//! Fusion of the views' latents: a weighted sum.
 
 use crate::lent::{Input, Output};
 use crate::status::Status;
@@ -8,8 +8,8 @@ use viewfuse_core::pages::{Fetch, StartingAt};
 /// The weighted sum of the views' latents, in view order.
 ///
 /// `weights` is `[view_count]`, each finite and at least 0; `latents` is `[view_count][channel_count]`, `fused` is
-/// `[channel_count]`. Latents that are not finite give channels that are not. `fused` may be the place of the first
-/// view's latents, but may not overlap the weights or the latents otherwise.
+/// `[channel_count]`. Latents that are not finite give channels that are not. `fused` may be the same memory as the
+/// first view's latents, but may not overlap the weights or the latents otherwise.
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.

@@ -58,7 +58,7 @@ impl Output {
 /// A value of a plain struct.
 ///
 /// # Safety
-/// Unless it is null or misaligned, `place` may be read, and `T` is a value whatever its bits are.
+/// Unless it is null or misaligned, `place` may be read, and every bit pattern is a valid `T`.
 pub(crate) unsafe fn read<T: Copy>(place: *const T) -> Result<T, Status> {
     checked(place, 1)?;
     // SAFETY: neither null nor misaligned; the caller vouches for the rest.

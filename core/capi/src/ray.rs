@@ -1,34 +1,34 @@
-//! Samples along a ray become a pixel.
+//! Compositing: samples along a ray become a pixel.
 
 use crate::lent::{Input, read, write};
 use crate::status::Status;
 use viewfuse_core::composite::{Compositor, RayBlock};
 use viewfuse_core::pages::Fetch;
 
-/// A ray on its way from the camera. Made by viewfuse_ray_start.
+/// The state of compositing along a ray. Initialised by viewfuse_ray_start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
-    /// Red, green and blue gathered so far.
+    /// Weighted sums of red, green and blue so far.
     pub accumulated: [f32; 3],
-    /// Depth gathered so far, times its weight.
+    /// Weighted sum of the depths so far.
     pub weighted_depth: f32,
     /// Sum of the optical depths.
     pub optical_depth: f32,
-    /// How much light passes what was met so far, in 0 to 1. The ray may end where this is so small that nothing behind
-    /// can matter: a colour changes by at most this much of its range.
+    /// Transmittance of the samples so far, from 0 to 1. Early termination: stop where it is below a threshold. The samples
+    /// behind change a colour by at most this fraction of its range.
     pub transmittance: f32,
 }
 
-/// What a ray saw.
+/// The composited pixel of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Pixel {
-    /// Red, green, blue, with the background behind.
+    /// Red, green, blue, composited over the background.
     pub rgb: [f32; 3],
     /// Mean depth of what was hit.
     pub depth: f32,
-    /// How much of the background is hidden, in 0 to 1.
+    /// Opacity: 1 minus the transmittance, from 0 to 1.
     pub opacity: f32,
 }
 
@@ -46,7 +46,7 @@ impl Ray {
     }
 }
 
-/// A ray that has met nothing yet.
+/// Starts a ray: no samples yet, transmittance 1.
 ///
 /// # Safety
 /// The pointer is null or valid.
@@ -71,9 +71,9 @@ pub unsafe extern "C" fn viewfuse_ray_add(ray: *mut Ray, rgb: *const f32, optica
     })
 }
 
-/// Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy in 0 to 1 (NaN
-/// counts as 0), which the ray's opacity will at least be, and its distance along the ray. For one ray use either this or
-/// viewfuse_ray_add.
+/// Adds the next sample of a solid with a soft boundary, front to back: its colour `[3]`, its occupancy from 0 to 1
+/// (NaN counts as 0), which is a lower bound of the ray's opacity, and its distance along the ray. For one ray use
+/// either this or viewfuse_ray_add.
 ///
 /// # Safety
 /// Pointers are null or valid.
@@ -88,7 +88,7 @@ pub unsafe extern "C" fn viewfuse_ray_add_solid(ray: *mut Ray, rgb: *const f32, 
 }
 
 /// The pixel, with the background `[3]` behind everything; `empty_depth` is the depth of a ray that hit nothing. The ray
-/// stays as it is.
+/// is not changed.
 ///
 /// # Safety
 /// Pointers are null or valid.

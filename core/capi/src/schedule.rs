@@ -8,13 +8,13 @@ use viewfuse_core::schedule::{self, HeunStep, NoiseSchedule};
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Preconditioning {
-    /// How much of the noisy picture goes past the network.
+    /// Factor of the noisy picture in the denoised one (the skip connection).
     pub skip: f32,
     /// Factor of the network's output.
     pub output: f32,
     /// Factor of the network's input.
     pub input: f32,
-    /// The number that tells the network the level: a quarter of its natural logarithm.
+    /// The network's noise conditioning: a quarter of the level's natural logarithm.
     pub noise: f32,
 }
 
@@ -24,12 +24,12 @@ pub struct Preconditioning {
 pub struct Step {
     /// What remains of the noise: the level reached divided by the level before.
     pub remaining: f32,
-    /// Factor of the second-order correction; 0 where none is taken, as in the step to level 0.
+    /// Factor of the second-order correction; 0 without a correction, as in the step to level 0.
     pub correction: f32,
 }
 
 /// Noise level `index` of `count` from `sigma_max` (the first) down to `sigma_min` (the last), evenly spaced in the
-/// seventh root; level `count` and everything behind is 0. The published schedule has the ends 0.002 and 80. The ends
+/// seventh root; level `count` and everything behind is 0. The published schedule runs from 80 to 0.002. Both levels
 /// lie between 1e-30 and 1e30.
 ///
 /// # Safety
@@ -81,7 +81,7 @@ pub unsafe extern "C" fn viewfuse_step_between(sigma: f32, next: f32, step: *mut
     Status::of(unsafe { write(step, Step { remaining, correction }) })
 }
 
-/// What the network is given: `input * noisy`, for `count` values.
+/// The network's input: `input * noisy`, for `count` values.
 ///
 /// `noisy` and `given` are `[count]`; they may be the same array, but may not overlap otherwise.
 ///
@@ -206,14 +206,14 @@ unsafe fn each<const N: usize>(
         return Err(Status::Count);
     }
     for input in inputs {
-        // SAFETY: the caller's promise; only to look at the pointer.
+        // SAFETY: the caller's promise; only to check the pointer.
         unsafe { Input::new(input, count as usize) }?;
     }
     // SAFETY: the caller's promise.
     let mut results = unsafe { Output::new(results, count as usize) }?;
     let mut index = 0;
     while index < count as usize {
-        // SAFETY: the pointers were looked at above, and `index` is one of their floats.
+        // SAFETY: the pointers were checked above, and `index` is one of their floats.
         results.store(index, of(inputs.map(|input| unsafe { input.add(index).read() })));
         index += 1;
     }

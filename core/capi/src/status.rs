@@ -1,10 +1,10 @@
-//! What can be wrong with a call.
+//! Status codes.
 
 use core::ffi::{CStr, c_char};
 use viewfuse_core::pose::PoseError;
 use viewfuse_core::weighting::SchemeError;
 
-/// What came of a call.
+/// The result of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub enum Status {
@@ -14,7 +14,7 @@ pub enum Status {
     Pointer = 1,
     /// A count is 0, larger than the function takes, or larger than the memory.
     Count = 2,
-    /// The scheme's formula or choice is none of those listed.
+    /// The scheme's formula or choice is not one of those listed.
     Formula = 3,
     /// The scheme's parameter is out of its range.
     Parameter = 4,
@@ -30,7 +30,7 @@ pub enum Status {
     PoseMirrored = 9,
     /// A weight is negative, NaN or infinite.
     Weight = 10,
-    /// A noise level is negative, NaN or infinite, or the ends of a schedule are not positive levels in order.
+    /// A noise level is negative, NaN or infinite, or the levels of a schedule are out of range or in the wrong order.
     NoiseLevel = 11,
 }
 
@@ -64,7 +64,7 @@ impl Status {
     }
 }
 
-/// A status in words, in English, as a string that stays for good. Any number may be asked.
+/// The message of a status, in English, as a static string. Every number is valid input.
 #[unsafe(no_mangle)]
 pub extern "C" fn viewfuse_status_text(status: i32) -> *const c_char {
     let text: &'static CStr = match status {

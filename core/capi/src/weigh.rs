@@ -1,4 +1,4 @@
-//! How much each source counts.
+//! Weights of the source views.
 
 use crate::lent::{Input, Output, checked, read};
 use crate::status::Status;
@@ -9,13 +9,13 @@ use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{self, AngleKind};
 use viewfuse_core::weights::Weights;
 
-/// Which angle between two cameras counts.
+/// The angle between two cameras that error weighting uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Angle {
     /// Between the principal axes.
     PrincipalAxis = 0,
-    /// Of the full relative rotation: roll counts.
+    /// Of the full relative rotation, roll included.
     FullRotation = 1,
 }
 
@@ -101,11 +101,11 @@ pub unsafe extern "C" fn viewfuse_weigh_32(
 /// The weights of up to 8 sources for a target, by learned attention: finite, at least 0, with the sum 1.
 ///
 /// `parameters` is `[VIEWFUSE_ATTENTION_PARAMETERS]`: of each of the three layers (42 to 64, 64 to 64, 64 to 128) the
-/// weights `[output][input]`, then the biases `[output]`. They are read where they lie, in flash for instance.
+/// weights `[output][input]`, then the biases `[output]`. They are read in place, for example from flash.
 /// `source_poses` is `[source_count][4][4]`, `target_pose` is `[4][4]`, `weights` is `[source_count]`.
 ///
 /// # Safety
-/// Pointers are null or valid for these shapes; nobody changes the parameters meanwhile.
+/// Pointers are null or valid for these shapes; the parameters do not change during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_attend_8(
     parameters: *const f32,
@@ -187,7 +187,7 @@ unsafe fn attend<const S: usize>(
     })
 }
 
-/// The cameras of a call and the place for their weights.
+/// The cameras of a call and the destination of their weights.
 struct Views<const S: usize> {
     sources: Input,
     count: u32,

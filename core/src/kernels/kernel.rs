@@ -16,8 +16,8 @@ pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
     row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
 }
 
-/// The elements of one dispatch: large work is cut into several. Invocation `i` works on element `first + i` if
-/// `i < count`.
+/// The elements of one dispatch; large work is split into several dispatches. Invocation `i` works on element
+/// `first + i` if `i < count`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Piece {
@@ -27,7 +27,7 @@ pub struct Piece {
     pub count: u32,
 }
 
-/// What a kernel does with an array.
+/// How a kernel accesses an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
     /// It only reads.
@@ -50,15 +50,15 @@ pub enum Layout {
 /// An array that a kernel binds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Array {
-    /// Its name in the entry point; pages have `_a` to `_d` behind it.
+    /// Its name in the entry point; pages add `_a` to `_d`.
     pub name: &'static str,
-    /// What is done with it.
+    /// How the kernel accesses it.
     pub access: Access,
     /// How it is bound.
     pub layout: Layout,
     /// Bytes of an element of the entry point.
     pub stride: usize,
-    /// Bytes that the kernel reads without looking at the length; 0 where it looks.
+    /// Bytes that the kernel reads without checking the length; 0 where it checks.
     pub least_bytes: usize,
 }
 
@@ -102,12 +102,12 @@ macro_rules! array {
     };
 }
 
-/// Whether a word is among those of a row.
+/// Whether a row has a mark.
 macro_rules! has {
-    ($wanted:ident:) => { false };
+    ($mark:ident:) => { false };
     (twin: twin $(, $rest:ident)*) => { true };
     (tiled: tiled $(, $rest:ident)*) => { true };
-    ($wanted:ident: $other:ident $(, $rest:ident)*) => { has!($wanted: $($rest),*) };
+    ($mark:ident: $other:ident $(, $rest:ident)*) => { has!($mark: $($rest),*) };
 }
 
 macro_rules! list {
@@ -150,7 +150,7 @@ macro_rules! list {
                 }
             }
 
-            /// Whether its workgroups compute tiles together: only those have memory of their own, and barriers.
+            /// Whether its workgroups compute tiles together: only these kernels use workgroup memory and barriers.
             pub const fn is_tiled(self) -> bool {
                 match self {
                     $(Kernel::$Kernel => has!(tiled: $($way),*),)+

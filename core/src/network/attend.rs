@@ -1,4 +1,4 @@
-//! Self-attention of an image: products of matrices that are both computed, and softmax over the rows of one.
+//! Self-attention of an image: matrix products of two computed matrices, and softmax over the rows of a matrix.
 //!
 //! With queries, keys and values `[pixel][channel]`: scores are `queries keys^T / sqrt(channels)`, their softmax over the
 //! keys are weights, and `weights values` is the result. A matrix may be some of the columns of a wider one.
@@ -64,8 +64,8 @@ pub fn matrix_element(
 }
 
 /// The largest number of a row `scores[column]`, and the reciprocal of the sum of `e^(score - largest)`, at most 1: what
-/// [`softmax_value`] needs. A row of minus infinity alone gives 0 for the second, one with NaN or plus infinity NaN, so that
-/// it is found and not hidden.
+/// [`softmax_value`] needs. A row of minus infinity alone gives 0 for the second; a row with NaN or plus infinity
+/// gives NaN, so that the fault is reported and not hidden.
 #[inline]
 pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_count: u32) -> [f32; 2] {
     let mut largest = -f32::MAX;

@@ -4,7 +4,7 @@
 //! copies.
 //!
 //! It is the matrix product of the image's patches, `[output pixel][row of the window][column of the window][channel]`,
-//! with the weights; [`patch_value`] is that matrix, which devices read without storing it.
+//! with the weights; [`patch_value`] is that matrix, which devices compute on the fly and do not store.
 
 use super::linear::{first_of_sum, rectified};
 use crate::pages::Fetch;

@@ -1,4 +1,5 @@
-//! Convolution of every channel by itself: the first half of a separable convolution, and a filter before resampling.
+//! Depthwise convolution: each channel has its own window. The first half of a separable convolution, and a filter before
+//! resampling.
 
 use super::convolve::window_pixel;
 use crate::pages::Fetch;

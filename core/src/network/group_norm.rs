@@ -1,10 +1,10 @@
 //! Group norm: the channels of an image in groups, each brought to mean 0 and variance 1, then scaled and shifted
 //! channel by channel; and the mean of every channel.
 //!
-//! Statistics are found in two steps, so that a device has enough to do at once: first of parts of the image, each in two
-//! passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). Means are sums of
-//! differences from one of the values, and no difference of large sums is taken: of a group whose values are 1e4 times
-//! its deviation only the mean's own rounding is lost, and a constant group has deviations of exactly 0.
+//! Statistics are computed in two steps, so that a device has enough parallel work: first of parts of the image, each
+//! in two passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). Means are
+//! sums of differences from one of the values, and no difference of large sums is taken: of a group whose values are
+//! 1e4 times its deviation only the mean's own rounding is lost, and a constant group has deviations of exactly 0.
 
 use crate::math::{exp, max, sqrt};
 use crate::pages::Fetch;
@@ -28,7 +28,7 @@ pub struct GroupNormBlock {
     pub in_first: u32,
     /// Groups of neighbouring channels, at least 1.
     pub group_count: u32,
-    /// What is added to variances.
+    /// Added to variances (epsilon).
     pub variance_floor: f32,
     /// Whether outputs go through `x / (1 + e^-x)` (SiLU).
     pub silu_outputs: u32,
@@ -86,9 +86,10 @@ pub fn group_norm_partials(inputs: &(impl Fetch<f32> + ?Sized), block: &GroupNor
     [mean, deviations]
 }
 
-/// Mean of a group, and what its deviations are multiplied by: `1 / sqrt(variance + variance_floor)`, from the statistics
-/// `partials[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives 0 for the
-/// factor; one whose squares overflow, or that holds NaN or infinity, gives NaN, so that it is found and not hidden.
+/// Mean of a group, and what its deviations are multiplied by: `1 / sqrt(variance + variance_floor)`, from the
+/// statistics `partials[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives
+/// 0 for the factor; one whose squares overflow, or that holds NaN or infinity, gives NaN, so that the fault is
+/// reported and not hidden.
 #[inline]
 pub fn group_norm_statistics(
     partials: &(impl Fetch<[f32; 2]> + ?Sized),

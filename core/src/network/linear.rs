@@ -43,13 +43,13 @@ pub fn linear_element(
     rectified(sum, block.relu_outputs)
 }
 
-/// Number `inner` of a row of the inputs, as it counts.
+/// Number `inner` of a row of the inputs, rectified if the block says so.
 #[inline]
 pub fn input_value(inputs: &(impl Fetch<f32> + ?Sized), block: &LinearBlock, row: usize, inner: usize) -> f32 {
     rectified(inputs.fetch(row * block.inner_count as usize + inner), block.relu_inputs)
 }
 
-/// What the sum for output number `element` begins with: `bias[column]` plus `residual[element]`, if there is a residual.
+/// The start of the sum for output number `element`: `bias[column]` plus `residual[element]`, if there is a residual.
 #[inline]
 pub fn first_of_sum(
     bias: &(impl Fetch<f32> + ?Sized),
@@ -62,7 +62,8 @@ pub fn first_of_sum(
     if has_residual != 0 { first + residual.fetch(element) } else { first }
 }
 
-/// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays: what overflowed in one layer is found behind the last.
+/// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays NaN: an overflow in one layer is reported behind
+/// the last.
 #[inline]
 pub fn rectified(x: f32, relu: u32) -> f32 {
     if relu != 0 && x <= 0.0 { 0.0 } else { x }

@@ -1,4 +1,4 @@
-//! Images of other sizes: the largest of a window, and bilinear enlargement that keeps the corners.
+//! Max pool, and bilinear upsampling with aligned corners.
 
 use crate::lookup::split;
 use crate::pages::Fetch;
@@ -22,12 +22,12 @@ pub struct PoolBlock {
     pub size: u32,
     /// Pixels from one window to the next.
     pub stride: u32,
-    /// How far windows reach over the border; what lies there does not count.
+    /// Padding: how far windows reach over the border. Places there do not count.
     pub padding: u32,
 }
 
-/// Output number `element` of `[row][column][channel]`: the largest input of its channel in its window. A window that
-/// holds no pixel gives `-f32::MAX`.
+/// Output number `element` of `[row][column][channel]`: the largest input of its channel in its window (max pool). A
+/// window that holds no pixel gives `-f32::MAX`.
 #[inline]
 pub fn pooled_element(inputs: &(impl Fetch<f32> + ?Sized), block: &PoolBlock, element: usize) -> f32 {
     let (channels, out_width) = (block.channels, block.out_width);

@@ -13,8 +13,10 @@ pub const CONTRAST: f32 = 0.04;
 pub const COLOUR_SHARE: f32 = 0.2;
 /// Share of the census, a number in `[0, 1]`, in the cost.
 pub const CENSUS_SHARE: f32 = 0.2;
-/// Share of the views' own disparities in the cost.
-pub const DISSENT_SHARE: f32 = 0.0625;
+/// Least weight of a place without any texture.
+pub const LEAST_TOLD: f32 = 0.1;
+/// Mean contrast, in [`CONTRAST`], from which on a place counts fully.
+pub const FULL_TEXTURE: f32 = 0.3;
 /// The cost of a point that some silhouette does not contain.
 pub const OUTSIDE_COST: f32 = 0.5;
 
@@ -38,6 +40,7 @@ pub fn census_cost(
     let here = pixel as usize * groups + group as usize;
     let mut sum = [0.0; PLANES];
     let mut count = [0.0; PLANES];
+    let mut texture = [0.0; PLANES];
     // The half of the window that comes before the pixel: the other half says the same with the opposite sign.
     let mut offset = 0;
     while offset < 12 {
@@ -66,6 +69,7 @@ pub fn census_cost(
                     let seen = valid[a][plane] * valid[b][plane] * pair.weight;
                     sum[plane] += seen * min(abs(lighter[a][plane] - lighter[b][plane]), 1.0);
                     count[plane] += seen;
+                    texture[plane] += seen * max(abs(lighter[a][plane]), abs(lighter[b][plane]));
                     plane += 1;
                 }
                 index += 1;
@@ -81,10 +85,13 @@ pub fn census_cost(
     while plane < PLANES {
         let colour = difference[plane] / max(weight[plane], 1.0e-6);
         let census = sum[plane] / max(count[plane], 1.0e-6);
-        let matched = COLOUR_SHARE * colour + CENSUS_SHARE * census + DISSENT_SHARE * dissent[plane];
+        let matched = COLOUR_SHARE * colour + CENSUS_SHARE * census + frustum.dissent_share * dissent[plane];
         let inside = hull[plane];
-        share[plane] = weight[plane] * inside + (1.0 - inside);
-        cost[plane] = matched * weight[plane] * inside + OUTSIDE_COST * (1.0 - inside);
+        let told = LEAST_TOLD
+            + (1.0 - LEAST_TOLD) * min(texture[plane] / max(count[plane], 1.0e-6) * (1.0 / FULL_TEXTURE), 1.0);
+        let weight = weight[plane] * told;
+        share[plane] = weight * inside + (1.0 - inside);
+        cost[plane] = matched * weight * inside + OUTSIDE_COST * (1.0 - inside);
         plane += 1;
     }
     [cost, share]

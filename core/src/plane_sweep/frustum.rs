@@ -26,13 +26,15 @@ pub struct FrustumBlock {
     pub pair_count: u32,
     /// 1 if alpha is a silhouette; 0 if it says where a photograph has pixels.
     pub has_silhouettes: u32,
+    /// Cost of contradicting the views' own disparities.
+    pub dissent_share: f32,
     /// First row of the band that is worked on.
     pub first_row: u32,
     /// Rows of the band.
     pub row_count: u32,
 }
 
-const _: () = assert!(size_of::<FrustumBlock>() == 112);
+const _: () = assert!(size_of::<FrustumBlock>() == 116);
 
 impl FrustumBlock {
     /// Disparity of a plane.

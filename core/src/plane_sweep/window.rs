@@ -16,8 +16,10 @@ pub struct WindowBlock {
     pub group_count: u32,
     /// Reaches of the windows, in pixels to each side, from the smallest to the largest.
     pub reach: [u32; 3],
-    /// Zeros.
-    pub padding: [u32; 2],
+    /// Cost of the nearest plane beside the farthest one.
+    pub near_cost: f32,
+    /// Zero.
+    pub padding: u32,
 }
 
 const _: () = assert!(size_of::<WindowBlock>() == 32);
@@ -33,7 +35,7 @@ pub const PRIOR_WEIGHT: f32 = 0.02;
 
 impl WindowBlock {
     /// Windows for a frustum.
-    pub fn new(frustum: &FrustumBlock) -> WindowBlock {
+    pub fn new(frustum: &FrustumBlock, near_cost: f32) -> WindowBlock {
         let (width, height) = (frustum.camera.width, frustum.camera.height);
         let longest = if width > height { width } else { height };
         let mut reach = [1; 3];
@@ -42,7 +44,7 @@ impl WindowBlock {
             reach[window] = crate::math::max(REACH[window] * longest as f32 / 250.0 + 0.5, 1.0) as u32;
             window += 1;
         }
-        WindowBlock { width, height, group_count: frustum.group_count, reach, padding: [0; 2] }
+        WindowBlock { width, height, group_count: frustum.group_count, reach, near_cost, padding: 0 }
     }
 }
 
@@ -110,6 +112,12 @@ pub fn window_cost(block: &WindowBlock, sums: &[Planes], pixel: u32, group: u32)
             plane += 1;
         }
         window += 1;
+    }
+    let count = block.group_count as f32 * PLANES as f32;
+    let mut plane = 0;
+    while plane < PLANES {
+        total[plane] += block.near_cost * ((group as f32 * PLANES as f32 + plane as f32) / count);
+        plane += 1;
     }
     total
 }

@@ -1,6 +1,6 @@
-//! Stochastic churn: noise that is added before a step, so that errors of the steps before are forgotten.
+//! Stochastic churn: noise that is added before a step and corrects errors of earlier steps.
 //!
-//! Source: Karras et al. (2022), algorithm 2. Only for samplers that forget the results before the newest
+//! Source: Karras et al. (2022), algorithm 2. Only for samplers that use the newest result only
 //! ([`super::Sampler::is_single_step`]).
 
 use crate::math::{min, sqrt};
@@ -9,13 +9,13 @@ use core::f32::consts::SQRT_2;
 /// How much noise is added, and where.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Churn {
-    /// `S_churn`: how much over the whole run, at least 0; 0 for none.
+    /// `S_churn`: amount over the whole run, at least 0; 0 for none.
     pub amount: f32,
     /// `S_min`: the lowest level at which noise is added.
     pub lowest: f32,
     /// `S_max`: the highest level at which noise is added; may be infinite.
     pub highest: f32,
-    /// `S_noise`: standard deviation of the noise that is added, relative to what the level asks for.
+    /// `S_noise`: standard deviation of the added noise, relative to that of the level.
     pub deviation: f32,
 }
 
@@ -29,7 +29,7 @@ pub struct Churned {
 }
 
 impl Churn {
-    /// No noise on the way.
+    /// No noise between the steps.
     pub const NONE: Churn = Churn { amount: 0.0, lowest: 0.0, highest: f32::INFINITY, deviation: 1.0 };
 
     /// The noise before the step from level `sigma`, one of `level_count`: the level rises by

@@ -1,4 +1,4 @@
-//! How far to step, and when to stop: levels chosen on the way instead of before.
+//! Adaptive step size and early stop: levels chosen during the run instead of before.
 //!
 //! A step of `unipc` is taken twice, by its predictor and, with the call that the next step needs anyway, by its corrector,
 //! which is one order better. Their difference estimates the predictor's local error without a further call, as in any
@@ -10,15 +10,15 @@ use crate::schedule::SIGMA_DATA;
 
 /// The first step, for which there is no estimate: from 80 to 40.
 pub const FIRST_STEP: f32 = core::f32::consts::LN_2;
-/// The longest step: a factor of 4.5. Further than that a polynomial through results says nothing.
+/// The longest step: a factor of 4.5. Beyond that a polynomial through results is not accurate.
 pub const LONGEST_STEP: f32 = 1.5;
-/// Steps of this length (and up to half as long again) are taken whatever the estimate says.
+/// Steps of this length (and up to half as long again) are taken for any estimate.
 pub const SHORTEST_STEP: f32 = 0.05;
 
-/// What the largest value of a picture may still change for it to count as finished: half of one of the 255 steps between
-/// -1 and 1.
+/// A picture counts as finished when its largest remaining change is below this: half of one of the 255 steps between -1
+/// and 1.
 pub const HALF_A_LEVEL: f32 = 1.0 / 255.0;
-/// Above this level a picture that does not change is no sign of an end: it is the mean of many, and not decided yet.
+/// Above this level a picture that does not change is not finished: it is the mean of many possible pictures.
 pub const UNDECIDED_ABOVE: f32 = 0.2 * SIGMA_DATA;
 
 /// Whether a step is taken, and how long the next one (or the same one once more) should be.
@@ -31,18 +31,18 @@ pub struct Verdict {
 }
 
 /// The verdict on a step of length `step` by a predictor of local order `local_order` (one more than how many results it
-/// combined), with the `error` that was estimated and the one that was asked for, `tolerance`.
+/// combined), with the estimated `error` and its `tolerance`.
 ///
 /// The next step is the one that would just have reached nine tenths of the tolerance, limited to 0.3 to 2 times this one
-/// and to [`LONGEST_STEP`]. A step is refused where the error exceeds five times the tolerance: a refused step costs a
-/// call, a bad one only accuracy. An error that is not a number is refused, if the step is not at its shortest.
+/// and to [`LONGEST_STEP`]. A step is rejected where the error exceeds five times the tolerance: a rejected step
+/// costs a call, a bad one only accuracy. An error of NaN is rejected, unless the step has the least length.
 pub fn verdict(error: f32, tolerance: f32, step: f32, local_order: u32) -> Verdict {
     const REFUSED_FROM: f32 = 5.0;
     let ratio = tolerance / max(error, f32::MIN_POSITIVE);
     let factor = 0.9 * exp(clamp(ln(ratio) / local_order as f32, -5.0, 5.0));
     let factor = if error <= f32::MAX { clamp(factor, 0.3, 2.0) } else { 0.3 };
     Verdict {
-        // The last step may be a little longer than asked for, and a length measured between two levels is rounded.
+        // The last step may be a little longer than requested, and a length measured between two levels is rounded.
         is_accepted: error <= REFUSED_FROM * tolerance || step <= 1.5 * SHORTEST_STEP,
         step: clamp(step * factor, SHORTEST_STEP, LONGEST_STEP),
     }
@@ -55,9 +55,9 @@ pub fn reached(sigma: f32, step: f32, smallest: f32) -> f32 {
     if left <= step + 0.3 * min(step, 0.8) { smallest } else { sigma * exp(-step) }
 }
 
-/// How much a picture will still change: between two calls, at levels `before` and `sigma` below it, it changed by
-/// `change`. Towards small noise it approaches its end in proportion to the level. Infinite above [`UNDECIDED_ABOVE`], and
-/// where the level did not fall.
+/// Estimate of a picture's remaining change: between two calls, at levels `before` and `sigma` below it, it changed by
+/// `change`. Towards small noise it approaches the final picture in proportion to the level. Infinite above
+/// [`UNDECIDED_ABOVE`], and where the level did not fall.
 pub fn change_to_come(change: f32, before: f32, sigma: f32) -> f32 {
     if sigma > UNDECIDED_ABOVE || !(sigma < before) { f32::INFINITY } else { change * (sigma / (before - sigma)) }
 }

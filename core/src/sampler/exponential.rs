@@ -1,17 +1,17 @@
 //! DPM-Solver++ and UniPC: results are denoised pictures.
 //!
 //! With `l = -ln s` and the step's length `h = ln(s / n)` the flow is `x_n = n / s x_s + integral of exp(l - l_n) D dl`
-//! exactly; a polynomial in `l` through the known results stands for `D`.
+//! exactly; a polynomial in `l` through the known results replaces `D`.
 //!
 //! Sources: Lu et al., "DPM-Solver++" (2022), and their code; Zhao et al., "UniPC" (2023), and theirs, with data
 //! prediction. Where these solve for their coefficients exactly, as for three results and more, they are the integrals of
-//! that polynomial, whatever their function `B(h)`.
+//! that polynomial, for any function `B(h)`.
 
 use super::Mix;
 use super::interpolation::{Row, exponential_moments, places, weights};
 use crate::math::ln_ratio;
 
-/// What remains of the state, the length of the step, and the integrals over it.
+/// The factor of the state, the length of the step, and the integrals over it.
 fn prepared(from: f32, next: f32) -> (f32, f32, Row) {
     let h = ln_ratio(from, next);
     (next / from, h, exponential_moments(h, (from - next) / from))

@@ -6,8 +6,8 @@ use crate::math::ln_ratio;
 /// Numbers of a step in the logarithm of the level, or of one in the level itself.
 pub(super) type Row = [f32; MOST_RESULTS];
 
-/// `integral over t in [0, 1] of h exp(-h (1 - t)) t^k`, for `k` of 0 to 3: what a result that grows like `t^k` along a
-/// step of length `h` in the logarithm of the level adds to the state. `first` is the one for `k = 0`,
+/// `integral over t in [0, 1] of h exp(-h (1 - t)) t^k`, for `k` of 0 to 3: the contribution to the state of a result
+/// that grows like `t^k` along a step of length `h` in the logarithm of the level. `first` is the one for `k = 0`,
 /// `1 - exp(-h)`, which the caller knows without a logarithm. They satisfy `m_k = 1 - k / h m_(k-1)`.
 pub(super) fn exponential_moments(h: f32, first: f32) -> Row {
     let mut moments = [first, 0.0, 0.0, 0.0];
@@ -37,7 +37,7 @@ pub(super) fn exponential_moments(h: f32, first: f32) -> Row {
 /// The integrals of `t^k` alone.
 pub(super) const EVEN_MOMENTS: Row = [1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0];
 
-/// What each of `count` results at different `places` counts in the integral of the polynomial through them, with the
+/// The weight of each of `count` results at different `places` in the integral of the polynomial through them, with the
 /// integrals of `t^k` given as `moments`. The sum is exactly the first moment to a rounding: a result that does not change
 /// is taken as it is.
 pub(super) fn weights(places: &Row, count: u32, moments: &Row) -> Row {

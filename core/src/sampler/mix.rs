@@ -1,4 +1,4 @@
-//! What samplers do to pictures: linear combinations, and noise.
+//! Operations of samplers on pictures: linear combinations, and noise.
 
 use crate::pages::Fetch;
 use crate::random::normal;
@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// How many results a step combines at most.
 pub const MOST_RESULTS: usize = 4;
 
-/// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. What has
+/// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. A picture with
 /// coefficient 0 is not read. Also the block of the kernel `mix_pictures`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -24,15 +24,15 @@ impl Mix {
     /// The newest result as it is.
     pub const NEWEST: Mix = Mix { state: 0.0, results: [1.0, 0.0, 0.0, 0.0] };
 
-    /// The combination of numbers; what has coefficient 0 counts nothing, whatever it is.
+    /// The combination of numbers; a number with coefficient 0 is ignored, also NaN.
     #[inline]
     pub fn of(&self, state: f32, results: &[f32; MOST_RESULTS]) -> f32 {
         let [a, b, c, d] = results;
         mixed_element(self, &[state], &[*a], &[*b], &[*c], &[*d], 0)
     }
 
-    /// The difference between what a corrector and a predictor make of the same state: the corrector's newest result is
-    /// one that the predictor does not have.
+    /// The difference between a corrector's and a predictor's combination of the same state: the corrector's newest
+    /// result is one that the predictor does not have.
     pub fn correction_beyond(&self, predictor: &Mix) -> Mix {
         let ([new, a, b, c], [p, q, r, _]) = (self.results, predictor.results);
         Mix { state: self.state - predictor.state, results: [new, a - p, b - q, c - r] }

@@ -5,52 +5,52 @@ use crate::math::clamp;
 use bytemuck::{Pod, Zeroable};
 use core::fmt;
 
-/// What there is to know of a scheme beside its formula.
+/// The properties of a scheme, one row each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
     /// The formula, whose number kernels and the C face know it by.
     pub formula: Formula,
     /// The formula's name in [`Formula`].
     pub variant: &'static str,
-    /// What a person calls the scheme.
+    /// Its name in text: `mean`, `l1`, ...
     pub name: &'static str,
     /// Its number, if it takes one.
     pub parameter: Option<Parameter>,
     /// Its choice among a few, if it has one.
     pub choice: Option<Choice>,
-    /// How it appears in tables over all schemes: texts as a person types them.
+    /// Its entries in tables over all schemes, in text form.
     pub tables: &'static [&'static str],
-    /// The formula's documentation, a line each, as it stands in the C header.
+    /// The formula's documentation, a line each, as in the C header.
     pub doc: &'static str,
 }
 
 /// A number that a scheme takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameter {
-    /// What a person calls it.
+    /// Its key in text.
     pub key: &'static str,
-    /// The least that it can be.
+    /// The smallest value.
     pub least: f32,
-    /// The most that it can be.
+    /// The largest value.
     pub most: f32,
-    /// What it is if it is not given.
+    /// The default.
     pub default: f32,
-    /// Its range in words: `key must be ...`.
-    pub wanted: &'static str,
+    /// Its range as text: `key must be ...`.
+    pub range: &'static str,
 }
 
-/// What a scheme lets choose among a few; the first is the default.
+/// A choice among a few options; the first is the default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Choice {
-    /// What a person calls it.
+    /// Its key in text.
     pub key: &'static str,
     /// Number of the first option; the others count from there.
     pub first: u32,
-    /// What a person calls the options.
+    /// The options in text.
     pub options: &'static [&'static str],
 }
 
-/// Numbers of a row without its texts, for kernels: of what a scheme does not use all are 0.
+/// Numbers of a row without its texts, for kernels: those that a scheme does not use are 0.
 #[derive(Clone, Copy)]
 pub(super) struct Limits {
     least: f32,
@@ -82,7 +82,7 @@ impl Formula {
     }
 }
 
-/// Why something is no scheme.
+/// Why a scheme is not valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SchemeError {
     /// No formula has this number.
@@ -98,7 +98,7 @@ impl fmt::Display for SchemeError {
         match self {
             SchemeError::Formula(number) => write!(f, "no formula has the number {number}"),
             SchemeError::Parameter(formula) => match formula.row().parameter {
-                Some(Parameter { key, wanted, .. }) => write!(f, "{key} must be {wanted}"),
+                Some(Parameter { key, range, .. }) => write!(f, "{key} must be {range}"),
                 None => f.write_str("the parameter is out of its range"),
             },
             SchemeError::Choice(formula) => match formula.row().choice {
@@ -154,7 +154,7 @@ impl Scheme {
         Scheme { formula, choice: first, parameter: default }
     }
 
-    /// The formula with this choice and parameter; what it does not use may be anything.
+    /// The formula with this choice and parameter; a value that it does not use may be any.
     ///
     /// # Errors
     /// [`SchemeError::Choice`] or [`SchemeError::Parameter`] if it is out of the range that the formula's row gives.
@@ -232,7 +232,7 @@ impl Scheme {
 }
 
 impl fmt::Display for Scheme {
-    /// As a person types it: `gaussian:beta=1`. A choice behind a parameter is left out where it is the default.
+    /// The text form: `gaussian:beta=1`. A choice behind a parameter is left out where it is the default.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Row { name, parameter, choice, .. } = self.formula.row();
         f.write_str(name)?;
@@ -266,7 +266,7 @@ pub struct SchemeBlock {
 const _: () = assert!(size_of::<SchemeBlock>() == 16);
 
 impl SchemeBlock {
-    /// The scheme that the block was made from. What no scheme has is brought into its range.
+    /// The scheme that the block was made from. Values out of range are clamped.
     #[inline]
     pub fn scheme(&self) -> Scheme {
         let formula = Formula::numbered_or_mean(self.formula);

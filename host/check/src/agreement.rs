@@ -1,34 +1,34 @@
-//! How well numbers agree with those expected, each within its own bound.
+//! Agreement of numbers with expected ones, each within its own bound.
 //!
-//! A check must be able to fail: a NaN, another length, nothing at all, the same number everywhere and too many elements
-//! that hang on rounding are disagreements, whatever the bounds.
+//! A check must be able to fail: NaN, another length, no elements, the same number everywhere and too many undecided
+//! elements (those that depend on rounding) are disagreements, for any bounds.
 
 use super::bounded::Bounded;
 use super::compare::unit_in_last_place;
 use std::fmt;
 
-/// Largest share of elements that may hang on rounding.
+/// The largest share of undecided elements: those that depend on rounding.
 pub const MOST_UNDECIDED: f64 = 0.02;
 
-/// Why numbers are not those expected.
+/// Why numbers do not agree with the expected ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Disagreement {
     /// There are more or fewer of them, or none at all.
     Length,
-    /// They are all the same: nothing was tested.
+    /// They are all the same, so nothing was tested.
     Constant,
-    /// More than [`MOST_UNDECIDED`] of the elements hang on rounding.
+    /// More than [`MOST_UNDECIDED`] of the elements are undecided.
     Undecided {
         /// Their share.
         share: f64,
     },
-    /// One is NaN or further off than its bound: of several, the worst in units of its bound.
+    /// An element is NaN or exceeds its bound; of several, the worst in units of its bound.
     Mismatch {
         /// Which.
         index: usize,
-        /// What came out.
+        /// The result.
         actual: f32,
-        /// What should have.
+        /// The expectation.
         expected: Bounded,
     },
 }
@@ -39,7 +39,7 @@ impl fmt::Display for Disagreement {
             Disagreement::Length => write!(formatter, "not as many numbers as expected"),
             Disagreement::Constant => write!(formatter, "every number is the same"),
             Disagreement::Undecided { share } => {
-                write!(formatter, "{:.1} % of the elements hang on rounding", 100.0 * share)
+                write!(formatter, "{:.1} % of the elements depend on rounding", 100.0 * share)
             }
             Disagreement::Mismatch { index, actual, expected: Bounded { value, error } } => {
                 write!(formatter, "[{index}] is {actual:e} instead of {value:e}, which may be off by {error:.1e}")
@@ -48,12 +48,12 @@ impl fmt::Display for Disagreement {
     }
 }
 
-/// How far from what is expected an element may be, and from which size on its relative error is looked at.
+/// When an element is undecided, and the smallest size for relative errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Elements whose own bound is larger than this are undecided.
     pub tolerance: f64,
-    /// Relative differences and those in ULP are taken of elements of at least this size.
+    /// Relative differences and those in ULP are computed for elements of at least this size.
     pub least: f64,
 }
 
@@ -69,7 +69,7 @@ pub struct Differences {
 }
 
 impl Differences {
-    /// Counts a pair of numbers; NaN is infinitely far off.
+    /// Adds a pair of numbers; the difference to NaN is infinite.
     pub fn add(&mut self, actual: f32, expected: f64, least: f64) {
         let difference = difference(actual, expected);
         self.absolute = self.absolute.max(difference);
@@ -86,12 +86,12 @@ fn difference(actual: f32, expected: f64) -> f64 {
     if difference.is_nan() { f64::INFINITY } else { difference }
 }
 
-/// How well numbers agree with those expected.
+/// The agreement of numbers with expected ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
-    /// How many were compared.
+    /// The number of compared elements.
     pub compared: usize,
-    /// Share of those that hang on rounding and were not.
+    /// Share of the undecided elements, which were not compared.
     pub undecided: f64,
     /// Largest differences of those compared.
     pub worst: Differences,
@@ -99,17 +99,17 @@ pub struct Agreement {
     pub worst_of_bound: f64,
     /// Largest bound of those compared.
     pub largest_bound: f64,
-    /// What is wrong, if anything: a mismatch before all others but the length.
+    /// The disagreement, if any: a mismatch takes precedence over all others but the length.
     pub disagreement: Option<Disagreement>,
 }
 
-/// Whether an element is compared: there is an expectation, and it is no worse than `tolerance`.
+/// Whether an element is compared: it has an expectation whose bound is at most `tolerance`.
 pub fn is_decided(expected: &Option<Bounded>, tolerance: f64) -> Option<Bounded> {
     expected.filter(|expected| expected.error <= tolerance)
 }
 
-/// Measures results against what was expected of them, each within its own bound. Elements without an expectation, or with
-/// one that is no better than the tolerance, are undecided and must be few; NaN is wrong also there.
+/// Compares results with their expectations, each within its own bound. Elements without an expectation, or with a bound
+/// above the tolerance, are undecided and must be few; NaN is a mismatch also there.
 pub fn measure(actual: &[f32], expected: &[Option<Bounded>], limits: Limits) -> Agreement {
     let mut agreement = Agreement::default();
     if actual.len() != expected.len() || actual.is_empty() {
@@ -148,16 +148,16 @@ pub fn measure(actual: &[f32], expected: &[Option<Bounded>], limits: Limits) -> 
     agreement
 }
 
-/// How a device's results differ from another's.
+/// Differences between the results of two devices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Versus {
-    /// Largest differences of the elements that do not hang on rounding.
+    /// Largest differences of the decided elements.
     pub worst: Differences,
     /// Share of all elements that are the same bit for bit.
     pub equal: f64,
 }
 
-/// Measures results against those of another device, which are as many. `expected` says which elements hang on rounding.
+/// Compares results with those of another device, of the same length. `expected` tells which elements are undecided.
 pub fn versus(actual: &[f32], other: &[f32], expected: &[Option<Bounded>], limits: Limits) -> Versus {
     let mut worst = Differences::default();
     let mut equal = 0;

@@ -1,15 +1,15 @@
-//! The paper's attention in `f64`: embeddings of poses, and the softmax of their products, with bounds on what `f32` may
-//! make of them.
+//! The paper's attention in `f64`: embeddings of poses, and the softmax of their products, with bounds on the error of
+//! `f32`.
 
 use super::bounded::{Bounded, DIVISION, ROUNDING};
 use viewfuse_core::attention::{EMBEDDING, FREQUENCY_COUNT, FREQUENCY_FACTOR, FourierEmbedding, Linear};
 use viewfuse_core::pose::PoseBlock;
 
-/// What the exponential has lost of a weight, and what a device may flush to 0.
+/// The absolute error of a weight by underflow of the exponential, which a device may flush to 0.
 const NEGLIGIBLE: f64 = 4.0e-38;
 
-/// The embedding of a pose, `[EMBEDDING]`. Coordinates of the centre must be below 170, so that no sine is asked of more
-/// than 8192.
+/// The embedding of a pose, `[EMBEDDING]`. Coordinates of the centre must be below 170, so that no sine has an argument
+/// above 8192.
 pub fn embed(embedding: &FourierEmbedding, pose: &PoseBlock) -> Vec<Bounded> {
     let features = features(pose);
     let hidden = relu(apply(&embedding.first, &features));
@@ -42,7 +42,7 @@ fn relu(values: Vec<Bounded>) -> Vec<Bounded> {
 
 /// The weights of the keys, `keys[source][EMBEDDING]`, for a query.
 ///
-/// An error of a logit is a relative error of its weight, and those of all logits, weighted, come in through the sum.
+/// An error of a logit is a relative error of its weight; the errors of all logits, weighted, enter through the sum.
 /// Products are summed with their rounding errors and compared with the largest, so that what is rounded is small.
 pub fn attend(query: &[f32], keys: &[f32]) -> Vec<Bounded> {
     let scale = 1.0 / (EMBEDDING as f64).sqrt();

@@ -1,9 +1,9 @@
-//! Numbers in `f64` that know how far the same calculation in `f32` may stray from them (running error analysis,
-//! Wilkinson 1963).
+//! Numbers in `f64` with a bound on the error of the same calculation in `f32` (running error analysis, Wilkinson
+//! 1963).
 //!
-//! Every operation carries the errors of its operands on and adds its own rounding, counted twice because the code under
-//! test may take its operations in another order. A division counts as what Vulkan allows it: a bound made here holds on
-//! every device, not only on those that divide correctly. A comparison that the errors leave open has no answer.
+//! Every operation propagates the errors of its operands and adds its own rounding, counted twice because the code
+//! under test may order its operations differently. A division has the error that Vulkan allows, so a bound holds on
+//! every device, not only on those with correctly rounded divisions. A comparison within the errors has no answer.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -17,7 +17,7 @@ pub const DIVISION: f64 = 3.0 * ROUNDING;
 /// Absolute error of our sine and cosine for arguments up to 8192.
 const SINE_ERROR: f64 = 9.0e-8;
 
-/// What `count` roundings, one after the other, may make of a number, relative: `n u / (1 - n u)` (Higham, "Accuracy and
+/// The relative error of `count` roundings in sequence: `n u / (1 - n u)` (Higham, "Accuracy and
 /// Stability of Numerical Algorithms", section 3.1).
 pub fn roundings(count: usize) -> f64 {
     let all = count as f64 * ROUNDING / 2.0;
@@ -27,9 +27,9 @@ pub fn roundings(count: usize) -> f64 {
 /// A value and a bound on the error of its `f32` counterpart.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounded {
-    /// The value as `f64` knows it.
+    /// The value in `f64`.
     pub value: f64,
-    /// How far `f32` may be from it.
+    /// The bound on the error of `f32`.
     pub error: f64,
 }
 
@@ -39,7 +39,7 @@ impl Bounded {
     /// One, exactly.
     pub const ONE: Bounded = Bounded { value: 1.0, error: 0.0 };
 
-    /// The outcome of an operation: its own rounding is added to what its operands brought.
+    /// The result of an operation: its own rounding is added to the errors of its operands.
     fn rounded(value: f64, brought: f64) -> Bounded {
         Bounded { value, error: brought + ROUNDING * value.abs() }
     }
@@ -47,7 +47,7 @@ impl Bounded {
     /// A sum of products in any order.
     ///
     /// Of `n` summands each is rounded at most `n` times: once as a product, and in at most `n - 1` additions, in
-    /// whichever order they run (Higham, section 4.2). Products that a device may flush to 0 are counted as well.
+    /// whichever order they run (Higham, section 4.2). Underflow of products, which a device may flush to 0, is included.
     pub fn sum(summands: impl Iterator<Item = f64>) -> Bounded {
         let (mut value, mut magnitudes, mut count) = (0.0, 0.0, 0);
         for summand in summands {
@@ -59,7 +59,7 @@ impl Bounded {
         Bounded { value, error: magnitudes * roundings(count) + flushed }
     }
 
-    /// Whether this is below another number; `None` where rounding decides.
+    /// Whether this is below another number; `None` if it depends on rounding.
     pub fn below(self, other: Bounded) -> Option<bool> {
         let margin = other.value - self.value;
         // Exactly known operands compare exactly.
@@ -70,7 +70,7 @@ impl Bounded {
         }
     }
 
-    /// The lesser of two.
+    /// The smaller of two.
     pub fn lesser(self, other: Bounded) -> Bounded {
         match self.below(other) {
             Some(true) => self,
@@ -79,7 +79,7 @@ impl Bounded {
         }
     }
 
-    /// The greater of two.
+    /// The larger of two.
     pub fn greater(self, other: Bounded) -> Bounded {
         match self.below(other) {
             Some(false) => self,
@@ -93,7 +93,7 @@ impl Bounded {
         self.greater(low.into()).lesser(high.into())
     }
 
-    /// Without its sign.
+    /// Its magnitude.
     pub fn magnitude(self) -> Bounded {
         Bounded { value: self.value.abs(), ..self }
     }

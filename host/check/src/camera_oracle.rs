@@ -1,4 +1,4 @@
-//! What cameras see and what grids hold, in `f64` with bounds on what `f32` may make of them.
+//! Projections and grid look-ups in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
@@ -6,7 +6,7 @@ use viewfuse_core::camera::CameraBlock;
 /// A point or a direction.
 pub type Vector = [Bounded; 3];
 
-/// A point known exactly.
+/// A point without error.
 pub fn point(coordinates: [f32; 3]) -> Vector {
     coordinates.map(Bounded::from)
 }
@@ -21,7 +21,7 @@ pub fn along(origin: Vector, direction: Vector, t: Bounded) -> Vector {
     [0, 1, 2].map(|axis| origin[axis] + direction[axis] * t)
 }
 
-/// Where a camera stands.
+/// A camera's centre.
 pub fn centre(camera: &CameraBlock) -> Vector {
     point([camera.pose.right[3], camera.pose.down[3], camera.pose.forward[3]])
 }
@@ -53,7 +53,7 @@ pub struct Seen {
     pub in_image: Option<bool>,
 }
 
-/// Where a point appears.
+/// The projection of a point.
 pub fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
     let origin = centre(camera);
     let offset = [0, 1, 2].map(|axis| point_world[axis] - origin[axis]);
@@ -80,12 +80,12 @@ pub fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
     Seen { x, y, depth, in_image }
 }
 
-/// Nodes of one axis of a grid that a coordinate may touch.
+/// Nodes of one axis of a grid around a coordinate, within its error.
 #[derive(Clone, Debug)]
 pub struct Tents {
-    /// Each with the height of its tent at the coordinate.
+    /// Each with its linear weight at the coordinate.
     pub nodes: Vec<(usize, f64)>,
-    /// The error of those heights.
+    /// The error of those weights.
     pub error: f64,
 }
 
@@ -104,7 +104,7 @@ pub fn tents(coordinate: Bounded, count: u32) -> Tents {
     }
 }
 
-/// Bilinear look-up of `node(row, column)`. An error of the coordinates costs as much as the grid changes over it.
+/// Bilinear look-up of `node(row, column)`. An error of the coordinates contributes the grid's change over it.
 pub fn bilinear(node: impl Fn(usize, usize) -> f32, columns: &Tents, rows: &Tents) -> Bounded {
     let (mut value, mut least, mut greatest) = (0.0, f64::MAX, f64::MIN);
     for (row, height) in &rows.nodes {

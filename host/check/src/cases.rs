@@ -1,4 +1,4 @@
-//! The cases, one for each kernel and called like it, and the way from a kernel to its case.
+//! The cases, one for each kernel and with its name, and the mapping from a kernel to its case.
 
 pub mod attend;
 pub mod composite;
@@ -65,8 +65,8 @@ macro_rules! visits {
         $(#[$doc:meta])*
         $Kernel:ident $method:ident $arguments:tt $elements:tt by $($body:ident)::+ $(, $way:ident)* { $($arrays:tt)+ }
     )+) => {
-        /// Does something with the case of a kernel: the type of the kernel's name. A kernel without a case does not
-        /// compile.
+        /// Runs an operation on the case of a kernel, which is the type of the kernel's name. A kernel without a case
+        /// does not compile.
         pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
             match kernel {
                 $(Kernel::$Kernel => visitor.visit::<$Kernel>(),)+

@@ -1,40 +1,40 @@
-//! The one comparison of computed with expected numbers.
+//! Comparison of computed with expected numbers.
 //!
 //! A check must be able to fail: NaN, a missing element, an empty result and a constant where the expectation varies
-//! are failures, whatever the tolerance.
+//! are failures, for any tolerance.
 
 use std::fmt;
 
 /// Tolerances: an element passes if `|actual - expected| <= absolute + relative * |expected|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparator {
-    /// Allowed difference whatever the size of the expected number.
+    /// The absolute part of the tolerance.
     pub absolute: f64,
-    /// Allowed difference in units of the expected number.
+    /// The relative part of the tolerance.
     pub relative: f64,
 }
 
-/// An element and how far off it is.
+/// An element and its difference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worst {
     /// Its place in the compared slices.
     pub index: usize,
-    /// What was computed.
+    /// The computed number.
     pub actual: f32,
-    /// What it should be.
+    /// The expected number.
     pub expected: f64,
     /// Distance in units in the last place of the expected number as `f32`.
     pub ulps: f64,
 }
 
-/// Why two results are not the same.
+/// Why two results do not agree.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mismatch {
     /// The lengths differ: actual, expected.
     Length(usize, usize),
-    /// There is nothing to compare.
+    /// There are no elements.
     Empty,
-    /// Every actual number is the same where they were expected to vary.
+    /// All computed numbers are the same, but the expected ones vary.
     Constant(f32),
     /// This element, the worst one, is out of tolerance.
     Element(Worst),
@@ -54,7 +54,7 @@ impl fmt::Display for Mismatch {
 }
 
 impl Comparator {
-    /// Compares element by element; on success returns the element that is farthest off in units of its tolerance.
+    /// Compares element by element; on success returns the element with the largest difference in units of its tolerance.
     ///
     /// # Errors
     /// The [`Mismatch`]; of several elements out of tolerance, the worst.

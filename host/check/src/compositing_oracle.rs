@@ -1,4 +1,4 @@
-//! Fusion and compositing in `f64`, with bounds on what `f32` may make of them.
+//! Fusion and compositing in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, DIVISION, ROUNDING};
 use viewfuse_core::composite::CompositeBlock;
@@ -13,11 +13,11 @@ pub fn fuse_element(weights: &[f32], latents: &[f32], block: &FuseBlock, element
     terms.fold(Bounded::ZERO, |sum, (weight, latent)| sum + Bounded::from(*weight) * Bounded::from(*latent))
 }
 
-/// A ray's red, green, blue, opacity and depth from its samples, front to back. `None` where rounding decides whether
-/// anything is met at all.
+/// A ray's red, green, blue, opacity and depth from its samples, front to back. `None` if it depends on
+/// rounding whether the ray is empty.
 ///
 /// The sums are taken by parts: `sum (T_i - T_(i+1)) c_i` is `c_0 + sum T_i (c_i - c_(i-1))`, so that an error of a
-/// transmittance counts as far as what is seen changes there, not twice as far as what is seen.
+/// transmittance contributes the change of the channel there, not twice the channel.
 pub fn composite(samples: &[[f32; 4]], depths: &[f32], block: &CompositeBlock) -> [Option<Bounded>; 5] {
     let met: Vec<(&[f32; 4], f32)> = samples
         .iter()
@@ -61,8 +61,8 @@ fn weighted(passes: &[Bounded], values: &[f64]) -> Bounded {
     Bounded { error: sum.error + (values.len() + 2) as f64 * ROUNDING * largest, ..sum }
 }
 
-/// `sum (T_i - T_(i+1)) d_i / (1 - T_n)`: an error of a transmittance counts as far as the depth changes there; one of the
-/// last as far as the last depth is from the mean.
+/// `sum (T_i - T_(i+1)) d_i / (1 - T_n)`: an error of a transmittance contributes the change of the depth there; an
+/// error of the last one the distance of the last depth from the mean.
 fn mean_depth(passes: &[Bounded], depths: &[f64], opacity: Bounded) -> Bounded {
     let count = depths.len();
     let mut sum = 0.0;

@@ -1,4 +1,4 @@
-//! Means of images and normalisation by them in `f64`, with bounds on what `f32` may make of them.
+//! Channel means and group norm of images in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, DIVISION, ROUNDING, roundings};
 use viewfuse_core::network::group_norm::{GroupNormBlock, MeanBlock, PART};

@@ -1,7 +1,7 @@
-//! The kernels of [`viewfuse_core::visual_hull`] evaluated in `f64` from their documentation, with bounds on what `f32` may
-//! make of them.
+//! The kernels of [`viewfuse_core::visual_hull`] evaluated in `f64` from their documentation, with bounds on the error
+//! of `f32`.
 //!
-//! `None` means that rounding decides: a value lies so near to a threshold that `f32` may fall on either side of it.
+//! `None` means undecided: a value lies so near to a threshold that `f32` may fall on either side of it.
 
 mod shade;
 mod sweep;
@@ -15,7 +15,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::visual_hull::hull::{ENTRY_ALPHA, ENTRY_STEP, LEAST_ALPHA};
 use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 
-/// What nothing is seen at; the same number in both precisions.
+/// The depth of a pixel without a surface; the same number in both precisions.
 pub const NOWHERE: Bounded = Bounded { value: NO_SURFACE as f64, error: 0.0 };
 
 /// Visibility at `b` widths behind a surface: `(1 - b^2 / 4)^4`, 0 from two widths on.
@@ -23,7 +23,7 @@ fn bell(b: Bounded) -> Bounded {
     (Bounded::ONE - b.squared() / Bounded::from(4.0)).greater(Bounded::ZERO).squared().squared()
 }
 
-/// The views and the object that kernels look at.
+/// The views and the object of the kernels.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a> {
     /// The box.

@@ -1,13 +1,13 @@
-//! How closely devices agree with the mathematics: every kernel against an `f64` evaluation, and whole pictures.
+//! Checks of devices: every kernel against an `f64` evaluation, and whole pictures.
 //!
-//! Each kernel runs through a device's trait method on small random inputs. What must come out is evaluated in `f64` by
-//! code that shares nothing with the kernel, with a bound for each number: running error analysis, or roundings counted
-//! by hand. The bounds hold on every device, also on one whose divisions are as coarse as Vulkan allows. Where rounding
-//! decides (which side of a threshold), there is no answer; such elements must be few.
+//! Each kernel runs through a device's trait method on small random inputs. The expected outputs are evaluated in `f64`
+//! by independent code, with a bound for each number: running error analysis, or roundings counted by hand. The bounds
+//! hold on every device, also with the least accurate divisions that Vulkan allows. An element that depends on rounding
+//! (the side of a threshold) is undecided; such elements must be few.
 //!
 //! ```text
-//! compare, bounded, agreement   numbers that differ: by how much, and whether that is right
-//! oracle, attention_oracle,     what must come out
+//! compare, bounded, agreement   differences of numbers, and whether they are within their bounds
+//! oracle, attention_oracle,     expected outputs in f64
 //!   camera_oracle, hull_oracle,
 //!   ray_oracle, compositing_oracle,
 //!   winograd_oracle,
@@ -15,10 +15,10 @@
 //!   group_norm_oracle,
 //!   matrix_oracle, volume_oracle
 //! poses, sights, world          inputs for a seed
-//! case, cases                   one for each kernel: inputs, how a device runs it, what must come out
-//! report, measure               a device's kernels, checked
-//! picture                       a whole picture against the CPU's
-//! verify                        this build against files of reference values
+//! case, cases                   one for each kernel: inputs, dispatch, expected outputs
+//! report, measure               the check of a device's kernels
+//! picture                       a whole picture compared with the CPU's
+//! verify                        this build compared with files of reference values
 //! ```
 #![forbid(unsafe_code)]
 

@@ -1,4 +1,4 @@
-//! Products of matrices that are both computed, and softmax, in `f64` with bounds on what `f32` may make of them.
+//! Matrix products of two computed matrices, and softmax, in `f64` with bounds on the error of `f32`.
 
 use super::bounded::Bounded;
 use viewfuse_core::network::attend::MatrixBlock;

@@ -12,24 +12,24 @@ use viewfuse_device::cpu::Cpu;
 use viewfuse_job::progress::Progress;
 use viewfuse_vulkan::kernel::Kernel;
 
-/// Seeds that a kernel is checked with unless a person says otherwise.
+/// The default number of seeds for a kernel's check.
 pub const DEFAULT_SEED_COUNT: u32 = 4;
-/// How long a kernel runs to have its time taken.
+/// The duration of timing a kernel.
 const MEASURED: Duration = Duration::from_millis(40);
 
-/// Which device this is.
+/// The role of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// The CPU: there is nothing but `f64` to compare it with.
+    /// The CPU, which is compared with `f64` only.
     Reference,
-    /// Another one: it is compared with the CPU as well.
+    /// Another device, which is compared with the CPU as well.
     Other,
 }
 
 /// Checks every kernel of a device, for the seeds `1..=seed_count`.
 ///
 /// # Errors
-/// [`CheckError`] if the device fails. A tolerance that is exceeded is no error but part of the report.
+/// [`CheckError`] if the device fails. An exceeded tolerance is not an error but part of the report.
 pub fn check_device<D: Device>(
     device: &D,
     role: Role,
@@ -110,8 +110,8 @@ impl<D: Device> Visitor for Check<'_, D> {
     }
 }
 
-/// The time of an element at the largest size. Runs may go on behind the call: a download waits for all of them, and its
-/// own time is taken off.
+/// The time of an element at the largest size. Calls may return before the kernel is done: a download waits for all of
+/// them, and its own time is subtracted.
 fn seconds_per_element<C: Case, D: Device>(device: &D) -> Result<f64, DeviceError> {
     let inputs = C::inputs(1, SIZES[SIZES.len() - 1]);
     let mut loaded = C::load(device, &inputs)?;

@@ -1,4 +1,4 @@
-//! Layers of networks in `f64`, with bounds on what `f32` may make of them in whatever order a device sums.
+//! Layers of networks in `f64`, with bounds on the error of `f32` for any order of summation.
 
 use super::bounded::{Bounded, DIVISION, ROUNDING};
 use super::camera_oracle::{bilinear, tents};
@@ -9,7 +9,7 @@ use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
 use viewfuse_core::network::transpose::TransposedBlock;
 
-/// What a layer reads.
+/// The inputs of a layer.
 #[derive(Clone, Copy, Debug)]
 pub struct LayerInputs<'a> {
     /// Rows or an image.
@@ -18,7 +18,7 @@ pub struct LayerInputs<'a> {
     pub weights: &'a [f32],
     /// `[column]`.
     pub bias: &'a [f32],
-    /// As the outputs, if there is one.
+    /// The residual in the outputs' shape, if there is one.
     pub residual: Option<&'a [f32]>,
 }
 
@@ -38,7 +38,7 @@ impl LayerInputs<'_> {
     }
 }
 
-/// The negative part cut off, or not.
+/// Rectified, or not.
 fn relu(value: Bounded, relu: u32) -> Bounded {
     if relu == 0 { value } else { value.greater(Bounded::ZERO) }
 }
@@ -52,7 +52,7 @@ pub fn linear(layer: &LayerInputs, block: &LinearBlock, element: usize) -> Bound
     relu(sum, block.relu_outputs)
 }
 
-/// Where windows lie over an image.
+/// Positions of windows on an image.
 #[derive(Clone, Copy, Debug)]
 struct Windows {
     /// Rows and columns of the image, enlarged.
@@ -74,7 +74,7 @@ impl Windows {
     }
 }
 
-/// What a convolution sees at `[row, column]` of its image, counted from `-padding`: 0 outside.
+/// The input of a convolution at `[row, column]` of its image, counted from `-padding`: 0 outside.
 fn seen(layer: &LayerInputs, block: &ConvolveBlock, out: [usize; 2], place: [usize; 2], channel: usize) -> f32 {
     let size = [block.in_height, block.in_width].map(|side| side * block.enlarge);
     let windows = Windows { size, stride: block.stride, dilation: block.dilation, padding: block.padding };
@@ -90,7 +90,7 @@ pub fn convolve(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channe
     ended(block, convolve_sum(layer, block, pixel, channel))
 }
 
-/// The same of a layer for large images, for which a device may take Winograd's way.
+/// The same of a layer for large images, for which a device may use Winograd's algorithm.
 pub fn convolve_wide(layer: &LayerInputs, block: &ConvolveBlock, pixel: usize, channel: usize) -> Bounded {
     let sum = convolve_sum(layer, block, pixel, channel);
     let side = [block.out_height, block.out_width].map(|side| side as usize);
@@ -124,7 +124,7 @@ fn ended(block: &ConvolveBlock, sum: Bounded) -> Bounded {
     relu(sum * Bounded::from(block.scale), block.relu_outputs)
 }
 
-/// Channel `channel` of output pixel `pixel` of a convolution of every channel by itself.
+/// Channel `channel` of output pixel `pixel` of a depthwise convolution.
 pub fn depthwise(inputs: &[f32], weights: &[f32], block: &DepthwiseBlock, pixel: usize, channel: usize) -> Bounded {
     let size = [block.in_height, block.in_width];
     let windows = Windows { size, stride: block.stride, dilation: block.dilation, padding: block.padding };
@@ -153,7 +153,7 @@ pub fn transposed(layer: &LayerInputs, block: &TransposedBlock, at: [usize; 2], 
     relu(Bounded::sum(products.chain([f64::from(layer.bias[channel])])), block.relu_outputs)
 }
 
-/// Output number `element` of pooling: exact.
+/// Output number `element` of max pool: exact.
 pub fn max_pool(inputs: &[f32], block: &PoolBlock, element: usize) -> Bounded {
     let (channels, out_width) = (block.channels as usize, block.out_width as usize);
     let (pixel, channel) = (element / channels, element % channels);
@@ -168,7 +168,7 @@ pub fn max_pool(inputs: &[f32], block: &PoolBlock, element: usize) -> Bounded {
         .into()
 }
 
-/// What lies in an enlarged image at output pixel `[row, column]`, of an input channel.
+/// An upsampled image at output pixel `[row, column]`, of an input channel.
 pub fn upsample(inputs: &[f32], block: &UpsampleBlock, row: u32, column: u32, channel: usize) -> Bounded {
     let (width, channels) = (block.in_width as usize, block.in_channels as usize);
     let coordinate = |index: u32, out_count: u32, in_count: u32| {

@@ -1,17 +1,17 @@
-//! The formulas of weighting, evaluated in `f64` on the same `f32` poses, each with a bound on what `f32` may differ.
+//! The formulas of weighting, evaluated in `f64` on the same `f32` poses, each with a bound on the error of `f32`.
 //!
 //! Bounds count roundings to first order in units of `u = 2^-24`. An error `e` with a relative error of `k` units
 //! (`k + 1` once the offset is added) gives weights with at most `2 (k + 1) + S + 2` units: the numerator and the sum
 //! inherit `k + 1` each, the quotient of the smallest
 //! and each error is rounded (1 in the numerator, 1 in the sum), the sum has `S - 1` additions, and the last division 1.
 //!
-//! That is where divisions and square roots are correctly rounded. [`Arithmetic`] says what they cost elsewhere; how
-//! many of them are on the way to a weight is counted for each formula.
+//! This holds for correctly rounded divisions and square roots. [`Arithmetic`] has their errors on other devices; their
+//! number in a weight is counted for each formula.
 
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{AngleKind, ERROR_OFFSET, Formula, Scheme};
 
-/// What divisions and square roots cost beyond a correct rounding, in units of `2^-24`.
+/// Errors of divisions and square roots beyond a correct rounding, in units of `2^-24`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arithmetic {
     /// A division.
@@ -23,8 +23,8 @@ pub struct Arithmetic {
 impl Arithmetic {
     /// Everything is correctly rounded: CPUs.
     pub const EXACT: Arithmetic = Arithmetic { division: 0.0, square_root: 0.0 };
-    /// What Vulkan allows: a division 2.5 ULP, which are 5 units; a square root is 1 over a reciprocal root of 2 ULP,
-    /// which are 9 together.
+    /// The errors that Vulkan allows: a division 2.5 ULP, which are 5 units; a square root is 1 over a reciprocal root
+    /// of 2 ULP, which are 9 together.
     pub const VULKAN: Arithmetic = Arithmetic { division: 4.0, square_root: 8.0 };
 }
 

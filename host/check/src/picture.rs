@@ -1,7 +1,7 @@
-//! A whole picture on a device against the CPU's.
+//! A whole picture on a device compared with the CPU's.
 //!
-//! The scene is a person's, or the synthetic lorry, photographed into a temporary folder: an installed program has no
-//! sample beside it. The last view is rendered from up to [`MOST_SOURCES`] others.
+//! The scene is a given one, or the synthetic lorry, rendered into a temporary folder: an installed program has no
+//! sample scene. The last view is rendered from up to [`MOST_SOURCES`] others.
 
 use super::measure::Role;
 use super::report::{CheckError, PictureReport, PictureVersusCpu};
@@ -23,7 +23,7 @@ use viewfuse_synthetic::render::RAYS_PER_SIDE;
 use viewfuse_synthetic::{toy, write_scene};
 use viewfuse_weighting::Weighting;
 
-/// Most sources of the picture.
+/// The most sources of the picture.
 pub const MOST_SOURCES: usize = 12;
 /// Longest side of the picture.
 pub const LONGEST_SIDE: u32 = 160;
@@ -42,12 +42,12 @@ pub struct Picture {
     options: RenderOptions,
     reference: RgbImage,
     reference_time: Duration,
-    /// Holds the synthetic photographs for as long as they are needed.
+    /// Keeps the temporary folder of the synthetic photographs.
     _folder: Option<TempDir>,
 }
 
 impl Picture {
-    /// Of a scene, or of the synthetic one; renders the CPU's.
+    /// The picture of a scene, or of the synthetic one; renders it on the CPU.
     ///
     /// # Errors
     /// [`CheckError::Picture`].
@@ -153,7 +153,7 @@ fn rendered(
     Ok((picture.ok_or("the scene has no view to render")?, time))
 }
 
-/// How a picture differs from another of the same size, and whether that is too much.
+/// The difference of two pictures of the same size, and whether it exceeds the tolerance.
 pub fn compare(picture: &RgbImage, reference: &RgbImage) -> (Option<PictureVersusCpu>, Option<String>) {
     if picture.dimensions() != reference.dimensions() || picture.is_empty() {
         return (None, Some("the pictures do not have the same size".to_owned()));

@@ -1,4 +1,4 @@
-//! PixelNeRF's points in `f64`: what goes into its network and what comes out, with bounds on what `f32` may make of them.
+//! PixelNeRF's points in `f64`: the inputs of its network and radiance from its outputs, with bounds on the error of `f32`.
 
 use super::bounded::Bounded;
 use super::camera_oracle::{Vector, axes, bilinear, centre, dot, point, project, tents};
@@ -33,7 +33,7 @@ pub fn embed(view: &CameraBlock, at: &RayPoint, block: &EmbedBlock) -> Vec<Bound
     features
 }
 
-/// Whether a point is in front of a view; `None` where rounding decides.
+/// Whether a point is in front of a view; `None` if it depends on rounding.
 pub(super) fn is_in_front(view: &CameraBlock, at: Vector) -> Option<bool> {
     let origin = centre(view);
     let [_, _, forward] = axes(view);
@@ -56,7 +56,7 @@ pub fn visible_weights(views: &[CameraBlock], weights: &[f32], at: &RayPoint) ->
     of_seen.into_iter().map(|weight| Some(weight / all)).collect()
 }
 
-/// All channels of a view's grid where a point appears; `None` where rounding decides whether it does.
+/// All channels of a view's grid at a point's projection; `None` if it depends on rounding whether the point is in front.
 pub fn gather(view: &CameraBlock, grid: &[f32], at: &RayPoint, block: &GatherBlock) -> Option<Vec<Bounded>> {
     let position = point(at.position);
     let (x, y) = if is_in_front(view, position)? {
@@ -80,7 +80,7 @@ pub fn gather(view: &CameraBlock, grid: &[f32], at: &RayPoint, block: &GatherBlo
     )
 }
 
-/// Red, green, blue and optical depth of a network's outputs.
+/// Red, green, blue and optical depth from a network's outputs.
 pub fn radiance(raw: &[f32], length: f32) -> [Bounded; 4] {
     let colour = |raw: f32| {
         let exponential = (-Bounded::from(raw)).lesser(SATURATED.into()).exp();

@@ -4,7 +4,7 @@ use crate::oracle::{Matrix, cross, normalised};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::threefry_2x32;
 
-/// A sequence of random numbers that a seed determines.
+/// A sequence of random draws that a seed determines.
 #[derive(Clone, Debug)]
 pub struct Random {
     seed: u32,
@@ -122,7 +122,7 @@ pub(crate) fn random(kernel: u32, seed: u64, size: u32) -> Random {
     Random::new((seed as u32).wrapping_mul(0x9e37_79b9) ^ (size << 8) ^ kernel)
 }
 
-/// As `f32`, so many.
+/// `count` draws as `f32`.
 pub(crate) fn numbers(count: usize, mut next: impl FnMut() -> f64) -> Vec<f32> {
     (0..count).map(|_| next() as f32).collect()
 }

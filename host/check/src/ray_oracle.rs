@@ -1,7 +1,7 @@
-//! Rays, samples on them, and the sample mask, in `f64` with bounds on what `f32` may make of them.
+//! Rays, samples on them, and the sample mask, in `f64` with bounds on the error of `f32`.
 //!
-//! Random numbers are whole numbers until they are scaled, and are taken from the code under test: known answers are held
-//! against them elsewhere.
+//! Random draws are integers before scaling, and come from the code under test: other tests compare them with known
+//! answers.
 
 use super::bounded::Bounded;
 use super::camera_oracle::{along, centre, point, towards};
@@ -29,7 +29,7 @@ pub fn cast_ray(block: &CastBlock, pixel: u32) -> [Bounded; 8] {
     [origin_x, origin_y, origin_z, near, x / length, y / length, z / length, far]
 }
 
-/// A depth at a share of the part of a ray that is looked at.
+/// A depth at a share of the interval between a ray's bounds.
 fn depth_at(ray: &TargetRay, share: Bounded) -> Bounded {
     let (near, far) = (Bounded::from(ray.near), Bounded::from(ray.far));
     (near + (far - near) * share).clamped(ray.near, ray.far)
@@ -61,7 +61,7 @@ pub fn normal(seed: [u32; 2], pixel: u32, sample: u32) -> Bounded {
     radius * (turn * second.into()).cosine()
 }
 
-/// Depth of a fine sample; `seen[part]` is weight and transmittance. `None` where rounding decides which part it is.
+/// Depth of a fine sample; `seen[part]` is weight and transmittance. `None` if the part depends on rounding.
 pub fn fine_depth(
     seen: &[[f32; 2]],
     ray: &TargetRay,
@@ -84,7 +84,7 @@ pub fn fine_depth(
         })
         .collect();
     let wanted = draw[0] * reached[reached.len() - 1];
-    // In front of it are the parts that end at or below the wanted sum; the last part is never.
+    // In front of it are the parts whose cumulative sum is at most the requested one; the last part never is.
     let mut part = 0_u32;
     for end in &reached[..reached.len() - 1] {
         part += u32::from(!wanted.below(*end)?);
@@ -126,12 +126,12 @@ pub fn weigh_samples(samples: &[[f32; 4]]) -> Vec<[Bounded; 2]> {
     samples.iter().map(weigh).collect()
 }
 
-/// How much passes an optical depth.
+/// The transmittance of an optical depth.
 fn passing(optical_depth: Bounded) -> Bounded {
     if optical_depth == Bounded::ZERO { Bounded::ONE } else { (-optical_depth).exp() }
 }
 
-/// Whether a sample is in the mask; `None` where rounding decides. `seen[ray][part]` is weight and transmittance.
+/// Whether a sample is in the mask; `None` if it depends on rounding. `seen[ray][part]` is weight and transmittance.
 pub fn is_sampled(
     seen: &[[f32; 2]],
     ray: &TargetRay,
@@ -165,7 +165,7 @@ pub fn is_sampled(
     if answers[0] == answers[1] { answers[0] } else { None }
 }
 
-/// Whether any is true, if those that are known tell.
+/// Whether any is true; `None` if it depends on undecided ones.
 fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
     let answers: Vec<Option<bool>> = answers.collect();
     if answers.contains(&Some(true)) {
@@ -177,7 +177,7 @@ fn any(answers: impl Iterator<Item = Option<bool>>) -> Option<bool> {
     }
 }
 
-/// Whether what was seen of a ray puts samples in a part into the mask.
+/// Whether a ray's weights put samples in a part into the mask.
 fn says_so(seen: &[[f32; 2]], part: u32, block: &SampleMaskBlock) -> Option<bool> {
     let part = part as usize;
     let around = &seen[part.saturating_sub(1)..seen.len().min(part + 2)];

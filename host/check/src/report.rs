@@ -1,10 +1,10 @@
-//! What a check found, as a person and as a program reads it.
+//! The result of a check, for persons and programs.
 
 use super::agreement::Versus;
 use serde::Serialize;
 use viewfuse_job::progress::Interrupted;
 
-/// Why a check did not come to its end.
+/// Why a check was not completed.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// A device failed in a kernel.
@@ -12,7 +12,7 @@ pub enum CheckError {
     Device {
         /// The kernel.
         kernel: &'static str,
-        /// What the device said.
+        /// The device's error.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// A picture could not be rendered.
@@ -20,18 +20,18 @@ pub enum CheckError {
     Picture {
         /// The scene.
         scene: String,
-        /// Why not.
+        /// The cause.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
-    /// The person stopped the work.
+    /// The work was cancelled.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }
 
-/// How a kernel's numbers differ from the CPU's.
+/// Differences of a kernel's numbers from the CPU's.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct VersusCpu {
-    /// Largest difference of the numbers that do not hang on rounding.
+    /// Largest difference of the decided numbers.
     pub absolute: f64,
     /// The same in units of the last place.
     pub ulps: f64,
@@ -50,9 +50,9 @@ impl From<Versus> for VersusCpu {
 pub struct KernelReport {
     /// Its name.
     pub kernel: &'static str,
-    /// How many numbers were compared with `f64`.
+    /// Numbers that were compared with `f64`.
     pub compared: usize,
-    /// Share of the numbers that hang on rounding and were not.
+    /// Share of the undecided numbers, which were not compared.
     pub undecided: f64,
     /// Largest difference from `f64`.
     pub absolute: f64,
@@ -60,19 +60,19 @@ pub struct KernelReport {
     pub relative: f64,
     /// The same in units of the last place.
     pub ulps: f64,
-    /// From which size on relative differences are looked at.
+    /// The smallest size for relative differences.
     pub least: f64,
     /// Largest quotient of a difference and the bound of its number.
     pub of_bound: f64,
     /// Largest bound of the numbers compared.
     pub tolerance: f64,
-    /// Where the bounds come from.
+    /// The derivation of the bounds.
     pub reason: &'static str,
-    /// How the numbers differ from the CPU's; nothing for the CPU itself.
+    /// Differences from the CPU's numbers; null for the CPU itself.
     pub versus_cpu: Option<VersusCpu>,
     /// Time for an element, in nanoseconds.
     pub nanoseconds_per_element: f64,
-    /// What is wrong, if anything.
+    /// The exceeded tolerance, if any.
     pub breach: Option<String>,
 }
 
@@ -81,17 +81,17 @@ pub struct KernelReport {
 pub struct PictureReport {
     /// The scene.
     pub scene: String,
-    /// The view that was rendered, and from how many others.
+    /// The rendered view.
     pub target: String,
-    /// How many sources there were.
+    /// The number of sources.
     pub source_count: usize,
     /// Width and height.
     pub size: [u32; 2],
-    /// From the photographs to the picture.
+    /// Time from the photographs to the picture.
     pub seconds: f64,
-    /// How the picture differs from the CPU's; nothing for the CPU itself.
+    /// Differences from the CPU's picture; null for the CPU itself.
     pub versus_cpu: Option<PictureVersusCpu>,
-    /// What is wrong, if anything.
+    /// The exceeded tolerance, if any.
     pub breach: Option<String>,
 }
 
@@ -100,16 +100,16 @@ pub struct PictureReport {
 pub struct PictureVersusCpu {
     /// Largest difference of a channel, in steps of 1/255.
     pub worst: u8,
-    /// How many pixels differ at all.
+    /// The number of differing pixels.
     pub differing: usize,
-    /// Peak signal to noise ratio in decibels; nothing for equal pictures.
+    /// Peak signal to noise ratio in decibels; null for equal pictures.
     pub psnr: Option<f64>,
 }
 
 /// A device.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeviceReport {
-    /// What it calls itself.
+    /// Its name.
     pub device: String,
     /// Its kernels, in the order of the data.
     pub kernels: Vec<KernelReport>,
@@ -118,7 +118,7 @@ pub struct DeviceReport {
 }
 
 impl DeviceReport {
-    /// Names of what breaches its tolerance: kernels, or `picture`.
+    /// Names of the exceeded tolerances: kernels, or `picture`.
     pub fn breaches(&self) -> Vec<&'static str> {
         let kernels = self.kernels.iter().filter(|kernel| kernel.breach.is_some()).map(|kernel| kernel.kernel);
         let picture = self.picture.iter().filter(|picture| picture.breach.is_some()).map(|_| "picture");
@@ -131,27 +131,27 @@ impl DeviceReport {
 pub struct Report {
     /// Version of the program.
     pub viewfuse: &'static str,
-    /// How many seeds each kernel was checked with.
+    /// Seeds of each kernel.
     pub seed_count: u32,
-    /// The sizes it was checked at.
+    /// Sizes of each kernel, in elements.
     pub sizes: Vec<u32>,
-    /// In the order in which they were checked.
+    /// The checked devices, in order.
     pub devices: Vec<DeviceReport>,
-    /// Devices that failed, and how.
+    /// Devices that failed, with the error.
     pub failures: Vec<String>,
-    /// Devices that were not checked, and why.
+    /// Devices that were not checked, with the reason.
     pub notes: Vec<String>,
 }
 
 impl Report {
-    /// Whether something was checked, no device failed, and nothing breaches its tolerance.
+    /// Whether a device was checked, none failed, and no tolerance is exceeded.
     pub fn passes(&self) -> bool {
         self.failures.is_empty()
             && !self.devices.is_empty()
             && self.devices.iter().all(|device| device.breaches().is_empty())
     }
 
-    /// What a command returns that ends with this report.
+    /// The exit code of a command with this report.
     pub fn exit_code(&self) -> u8 {
         u8::from(!self.passes())
     }

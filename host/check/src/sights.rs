@@ -1,5 +1,5 @@
-//! Cameras, rays and points for kernels that look along rays: in front of cameras and behind them, at the borders of their
-//! images, far outside, far away.
+//! Cameras, rays and points for kernels on rays: in front of cameras and behind them, at the borders of their images, far
+//! outside, far away.
 
 use super::poses::{Random, looking_at_origin};
 use viewfuse_core::Vec3;
@@ -32,7 +32,7 @@ pub fn camera(random: &mut Random) -> CameraBlock {
     Camera { pose, pinhole }.block(0)
 }
 
-/// A ray with a part that is looked at; of some that is nothing.
+/// A ray with near and far bounds, which are equal for some.
 pub fn ray(random: &mut Random) -> TargetRay {
     let near = random.range(0.3, 1.5);
     let far = if random.below(16) == 0 { near } else { near + random.log_range(1.0e-2, 10.0) };

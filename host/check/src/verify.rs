@@ -1,7 +1,7 @@
-//! Comparing this build with files of reference values from the official implementations.
+//! Comparison of this build with files of reference values from the official implementations.
 //!
-//! A file is recognised by what it holds; quantities that this version does not compute are listed, not skipped in
-//! silence. Every comparison is `!(error <= tolerance)`: NaN fails.
+//! A file is recognised by its content; quantities that this version does not compute are listed, not silently
+//! skipped. Every comparison is `!(error <= tolerance)`: NaN fails.
 
 mod attention;
 mod file;
@@ -23,7 +23,7 @@ pub enum VerifyError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         cause: std::io::Error,
     },
     /// The file is neither JSON nor safetensors.
@@ -31,9 +31,9 @@ pub enum VerifyError {
     Format {
         /// The file.
         path: PathBuf,
-        /// What the JSON reader said.
+        /// The JSON reader's error.
         json: serde_json::Error,
-        /// What the safetensors reader said.
+        /// The safetensors reader's error.
         safetensors: safetensors::SafeTensorError,
     },
     /// The JSON does not have the form of a reference file.
@@ -41,12 +41,12 @@ pub enum VerifyError {
     Content {
         /// The file.
         path: PathBuf,
-        /// Which case, method or tensor.
+        /// The case, method or tensor.
         place: String,
-        /// What is wrong with it.
+        /// The problem.
         message: String,
     },
-    /// Nothing in the file is known to this version.
+    /// The file has no known reference values.
     #[error("{}: holds no reference values that this version knows", path.display())]
     Unknown {
         /// The file.
@@ -63,25 +63,25 @@ pub enum Measure {
     Relative,
 }
 
-/// The outcome for one quantity of a file.
+/// The result for one quantity of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Quantity {
-    /// What was compared.
+    /// The compared quantities.
     pub name: String,
-    /// How many numbers.
+    /// Compared numbers.
     pub count: usize,
-    /// The largest difference; NaN if any was.
+    /// The largest difference; NaN if one is NaN.
     pub worst: f64,
-    /// How differences are measured.
+    /// The kind of difference.
     pub measure: Measure,
-    /// The largest difference that passes.
+    /// The tolerance.
     pub tolerance: f64,
-    /// Where the largest difference is.
+    /// The place of the largest difference.
     pub place: String,
 }
 
 impl Quantity {
-    /// Nothing compared yet.
+    /// No numbers compared yet.
     fn new(name: impl Into<String>, measure: Measure, tolerance: f64) -> Quantity {
         Quantity { name: name.into(), count: 0, worst: 0.0, measure, tolerance, place: String::new() }
     }
@@ -96,7 +96,7 @@ impl Quantity {
             Measure::Relative => difference / reference.abs(),
         };
         self.count += 1;
-        // Once NaN, always NaN; the first place is remembered.
+        // NaN stays NaN, with its first place.
         if !self.worst.is_nan() && !(error <= self.worst) {
             self.worst = error;
             self.place = place();
@@ -126,12 +126,12 @@ impl Quantity {
     }
 }
 
-/// The outcome for a file.
+/// The result for a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// The file.
     pub path: PathBuf,
-    /// What was compared.
+    /// The compared quantities.
     pub quantities: Vec<Quantity>,
     /// Reference values that this version does not compute.
     pub not_covered: Vec<String>,
@@ -144,10 +144,10 @@ impl Report {
     }
 }
 
-/// Compares this build with a file; what has kernels is computed on a device.
+/// Compares this build with a file; kernels run on the given device.
 ///
 /// # Errors
-/// [`VerifyError`] if the file cannot be compared at all. A tolerance that is exceeded is no error but part of the
+/// [`VerifyError`] if the file cannot be compared at all. An exceeded tolerance is not an error but part of the
 /// report.
 pub fn verify<D: Device>(path: &Path, device: &D, progress: &dyn Progress) -> Result<Report, VerifyError> {
     let bytes = std::fs::read(path).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;

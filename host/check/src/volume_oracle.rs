@@ -1,4 +1,4 @@
-//! From volumes to a feature image in `f64`, with bounds on what `f32` may make of it.
+//! Feature images from volumes in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, ROUNDING, roundings};
 use super::camera_oracle::{point, project};
@@ -10,7 +10,7 @@ use viewfuse_core::rays::RayPoint;
 /// Nodes of one axis around a coordinate, with their shares; those outside (`None`) hold zeros.
 struct Nodes {
     nodes: Vec<(Option<usize>, f64)>,
-    /// How far the coordinate may be off.
+    /// The error of the coordinate.
     error: f64,
 }
 
@@ -28,7 +28,7 @@ fn nodes(coordinate: Bounded, count: u32) -> Nodes {
     Nodes { nodes: (low.floor() as i64..=high.ceil() as i64).map(node).collect(), error: high - low }
 }
 
-/// All features of a view's volume where a point lies; `None` where rounding decides whether it is in front of the view.
+/// All features of a view's volume where a point lies; `None` if it depends on rounding whether it is in front of the view.
 pub fn gather(view: &CameraBlock, volume: &[f32], at: &RayPoint, block: &VolumeBlock) -> Option<Vec<Bounded>> {
     let features = block.feature_count as usize;
     let position = point(at.position);
@@ -99,7 +99,7 @@ pub fn weigh_features(raw: &[f32], points: &[RayPoint], block: &FeatureBlock) ->
     weights.collect()
 }
 
-/// How much passes an optical depth.
+/// The transmittance of an optical depth.
 fn passing(optical_depth: Bounded) -> Bounded {
     if optical_depth.value == 0.0 { Bounded::ONE } else { (-optical_depth).exp() }
 }

@@ -1,11 +1,11 @@
-//! How far a convolution by Winograd's way, F(4x4, 3x3), may be from the sum of its products.
+//! The error bound of a convolution by Winograd's algorithm, F(4x4, 3x3), against the sum of its products.
 //!
-//! Of `A^T ((G g G^T) * (B^T d B)) A`, summed over the channels, each number is a sum of products of entries of the five
-//! matrices, of inputs and of weights. Each product is rounded at most as often as there are operations on its way, so
-//! that the error is at most that many roundings of the same expression with everything replaced by its magnitude:
-//! `|A^T| ((|G| |g| |G^T|) * (|B^T| |d| |B|)) |A|`. Multiplications by 2, 4 and 8 are exact; counted are one rounding of the
-//! transformed weights, 3 in each direction of the inputs' transform, as many as channels and one more in the sum over
-//! them, 3 in each direction of the outputs' transform.
+//! Of `A^T ((G g G^T) * (B^T d B)) A`, summed over the channels, each number is a sum of products of entries of the
+//! five matrices, of inputs and of weights. Each product is rounded at most as often as there are operations on its
+//! way, so that the error is at most that many roundings of the same expression with everything replaced by its
+//! magnitude: `|A^T| ((|G| |g| |G^T|) * (|B^T| |d| |B|)) |A|`. Multiplications by 2, 4 and 8 are exact; counted are one
+//! rounding of the transformed weights, 3 in each direction of the inputs' transform, as many as channels and one more
+//! in the sum over them, 3 in each direction of the outputs' transform.
 
 use super::bounded::roundings;
 
@@ -44,7 +44,7 @@ const OUTPUTS: [[f64; REACH]; SIDE] = [
     [0.0, 1.0, 1.0, 8.0, 8.0, 1.0],
 ];
 
-/// An output number of a tile and what it is made of.
+/// An output number of a tile, with the inputs and weights that it depends on.
 pub struct Tile<I, W> {
     /// Row and column in the tile.
     pub place: [usize; 2],
@@ -57,7 +57,7 @@ pub struct Tile<I, W> {
 }
 
 impl<I: Fn([usize; 2], usize) -> f64, W: Fn([usize; 2], usize) -> f64> Tile<I, W> {
-    /// How far the output may be off, beside what bias and residual bring.
+    /// The bound on the output's error, without that of bias and residual.
     pub fn error(&self) -> f64 {
         let mut magnitudes = 0.0;
         for channel in 0..self.channels {

@@ -11,7 +11,7 @@ use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, HullScene};
 
-/// What kernels read.
+/// The kernels' inputs.
 #[derive(Clone, Debug)]
 pub struct World {
     /// The box.
@@ -30,7 +30,7 @@ pub struct World {
     pub weights: Vec<f32>,
     /// `[view][other]`.
     pub pair_weights: Vec<f32>,
-    /// A camera to march from.
+    /// A target camera.
     pub target: CameraBlock,
 }
 
@@ -54,7 +54,7 @@ impl Numbers {
     }
 }
 
-/// A camera on a wobbly ring. Its numbers are sound whatever the random ones are.
+/// A camera on a wobbly ring. It is valid for all random draws.
 fn camera(numbers: &mut Numbers, index: usize, size: [u32; 2]) -> Camera {
     let azimuth = 1.1 * index as f32 + numbers.between(-0.2, 0.2);
     let distance = numbers.between(2.2, 2.8);
@@ -140,7 +140,7 @@ impl World {
         }
     }
 
-    /// Everything that the kernels of the visual hull share, in a device's memory.
+    /// The common buffers of the visual hull's kernels, in a device's memory.
     ///
     /// # Errors
     /// If the device has no memory left.
@@ -172,13 +172,13 @@ impl World {
         (0..).zip(&self.views).flat_map(move |(view, camera)| (0..pixel_count(camera)).map(move |pixel| (view, pixel)))
     }
 
-    /// Puts a view's focal length off by 1 %.
+    /// Changes a view's focal length by 1 %.
     pub fn spoil_focal(&mut self) {
         self.views[1].intrinsics[0] *= 1.01;
     }
 
-    /// Puts red and alpha of all views but the first off by 1 %, in opposite directions: together they would leave the
-    /// colour as it is.
+    /// Changes red and alpha of all views but the first by 1 %, in opposite directions: equal changes would not change the
+    /// colour.
     pub fn spoil_texels(&mut self) {
         let first = self.views[1].first_texel as usize;
         for [red, _, _, alpha] in &mut self.texels[first..] {
@@ -186,17 +186,17 @@ impl World {
         }
     }
 
-    /// Puts the depths off by 1 %.
+    /// Changes the depths by 1 %.
     pub fn spoil_depths(&mut self) {
         self.depths.iter_mut().filter(|depth| **depth < NO_SURFACE).for_each(|depth| *depth *= 1.01);
     }
 
-    /// Puts the depths of entry off by 1 %.
+    /// Changes the depths of entry by 1 %.
     pub fn spoil_entries(&mut self) {
         self.entries.iter_mut().filter(|depth| **depth < NO_SURFACE).for_each(|depth| *depth *= 1.01);
     }
 
-    /// Puts a side of the box off by 1 %.
+    /// Changes a side of the box by 1 %.
     pub fn spoil_box(&mut self) {
         self.object.high[0] *= 1.01;
     }
@@ -222,7 +222,7 @@ fn simplex(numbers: &mut Numbers, count: usize, own: Option<usize>) -> Vec<f32> 
     weights.iter().map(|weight| weight / sum).collect()
 }
 
-/// `[pixel][plane]`: costs as a sweep could give: smooth with a valley, a quarter of them outside the hull.
+/// `[pixel][plane]`: costs of a plausible sweep: smooth with a valley, a quarter of them outside the hull.
 pub fn costs(numbers: &mut Numbers, pixel_count: u32, plane_count: u32) -> Vec<f32> {
     let mut costs = Vec::new();
     for _ in 0..pixel_count {

@@ -45,7 +45,7 @@ use std::process::ExitCode;
 #[command(
     name = "viewfuse",
     version,
-    about = "From a handful of posed photographs, the picture from a camera that was never there.",
+    about = "Renders novel views of an object from a few posed photographs.",
     long_about = long_about(),
     after_help = "Exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted.",
     max_term_width = 110
@@ -59,31 +59,31 @@ struct Arguments {
 enum Command {
     /// Render novel views: pictures, depth maps, contact sheets and a run record.
     Render(render::Arguments),
-    /// Show the weight that every scheme gives each source for a target.
+    /// Show the weight of each source view for a target view under every scheme.
     Weights(weights::Arguments),
-    /// Show what was read: cameras from above, what they look at, and what looks wrong.
+    /// Show a scene: its cameras from above, the point that they look at, and warnings.
     Inspect(inspect::Arguments),
-    /// Compare weighting schemes on views that are left out of the sources.
+    /// Compare weighting schemes on held-out views.
     Evaluate(evaluate::Arguments),
-    /// Measure error against run time over what can be left out, on each device.
+    /// Measure error against run time for all omissions, on each device.
     Pareto(pareto::Arguments),
-    /// Score pictures against what they should be.
+    /// Score pictures against their ground truth.
     Compare(compare::Arguments),
-    /// Learn a network, or the weighting of views for one, from scenes.
+    /// Train a network, or the weighting of views for a network, on scenes.
     Train(train::Arguments),
-    /// Make scenes to learn from.
+    /// Generate scenes for training.
     Scenes(scenes::Arguments),
-    /// Write evaluations, run times and trainings as one HTML page.
+    /// Write an HTML page with evaluations, run times and trainings.
     Report(report::Arguments),
     /// Write a checkpoint as safetensors.
     Convert(convert::Arguments),
     /// Write a scene in another layout.
     Export(export::Arguments),
-    /// List the devices that kernels can run on, and what those that cannot be used lack.
+    /// List the devices, and the missing requirements of those that cannot be used.
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
     Verify(verify::Arguments),
-    /// Check how closely each device agrees with the mathematics, kernel by kernel.
+    /// Compare every kernel on each device with an evaluation in double precision.
     Check(check::Arguments),
 }
 
@@ -122,13 +122,13 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     }
 }
 
-/// Arguments that do not fit what a file turned out to hold; the exit code is that of wrong arguments.
+/// The error of arguments that do not fit the content of a file; the exit code is that of wrong arguments.
 fn wrong(message: impl Display) -> anyhow::Error {
     clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n\nFor more information, try '--help'.\n"))
         .into()
 }
 
-/// Prints a line. A reader that has gone away (`| head`) is no reason to stop: files are still to be written.
+/// Prints a line. A closed pipe (`| head`) is ignored, because the files are still to be written.
 fn say(text: impl Display) -> io::Result<()> {
     match writeln!(io::stdout().lock(), "{text}") {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -136,7 +136,7 @@ fn say(text: impl Display) -> io::Result<()> {
     }
 }
 
-/// Runs a piece of work on this many threads instead of all cores.
+/// Runs `work` on this many threads instead of all cores.
 fn on_threads<T: Send>(threads: Option<u16>, work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
     match threads {
         None => Ok(work()),

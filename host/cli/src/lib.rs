@@ -1,4 +1,4 @@
-//! The command `viewfuse`: what its binary calls. A library, so that tests can ask cargo for all its features.
+//! The command `viewfuse`, called by its binary. It is a library so that tests can build it with all features.
 #![forbid(unsafe_code)]
 
 mod cli;
@@ -6,7 +6,7 @@ mod cli;
 use std::process::ExitCode;
 use viewfuse_job::progress::Interrupted;
 
-/// Does what the command line says and returns the exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted.
+/// Runs the command line and returns the exit code: 0 done, 1 the job failed, 2 wrong arguments, 130 interrupted.
 pub fn main() -> ExitCode {
     match cli::run() {
         Ok(code) => code,

@@ -10,7 +10,7 @@ use viewfuse_core::visual_hull::ObjectBlock;
 /// The parameters of a layer in a device's memory. They never change, and all blocks that they are used with have the
 /// same inner index and columns.
 pub struct Layer<D: Device + ?Sized> {
-    /// As the device wants them.
+    /// In the device's own form.
     pub weights: D::Weights,
     /// `[column]`.
     pub bias: D::Buffer<f32>,
@@ -41,7 +41,7 @@ pub struct Rays<D: Memory + ?Sized> {
 pub struct Pixels<D: Memory + ?Sized> {
     /// `[row][column]`: red, green, blue, opacity.
     pub colours: D::Buffer<[f32; 4]>,
-    /// `[row][column]`: depth along the principal axis; 0 where nothing is met.
+    /// `[row][column]`: depth along the principal axis; 0 where there is no surface.
     pub depths: D::Buffer<f32>,
 }
 

@@ -1,4 +1,4 @@
-//! Which device: what is there, what a person asked for, and why it became this one.
+//! The choice of a device: the devices of this machine, the requested one, and the reason for the chosen one.
 
 use super::cpu::Cpu;
 use super::memory::Memory;
@@ -8,10 +8,10 @@ use std::str::FromStr;
 use std::sync::Arc;
 use viewfuse_vulkan::{Adapter, GpuOptions, Instance, InstanceOptions, VulkanError};
 
-/// The device that a person asks for.
+/// The requested device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceChoice {
-    /// A GPU if there is one that can do the work, otherwise the CPU.
+    /// The first GPU that fulfils the requirements, otherwise the CPU.
     Auto,
     /// All cores of this machine.
     Cpu,
@@ -19,7 +19,7 @@ pub enum DeviceChoice {
     Vulkan(String),
 }
 
-/// A text that names no device.
+/// A text that does not name a device.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown device '{0}'; the choices are auto, cpu, vulkan, vulkan:NUMBER, vulkan:NAME (see `viewfuse devices`)")]
 pub struct UnknownDevice(String);
@@ -58,7 +58,7 @@ pub enum AnyDevice {
 }
 
 impl AnyDevice {
-    /// What the run record calls it.
+    /// Its name in the run record.
     pub fn name(&self) -> String {
         match self {
             AnyDevice::Cpu(cpu) => cpu.name(),
@@ -67,65 +67,65 @@ impl AnyDevice {
     }
 }
 
-/// A device, and why it is this one.
+/// A device, and the reason for choosing it.
 pub struct Chosen {
     /// The device.
     pub device: AnyDevice,
-    /// Why, in words that follow its name.
+    /// The reason, as text that follows the device's name.
     pub reason: String,
 }
 
-/// How devices are found and opened.
+/// Options for finding and opening devices.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
-    /// Which Vulkan, and whether it is watched by validation layers.
+    /// The Vulkan loader, and whether validation layers are on.
     pub instance: InstanceOptions,
-    /// How a Vulkan device works.
+    /// Options of a Vulkan device.
     pub gpu: GpuOptions,
 }
 
-/// Opens what a person asked for.
+/// Opens the requested device.
 ///
 /// # Errors
-/// [`VulkanError`] if a Vulkan device was asked for and cannot be had; the automatic choice falls back on the CPU.
+/// [`VulkanError`] if a Vulkan device was requested and cannot be opened; the automatic choice falls back on the CPU.
 pub fn open(choice: &DeviceChoice, options: &DeviceOptions) -> Result<Chosen, VulkanError> {
     let cpu = |reason: String| Chosen { device: AnyDevice::Cpu(Cpu), reason };
     match choice {
-        DeviceChoice::Cpu => Ok(cpu("asked for".to_owned())),
+        DeviceChoice::Cpu => Ok(cpu("requested".to_owned())),
         DeviceChoice::Vulkan(wanted) => {
             let (instance, adapters) = vulkan_devices(&options.instance)?;
             let adapter = Adapter::choose(&adapters, wanted)?;
             let device = Vulkan::open(&instance, adapter, &options.gpu)?;
-            Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "asked for".to_owned() })
+            Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "requested".to_owned() })
         }
         DeviceChoice::Auto => Ok(match automatic(options) {
             Ok(device) => {
-                Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "a GPU that can do the work".to_owned() }
+                Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "the first usable GPU".to_owned() }
             }
             Err(reason) => cpu(reason),
         }),
     }
 }
 
-/// Devices to go through one after the other.
+/// Several devices, used one after the other.
 #[derive(Default)]
 pub struct Several {
-    /// The devices, the CPU first unless asked for otherwise.
+    /// The devices; the CPU comes first unless requested otherwise.
     pub devices: Vec<AnyDevice>,
-    /// Devices that are there and cannot do the work, and what they lack; or why there is only the CPU.
+    /// Devices that lack a requirement, and what they lack; or the reason why there is only the CPU.
     pub notes: Vec<String>,
-    /// Devices that should be able to do the work but could not be opened.
+    /// Devices that fulfil the requirements but could not be opened.
     pub failures: Vec<String>,
 }
 
-/// Opens the devices that a person asked for, in that order; if none, all that can do the work.
+/// Opens the requested devices, in that order; without a request, all usable ones.
 ///
 /// # Errors
-/// [`VulkanError`] if a device was asked for and cannot be had.
-pub fn open_several(asked: &[DeviceChoice], options: &DeviceOptions) -> Result<Several, VulkanError> {
+/// [`VulkanError`] if a device was requested and cannot be opened.
+pub fn open_several(requested: &[DeviceChoice], options: &DeviceOptions) -> Result<Several, VulkanError> {
     let mut several = Several::default();
-    if !asked.is_empty() {
-        several.devices = asked.iter().map(|choice| Ok(open(choice, options)?.device)).collect::<Result<_, _>>()?;
+    if !requested.is_empty() {
+        several.devices = requested.iter().map(|choice| Ok(open(choice, options)?.device)).collect::<Result<_, _>>()?;
         return Ok(several);
     }
     several.devices.push(AnyDevice::Cpu(Cpu));
@@ -145,7 +145,7 @@ pub fn open_several(asked: &[DeviceChoice], options: &DeviceOptions) -> Result<S
     Ok(several)
 }
 
-/// The first GPU that can do the work, or why there is none.
+/// The first usable GPU, or the reason why there is none.
 fn automatic(options: &DeviceOptions) -> Result<Vulkan, String> {
     let (instance, adapters) =
         vulkan_devices(&options.instance).map_err(|error| format!("because there is {error}"))?;
@@ -163,7 +163,7 @@ fn automatic(options: &DeviceOptions) -> Result<Vulkan, String> {
     Err(format!("because {}", reasons.join(" and ")))
 }
 
-/// Vulkan with its devices, the ones to prefer first.
+/// Vulkan with its devices, the preferred ones first.
 ///
 /// # Errors
 /// [`VulkanError`] without a loader, a driver or a device.

@@ -1,8 +1,8 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
 //!
-//! A kernel's form here is a function of its name in one of the modules, on slices. Most call the kernel's body; where the
-//! row says `twin`, the form has its own, faster order of work, and the body in `viewfuse-core` is the definition that it
-//! is tested against.
+//! A kernel's form here is a function of its name in one of the modules, on slices. Most forms call the kernel's body.
+//! Where the row says `twin`, the form has its own, faster loops, and the body in `viewfuse-core` is the definition
+//! that it is tested against.
 
 mod compositing;
 mod group_norm;

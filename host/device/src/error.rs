@@ -3,14 +3,14 @@
 use std::error::Error;
 use viewfuse_vulkan::VulkanError;
 
-/// A device failed: the one error of every device, so that what is built upon devices has errors without parameters. What
-/// the device itself said is shown as it is.
+/// A device failed. This is the one error of every device, so that crates above have errors without type parameters. The
+/// device's own message is shown unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// A Vulkan device did.
+    /// A Vulkan device failed.
     #[error(transparent)]
     Vulkan(#[from] VulkanError),
-    /// A device of another kind did.
+    /// A device of another kind failed.
     #[error(transparent)]
     Other(Box<dyn Error + Send + Sync>),
 }

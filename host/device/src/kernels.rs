@@ -1,4 +1,4 @@
-//! What a device runs: a method for every kernel, from the kernels' rows.
+//! The trait of a device: a method for every kernel, from the kernels' rows.
 
 use super::error::DeviceError;
 use super::memory::Memory;
@@ -8,12 +8,12 @@ use viewfuse_core::kernels::*;
 /// The sizes of a layer's weights, and what they are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LayerShape {
-    /// Numbers that an output is made of: channels of the input, times places of the window.
+    /// Products that an output is the sum of: channels of the input, times places of the window.
     pub inner_count: usize,
     /// Output channels; for a transposed convolution times places of the square.
     pub column_count: usize,
-    /// Whether it is used by nothing but convolutions with windows of 3x3 without gaps at every pixel of images that are
-    /// large (32x32 or more). A device may have another way for these.
+    /// Whether it is used only by convolutions with windows of 3x3, without dilation, at every pixel of large images (32x32
+    /// or more). A device may have another algorithm for these.
     pub has_wide_images: bool,
 }
 
@@ -38,11 +38,11 @@ macro_rules! device {
         /// exists on one device only does not compile. A method takes the kernel's parameters, the numbers that say how
         /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters say.
         pub trait Device: Memory {
-            /// A layer's weights as the device wants them.
+            /// A layer's weights in the device's own form.
             type Weights: Send + Sync;
 
-            /// Puts `weights[inner][column]` (for a convolution `[row of the window][column of the window][input
-            /// channel][output channel]`) where and how the kernels need them; they may be longer than the shape says.
+            /// Takes `weights[inner][column]` (for a convolution `[row of the window][column of the window][input
+            /// channel][output channel]`) to the device, in its own form; they may be longer than the shape says.
             ///
             /// # Errors
             /// If the device has no memory left.

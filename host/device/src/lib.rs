@@ -4,16 +4,16 @@
 //! [`viewfuse_core::kernels`], so that a kernel that exists on one device only does not compile. The body of every kernel
 //! is a function in `viewfuse-core`; a device decides how its elements are spread over cores or invocations.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
-//! error         what can go wrong on any device                         DeviceError
+//! error         the errors of any device                                DeviceError
 //! memory        buffers on a device                                     Memory, Element, KernelTime
 //! parallel      one parallel driver under all kernels of the CPU
 //! kernels       a method for each kernel, made from the rows            Device, LayerShape
 //! bundles       arguments that belong together                          Layer, HullScene, Pixels, Rays
 //! cpu, vulkan   the devices                                             Cpu, Vulkan
-//! choice        which of those that are there                           Choice
+//! choice        the choice of one of this machine's devices             Choice
 //! ```
 #![forbid(unsafe_code)]
 

@@ -1,14 +1,14 @@
-//! What a device holds, and what it tells about itself.
+//! Buffers on a device, its kernel times and transfers.
 
 use super::error::DeviceError;
 use bytemuck::Pod;
 use std::time::Duration;
 
-/// What a buffer can hold: plain data.
+/// Elements of a buffer: plain data.
 pub trait Element: Pod + Default + Send + Sync {}
 impl<T: Pod + Default + Send + Sync> Element for T {}
 
-/// What a kernel took.
+/// The time of a kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KernelTime {
     /// Its name.
@@ -21,14 +21,14 @@ pub struct KernelTime {
     pub time: Duration,
 }
 
-/// What went over the border of a device's memory.
+/// Transfers between host and device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Transfers {
-    /// How many arrays went to the device.
+    /// Arrays that were uploaded.
     pub uploads: u64,
     /// Their bytes.
     pub uploaded_bytes: u64,
-    /// How many arrays came back.
+    /// Arrays that were downloaded.
     pub downloads: u64,
     /// Their bytes.
     pub downloaded_bytes: u64,
@@ -39,7 +39,7 @@ pub trait Memory {
     /// Memory of the device that holds `T`s.
     type Buffer<T: Element>;
 
-    /// What the run record calls it.
+    /// Its name in the run record.
     fn name(&self) -> String;
 
     /// A buffer with these values.
@@ -54,23 +54,23 @@ pub trait Memory {
     /// If the device has no memory left.
     fn zeros<T: Element>(&self, count: usize) -> Result<Self::Buffer<T>, DeviceError>;
 
-    /// Most elements of a buffer that is bound as a whole: what grows with the work is cut so that it fits.
+    /// The most elements of a buffer that is bound as a whole: buffers that grow with the work are split to fit.
     fn most_elements<T: Element>(&self) -> usize;
 
-    /// Fewest elements of a kernel that keep the device busy: work between two looks at the interrupt flag is not cut
+    /// The fewest elements of a kernel that keep the device busy: work between two checks for cancellation is not split
     /// finer.
     fn busy_elements(&self) -> usize;
 
-    /// Waits until everything that was asked for is done, so that its time can be told.
+    /// Waits until all dispatched work is done, so that its time can be measured.
     ///
     /// # Errors
     /// If the device is lost, or a kernel took too long.
     fn finish(&self) -> Result<(), DeviceError>;
 
-    /// What each kernel took so far, kernels that never ran left out; nothing for devices that do not tell.
+    /// The time of each kernel so far, without those that never ran; empty for devices without timestamps.
     fn kernel_times(&self) -> Vec<KernelTime>;
 
-    /// What was transferred so far; nothing for devices whose memory is the host's.
+    /// The transfers so far; zeros for devices whose memory is the host's.
     fn transfers(&self) -> Transfers {
         Transfers::default()
     }

@@ -1,13 +1,13 @@
 //! The one driver under all parallel loops: compiled once, for work behind a `dyn Fn`.
 //!
 //! Loops hand out parts of a slice, or indices, under a lock; the threads of the current pool take one after the other
-//! until none is left. What a part holds does not depend on which thread takes it, so results are the same bits for any
-//! number of threads. A part should be 20 µs of work or more: handing it out takes well below 1 µs, waking a thread some.
-//! Work of a single part runs where it is called.
+//! until none is left. The result of a part does not depend on the thread that computes it, so results are the same bits
+//! for any number of threads. A part should be 20 µs of work or more: handing it out takes well below 1 µs, waking a thread
+//! a few. Work of a single part runs on the calling thread.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Parts for each thread, where there is enough work: the last ones keep no thread waiting for long.
+/// Parts for each thread, where there is enough work: many, so that the threads finish at about the same time.
 const PARTS_PER_THREAD: usize = 16;
 
 /// Runs `worker` on as many threads of the current pool as there are parts, and returns when all have returned.
@@ -24,7 +24,7 @@ fn drive(part_count: usize, worker: &(dyn Fn() + Sync)) {
     });
 }
 
-/// The lock. Nobody works while holding it: it cannot be poisoned.
+/// The lock. No work runs while it is held, so it cannot be poisoned.
 fn take<T>(parts: &Mutex<T>) -> MutexGuard<'_, T> {
     parts.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -101,7 +101,7 @@ pub fn map<R: Send>(count: usize, least: usize, work: impl Fn(usize) -> R + Sync
     results.into_iter().flatten().collect()
 }
 
-/// As [`map`] with parts of one result, until one fails: the error is the first one's in the order of the indices among those that were tried.
+/// As [`map`] with parts of one result, until one fails: of the errors, the one of the lowest index is returned.
 ///
 /// # Errors
 /// The error of `work`.

@@ -9,13 +9,13 @@ use viewfuse_core::for_each_kernel;
 use viewfuse_core::kernels::*;
 use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
-/// A Vulkan device. Calls return when their work is on its way; only a download waits for it.
+/// A Vulkan device. Calls return when their work is submitted; only a download waits for it.
 pub struct Vulkan {
     gpu: Gpu,
     transfers: Mutex<Transfers>,
 }
 
-/// Elements that keep a GPU busy.
+/// Elements of a kernel that keep a GPU busy.
 const BUSY_ELEMENTS: usize = 1 << 16;
 
 impl Vulkan {
@@ -31,7 +31,7 @@ impl Vulkan {
         self.transfers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What a kernel did, up to the last download.
+    /// The dispatches of a kernel, up to the last download.
     pub fn tally(&self, kernel: Kernel) -> Tally {
         self.gpu.tally(kernel)
     }
@@ -97,7 +97,7 @@ macro_rules! argument {
     ($kind:ident $host:ty) => { &Buffer<$host> };
 }
 
-/// How it is bound. Something must be bound also where an optional array is left out.
+/// How it is bound. A buffer must be bound also where an optional array is left out.
 macro_rules! bind {
     (optional $array:ident $other:ident) => {
         $array.map_or_else(|| $other.bind(), Buffer::bind)

@@ -1,4 +1,4 @@
-//! A field of any kind on any of the devices: what an application holds that lets a person choose both.
+//! A field of any kind on any of the devices, for applications in which a person chooses both.
 
 use super::field::{About, Field};
 use super::renderer::{On, Renderer};
@@ -11,7 +11,7 @@ use viewfuse_device::choice::AnyDevice;
 #[derive(Clone)]
 pub struct AnyField(Arc<dyn OnAnyDevice>);
 
-/// What is compiled once a field: it on each of the devices.
+/// The code that is compiled once a field: the field on each of the devices.
 trait OnAnyDevice: Any + Send + Sync {
     fn about(&self) -> About;
 
@@ -32,17 +32,17 @@ impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
 }
 
 impl AnyField {
-    /// A field without its type.
+    /// The field with its type erased.
     pub fn new(field: impl Field + Send + Sync + 'static) -> AnyField {
         AnyField(Arc::new(field))
     }
 
-    /// What it wants, and how it works.
+    /// Its requirements and properties.
     pub fn about(&self) -> About {
         self.0.about()
     }
 
-    /// It on a device.
+    /// The field on a device.
     pub fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a> {
         self.0.on(device)
     }

@@ -1,4 +1,4 @@
-//! A field's pictures made smaller and enlarged: what a person gets who asks for a preview.
+//! Previews: a field's pictures rendered smaller and enlarged.
 
 use super::{About, Field, FieldError, Prepared, Record, Rendered, Request};
 use viewfuse_core::camera::Camera;
@@ -7,16 +7,16 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// A field whose pictures have a fraction of the rows and columns that are asked for, and are enlarged to them.
+/// A field whose pictures are rendered with a fraction of the requested rows and columns and then enlarged.
 #[derive(Clone, Debug)]
 pub struct Enlarged<F> {
     /// The field.
     pub field: F,
-    /// Rows and columns are divided by this; 1 for pictures as they are.
+    /// Rows and columns are divided by this; 1 changes nothing.
     pub factor: u32,
 }
 
-/// The field's views.
+/// The field's prepared views.
 struct Views<'a> {
     inner: Box<dyn Prepared + 'a>,
     factor: u32,
@@ -49,7 +49,7 @@ impl Prepared for Views<'_> {
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         let target = request.camera;
         let (width, height) = (target.pinhole.width(), target.pinhole.height());
-        // A camera that cannot be made so small is left as it is.
+        // A camera that cannot be made so small is not changed.
         let pinhole = target.pinhole.resized(width.div_ceil(self.factor), height.div_ceil(self.factor));
         let small = Camera { pinhole: pinhole.unwrap_or(target.pinhole), ..*target };
         let rendered = self.inner.render(&Request { camera: &small, ..*request }, progress)?;
@@ -62,7 +62,7 @@ impl Prepared for Views<'_> {
 }
 
 /// A picture of `[width, height]` pixels, each the bilinear mean of the four nearest ones of a smaller picture; depths are
-/// those of the nearest one, since a mean of two depths is the depth of nothing.
+/// those of the nearest one, since the mean of two depths is not on a surface.
 fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
     if [rendered.width, rendered.height] == [width, height] {
         return rendered;
@@ -88,16 +88,16 @@ fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
     picture
 }
 
-/// For each of `wanted` pixels along an axis the two nearest of `own`, with their shares, which sum to 1.
-fn places(own: u32, wanted: u32) -> Vec<[(u32, f32); 2]> {
+/// For each of `enlarged` pixels along an axis the two nearest of `own`, with their shares, which sum to 1.
+fn places(own: u32, enlarged: u32) -> Vec<[(u32, f32); 2]> {
     let last = own.saturating_sub(1);
     let place = |pixel: u32| {
-        let centre = (pixel as f32 + 0.5) * own as f32 / wanted as f32 - 0.5;
+        let centre = (pixel as f32 + 0.5) * own as f32 / enlarged as f32 - 0.5;
         let centre = centre.clamp(0.0, last as f32);
         let (before, share) = (centre.floor(), centre.fract());
         [(before as u32, 1.0 - share), ((before as u32 + 1).min(last), share)]
     };
-    (0..wanted).map(place).collect()
+    (0..enlarged).map(place).collect()
 }
 
 #[cfg(test)]

@@ -6,24 +6,24 @@ use viewfuse_job::progress::Interrupted;
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::loader::LoadError;
 
-/// A tensor has an element that is infinite or not a number.
+/// A tensor has an element that is NaN or infinite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{stage}: element {index} of the {tensor} is {value}, not a finite number")]
 pub struct NotFinite {
-    /// What was being done.
+    /// The stage.
     pub stage: String,
-    /// What came out of it.
+    /// The stage's result.
     pub tensor: String,
-    /// The first such element, flat.
+    /// Index of the first such element, flat.
     pub index: usize,
-    /// What it is.
+    /// Its value.
     pub value: f32,
 }
 
 /// Why a field could not make a picture.
 #[derive(Debug, thiserror::Error)]
 pub enum FieldError {
-    /// The field cannot work with these sources or settings, for a reason of its own: [`FieldError::unsuitable`].
+    /// The field cannot use these sources or settings, for a reason of its own: [`FieldError::unsuitable`].
     #[error(transparent)]
     Unsuitable(Box<dyn Error + Send + Sync>),
     /// The device failed.
@@ -35,7 +35,7 @@ pub enum FieldError {
     /// A stage produced a value that is NaN or infinite.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
-    /// The person stopped the work. Not transparent: whoever looks for the cause must find [`Interrupted`] itself.
+    /// The work was cancelled. Not transparent, so that a search through the causes finds [`Interrupted`] itself.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }
@@ -46,7 +46,7 @@ impl FieldError {
         FieldError::Unsuitable(reason.into())
     }
 
-    /// Whether the field's own reason is of this type.
+    /// Whether the field's own error is of this type.
     pub fn is<E: Error + 'static>(&self) -> bool {
         matches!(self, FieldError::Unsuitable(reason) if reason.is::<E>())
     }

@@ -1,13 +1,12 @@
-//! Learned fields: one row each. Which one a checkpoint is of, the names of its tensors tell.
+//! Learned fields: one row each. The names of a checkpoint's tensors tell its family.
 
 use super::any::AnyField;
 pub use super::options::Computable;
 use super::options::{FieldOptions, OpenError};
-use super::{genvs, pixelnerf};
 use std::fmt;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 
-/// The views that no target uses: what every family may leave out.
+/// The omission of every family: the encoding of views that no target uses.
 pub const VIEWS: Computable = ("views", "Encode views that no target uses");
 
 /// Declares the families from their rows.
@@ -32,17 +31,17 @@ macro_rules! families {
                 match self { $(Family::$Family => $title,)+ }
             }
 
-            /// What names of its tensors begin with, and of no other family.
+            /// The prefix of its tensors' names, which no other family has.
             const fn prefix(self) -> &'static str {
                 match self { $(Family::$Family => $prefix,)+ }
             }
 
-            /// Names of the options of [`FieldOptions::given`] that it knows.
+            /// The options of [`FieldOptions::given`] that it accepts.
             const fn options(self) -> &'static [&'static str] {
                 match self { $(Family::$Family => $options,)+ }
             }
 
-            /// What it may leave out, besides [`VIEWS`].
+            /// Its omissions besides [`VIEWS`].
             pub const fn computable(self) -> &'static [Computable] {
                 match self { $(Family::$Family => $computable,)+ }
             }
@@ -62,20 +61,20 @@ macro_rules! families {
 families! {
     /// [`super::pixelnerf`].
     PixelNerf {
-        title: "PixelNeRF", prefix: "encoder.model.", open: pixelnerf::open,
+        title: "PixelNeRF", prefix: "encoder.model.", open: super::pixelnerf::open,
         options: &["published-depth", "probe-step", "probe-error"],
-        computable: pixelnerf::COMPUTABLE,
+        computable: super::pixelnerf::COMPUTABLE,
         test_networks: &[
-            TestNetwork { name: "formula", small: Small::Width, checkpoint: pixelnerf::test_networks::deterministic_of_width },
-            TestNetwork { name: "body", small: Small::Width, checkpoint: pixelnerf::test_networks::body_of_width },
+            TestNetwork { name: "formula", small: Small::Width, checkpoint: super::pixelnerf::test_networks::deterministic_of_width },
+            TestNetwork { name: "body", small: Small::Width, checkpoint: super::pixelnerf::test_networks::body_of_width },
         ],
     }
     /// [`super::genvs`].
     Genvs {
-        title: "GeNVS", prefix: "pixel_nerf_net.", open: genvs::open,
+        title: "GeNVS", prefix: "pixel_nerf_net.", open: super::genvs::open,
         options: &["sampler", "steps", "tolerance", "churn", "half-volumes", "reuse", "noise"],
-        computable: genvs::COMPUTABLE,
-        test_networks: &[TestNetwork { name: "genvs", small: Small::One, checkpoint: genvs::test_networks::deterministic_of_size }],
+        computable: super::genvs::COMPUTABLE,
+        test_networks: &[TestNetwork { name: "genvs", small: Small::One, checkpoint: super::genvs::test_networks::deterministic_of_size }],
     }
 }
 
@@ -84,42 +83,42 @@ families! {
 pub struct TestNetwork {
     /// Its name.
     pub name: &'static str,
-    /// Which small members its family has.
+    /// The small members of its family.
     pub small: Small,
-    /// The published size without a number, otherwise the small member of that width (whatever it is for [`Small::One`]).
+    /// `None` gives the published size, a number the small member of that width (any number for [`Small::One`]).
     pub checkpoint: fn(Option<u16>) -> Checkpoint,
 }
 
 /// Small members of a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Small {
-    /// One of every width.
+    /// One for each width.
     Width,
-    /// One.
+    /// A single one.
     One,
 }
 
 impl Family {
-    /// The family of a checkpoint. Whether it has every tensor that the network needs, the network says itself.
+    /// The family of a checkpoint. Opening the network checks that no tensor is missing.
     ///
     /// # Errors
-    /// [`CheckpointError::Tensors`] if it is of none.
+    /// [`CheckpointError::Tensors`] if it is of no family.
     pub fn of(checkpoint: &Checkpoint) -> Result<Family, CheckpointError> {
         let holds = |family: &Family| checkpoint.shapes().keys().any(|name| name.starts_with(family.prefix()));
         Family::ALL.into_iter().find(holds).ok_or_else(|| CheckpointError::Tensors {
             path: checkpoint.path().to_path_buf(),
             detail: format!(
-                "holds no network that is known here: no tensor's name begins with {}",
+                "holds no supported network: no tensor's name begins with {}",
                 Family::ALL.map(|family| format!("'{}' ({family})", family.prefix())).join(" or ")
             ),
         })
     }
 }
 
-/// The learned field of a checkpoint, whatever its family.
+/// Opens the learned field of a checkpoint of any family.
 ///
 /// # Errors
-/// [`OpenError`] if the checkpoint is of no family or cannot be read, or an option does not go with the family.
+/// [`OpenError`] if the checkpoint is of no family or cannot be read, or if the family does not accept an option.
 pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
     let family = Family::of(&checkpoint)?;
     let is = format!("is a {family}");
@@ -158,7 +157,7 @@ mod tests {
     fn neither() {
         let other = Checkpoint::in_memory("other", [], BTreeMap::new());
         let message = Family::of(&other).expect_err("nothing").to_string();
-        let expected = "other: holds no network that is known here: no tensor's name begins with 'encoder.model.' (PixelNeRF) \
+        let expected = "other: holds no supported network: no tensor's name begins with 'encoder.model.' (PixelNeRF) \
              or 'pixel_nerf_net.' (GeNVS)";
         assert_eq!(message, expected);
     }

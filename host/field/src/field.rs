@@ -1,5 +1,5 @@
-//! What a field is: [`Field`] says what it wants, and takes source views to a device; [`Prepared`] encodes views and
-//! renders. [`Session`](crate::session::Session) drives both: it alone decides when a view is encoded.
+//! The traits of a field: [`Field`] states its requirements and takes source views to a device; [`Prepared`] encodes views
+//! and renders. [`Session`](crate::session::Session) calls both: it alone decides when a view is encoded.
 
 use super::error::FieldError;
 use super::record::Record;
@@ -9,12 +9,12 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// Longest side of a picture whose size nobody asked for.
+/// Default limit of a picture's longest side.
 pub const LONGEST_DEFAULT_SIDE: u32 = 512;
 
-/// What makes a target's picture from source views, on any device.
+/// Renders target views from source views, on any device.
 pub trait Field {
-    /// What it wants and how it works, with its settings.
+    /// Its requirements and properties, with its settings.
     fn about(&self) -> About;
 
     /// Takes the photographs, and its parameters if it has any, to a device. Nothing is encoded yet.
@@ -29,10 +29,10 @@ pub trait Field {
     ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
 }
 
-/// Source views on a device, with what a field knows of them so far.
+/// Source views on a device, with their encodings so far.
 pub trait Prepared {
     /// Begins a weighting. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0. Only
-    /// fields that encode under [`Encoding::EachWeighting`] have anything to do.
+    /// fields with [`Encoding::EachWeighting`] implement it.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -52,32 +52,32 @@ pub trait Prepared {
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
 
-    /// What it did and left out so far; encoded views are counted by the session.
+    /// The record of its work so far; the session counts encoded views.
     fn record(&self) -> Record {
         Record::default()
     }
 }
 
-/// What a field wants, and how it works.
+/// Requirements and properties of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct About {
-    /// What the run record calls it.
+    /// Its name in the run record.
     pub name: &'static str,
-    /// The least number of sources it can work with.
+    /// The fewest sources that it can use.
     pub least_sources: usize,
-    /// How large it wants the sources.
+    /// The size of the source photographs.
     pub source_side: SourceSide,
-    /// The longest side of its pictures where nobody asks for a size.
+    /// The default limit of its pictures' longest side.
     pub longest_side: u32,
-    /// When a view is encoded.
+    /// When views are encoded.
     pub encoding: Encoding,
-    /// Whether its rays end where little light still passes ([`Request::early_termination`]); otherwise they go on to the end.
+    /// Whether it supports early termination of rays ([`Request::early_termination`]).
     pub ends_rays: bool,
 }
 
 impl About {
-    /// A field of this name that takes any number of sources as large as the pictures, encodes them when they are first
-    /// used, and whose rays go on to the end.
+    /// A field of this name that uses any number of sources at the pictures' size, encodes them at their first use, and has
+    /// no early termination.
     pub const fn new(name: &'static str) -> About {
         About {
             name,
@@ -90,10 +90,10 @@ impl About {
     }
 }
 
-/// Longest side of the sources that a field wants.
+/// Longest side of a field's source photographs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SourceSide {
-    /// So many pixels, whatever the pictures are.
+    /// This many pixels, independent of the pictures.
     Pixels(u32),
     /// This share of the pictures' longest side.
     Share(f32),
@@ -112,40 +112,40 @@ impl SourceSide {
 /// When a source view is encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// All views, and anew under each weighting: what is known of a view depends on how relevant the others are to it.
+    /// All views, again for each weighting: a view's encoding depends on how relevant the others are to it.
     EachWeighting,
     /// All views, once, before the first target.
     AllFirst,
-    /// Once, when a target first gives the view a weight. The others take no part in a picture.
+    /// Once, when a target first gives the view a weight. Views without a weight do not contribute to a picture.
     WhenUsed,
 }
 
-/// A picture to be rendered.
+/// A picture to render.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// The camera, of the picture's size.
     pub camera: &'a Camera,
     /// The weights of all sources; they sum to 1.
     pub weights: &'a SourceWeights,
-    /// The views that take part, in ascending order: under [`Encoding::WhenUsed`] those with a weight, otherwise all.
+    /// The contributing views, in ascending order: with [`Encoding::WhenUsed`] those with a weight, otherwise all.
     pub views: &'a [usize],
-    /// Transmittance at which a ray may end early: no channel changes by more than that.
+    /// Early termination: the transmittance below which samples are left out; no channel changes by more than that.
     pub early_termination: f32,
 }
 
 impl Request<'_> {
-    /// The weights of the views that take part, in their order.
+    /// The weights of the contributing views, in their order.
     pub fn view_weights(&self) -> Vec<f32> {
         self.views.iter().map(|view| self.weights.get(*view as u32)).collect()
     }
 }
 
-/// A rendered target, values not yet rounded. Row-major, one entry a pixel.
+/// A rendered target view, values not yet rounded. Row-major, one entry a pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendered {
     /// Red, green, blue in `[0, 1]` and opacity.
     pub colours: Vec<[f32; 4]>,
-    /// Depth along the principal axis in world units, 0 where nothing is met; empty for fields that know no depth.
+    /// Depth along the principal axis in world units, 0 where there is no surface; empty for fields without depths.
     pub depths: Vec<f32>,
     /// Width of the picture.
     pub width: u32,

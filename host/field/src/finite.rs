@@ -5,7 +5,7 @@ pub use super::error::NotFinite;
 use viewfuse_core::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_device::Device;
 
-/// Looks at all values of a tensor that a stage made.
+/// Checks all values of a stage's result.
 ///
 /// # Errors
 /// [`NotFinite`] with the first value that is not finite.
@@ -18,8 +18,8 @@ pub fn check_finite(values: &[f32], stage: &str, tensor: &str) -> Result<(), Not
     }
 }
 
-/// Looks at the first `count` values of a tensor that a stage made, on the device: only where one is not finite the tensor
-/// comes to the host, to say which value it is.
+/// Checks the first `count` values of a stage's result on the device. Only if one is not finite, the tensor is downloaded
+/// to report that value.
 ///
 /// # Errors
 /// [`FieldError::NotFinite`] with the first value that is not finite; [`FieldError::Device`] if the device is lost.
@@ -38,7 +38,7 @@ pub fn check_finite_on<D: Device>(
     Ok(())
 }
 
-/// Downloads a tensor that a stage made, and looks at all its values.
+/// Downloads a stage's result, and checks all its values.
 ///
 /// # Errors
 /// [`FieldError::NotFinite`] with the first value that is not finite; [`FieldError::Device`] if the device is lost.

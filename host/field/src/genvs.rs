@@ -2,7 +2,7 @@
 //! in [`viewfuse_core::genvs`], [`viewfuse_core::network`], [`viewfuse_core::schedule`] and [`viewfuse_core::sampler`].
 //!
 //! Source: Chan et al., "Generative novel view synthesis with 3D-aware diffusion models" (2023), and the code of "Pay
-//! Attention to Where You Looked". The views are combined by weights where the published network takes their mean.
+//! Attention to Where You Looked". The views are combined with weights; the published network takes their mean.
 
 mod architecture;
 mod denoiser;
@@ -48,8 +48,8 @@ pub struct Genvs {
 }
 
 impl Genvs {
-    /// The network of a checkpoint: its names and shapes are checked here, its parameters are read by every
-    /// [`Field::prepare`], so that they are in memory once.
+    /// The network of a checkpoint. Names and shapes are checked here; each [`Field::prepare`] reads the parameters, so
+    /// that they are in memory once.
     ///
     /// # Errors
     /// [`CheckpointError`] if it is not of this family.
@@ -75,13 +75,13 @@ impl Genvs {
         Genvs { architecture, checkpoint, options: options.checked() }
     }
 
-    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures.
+    /// The most bytes that a run from sources of these widths and heights takes, beside photographs and pictures.
     pub fn memory_estimate<D: Device>(&self, device: &D, source_sizes: &[[u32; 2]]) -> u64 {
         memory::estimate(device, &self.architecture, &self.options, source_sizes)
     }
 
-    /// Rows and columns of pictures are multiples of this: so often the denoiser halves them, and rays are cast at half
-    /// the resolution.
+    /// Rows and columns of pictures are multiples of this, because the denoiser halves them at each level and rays are
+    /// cast at half the resolution.
     fn picture_step(&self) -> u32 {
         self.architecture.denoiser.as_ref().map_or(2, |denoiser| 1 << denoiser.levels.len().saturating_sub(1).max(1))
     }
@@ -123,7 +123,7 @@ impl Field for Genvs {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
         if sources.background != [1.0; 3] {
-            progress.warn("this network's pictures are over white; truths over another background differ by that");
+            progress.warn("this network renders over white; a ground truth over another background differs by that");
         }
         let views = self.views(device, sources)?;
         let trained = self.architecture.image_side as u32;

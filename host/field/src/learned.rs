@@ -1,14 +1,14 @@
-//! What trained networks of this kind share: how they are shown photographs, and where their rays begin and end.
+//! Common parts of learned fields: the form of their input images, and default near and far bounds.
 
 use viewfuse_core::camera::Camera;
 use viewfuse_scene::rig::Rig;
 
-/// Where rays begin and end as published for SRN's cars (0.8 and 1.8 of cameras at distance 1.3), as shares of the
-/// cameras' distance from what they look at.
+/// Near and far bounds as published for SRN's cars (0.8 and 1.8 for cameras at distance 1.3), as multiples of the cameras'
+/// distance from the point that they look at.
 const NEAR_FAR_SHARES: [f32; 2] = [8.0 / 13.0, 18.0 / 13.0];
 
-/// Where rays begin and end unless a person says so: by the mean distance of the cameras from what they look at. A single
-/// camera does not show that: its distance from the world's origin counts then, where SRN's objects stand.
+/// Default near and far bounds, from the mean distance of the cameras to the point that they look at. A single camera does
+/// not define that point: then it is the world's origin, where SRN's objects are.
 pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
     let distance = match cameras {
         [camera] => camera.pose.centre_world().length(),
@@ -17,23 +17,23 @@ pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
     NEAR_FAR_SHARES.map(|share| share * if distance > 0.0 { distance } else { 1.0 })
 }
 
-/// Rays are to end where they begin or before, or one of the two is NaN or infinite.
+/// The far bound of rays is not above the near bound, or a bound is NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("the near bound of rays, {near}, must be below the far bound, {far}, and both must be finite")]
 pub struct NoDepths {
-    /// Where they begin.
+    /// The near bound.
     pub near: f32,
-    /// Where they end.
+    /// The far bound.
     pub far: f32,
 }
 
 impl NoDepths {
-    /// Near and far bounds as they are, if there is something between them.
+    /// Returns the bounds unchanged, if the far bound is above the near bound and both are finite.
     ///
     /// # Errors
     /// [`NoDepths`].
     pub fn check([near, far]: [f32; 2]) -> Result<[f32; 2], NoDepths> {
-        // Not the other way round: NaN is no depth either.
+        // Not the other way round: NaN must fail, too.
         if near < far && (far - near).is_finite() { Ok([near, far]) } else { Err(NoDepths { near, far }) }
     }
 }

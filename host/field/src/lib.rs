@@ -1,24 +1,24 @@
-//! Fields: what there is at a point in space, from source views.
+//! Fields: density and colour (or features) at points in space, from source views.
 //!
 //! ```text
-//! error             why a field could not make a picture
+//! error             the errors of a field
 //! finite            NaN and infinity are found at the stage that produced them
-//! record            what a field tells about its work
-//! field             what a field is: it prepares, encodes and renders
-//! renderer          a field on a device, without types
+//! record            the record of a field's work
+//! field             the traits of a field: it prepares, encodes and renders
+//! renderer          a field on a device, with types erased
 //! session           when views are encoded
 //! training_free     visual hull and plane sweep
 //! any               a field of any kind
-//! options           what a person can say about a learned field
-//! learned           what learned fields share
-//! pixelnerf, genvs  learned fields, a folder each
+//! options           options of learned fields
+//! learned           common parts of learned fields
+//! *                 the learned fields, a folder each
 //! family            one row a learned field
-//! enlarged          small pictures, enlarged
-//! render            the way of the data, from a scene to pictures
+//! enlarged          previews: small pictures, enlarged
+//! render            the render loop, from a scene to pictures
 //! ```
 //!
-//! A field of one's own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`] renders
-//! with it as with those that are here.
+//! A field of your own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`] renders
+//! with it as with the fields of this crate.
 #![forbid(unsafe_code)]
 
 pub mod any;

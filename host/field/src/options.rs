@@ -1,13 +1,13 @@
-//! What a person can say about a learned field. What is not said, the field decides; what it does not know, it refuses.
+//! Options of learned fields. A field has defaults for missing options, and rejects options that it does not have.
 
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_nn::checkpoint::CheckpointError;
 
-/// What a family may leave out and a person may ask to compute nevertheless: name and help.
+/// An omission of a family that `compute` switches off: name and help.
 pub type Computable = (&'static str, &'static str);
 
-/// What a person said about a learned field. Names of options in errors are those of the members, with dashes.
+/// Options of a learned field. Errors name them as the members here, with dashes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FieldOptions {
     /// Seed of every random draw.
@@ -16,25 +16,25 @@ pub struct FieldOptions {
     pub exact: bool,
     /// Near and far bounds of rays, world units.
     pub near_far: Option<[f32; 2]>,
-    /// Samples on a ray: as many numbers as the field takes; empty if nothing was said.
+    /// Samples on a ray: as many numbers as the field takes; empty for its default.
     pub samples: Vec<u32>,
-    /// What to compute although the scene does not need it, by names of the family's list.
+    /// Omissions that are switched off, by names of the family's list.
     pub compute: Vec<String>,
     /// Second-pass samples around the depth that the published code takes.
     pub published_depth: bool,
-    /// Pixels on a side of the square in which one ray is probed for empty space.
+    /// Side in pixels of the squares in which one ray is probed for empty space.
     pub probe_step: Option<u32>,
-    /// How much the probes' colours may change.
+    /// The largest change of the probes' colours.
     pub probe_error: Option<f32>,
-    /// The ends of the noise levels.
+    /// The largest and the smallest noise level.
     pub noise: Option<NoiseSchedule>,
     /// The sampler.
     pub sampler: Option<Sampler>,
-    /// Noise levels.
+    /// The number of noise levels.
     pub steps: Option<u32>,
-    /// The error of a step where levels are chosen on the way.
+    /// The largest error of a step of adaptive levels.
     pub tolerance: Option<f32>,
-    /// Noise that is added on the way, over the whole run.
+    /// Noise that is added between steps (churn), over the whole run.
     pub churn: Option<f32>,
     /// Keep views' features in half precision (f16).
     pub half_volumes: bool,
@@ -43,7 +43,7 @@ pub struct FieldOptions {
 }
 
 impl FieldOptions {
-    /// Names of what was given of the options that not every field knows.
+    /// Names of the given options, of those that not every field has.
     pub fn given(&self) -> Vec<&'static str> {
         let all = [
             ("published-depth", self.published_depth),
@@ -60,13 +60,13 @@ impl FieldOptions {
         all.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect()
     }
 
-    /// Whether something is to be computed although the scene does not need it.
+    /// Whether an omission is switched off.
     pub fn computes(&self, what: &str) -> bool {
         self.exact || self.compute.iter().any(|name| name == what)
     }
 }
 
-/// Why a learned field cannot be had.
+/// Why a learned field cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
     /// The checkpoint is of no family, or cannot be read.
@@ -77,15 +77,15 @@ pub enum OpenError {
     Refused {
         /// The option's name, perhaps with a value.
         option: String,
-        /// What is wrong, for example "cannot be used".
+        /// The problem, for example "cannot be used".
         problem: &'static str,
-        /// What the network is or has not, for example "is a PixelNeRF".
+        /// The reason, for example "is a PixelNeRF".
         reason: String,
     },
 }
 
 impl OpenError {
-    /// An option that the network has no use for.
+    /// An option that the network does not have.
     pub fn cannot(option: impl Into<String>, reason: impl Into<String>) -> OpenError {
         OpenError::Refused { option: option.into(), problem: "cannot be used", reason: reason.into() }
     }

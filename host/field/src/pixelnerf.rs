@@ -1,8 +1,8 @@
 //! PixelNeRF with weighted views, on any device; the mathematics is in [`viewfuse_core::pixelnerf`] and
 //! [`viewfuse_core::network`].
 //!
-//! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined by weights
-//! where the published network takes their mean.
+//! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined with weights;
+//! the published network takes their mean.
 
 pub mod architecture;
 mod encoder;
@@ -25,7 +25,7 @@ use super::{About, Encoding, Field, FieldError, LeftOut, Prepared, Record, Rende
 use encoder::{ViewLatents, encode};
 use network::{Network, Workspace};
 use parameters::{DeviceParameters, HostParameters};
-use pass::{Asked, Renderer, rays_at_once};
+use pass::{Evaluated, Renderer, rays_at_once};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
@@ -35,7 +35,7 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
-/// Longest side of the photographs that a network is shown: the size that the published ones were trained on.
+/// Longest side of a network's source photographs: the size at which the published ones were trained.
 pub const SOURCE_SIDE: u32 = 128;
 
 /// A PixelNeRF with its parameters, ready for any device.
@@ -60,12 +60,12 @@ struct Views<'a, D: Device> {
     counts: Counts,
 }
 
-/// What was done and what was left out so far.
+/// Counts of computed and omitted work so far.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     latent_rows: u64,
     mapped_rows: u64,
-    passes: [Asked; 2],
+    passes: [Evaluated; 2],
 }
 
 impl PixelNerf {
@@ -96,7 +96,7 @@ impl PixelNerf {
         PixelNerf { architecture, parameters, options: options.checked() }
     }
 
-    /// Bytes that a run from sources of these widths and heights takes at most, beside photographs and pictures.
+    /// The most bytes that a run from sources of these widths and heights takes, beside photographs and pictures.
     pub fn memory_estimate<D: Device>(&self, device: &D, source_sizes: &[[u32; 2]]) -> u64 {
         memory::estimate(device, &self.architecture, &self.options, source_sizes)
     }
@@ -195,13 +195,13 @@ impl<D: Device> Prepared for Views<'_, D> {
         let most_points = pixels.len() * sampling.coarse_count as usize;
         let (view_count, maps) = (request.views.len(), omissions.latent_layers);
         let mut workspace = Workspace::new(device, architecture, view_count, most_points, maps)?;
-        let mut asked = [Asked::default(); 2];
+        let mut evaluated = [Evaluated::default(); 2];
         let step = omissions.empty_space;
         let seen = match step > 1 {
             true => {
-                let mut probes = Asked::default();
+                let mut probes = Evaluated::default();
                 let seen = renderer.probe(&mut workspace, step, &mut probes)?;
-                asked[0].asked += probes.asked;
+                evaluated[0].evaluated += probes.evaluated;
                 Some(seen)
             }
             false => None,
@@ -210,7 +210,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         progress.expect(pixels.len().div_ceil(at_once));
         let mut tiles: Vec<Pixels<D>> = Vec::new();
         for some in pixels.chunks(at_once) {
-            tiles.push(renderer.render(&mut workspace, some, seen.as_ref(), &mut asked)?);
+            tiles.push(renderer.render(&mut workspace, some, seen.as_ref(), &mut evaluated)?);
             progress.step();
         }
         let mut rendered = Rendered { colours: Vec::new(), depths: Vec::new(), width, height };
@@ -219,7 +219,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             rendered.depths.extend(device.download(&tile.depths)?);
         }
         along_axis(&mut rendered, &renderer.cast);
-        self.counts.add(view_count * architecture.injected_count, maps, &asked);
+        self.counts.add(view_count * architecture.injected_count, maps, &evaluated);
         Ok(rendered)
     }
 
@@ -228,22 +228,22 @@ impl<D: Device> Prepared for Views<'_, D> {
         let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, .. } =
             self.field.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
-        let unasked = |pass: Asked| pass.samples.saturating_sub(pass.asked);
+        let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
         let left_out = vec![
             line("latent layers at points", latent_layers, mapped_rows, latent_rows, "rounding"),
             line(
                 "first-pass samples",
                 empty_space > 1,
-                unasked(coarse),
+                omitted(coarse),
                 coarse.samples,
-                "objects that pass between the probes; see `viewfuse pareto`",
+                "objects between the probes; see `viewfuse pareto`",
             ),
             line(
                 "second-pass samples",
                 empty_rays || empty_parts || hidden_samples,
-                unasked(fine),
+                omitted(fine),
                 fine.samples,
-                "what the first pass missed; the light behind is at most the transmittance at which rays end",
+                "surfaces that the first pass missed; those behind have at most the transmittance of early termination",
             ),
         ];
         let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
@@ -252,16 +252,16 @@ impl<D: Device> Prepared for Views<'_, D> {
 }
 
 impl Counts {
-    /// Adds a picture whose samples each took so many rows of latent layers.
-    fn add(&mut self, rows_a_sample: usize, maps: bool, asked: &[Asked; 2]) {
-        let rows = rows_a_sample as u64 * (asked[0].asked + asked[1].asked);
+    /// Adds a picture whose samples each took this many rows of latent layers.
+    fn add(&mut self, rows_a_sample: usize, maps: bool, evaluated: &[Evaluated; 2]) {
+        let rows = rows_a_sample as u64 * (evaluated[0].evaluated + evaluated[1].evaluated);
         self.latent_rows += rows;
         if maps {
             self.mapped_rows += rows;
         }
-        for (total, own) in self.passes.iter_mut().zip(asked) {
+        for (total, own) in self.passes.iter_mut().zip(evaluated) {
             total.samples += own.samples;
-            total.asked += own.asked;
+            total.evaluated += own.evaluated;
         }
     }
 }
@@ -273,7 +273,7 @@ fn upload_image<D: Device>(device: &D, image: &SourceImage) -> Result<Image<D>, 
     Image::upload(device, Size { height, width, channels: 3 }, &values)
 }
 
-/// Depths along the rays become depths along the principal axis; rays that meet nothing get 0.
+/// Depths along the rays become depths along the principal axis; rays without a surface get 0.
 fn along_axis(rendered: &mut Rendered, cast: &CastBlock) {
     let forward = cast.camera.pose.rotate_to_world(0.0, 0.0, 1.0);
     for (pixel, (depth, colour)) in (0..).zip(rendered.depths.iter_mut().zip(&rendered.colours)) {

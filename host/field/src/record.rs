@@ -1,51 +1,51 @@
-//! What a field tells about its work: for the run record, and for comparing settings.
+//! The record of a field's work: for the run record, and for comparing settings.
 
 use serde::Serialize;
 
-/// What a field tells about its work so far. Each field fills what it has.
+/// The record of a field's work so far. Each field fills in what applies to it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Record {
-    /// What it left out.
+    /// Its omissions.
     pub left_out: Vec<LeftOut>,
-    /// How it went from noise to pictures.
+    /// Its diffusion sampling.
     pub denoising: Option<Denoising>,
-    /// Bytes that the run takes at most, beside photographs and pictures.
+    /// The most bytes that the run takes, beside photographs and pictures.
     pub memory_estimate: Option<u64>,
     /// The near and far bounds of its rays, world units.
     pub near_far: Option<[f32; 2]>,
 }
 
-/// Something that a field leaves out because a scene does not need it.
+/// An omission: work that a field leaves out because a scene does not need it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// What.
+    /// Its name.
     pub what: &'static str,
-    /// Whether it was allowed to.
+    /// Whether it is switched on.
     pub switch: bool,
-    /// How much of it was left out.
+    /// Omitted units.
     pub left_out: u64,
-    /// Of how much in all.
+    /// All units.
     pub of: u64,
-    /// What that can cost.
+    /// The possible error.
     pub cost: &'static str,
 }
 
-/// How a field went from noise to pictures.
+/// The diffusion sampling of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Denoising {
     /// The sampler.
     pub sampler: &'static str,
-    /// How many noise levels a picture's run has; null where they are chosen on the way.
+    /// Noise levels of a picture's run; null for adaptive levels.
     pub levels: Option<u32>,
-    /// The error that a step may make where levels are chosen on the way, root mean square of values between -1 and 1.
+    /// The largest error of a step of adaptive levels, root mean square of values between -1 and 1.
     pub tolerance: Option<f32>,
     /// The largest and the smallest noise level.
     pub noise: [f32; 2],
-    /// Noise that is added on the way, over the whole run.
+    /// Noise that is added between steps (churn), over the whole run.
     pub churn: f32,
-    /// A run ends where no value will change by more than this; null where it goes to the end.
+    /// A run stops when no value will change by more than this; null without an early stop.
     pub early_termination: Option<f32>,
-    /// The level at which a picture starts from the one before; null where each starts from noise alone.
+    /// The noise level at which a picture starts from the one before; null where each starts from noise alone.
     pub reuse: Option<f32>,
     /// Calls of the denoiser that were made, for all pictures together.
     pub calls: u64,

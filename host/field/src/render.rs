@@ -1,4 +1,4 @@
-//! The way of the data, from a scene to pictures.
+//! The render loop, from a scene to pictures.
 
 use crate::{FieldError, Record, Rendered, Renderer, Session};
 use image::RgbImage;
@@ -8,7 +8,7 @@ use viewfuse_core::camera::{Camera, PinholeError};
 use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_core::weights::{Omission, Weights};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{
     Album, BackgroundChoice, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8,
@@ -35,25 +35,25 @@ pub enum RenderError {
          would be {width}x{fitting_height}"
     )]
     Shape {
-        /// Asked for.
+        /// The requested value.
         width: u32,
-        /// Asked for.
+        /// The requested value.
         height: u32,
-        /// The views'.
+        /// That of the views.
         view_width: u32,
-        /// The views'.
+        /// That of the views.
         view_height: u32,
         /// The height that keeps the views' shape.
         fitting_height: u32,
     },
-    /// The size is not usable at all.
-    #[error("a size of {width}x{height} is not usable: {error}")]
+    /// The size is invalid.
+    #[error("a size of {width}x{height} is invalid: {error}")]
     Size {
-        /// Asked for.
+        /// The requested value.
         width: u32,
-        /// Asked for.
+        /// The requested value.
         height: u32,
-        /// Why not.
+        /// The reason.
         error: PinholeError,
     },
     /// The scene does not suit the field.
@@ -70,7 +70,7 @@ pub enum RenderError {
 }
 
 impl RenderError {
-    /// A field's error, with the scene's path where it is about the scene.
+    /// A field's error, with the scene's path if it is about the scene.
     fn of(error: FieldError, scene: &Scene) -> RenderError {
         match error {
             FieldError::Unsuitable(reason) => {
@@ -80,32 +80,32 @@ impl RenderError {
         }
     }
 
-    /// Whether the device failed, and not the work.
+    /// Whether the error is a device failure.
     pub fn is_of_device(&self) -> bool {
         matches!(self, RenderError::Field(FieldError::Device(_)))
     }
 }
 
-/// What a person can set about a render.
+/// The options of a render.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Width and height of the pictures; otherwise the views' size, at most the field's
+    /// Width and height of the pictures; the default is the views' size, at most the field's
     /// [`About::longest_side`](crate::About::longest_side) on a side.
     pub size: Option<[u32; 2]>,
-    /// What is behind the object.
+    /// The background of the object.
     pub background: BackgroundChoice,
     /// Sources of least weight are left out while their weights together stay at or below this.
     pub leave_out: f32,
-    /// Transmittance at which a ray may end.
+    /// Transmittance of early termination.
     pub early_termination: f32,
 }
 
-/// Largest share of the weight that is left out unless a person says otherwise: it bounds the change of a fusion of all
+/// Default of the largest share of the weight that is left out: it bounds the change of a fusion of all
 /// views at 1 % of the range of its inputs. Where only some views see a point, the bound is this over their weight: for
 /// schemes that give one view nearly everything (cross attention), leaving out 5 % already costs 1 dB where that one view
 /// sees nothing.
 pub const DEFAULT_LEAVE_OUT: f32 = 0.01;
-/// Transmittance at which a ray may end unless a person says otherwise: 1/256 of the range of a channel.
+/// Default transmittance of early termination: 1/256 of the range of a channel.
 pub const DEFAULT_EARLY_TERMINATION: f32 = 1.0 / 256.0;
 
 impl Default for RenderOptions {
@@ -119,42 +119,42 @@ impl Default for RenderOptions {
     }
 }
 
-/// What the stages took. Those that several frames share are counted once, in their run.
+/// Times of the stages. Stages that several frames share are counted once, in their run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageCosts {
-    /// Decoding photographs, taking out backgrounds, resampling.
+    /// Decoding photographs, removing backgrounds, resampling.
     pub photographs: Duration,
     /// Taking the photographs to the device and finding the object.
     pub prepare: Duration,
-    /// Encoding the sources, as far as it does not wait for the frames that need them ([`Frame::encode`]).
+    /// Encoding the sources before the frames; for encoding at the first use see [`Frame::encode`].
     pub encode: Duration,
 }
 
-/// One target's picture with all that led to it.
+/// One target view's picture with its weights, scores and times.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// The target.
     pub target: Target,
     /// The sources' weights before views were left out.
     pub weights: SourceWeights,
-    /// What was left out, and the weights that were used.
+    /// The views that were left out, and the weights that were used.
     pub omission: Omission<MOST_SOURCES>,
     /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major.
     pub colours: Vec<[f32; 4]>,
     /// The picture.
     pub picture: RgbImage,
-    /// Depth along the principal axis in world units, 0 where nothing is met, row-major; empty for fields that know no
-    /// depth.
+    /// Depth along the principal axis in world units, 0 where there is no surface, row-major; empty for fields without
+    /// depths.
     pub depths: Vec<f32>,
-    /// The truth at the same size and its scores, where there is a photograph.
+    /// The ground truth at the same size and the scores, if there is a photograph.
     pub truth: Option<Truth>,
     /// Time for this frame alone.
     pub time: Duration,
-    /// The part of it that encoded sources which no frame before it used.
+    /// The part of it for encoding sources that no earlier frame used.
     pub encode: Duration,
 }
 
-/// A photograph at the target, and how the prediction compares.
+/// A photograph at the target, and the scores of the prediction.
 #[derive(Clone, Debug)]
 pub struct Truth {
     /// The photograph at the frame's size over the run's background.
@@ -173,11 +173,11 @@ impl Truth {
     }
 }
 
-/// The longest side of the pictures of a run: what was asked for, or that of the largest photograph, at most `longest`
+/// The longest side of the pictures of a run: of the requested size, or of the largest photograph, at most `longest`
 /// (a field's [`About::longest_side`](crate::About::longest_side)).
 ///
 /// # Errors
-/// [`RenderError::Shape`] if an asked size would stretch the pictures by more than a pixel.
+/// [`RenderError::Shape`] if the requested size would stretch the pictures by more than a pixel.
 pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Result<u32, RenderError> {
     let Some([width, height]) = options.size else {
         let largest = scene.views.iter().map(|view| longest_side(&view.camera)).max();
@@ -194,7 +194,7 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
     Ok(width.max(height))
 }
 
-/// A set of sources on a device: everything that no weighting and no target changes.
+/// A set of sources on a device: the state that depends on no weighting and no target.
 pub struct Stage<'a> {
     scene: &'a Scene,
     album: &'a Album<'a>,
@@ -204,7 +204,7 @@ pub struct Stage<'a> {
     /// The sources at working size.
     pub images: Arc<SourceImages>,
     session: Session<'a>,
-    /// What the stages took so far.
+    /// Times of the stages so far.
     pub costs: StageCosts,
 }
 
@@ -234,8 +234,8 @@ impl<'a> Stage<'a> {
         Ok(stage)
     }
 
-    /// The same with photographs that are prepared already: those of these sources, at the size that the field wants and
-    /// over the options' background.
+    /// The same with prepared photographs: those of these sources, at the field's size and over the options'
+    /// background.
     ///
     /// # Errors
     /// [`RenderError`].
@@ -258,7 +258,7 @@ impl<'a> Stage<'a> {
         Ok(Stage { scene, album, options, side, sources: source_poses, images, session, costs })
     }
 
-    /// Begins a weighting, for the frames that follow: encodes the sources as far as that does not wait for the frames, each
+    /// Begins a weighting for the following frames: encodes the sources if the field does so before the frames, each
     /// source as a target of the others.
     ///
     /// # Errors
@@ -270,12 +270,12 @@ impl<'a> Stage<'a> {
             .map_err(|error| RenderError::of(error, self.scene))
     }
 
-    /// What the field did and left out so far.
+    /// The record of the field's work so far.
     pub fn record(&self) -> Record {
         self.session.record()
     }
 
-    /// Weighs the sources for a target, leaves out what does not count, renders, and compares with the truth.
+    /// Weighs the sources for a target, leaves out those of least weight, renders, and compares with the ground truth.
     ///
     /// # Errors
     /// [`RenderError`].
@@ -359,16 +359,16 @@ fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32)
         .collect()
 }
 
-/// What a run tells when it is done.
+/// The summary of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Finished {
-    /// The times of what the frames share.
+    /// The times of the stages that the frames share.
     pub costs: StageCosts,
-    /// What the field did and left out.
+    /// The record of the field's work.
     pub record: Record,
 }
 
-/// Renders every target of a job and hands each frame over as soon as it is done.
+/// Renders every target view of a job and passes each frame to `deliver` as soon as it is done.
 ///
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.
@@ -394,7 +394,26 @@ pub fn render<X: From<RenderError>>(
     Ok(Finished { costs: stage.costs, record: stage.record() })
 }
 
-/// Runs a piece of work and adds its time.
+/// As [`render`] without progress reports: returns the frames of all target views, which stay in memory.
+///
+/// # Errors
+/// [`RenderError`].
+pub fn render_all(
+    scene: &Scene,
+    job: &FewShot,
+    weighting: &Weighting,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+) -> Result<Vec<Frame>, RenderError> {
+    let mut frames = Vec::with_capacity(job.targets.len());
+    render(scene, job, weighting, renderer, options, &Silent, |_sources, frame| {
+        frames.push(frame);
+        Ok::<(), RenderError>(())
+    })?;
+    Ok(frames)
+}
+
+/// Runs `work` and adds its time.
 fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let result = work();

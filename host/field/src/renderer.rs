@@ -1,5 +1,5 @@
-//! A field on a device, without types: what commands, evaluations and other loops drive. Each pair of device and field is
-//! compiled once, here or where an application pairs its own.
+//! A field on a device with types erased, for commands, evaluations and other loops. Each pair of device and field is
+//! compiled once, here or in the application that combines them.
 
 use super::error::FieldError;
 use super::field::{About, Field, Prepared};
@@ -9,10 +9,10 @@ use viewfuse_scene::photographs::SourceImages;
 
 /// A field on a device.
 pub trait Renderer: Sync {
-    /// What the field wants, and how it works.
+    /// The field's requirements and properties.
     fn about(&self) -> About;
 
-    /// What the run record calls the device.
+    /// The device's name in the run record.
     fn device_name(&self) -> String;
 
     /// Takes the photographs to the device.
@@ -25,25 +25,25 @@ pub trait Renderer: Sync {
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
 
-    /// Waits until everything that was asked for is done, so that its time can be told.
+    /// Waits until all dispatched work is done, so that its time can be measured.
     ///
     /// # Errors
     /// If the device is lost, or a kernel took too long.
     fn finish(&self) -> Result<(), DeviceError>;
 
-    /// What each kernel took so far; nothing for devices that do not tell.
+    /// The time of each kernel so far; empty for devices without timestamps.
     fn kernel_times(&self) -> Vec<KernelTime>;
 
-    /// What went to the device and came back so far; nothing for devices whose memory is the host's.
+    /// The transfers so far; zeros for devices whose memory is the host's.
     fn transfers(&self) -> Transfers;
 }
 
-/// A renderer from a device and a field, whoever wrote them.
+/// A renderer from any device and any field.
 #[derive(Debug)]
 pub struct On<'a, D, F> {
-    /// Where kernels run.
+    /// The device.
     pub device: &'a D,
-    /// What makes the pictures.
+    /// The field.
     pub field: &'a F,
 }
 

@@ -1,4 +1,4 @@
-//! The life cycle of source views, once for all fields: prepared, encoded when they are needed, rendered from.
+//! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
 use super::field::{About, Encoding, Prepared, Rendered, Request};
@@ -10,7 +10,8 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 
-/// Source views on a renderer's device. It knows which of them are encoded, under the weighting in force if that matters.
+/// Source views on a renderer's device, with the set of encoded views (for the current weighting, if encodings depend on
+/// it).
 pub struct Session<'a> {
     renderer: &'a dyn Renderer,
     about: About,
@@ -35,7 +36,7 @@ impl<'a> Session<'a> {
         Ok(Session { renderer, about: renderer.about(), prepared, encoded, is_weighed: false })
     }
 
-    /// Begins a weighting: encodes what does not wait for the targets that use it. `relevance[view]` are the weights of all
+    /// Begins a weighting: encodes views, if the field does so before the targets. `relevance[view]` are the weights of all
     /// sources for source `view` as a target, its own 0.
     ///
     /// # Errors
@@ -59,9 +60,9 @@ impl<'a> Session<'a> {
         Ok(self.renderer.finish()?)
     }
 
-    /// Encodes what a target with these weights needs and no target before it needed, so that the time can be told apart
-    /// from rendering, which does the same first. Where encodings depend on the weighting and none has begun, all sources
-    /// count the same.
+    /// Encodes the views that a target with these weights needs and no earlier target needed, so that the time of
+    /// encoding is separate from that of rendering, which would do it otherwise. If encodings depend on the weighting
+    /// and none has begun, all weights are equal.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -79,7 +80,8 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Renders a target with the sources' weights for it. `early_termination` is the transmittance at which a ray may end early.
+    /// Renders a target with the sources' weights for it. `early_termination` is the transmittance below which samples
+    /// are left out.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -95,7 +97,7 @@ impl<'a> Session<'a> {
         self.prepared.render(&Request { camera, weights, views, early_termination }, progress)
     }
 
-    /// What was done and left out so far.
+    /// The record of the work so far.
     pub fn record(&self) -> Record {
         let mut record = self.prepared.record();
         let skips_unused = match self.about.encoding {
@@ -115,13 +117,13 @@ impl<'a> Session<'a> {
         record
     }
 
-    /// The views that take part in a picture.
+    /// The views that contribute to a picture.
     fn views(&self, weights: &SourceWeights) -> Vec<usize> {
         let all = self.about.encoding != Encoding::WhenUsed;
         (0..self.encoded.len()).filter(|view| all || weights.get(*view as u32) > 0.0).collect()
     }
 
-    /// Encodes a view unless it is; says whether it was not.
+    /// Encodes a view if it is not encoded yet; returns whether it did.
     fn encode_view(&mut self, view: usize, progress: &dyn Progress) -> Result<bool, FieldError> {
         progress.check()?;
         if self.encoded[view] {
@@ -133,7 +135,7 @@ impl<'a> Session<'a> {
     }
 }
 
-/// The weights of all sources for each as a target where none says more than another.
+/// Equal weights of all sources for each source as a target.
 fn even(count: usize) -> Vec<SourceWeights> {
     let weights = |own: usize| {
         let score = |view: usize| f32::from(view < count && view != own);

@@ -1,11 +1,11 @@
-//! SHA-256 of what results hang on, as hexadecimal digits.
+//! SHA-256 of a run's inputs, as hexadecimal digits.
 
 use sha2::{Digest, Sha256};
 use std::fs::File;
 use std::io;
 use std::path::Path;
 
-/// Of a file's bytes.
+/// The digest of a file's bytes.
 ///
 /// # Errors
 /// If it cannot be read.

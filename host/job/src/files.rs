@@ -1,4 +1,4 @@
-//! Output files that appear whole or not at all.
+//! Output files that are written completely or not at all.
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -7,25 +7,25 @@ use tempfile::NamedTempFile;
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("{}: cannot be written: {cause}", path.display())]
     Io {
-        /// The file that was to appear.
+        /// The output file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         cause: std::io::Error,
     },
     /// The picture could not be encoded.
     #[error("{}: cannot be encoded: {cause}", path.display())]
     Encode {
-        /// The file that was to appear.
+        /// The output file.
         path: PathBuf,
-        /// What the encoder said.
+        /// The encoder's error.
         cause: Box<dyn std::error::Error + Send + Sync>,
     },
 }
 
-/// A file that is written piece by piece and appears when it is finished. Dropped before, it leaves nothing behind.
+/// A file that is written in pieces and appears when it is finished. Dropped before that, it leaves no file.
 #[derive(Debug)]
 pub struct WholeFile {
     path: PathBuf,
@@ -33,7 +33,7 @@ pub struct WholeFile {
 }
 
 impl WholeFile {
-    /// Begins a file. Until it is finished it is a temporary one beside `path`. Missing folders are made.
+    /// Begins a file. Until it is finished, its content is in a temporary file beside `path`. Missing folders are created.
     ///
     /// # Errors
     /// [`WriteError::Io`].
@@ -56,7 +56,7 @@ impl WholeFile {
         Ok(WholeFile { path: path.to_path_buf(), writer })
     }
 
-    /// Adds bytes.
+    /// Appends bytes.
     ///
     /// # Errors
     /// [`WriteError::Io`].
@@ -64,10 +64,10 @@ impl WholeFile {
         self.writer.write_all(bytes).map_err(|cause| WriteError::Io { path: self.path.clone(), cause })
     }
 
-    /// Makes it appear, in place of what may have been there.
+    /// Renames it into place; an existing file is replaced.
     ///
     /// # Errors
-    /// [`WriteError::Io`]; nothing is left behind then.
+    /// [`WriteError::Io`]; then no temporary file remains.
     pub fn finish(self) -> Result<(), WriteError> {
         let WholeFile { path, writer } = self;
         let finished = writer
@@ -78,18 +78,18 @@ impl WholeFile {
     }
 }
 
-/// Writes `bytes` to a temporary file beside `path` and renames it into place. Missing folders are made.
+/// Writes `bytes` to a temporary file beside `path` and renames it into place. Missing folders are created.
 ///
 /// # Errors
-/// [`WriteError::Io`]; nothing is left behind then.
+/// [`WriteError::Io`]; then no temporary file remains.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     let mut file = WholeFile::create(path)?;
     file.write(bytes)?;
     file.finish()
 }
 
-/// Checks, before long work, that a file can appear at `path`: it is no folder, and the nearest folder above it that
-/// exists takes new files. Nothing is left behind.
+/// Checks, before long work, that `path` can be written: it is not a folder, and files can be created in the nearest
+/// existing folder above it. No file remains.
 ///
 /// # Errors
 /// [`WriteError::Io`].
@@ -107,10 +107,10 @@ pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// Removes a file; that it is not there is no error.
+/// Removes a file; a missing file is no error.
 ///
 /// # Errors
-/// [`WriteError::Io`] if the system refuses.
+/// [`WriteError::Io`] if the system reports an error.
 pub fn remove_if_there(path: &Path) -> Result<(), WriteError> {
     match std::fs::remove_file(path) {
         Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => {

@@ -1,12 +1,12 @@
-//! What long work needs whoever does it: progress and cancellation through one trait, output files that appear whole or
-//! not at all, digests of inputs.
+//! Common parts of long jobs: progress and cancellation through one trait, output files that are written completely or not
+//! at all, digests of inputs.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
-//! progress   what is reported and asked while work goes on    Progress, Silent, Interrupted
-//! files      output files that appear whole or not at all     write_whole
-//! digest     SHA-256 of what results hang on
+//! progress   progress reports and cancellation                Progress, Silent, Interrupted
+//! files      output files, completely or not at all           write_whole
+//! digest     SHA-256 of inputs
 //! ```
 #![forbid(unsafe_code)]
 

@@ -1,24 +1,24 @@
-//! Progress and cancellation of long work, through one trait: the library reports and asks, whoever calls it decides what
-//! is shown and when to stop.
+//! Progress and cancellation of long work, through one trait: the library reports its progress and checks for cancellation;
+//! the caller decides what is shown and when to stop.
 
-/// The work was stopped by whoever started it.
+/// The work was cancelled by its caller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("interrupted; nothing half-written is left behind")]
 pub struct Interrupted;
 
-/// Whoever started long work: told how far it is, asked whether to go on. Every method has a default that shows nothing
-/// and never stops, so that `impl Progress for MyType {}` is enough to begin with.
+/// The caller's side of long work: it receives progress reports and can cancel. Every method has a default that shows
+/// nothing and never cancels, so that `impl Progress for MyType {}` is enough to begin with.
 pub trait Progress: Sync {
-    /// So many pieces more will come.
+    /// The work has this many more pieces.
     fn expect(&self, _pieces: usize) {}
 
     /// A piece is done.
     fn step(&self) {}
 
-    /// Something that the result may suffer from; the same warning may come several times.
+    /// A warning that concerns the result; the same warning may come several times.
     fn warn(&self, _warning: &str) {}
 
-    /// A line of news: a score, a file that was written.
+    /// A line of information: a score, the name of a written file.
     fn note(&self, _news: &str) {}
 
     /// Whether the work should stop.
@@ -41,7 +41,7 @@ pub struct Silent;
 
 impl Progress for Silent {}
 
-/// Work inside work that shows its own progress: shows nothing, and stops when the other is to stop.
+/// Nested work, whose caller shows its own progress: shows nothing, and is cancelled with the outer work.
 #[derive(Clone, Copy)]
 pub struct Quiet<'a>(pub &'a dyn Progress);
 

@@ -1,15 +1,15 @@
 //! Files of network parameters: named tensors.
 //!
-//! Opening a file reads what it says about its tensors, not the tensors: names and shapes are checked against an
-//! architecture before anything large is allocated. Read are safetensors, what PyTorch's `torch.save` writes, in its zip
-//! archives and in its older format, and networks that Python's `pickle` wrote, as the snapshots of EDM's training are;
-//! which of them it is, the content decides. No code in a file is ever executed: see [`pickle`].
+//! Opening a file reads the names and shapes of its tensors, not the values, so that they are checked against an
+//! architecture before large memory is allocated. The formats are safetensors, PyTorch's `torch.save` (zip archives and the
+//! older format), and networks that Python's `pickle` wrote, such as the snapshots of EDM's training. The format is
+//! recognised by the content. No code in a file is ever executed: see [`pickle`].
 //!
-//! A `state_dict`, or a network itself, is looked for at the top of the file and under [`PLACES`]; a `module.` in front
-//! of every name, from training on several GPUs, is taken off.
+//! A `state_dict`, or a network itself, is searched at the top of the file and under [`PLACES`]; a `module.` in front of
+//! every name, from training on several GPUs, is removed.
 //!
-//! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of what the file says about its
-//! tensors; reading takes what [`Checkpoint::byte_estimate`] says, which is known before and limited by
+//! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of the file's description of its
+//! tensors. Reading takes [`Checkpoint::byte_estimate`], which is known before and limited by
 //! [`LARGEST_TENSOR_BYTES`] and [`LARGEST_TOTAL_BYTES`].
 
 mod archive;
@@ -43,10 +43,10 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Memory that opening a file takes at most, in bytes: for the pickles that are there at once.
+/// The most memory that opening a file takes, in bytes: for the pickles that are in memory at once.
 pub const OPENING_BYTES: u64 = 3 * pickle::PICKLE_BYTES;
 
-/// A tensor that an architecture has.
+/// A tensor of an architecture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TensorShape {
     /// Its name in a `state_dict`.
@@ -65,16 +65,16 @@ pub struct Checkpoint {
     content: Content,
 }
 
-/// Where the values are.
+/// The source of the values.
 #[derive(Debug)]
 enum Content {
-    /// Nowhere: they are computed whenever they are asked for.
+    /// They are computed at each read.
     Computed(Formula),
-    /// In the file, which readers use one after another: they move its cursor.
+    /// The file, behind a lock: readers move its cursor.
     File(Mutex<File>, Places),
 }
 
-/// What computes the values of a tensor.
+/// Computes the values of a tensor.
 type Values = dyn Fn(&TensorShape) -> Vec<f32> + Send + Sync;
 struct Formula(Box<Values>);
 
@@ -85,11 +85,11 @@ impl std::fmt::Debug for Formula {
 }
 
 impl Checkpoint {
-    /// Opens a file: reads the names, shapes and places of its tensors.
+    /// Opens a file: reads the names, shapes and offsets of its tensors.
     ///
     /// # Errors
-    /// [`CheckpointError`] if it cannot be read, is no checkpoint, is damaged, or claims tensors that are absurdly
-    /// large or lie outside the file.
+    /// [`CheckpointError`] if it cannot be read, is not a checkpoint, is damaged, or describes tensors that are
+    /// too large or lie outside the file.
     pub fn open(path: &Path) -> Result<Checkpoint, CheckpointError> {
         let opened = || -> Result<Checkpoint, Problem> {
             let file = File::open(path)?;
@@ -158,12 +158,12 @@ impl Checkpoint {
         }
     }
 
-    /// The file, for messages.
+    /// Its path, for messages.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What kind of file it is, and where in it the tensors were, for messages.
+    /// The kind of file, and where in it the tensors were found, for messages.
     pub fn origin(&self) -> &str {
         &self.origin
     }
@@ -173,7 +173,7 @@ impl Checkpoint {
         &self.shapes
     }
 
-    /// The type in which it holds the elements of a tensor.
+    /// The element type of a tensor in the file.
     pub fn element(&self, name: &str) -> Option<Element> {
         match &self.content {
             Content::Computed(_) => self.shapes.get(name).map(|_| Element::F32),
@@ -181,14 +181,14 @@ impl Checkpoint {
         }
     }
 
-    /// What else the file says: of safetensors its metadata, of PyTorch's files the numbers and short texts that stand
-    /// beside the `state_dict`.
+    /// Other values of the file: the metadata of safetensors, the numbers and short texts beside the `state_dict` of
+    /// PyTorch's files.
     pub fn metadata(&self) -> &BTreeMap<String, String> {
         &self.metadata
     }
 
-    /// Memory that reading these tensors and keeping all of them takes, in bytes: 4 for every element, and what reading
-    /// the most demanding of them needs beside. Names that it does not have take nothing.
+    /// Memory for reading and keeping these tensors, in bytes: 4 for every element, and the buffers for reading the largest
+    /// of them. Missing names count 0.
     pub fn byte_estimate<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> u64 {
         let (mut kept, mut working) = (0u64, 0);
         for name in names {
@@ -202,7 +202,7 @@ impl Checkpoint {
         kept.saturating_add(working)
     }
 
-    /// Checks that it has exactly these tensors, and perhaps others that `optional` accepts.
+    /// Checks that it has exactly these tensors; others are allowed if `optional` accepts them.
     ///
     /// # Errors
     /// [`CheckpointError::Tensors`] with those that are missing, unexpected, or of another shape.
@@ -282,7 +282,7 @@ impl Checkpoint {
     }
 }
 
-/// What can end the reading of a tensor: the file, or who takes its pieces.
+/// Why reading a tensor stopped: an error of the file, or of the receiver of its pieces.
 enum ReadError {
     Problem(Problem),
     Checkpoint(CheckpointError),

@@ -1,4 +1,4 @@
-//! Convolutions: of all channels, of each channel by itself, and transposed.
+//! Convolutions: full, depthwise and transposed.
 
 use super::image::{Image, Size};
 use super::scratch::Scratch;
@@ -18,7 +18,7 @@ pub struct Convolution<D: Device> {
     pub channels: u32,
 }
 
-/// How a convolution is run.
+/// Options of a convolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConvolutionOptions {
     /// Pixels from one window to the next.
@@ -36,7 +36,7 @@ pub struct ConvolutionOptions {
 }
 
 impl ConvolutionOptions {
-    /// Image to image of the same size.
+    /// Outputs of the input's size.
     pub const PLAIN: ConvolutionOptions =
         ConvolutionOptions { stride: 1, dilation: 1, padding: None, upsampling: 1, scale: 1.0, relu: false };
     /// The same, rectified.
@@ -52,20 +52,20 @@ impl ConvolutionOptions {
         Windows { reach, stride: self.stride, padding, ceil_mode: false }
     }
 
-    /// Size of the output for an input, one row or column where not even one window fits.
+    /// Size of the output for an input; one row or column if no window fits.
     fn out_size(&self, size: Size, window: u32, channels: u32) -> Size {
         let count = |side: u32| self.windows(window).count_at_least_one(side * self.upsampling);
         Size { height: count(size.height), width: count(size.width), channels }
     }
 }
 
-/// What is added to a convolution's result, before it is scaled and rectified.
+/// The residual: added to a convolution's result before it is scaled and rectified.
 pub enum Residual<'a, D: Device> {
     /// Nothing.
     None,
     /// An image of its output's size.
     Image(&'a Image<D>),
-    /// The same numbers at every pixel: `[channel]` from a place of a buffer on.
+    /// The same numbers at every pixel: `[channel]` from an offset in a buffer.
     Channels(&'a D::Buffer<f32>, u32),
 }
 
@@ -179,7 +179,7 @@ impl<D: Device> Convolution<D> {
     }
 }
 
-/// A depthwise convolution (of every channel by itself) without bias, on a device.
+/// A depthwise convolution without bias, on a device.
 pub struct DepthwiseConvolution<D: Device> {
     pub(crate) weights: D::Buffer<f32>,
     pub(crate) size: u32,
@@ -196,7 +196,7 @@ impl<D: Device> DepthwiseConvolution<D> {
         Ok(DepthwiseConvolution { weights: device.upload(&[0.25; 4])?, size: 2, is_shared: true })
     }
 
-    /// Runs it into a new image. Scale, upsampling and rectification are not for it.
+    /// Runs it into a new image. It has no scale, upsampling or rectification.
     ///
     /// # Errors
     /// If the device is lost or has no memory left.

@@ -1,6 +1,6 @@
-//! Network parameters computed from their names: no file, the same numbers everywhere.
+//! Deterministic initialisation: network parameters computed from their names, the same numbers on every machine.
 //!
-//! Networks of full size can be checked against other implementations without downloading anything if both fill every
+//! Networks of full size can be checked against other implementations without a download if both fill every
 //! tensor by the same rule. With `h` the FNV-1a hash (64 bits) of the tensor's name, element `i` (flat, row-major)
 //! starts from `z = h + (i + 1) * 0x9E3779B97F4A7C15`, which SplitMix64's finaliser scrambles; its top 24 bits give
 //! `u = (z >> 40) / 2^23 - 1`, exact in `f32`, in `[-1, 1)`. What `u` becomes depends on the leaf, the part of the name

@@ -2,9 +2,9 @@
 //!
 //! ```text
 //! checkpoint             files of named tensors, and which of them an architecture must have
-//! initialisation         tensors computed from their names, for test networks
+//! initialisation         deterministic initialisation of test networks
 //! image, scratch         images in a device's memory, and their buffers, used again and again
-//! window                 where a window lies on an image
+//! window                 positions of windows on an image
 //! linear, convolution    one layer or operation each
 //! norm, pool, resample
 //! attention

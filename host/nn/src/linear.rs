@@ -7,13 +7,13 @@ use viewfuse_device::{Device, DeviceError, Layer};
 /// weights[input][output]`.
 pub struct Linear<D: Device> {
     pub(crate) layer: Layer<D>,
-    /// How many numbers go in.
+    /// The number of inputs.
     pub in_count: u32,
-    /// How many come out.
+    /// The number of outputs.
     pub out_count: u32,
 }
 
-/// Rectifications at a linear layer.
+/// Rectification at a linear layer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinearOptions {
     /// Whether negative inputs count as 0.
@@ -28,8 +28,8 @@ impl LinearOptions {
 }
 
 impl<D: Device> Linear<D> {
-    /// Runs it on the first `row_count` rows of buffers: `inputs[row][input]`, `outputs[row][output]`, and a `residual` of the
-    /// outputs' shape that is added before the outputs are rectified.
+    /// Runs it on the first `row_count` rows of buffers: `inputs[row][input]`, `outputs[row][output]`, and a `residual`
+    /// of the outputs' shape that is added before the outputs are rectified.
     ///
     /// # Errors
     /// If the device is lost.

@@ -18,12 +18,12 @@ pub enum LoadError {
     Device(#[from] DeviceError),
 }
 
-/// Tensors of a checkpoint whose names begin alike. Their shapes have been checked.
+/// Tensors of a checkpoint whose names have a common prefix. Their shapes have been checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Tensors<'a> {
     /// The checkpoint.
     pub checkpoint: &'a Checkpoint,
-    /// What all names begin with.
+    /// The prefix of the names.
     pub prefix: &'a str,
 }
 
@@ -51,8 +51,8 @@ impl Tensors<'_> {
         Ok(ConvolutionWeights::new(shape, &weights, self.bias(name, shape[0])?))
     }
 
-    /// A convolution with the batch norm behind it folded in (see [`BatchNorm::fold`]): `norm` is the norm's name, `epsilon`
-    /// what it adds to variances.
+    /// A convolution with the batch norm behind it folded in (see [`BatchNorm::fold`]): `norm` is the norm's name,
+    /// `epsilon` the number that it adds to variances.
     ///
     /// # Errors
     /// [`CheckpointError`] if a tensor cannot be read.
@@ -123,7 +123,7 @@ impl<'a, D: Device> Loader<'a, D> {
         self.changed_convolution(name, least_side, |weights| weights)
     }
 
-    /// The same, its weights changed on the way.
+    /// The same with weights that `change` modifies.
     ///
     /// # Errors
     /// [`LoadError`].
@@ -171,7 +171,8 @@ impl<'a, D: Device> Loader<'a, D> {
         Ok(self.tensors.linear(name)?.load(self.device)?)
     }
 
-    /// A group norm, from `weight[channel]` and `bias[channel]`: `group_count(channels)` groups, `epsilon` added to variances.
+    /// A group norm, from `weight[channel]` and `bias[channel]`: `group_count(channels)` groups, `epsilon` added to
+    /// variances.
     ///
     /// # Errors
     /// [`LoadError`].

@@ -13,7 +13,7 @@ pub struct GroupNorm<D: Device> {
     pub channels: u32,
     /// Groups of neighbouring channels.
     pub(crate) group_count: u32,
-    /// What is added to variances.
+    /// Added to variances (epsilon).
     pub(crate) epsilon: f32,
 }
 

@@ -1,5 +1,5 @@
-//! Pools: max pool and global average pool as kernels; the 3x3 average pool and DISTS' L2 pool on the host, in `f64`, because
-//! no kernel computes them: their images are downloaded and uploaded again.
+//! Pools: max pool and global average pool as kernels; the 3x3 average pool and DISTS' L2 pool on the host, in `f64`,
+//! because no kernel computes them: their images are downloaded and uploaded again.
 
 use super::image::{HostImage, Image, Size};
 use super::scratch::Scratch;
@@ -9,14 +9,14 @@ use viewfuse_core::network::resample::PoolBlock;
 use viewfuse_device::parallel::for_each_row;
 use viewfuse_device::{Device, DeviceError};
 
-/// The largest number of square windows, channel by channel; what lies outside of the image does not count.
+/// Max pool over square windows, channel by channel; places outside of the image do not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MaxPool {
     /// Rows and columns of the window.
     pub size: u32,
     /// Pixels from one window to the next.
     pub stride: u32,
-    /// How far windows reach over the border.
+    /// Padding: how far windows reach over the border.
     pub padding: u32,
     /// Whether a last window may reach over the bottom and right padding (PyTorch's `ceil_mode`).
     pub ceil_mode: bool,
@@ -70,7 +70,7 @@ pub fn global_average_pool<D: Device>(scratch: &mut Scratch<'_, D>, image: &Imag
 }
 
 /// The mean of the 3x3 pixels around each pixel. Pixels outside of the image count as zeros, or, without
-/// `count_include_pad`, not at all.
+/// `count_include_pad`, are left out.
 pub fn average_pool(image: &HostImage, count_include_pad: bool) -> HostImage {
     pooled(image, [image.height, image.width], 1, |window, channel| {
         let (mut sum, mut count) = (0.0, 0);
@@ -82,7 +82,7 @@ pub fn average_pool(image: &HostImage, count_include_pad: bool) -> HostImage {
     })
 }
 
-/// What DISTS adds before it takes the root.
+/// Added by DISTS before the square root.
 const L2_POOL_EPSILON: f64 = 1.0e-12;
 
 /// DISTS' L2 pool: the root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second pixel; outside
@@ -101,10 +101,10 @@ pub fn l2_pool(image: &HostImage) -> HostImage {
     })
 }
 
-/// A place of a window of 3x3 and the channels of the pixel there.
+/// A position in a window of 3x3 and the channels of the pixel there.
 type WindowPixel<'a> = ([usize; 2], &'a [f32]);
 
-/// An image of `size` of what `value` makes of the windows of 3x3 around every `stride`-th pixel.
+/// An image of `size`: `value` of the 3x3 window around every `stride`-th pixel.
 fn pooled(
     image: &HostImage,
     size: [usize; 2],

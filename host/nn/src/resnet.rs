@@ -1,4 +1,4 @@
-//! The trunk that both published networks have: torchvision's ResNet of basic blocks, its sizes, its tensors, and its run.
+//! The trunk of both published networks: torchvision's ResNet of basic blocks, with its sizes, tensors and evaluation.
 //!
 //! Source: He, Zhang, Ren, Sun: "Deep residual learning for image recognition", CVPR 2016; torchvision's `resnet.py`.
 
@@ -9,12 +9,12 @@ use super::pool::MaxPool;
 use super::scratch::Scratch;
 use viewfuse_device::{Device, DeviceError};
 
-/// What its batch norms add to variances.
+/// Added to variances by its batch norms (epsilon).
 pub const BATCH_NORM_EPSILON: f64 = 1.0e-5;
 
 /// The first convolution.
 const STEM: ConvolutionOptions = ConvolutionOptions { stride: 2, ..ConvolutionOptions::RELU };
-/// What follows it.
+/// The layers behind it.
 const POOL: MaxPool = MaxPool { size: 3, stride: 2, padding: 1, ceil_mode: false };
 /// Pixels of the input from one pixel of the first level to the next.
 const FIRST_STRIDE: u32 = 4;
@@ -41,14 +41,14 @@ pub struct ResNetLayer {
     pub shape: [usize; 4],
 }
 
-/// A basic block: two convolutions, what came in added before the last rectification.
+/// A basic block: two convolutions; the input is added before the last rectification (the shortcut).
 #[derive(Clone, Debug, PartialEq)]
 pub struct BasicBlock<L> {
     /// The first convolution, which may have a stride.
     pub conv1: L,
     /// The second convolution.
     pub conv2: L,
-    /// What came in goes through it where sizes or channels change (torchvision's `downsample`).
+    /// The shortcut's convolution, where sizes or channels change (torchvision's `downsample`).
     pub shortcut: Option<L>,
 }
 
@@ -62,7 +62,7 @@ pub struct ResNet<L> {
 }
 
 /// Whether the first block of level `level` (counted from 1) has a shortcut convolution: where the level halves the image
-/// or, in a trunk that stops halving, is meant to, and where it changes the channels.
+/// (or would halve it, in a trunk that stops halving), and where it changes the channels.
 pub fn has_shortcut(level: usize, in_channels: usize, out_channels: usize) -> bool {
     level > 1 || in_channels != out_channels
 }
@@ -100,7 +100,7 @@ impl<L> ResNet<L> {
     /// The same trunk of other layers, in the order of the data.
     ///
     /// # Errors
-    /// The first that a layer makes.
+    /// The first error of `layer`.
     pub fn try_map<M, E>(&self, mut layer: impl FnMut(&L) -> Result<M, E>) -> Result<ResNet<M>, E> {
         let stem = layer(&self.stem)?;
         let mut block = |block: &BasicBlock<L>| {
@@ -136,9 +136,8 @@ pub fn batch_norm_tensors(tensors: &mut Vec<TensorShape>, name: &str, channels: 
 }
 
 impl<D: Device> ResNet<Convolution<D>> {
-    /// What the stem makes of an image of three channels, then what each level does, as images of their own. Each level halves
-    /// rows and columns until one of its pixels stands for `output_stride` of the image; from there on, windows are dilated
-    /// instead.
+    /// The stem's output for an image of three channels, then each level's output. Each level halves rows and columns
+    /// until the output stride is `output_stride`; further levels have dilated windows instead.
     ///
     /// # Errors
     /// If the device is lost or has no memory left.

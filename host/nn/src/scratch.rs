@@ -1,10 +1,10 @@
-//! Scratch buffers: memory for the images between layers, used again and again.
+//! Scratch buffers: memory for the images between layers, which is reused.
 
 use super::image::{Image, Size};
 use viewfuse_device::{Device, DeviceError};
 
-/// A device and the buffers on it that are free. Every kernel writes all of its output: what a buffer held before is never
-/// read. Dropping it frees them.
+/// A device and its free buffers. Every kernel writes all of its output: earlier content of a buffer is never read.
+/// Dropping it frees them.
 pub struct Scratch<'a, D: Device> {
     device: &'a D,
     free: Vec<(usize, D::Buffer<f32>)>,
@@ -45,7 +45,7 @@ impl<'a, D: Device> Scratch<'a, D> {
         Ok(Image { values, size, pitch, first, capacity })
     }
 
-    /// Takes an image's buffer back for others.
+    /// Takes an image's buffer back for reuse.
     pub fn recycle(&mut self, image: Image<D>) {
         self.free.push((image.capacity, image.values));
     }

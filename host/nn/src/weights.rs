@@ -4,7 +4,7 @@ use super::convolution::Convolution;
 use super::linear::Linear;
 use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
 
-/// Rows and columns from which on a device may convolve images in its way for large ones.
+/// The fewest rows and columns of images for which a device may use its algorithm for large images.
 const LARGE_IMAGE: u32 = 32;
 
 /// A convolution's weights and bias. Windows are square: those of other shapes lie in the middle of a square of zeros.
@@ -68,7 +68,7 @@ impl ConvolutionWeights {
     }
 
     /// Takes them to a device. It is run with stride 1 and without dilation on images of at least `least_side` rows and
-    /// columns, or `least_side` is 0: a device may convolve large images in a way of its own, which rounds otherwise.
+    /// columns, or `least_side` is 0: a device may have another algorithm for large images, which rounds differently.
     ///
     /// # Errors
     /// If the device has no memory left.
@@ -98,12 +98,12 @@ impl LinearWeights {
         LinearWeights { values: transposed(weights, bias.len()), bias }
     }
 
-    /// How many numbers go in.
+    /// The number of inputs.
     pub fn in_count(&self) -> usize {
         self.values.len() / self.bias.len()
     }
 
-    /// Layers that read the same inputs as one, their outputs one behind the other. `in_count` numbers go into each.
+    /// Layers with the same inputs as one layer, their outputs concatenated. Each has `in_count` inputs.
     pub fn concatenated(layers: &[LinearWeights], in_count: usize) -> LinearWeights {
         let row = |input: usize| {
             layers.iter().flat_map(move |LinearWeights { values, bias }| {
@@ -140,23 +140,23 @@ impl LinearWeights {
 /// A batch norm with the statistics of training: a factor and a shift for each channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchNorm {
-    /// `[channel]`: what outputs are multiplied by.
+    /// `[channel]`: factors of the outputs.
     factors: Vec<f64>,
     mean: Vec<f32>,
     shift: Vec<f32>,
 }
 
 impl BatchNorm {
-    /// From PyTorch's `weight`, `bias`, `running_mean` and `running_var`; `epsilon` is added to variances. Negative variances
-    /// count as 0.
+    /// From PyTorch's `weight`, `bias`, `running_mean` and `running_var`; `epsilon` is added to variances. Negative
+    /// variances count as 0.
     pub fn new(weight: &[f32], bias: Vec<f32>, mean: Vec<f32>, variance: &[f32], epsilon: f64) -> BatchNorm {
         let factor =
             |(weight, variance): (&f32, &f32)| f64::from(*weight) / (f64::from(*variance).max(0.0) + epsilon).sqrt();
         BatchNorm { factors: weight.iter().zip(variance).map(factor).collect(), mean, shift: bias }
     }
 
-    /// Folds it into the convolution before it, in `f64`: multiplies `weights[output channel][...]` and returns the bias, from
-    /// the convolution's own.
+    /// Folds it into the convolution before it, in `f64`: multiplies `weights[output channel][...]` and returns the
+    /// bias, from the convolution's own.
     pub fn fold(&self, weights: &mut [f32], bias: &[f32]) -> Vec<f32> {
         let per_channel = (weights.len() / self.factors.len().max(1)).max(1);
         for (weights, factor) in weights.chunks_exact_mut(per_channel).zip(&self.factors) {

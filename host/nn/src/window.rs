@@ -1,6 +1,6 @@
-//! How many windows of a convolution or a pool lie on the side of an image.
+//! The number of windows of a convolution or a pool along a side of an image.
 
-/// How windows lie on an image.
+/// Positions of windows on an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Windows {
     /// Rows and columns of a window, the gaps of a dilated one included, at least 1.
@@ -14,7 +14,7 @@ pub(crate) struct Windows {
 }
 
 impl Windows {
-    /// How many lie on a side of this length; `None` if not even one does.
+    /// The number of windows along a side of this length; `None` if none fits.
     pub(crate) fn count(&self, side: u32) -> Option<u32> {
         let free = (side + 2 * self.padding).checked_sub(self.reach)?;
         Some(1 + if self.ceil_mode { free.div_ceil(self.stride) } else { free / self.stride })

@@ -38,7 +38,7 @@ impl Canvas {
         Canvas { pixels: RgbImage::from_pixel(width.max(1), height.max(1), Rgb(PAPER)) }
     }
 
-    /// The finished picture.
+    /// The drawn picture.
     pub fn into_image(self) -> RgbImage {
         self.pixels
     }

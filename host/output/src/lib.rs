@@ -1,12 +1,12 @@
-//! What a run writes: pictures, depth maps, contact sheets, and the run record ([`run`]).
+//! The output of a run: pictures, depth maps, contact sheets, and the run record ([`run`]).
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! png      pictures as files
 //! canvas   text, lines and small pictures on a picture
 //! sheet    the contact sheet of a target
-//! record   how the pictures came about, as JSON
+//! record   the run record, as JSON
 //! run      all of it in a folder
 //! ```
 #![forbid(unsafe_code)]

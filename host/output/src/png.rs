@@ -5,7 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 use viewfuse_job::files::{WriteError, write_whole};
 
-/// Writes a picture as PNG, whole or not at all.
+/// Writes a picture as PNG, completely or not at all.
 ///
 /// # Errors
 /// [`WriteError`].

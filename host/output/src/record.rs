@@ -1,4 +1,4 @@
-//! The run record: everything needed to say how a picture came about, as JSON.
+//! The run record: the inputs, settings and results of a run, as JSON.
 
 use serde::Serialize;
 use std::time::Duration;
@@ -17,43 +17,43 @@ pub struct RunRecord {
     pub scene: String,
     /// The device.
     pub device: String,
-    /// Why it is this one.
+    /// The reason for choosing it.
     pub device_reason: String,
     /// The field.
     pub field: &'static str,
-    /// Where its network's parameters come from; null for the field that needs none.
+    /// The source of its network's parameters; null for the training-free field.
     pub model: Option<String>,
-    /// Whether leaving out was forbidden altogether.
+    /// Whether all omissions are switched off.
     pub exact: bool,
-    /// What the field left out, in all frames together.
+    /// The field's omissions, of all frames together.
     pub left_out: Vec<LeftOut>,
-    /// How the field went from noise to the pictures; null for fields that do not.
+    /// The field's diffusion sampling; null for fields without a denoiser.
     pub denoising: Option<Denoising>,
     /// The weighting scheme.
     pub weighting: String,
-    /// Seed of every random number. The training-free field draws none.
+    /// Seed of every random draw. The training-free field makes none.
     pub seed: u64,
     /// Width and height of the pictures.
     pub size: [u32; 2],
-    /// Background as asked for and as used, red green blue in 0..=255.
+    /// Requested and used background, red green blue in 0..=255.
     pub background: BackgroundRecord,
-    /// Largest total weight of views that may be left out.
+    /// The largest total weight of views that are left out.
     pub leave_out: f32,
-    /// Transmittance at which rays may end: no channel changes by more than this times its range.
+    /// Transmittance of early termination: no channel changes by more than this times its range.
     pub early_termination: f32,
-    /// What was doubtful about the photographs.
+    /// Warnings about the photographs.
     pub warnings: Vec<String>,
     /// Names of the source views.
     pub sources: Vec<String>,
-    /// What it was estimated to take of memory beside photographs and pictures, in bytes; null for fields that cannot tell.
+    /// Estimated memory beside photographs and pictures, in bytes; null for fields without an estimate.
     pub memory_estimate: Option<u64>,
-    /// Near and far bounds of rays, world units; null for fields that find their own.
+    /// Near and far bounds of rays, world units; null for fields without such bounds.
     pub near_far: Option<[f32; 2]>,
-    /// Times of what all frames share.
+    /// Times of the stages that all frames share.
     pub times: TimesRecord,
-    /// What each kernel took, for devices that tell.
+    /// Times of the kernels, for devices with timestamps.
     pub kernels: Vec<KernelRecord>,
-    /// What went to the device and came back; zeros for devices whose memory is the host's.
+    /// Transfers between host and device; zeros for devices whose memory is the host's.
     pub transfers: TransfersRecord,
     /// One entry a target.
     pub frames: Vec<FrameRecord>,
@@ -62,7 +62,7 @@ pub struct RunRecord {
 /// See [`RunRecord::background`].
 #[derive(Clone, Debug, Serialize)]
 pub struct BackgroundRecord {
-    /// As asked for.
+    /// As requested.
     pub asked: String,
     /// As used.
     pub used: [u8; 3],
@@ -73,15 +73,15 @@ pub struct BackgroundRecord {
 pub struct TimesRecord {
     /// Reading the scene.
     pub open: f64,
-    /// Taking out backgrounds and resampling.
+    /// Removing backgrounds and resampling.
     pub photographs: f64,
     /// Taking the photographs to the device and finding the object.
     pub prepare: f64,
     /// Encoding the sources.
     pub encode: f64,
-    /// All frames together, comparison with the truth included.
+    /// All frames together, comparison with the ground truth included.
     pub frames: f64,
-    /// Everything, writing the pictures included.
+    /// The whole run, writing the pictures included.
     pub total: f64,
 }
 
@@ -103,11 +103,11 @@ pub struct KernelRecord {
 /// See [`RunRecord::transfers`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct TransfersRecord {
-    /// How many arrays went to the device.
+    /// Arrays that were uploaded.
     pub uploads: u64,
     /// Their bytes.
     pub uploaded_bytes: u64,
-    /// How many arrays came back.
+    /// Arrays that were downloaded.
     pub downloads: u64,
     /// Their bytes.
     pub downloaded_bytes: u64,
@@ -120,7 +120,7 @@ impl From<Transfers> for TransfersRecord {
     }
 }
 
-/// What each kernel took.
+/// Times of the kernels.
 pub fn kernel_records(times: &[KernelTime]) -> Vec<KernelRecord> {
     let all: f64 = times.iter().map(|time| time.time.as_secs_f64()).sum();
     let record = |time: &KernelTime| {
@@ -144,24 +144,24 @@ pub struct FrameRecord {
     pub weights_before: Vec<f32>,
     /// Names of the sources that were left out.
     pub left_out: Vec<String>,
-    /// Sum of their weights: a bound on what leaving them out changes in a fusion of all views, as a share of the
-    /// range of its inputs.
+    /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the range
+    /// of its inputs.
     pub left_out_weight: f32,
-    /// Peak signal to noise ratio against the truth, decibels; null for equal pictures or without a truth.
+    /// Peak signal to noise ratio against the ground truth, decibels; null for equal pictures or without a ground truth.
     pub psnr: Option<f64>,
-    /// Structural similarity with the truth.
+    /// Structural similarity with the ground truth.
     pub ssim: Option<f64>,
-    /// World units of depth in one step of the 16-bit depth map, whose 0 means that nothing is met; null for fields that
-    /// know no depth.
+    /// World units of depth in one step of the 16-bit depth map, in which 0 means no surface; null for fields without
+    /// depths.
     pub depth_step: Option<f32>,
     /// Time for this frame alone.
     pub seconds: f64,
-    /// The part of it that encoded sources which no frame before it used.
+    /// The part of it for encoding sources that no earlier frame used.
     pub encode_seconds: f64,
 }
 
 impl FrameRecord {
-    /// What is to be remembered of a frame whose sources have these names.
+    /// The record of a frame whose sources have these names.
     pub fn of(frame: &Frame, source_names: &[String]) -> FrameRecord {
         let count = source_names.len();
         let used = &frame.omission.weights.values()[..count];
@@ -192,7 +192,7 @@ pub fn source_names(scene: &Scene, job: &FewShot) -> Vec<String> {
     job.sources.iter().map(|&view| scene.views[view].name.clone()).collect()
 }
 
-/// The times that frames share, with those that the caller measured.
+/// The times of the stages that frames share, with those that the caller measured.
 pub fn times_record(open: Duration, stages: StageCosts, frames: Duration, total: Duration) -> TimesRecord {
     TimesRecord {
         open: open.as_secs_f64(),

@@ -1,4 +1,4 @@
-//! What a run leaves in a folder: `NAME.png`, `NAME_depth.png` (16 bit) and `NAME_sheet.png` for each target, and
+//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit) and `NAME_sheet.png` for each target, and
 //! `run.json`.
 
 use crate::png::write_png;
@@ -20,7 +20,7 @@ use viewfuse_weighting::Weighting;
 /// Name of the run record.
 pub const RECORD: &str = "run.json";
 
-/// Writes a run's frames as they come, and the record when all are there.
+/// Writes a run's frames one by one, and the record after the last.
 pub struct RunWriter {
     folder: PathBuf,
     /// The scene's path as it was opened.
@@ -36,27 +36,27 @@ pub struct RunWriter {
     warning: Option<String>,
 }
 
-/// What the record holds that only the caller knows.
+/// The values of the record that only the caller knows.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Circumstances {
     /// Version of the program.
     pub program: &'static str,
-    /// Why the device is the one that it is.
+    /// The reason for choosing the device.
     pub device_reason: String,
-    /// Where the network's parameters come from.
+    /// The source of the network's parameters.
     pub model: Option<String>,
-    /// Whether leaving out was forbidden altogether.
+    /// Whether all omissions are switched off.
     pub exact: bool,
     /// Seed of every random draw.
     pub seed: u64,
-    /// How long reading the scene took.
+    /// The time of reading the scene.
     pub open_time: Duration,
-    /// How long everything took.
+    /// The time of the whole run.
     pub total_time: Duration,
 }
 
 impl RunWriter {
-    /// Nothing is written yet. `scene_label` is the scene's path as the record is to show it.
+    /// Nothing is written yet. `scene_label` is the scene's path in the record.
     pub fn new(folder: &Path, scene: &Scene, scene_label: String, job: &FewShot, weighting: &Weighting) -> RunWriter {
         RunWriter {
             folder: folder.to_path_buf(),
@@ -72,7 +72,8 @@ impl RunWriter {
         }
     }
 
-    /// Writes a frame's pictures. With the first one the record of an earlier run goes: beside new pictures it would lie.
+    /// Writes a frame's pictures. With the first one, the record of an earlier run is removed: it would be wrong for
+    /// the new pictures.
     ///
     /// # Errors
     /// [`WriteError`].
@@ -165,7 +166,7 @@ impl RunWriter {
     }
 }
 
-/// A frame's depths in steps of [`depth_step`]; `None` for fields that know no depth.
+/// A frame's depths in steps of [`depth_step`]; `None` for fields without depths.
 pub fn depth_map(frame: &Frame) -> Option<ImageBuffer<Luma<u16>, Vec<u16>>> {
     if frame.depths.is_empty() {
         return None;

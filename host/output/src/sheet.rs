@@ -1,7 +1,7 @@
-//! The contact sheet: what went in and what came out, on one page.
+//! The contact sheet: sources and results on one page.
 //!
 //! Sources in the order of their weights, each with its weight as a number and a bar; below them the prediction, its
-//! depth, and where the truth is known the truth and the error.
+//! depth, and, if there is a ground truth, the ground truth and the error.
 
 use crate::canvas::{BLUE, CHARACTER_WIDTH, Canvas, GREY, INK, LINE_HEIGHT, PAPER};
 use image::{Rgb, RgbImage, imageops};
@@ -16,7 +16,7 @@ pub struct SheetSource {
     pub picture: RgbImage,
 }
 
-/// Everything that a sheet shows.
+/// The content of a sheet.
 pub struct Sheet {
     /// First line: scene, target, scheme.
     pub title: String,
@@ -35,7 +35,7 @@ const GAP: u32 = 8;
 const THUMBNAIL_HEIGHT: u32 = 96;
 const SOURCES_PER_ROW: usize = 6;
 const BAR: u32 = 4;
-/// Shown sources; further ones have small weights and are only counted.
+/// The most shown sources; further ones have small weights and are only counted.
 const SOURCES_SHOWN: usize = 24;
 /// An absolute error of a quarter of the range is shown in the strongest colour.
 const STRONGEST_ERROR: f32 = 0.25;
@@ -110,7 +110,7 @@ impl Sheet {
     }
 }
 
-/// A name that fits into so many characters: the end of a long one, where names of one series differ.
+/// A name shortened to this many characters: the end of a long one, where names of one series differ.
 fn end_of(name: &str, most: usize) -> String {
     let length = name.chars().count();
     if length <= most {

@@ -1,5 +1,5 @@
-//! Adam (Kingma and Ba, ICLR 2015), whose moments can be written down and read again: the library's own keeps them to
-//! itself, and a run that is continued would end elsewhere.
+//! Adam (Kingma and Ba, ICLR 2015), with moments that can be saved and loaded. The library's own does not expose them, so a
+//! continued run would give other results.
 
 use super::parameters::Parameters;
 use candle_core::backprop::GradStore;
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 /// Decay of the means of gradients and of their squares.
 const DECAYS: [f64; 2] = [0.9, 0.999];
-/// Added to the root of the mean square.
+/// Added to the root of the mean square (epsilon).
 const FLOOR: f64 = 1.0e-8;
 
 /// Moments of every parameter.
@@ -29,7 +29,7 @@ impl Adam {
         Ok(Adam { moments })
     }
 
-    /// One step, number `step` counted from 0. Gradients are scaled down together where their norm exceeds `most`.
+    /// One step, number `step` counted from 0. All gradients are scaled down if their norm exceeds `most`.
     pub(crate) fn step(
         &self,
         parameters: &Parameters,

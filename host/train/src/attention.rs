@@ -1,5 +1,5 @@
 //! The paper's cross-attention weighting as a graph: poses are embedded, and a softmax of products gives the weights. The
-//! same as [`viewfuse_core::attention::cross_attention`], whose parameters these become.
+//! same as [`viewfuse_core::attention::cross_attention`], with the same parameters.
 
 use super::TrainError;
 use super::parameters::{Parameters, fan_in, random};
@@ -9,7 +9,7 @@ use viewfuse_core::attention::{EMBEDDING, HIDDEN, POSE_FEATURES, pose_features};
 use viewfuse_core::pose::Pose;
 use viewfuse_nn::checkpoint::TensorShape;
 
-/// How a pose becomes a vector.
+/// The embedding of poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Embedding {
@@ -19,7 +19,7 @@ pub enum Embedding {
     Flat,
 }
 
-/// What the last layer's deviation is multiplied by: all weights begin nearly equal.
+/// Factor of the last layer's initial deviation: all weights start nearly equal.
 const LAST_GAIN: f32 = 0.3;
 
 impl Embedding {
@@ -33,7 +33,7 @@ impl Embedding {
         }
     }
 
-    /// What goes into the first layer.
+    /// The input of the first layer.
     fn features(self, pose: &Pose) -> Vec<f32> {
         match self {
             Embedding::Fourier => pose_features(pose.centre_world(), -pose.forward_world()).to_vec(),
@@ -50,7 +50,7 @@ pub(crate) struct Attention {
 }
 
 impl Attention {
-    /// At the beginning of training.
+    /// The initial parameters.
     pub(crate) fn new(embedding: Embedding, dtype: DType, seed: u64) -> std::result::Result<Attention, TrainError> {
         let layers = embedding.layers();
         let last = layers.last().map_or("", |(name, ..)| *name);

@@ -1,4 +1,4 @@
-//! A moving average of the parameters: what a short run ends with wanders less than its last step.
+//! A moving average of the parameters, which varies less than the parameters after the last step of a short run.
 
 use super::parameters::Parameters;
 use candle_core::{Result, Tensor, Var};
@@ -13,19 +13,19 @@ pub(crate) struct Average {
 }
 
 impl Average {
-    /// The parameters as they are. `decay` is what a step leaves of the average, as soon as there have been many steps.
+    /// Starts with the current parameters. `decay` is the factor of the average at each step, after many steps.
     pub(crate) fn new(parameters: &Parameters, decay: f64) -> Result<Average> {
         let copied = |(name, variable): (&str, &Var)| Ok((name.to_owned(), Var::from_tensor(&variable.copy()?)?));
         Ok(Average { values: parameters.iter().map(copied).collect::<Result<_>>()?, decay })
     }
 
-    /// Takes in the parameters after step `step`, counted from 0. At first, when they still change much, the average
-    /// follows sooner.
+    /// Adds the parameters after step `step`, counted from 0. In the first steps, when they change fast, the decay is
+    /// stronger.
     pub(crate) fn step(&self, parameters: &Parameters, step: u32) -> Result<()> {
         let decay = self.decay.min((1.0 + f64::from(step)) / (10.0 + f64::from(step)));
         for (name, variable) in parameters.iter() {
             if let Some(average) = self.values.get(name) {
-                // In this form, what does not change stays what it is, to the bit.
+                // In this form, an unchanged parameter keeps its bits.
                 let change = (variable.as_tensor() - average.as_tensor())?;
                 let next = (average.as_tensor() + (change * (1.0 - decay))?)?;
                 average.set(&next)?;
@@ -34,7 +34,7 @@ impl Average {
         Ok(())
     }
 
-    /// Does something while the parameters are the averages.
+    /// Calls `work` while the parameters are the averages.
     pub(crate) fn during<R, E: From<candle_core::Error>>(
         &self,
         parameters: &Parameters,

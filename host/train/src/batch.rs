@@ -1,4 +1,4 @@
-//! What one step learns from: a few objects, of each some views as sources and rays of others as targets.
+//! The batch of a step: a few objects, with some views of each as sources and rays of others as targets.
 
 use super::draw::{Draw, Purpose};
 use super::scenes::TrainingScene;
@@ -9,11 +9,11 @@ use viewfuse_core::rays::{CastBlock, TargetRay, cast_ray};
 /// Share of the rays that are drawn from the rectangle around the object.
 const SHARE_WITHIN_BOUNDS: f32 = 0.7;
 
-/// How much a step looks at.
+/// The sizes of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct BatchSize {
     pub(crate) objects: usize,
-    /// Of each object.
+    /// Rays of each object.
     pub(crate) rays: usize,
 }
 
@@ -25,7 +25,7 @@ pub(crate) struct Batch {
     pub(crate) cameras: Vec<Vec<CameraBlock>>,
     /// Pictures of the sources `[object and view][row][column][3]`, in `[-1, 1]`.
     pub(crate) pictures: Tensor,
-    /// Target of each object; of rays of many targets the first.
+    /// Target view of each object; the first one for rays of many targets.
     pub(crate) targets: Vec<Camera>,
     /// `[object][ray]`.
     pub(crate) rays: Vec<Vec<TargetRay>>,
@@ -33,12 +33,12 @@ pub(crate) struct Batch {
     pub(crate) truth: Tensor,
 }
 
-/// Where rays come from.
+/// The target views of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Targets {
-    /// From any view that is no source, each ray from its own.
+    /// Any views but the sources, another one for each ray.
     Many,
-    /// All rays of an object from one view that is no source.
+    /// One view of an object for all rays, not a source.
     One,
 }
 

@@ -12,7 +12,7 @@ const FONT: &str = "sans-serif";
 /// Draws the curves; a run without points has empty axes.
 pub(crate) fn svg(so_far: &Progressed, score_name: &str) -> String {
     let mut picture = String::new();
-    // Drawing into memory does not fail; a curve is no reason to lose a run.
+    // Drawing into memory does not fail; an error here must not stop a run.
     if draw(&mut picture, so_far, score_name).is_err() {
         picture.clear();
     }
@@ -50,7 +50,7 @@ fn draw(picture: &mut String, so_far: &Progressed, score_name: &str) -> Result<(
     Ok(())
 }
 
-/// From the least to the greatest, with some room; something where there is nothing.
+/// The range of the values, with a margin; a default range without values.
 fn span(points: &[(u32, f64)]) -> Range<f64> {
     let finite = || points.iter().map(|(_, value)| *value).filter(|value| value.is_finite());
     let (least, most) = (finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max));

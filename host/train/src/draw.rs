@@ -1,30 +1,30 @@
-//! Random numbers of a training run: each a function of the run's seed, the step, what it is for, and its index. So a run
-//! that was interrupted goes on with the numbers that it would have had.
+//! Random draws of a training run: each a function of the run's seed, the step, its purpose and its index. So an
+//! interrupted run continues with the same draws.
 
 use viewfuse_core::random::{normal, threefry_2x32, uniform_pair};
 
-/// What a number is for.
+/// The purpose of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// Which objects.
+    /// The choice of objects.
     Objects,
-    /// How many sources.
+    /// The number of sources.
     SourceCount,
-    /// Which views are sources.
+    /// The choice of source views.
     Sources,
-    /// Which views and pixels are rendered.
+    /// The choice of target views and pixels.
     Rays,
-    /// Where in its part of a ray a sample is.
+    /// Jitter of samples in their parts of a ray.
     Samples,
     /// Samples of the second pass.
     FineSamples,
-    /// How noisy pictures are.
+    /// Noise levels of pictures.
     NoiseLevel,
     /// Noise on pictures.
     Noise,
 }
 
-/// The numbers of one step.
+/// The draws of one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Draw {
     pub(crate) seed: u64,
@@ -51,16 +51,16 @@ impl Draw {
         normal(self.key(purpose), index as u32, 0)
     }
 
-    /// `wanted` different whole numbers below `count`, in random order; all if there are fewer. `index` tells draws of one
-    /// purpose apart.
-    pub(crate) fn choose(&self, purpose: Purpose, index: usize, count: usize, wanted: usize) -> Vec<usize> {
+    /// `chosen` different whole numbers below `count`, in random order; all if there are fewer. `index` distinguishes
+    /// draws of one purpose.
+    pub(crate) fn choose(&self, purpose: Purpose, index: usize, count: usize, chosen: usize) -> Vec<usize> {
         let mut all: Vec<usize> = (0..count).collect();
-        let wanted = wanted.min(count);
-        for place in 0..wanted {
+        let chosen = chosen.min(count);
+        for place in 0..chosen {
             let other = place + self.below(purpose, (index << 12) + place, count - place);
             all.swap(place, other);
         }
-        all.truncate(wanted);
+        all.truncate(chosen);
         all
     }
 }

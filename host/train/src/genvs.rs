@@ -1,5 +1,5 @@
-//! GeNVS as a graph that can be differentiated: the family of [`viewfuse_field::genvs`]. From pictures to volumes, from volumes
-//! to the features that a target sees, from features and noise to a picture.
+//! GeNVS as a differentiable graph: the family of [`viewfuse_field::genvs`]. Volumes from pictures, feature images from
+//! volumes, pictures from features and noise.
 
 mod denoiser;
 mod encoder;
@@ -24,11 +24,11 @@ use viewfuse_core::schedule::Preconditioning;
 use viewfuse_field::genvs::{Architecture, LAST_LENGTH, MLP, cast_block, ray_length};
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 
-/// What the names of the encoder's tensors begin with.
+/// The prefix of the encoder's tensors.
 const ENCODER: &str = "pixel_nerf_net.encoder.";
-/// Density that all of space begins with: light reaches most samples, and every sample a gradient.
+/// Initial density of all space: low, so that most samples have a weight and every sample a gradient.
 const FIRST_DENSITY: f32 = 2.0;
-/// What the deviation of the density's weights is multiplied by: surfaces have densities of 10 and more.
+/// Factor of the deviation of the density's weights: surfaces have densities of 10 and more.
 const DENSITY_GAIN: f32 = 4.0;
 
 /// The network with its parameters.
@@ -40,7 +40,7 @@ pub(crate) struct Genvs {
     pub(crate) is_frozen: bool,
 }
 
-/// Names of tensors that no picture depends on: all of switched-off batch norms, and a head without use.
+/// Names of unused tensors: those of switched-off batch norms, and of an unused head.
 fn unused(tensors: &[TensorShape]) -> BTreeSet<String> {
     let norms: Vec<&str> = tensors.iter().filter_map(|tensor| tensor.name.strip_suffix("running_mean")).collect();
     let is_unused = |name: &str| {
@@ -51,8 +51,8 @@ fn unused(tensors: &[TensorShape]) -> BTreeSet<String> {
 }
 
 impl Genvs {
-    /// At the beginning of training: He's initialisation where rectification follows, layers behind which something is added
-    /// zero, as published for the denoiser, whose other layers without a norm in front hand on what they get.
+    /// Initial parameters: He's initialisation in front of rectifications, zero in the last layers of residual branches, as
+    /// published for the denoiser, whose other layers without a norm in front copy their inputs.
     pub(crate) fn new(architecture: Architecture, dtype: DType, seed: u64) -> std::result::Result<Genvs, TrainError> {
         let parameters = Parameters::new(&used(&architecture), dtype, |tensor| {
             Ok(denoiser::handed_on(&architecture, tensor).unwrap_or_else(|| first_values(tensor, seed)))
@@ -60,7 +60,7 @@ impl Genvs {
         Ok(Genvs { architecture, parameters, is_frozen: false })
     }
 
-    /// A trained one, to be left as it is.
+    /// A trained network, which is not changed.
     ///
     /// # Errors
     /// [`TrainError`] if the checkpoint is of another family, has no denoiser, or is for pictures of another side.
@@ -68,7 +68,7 @@ impl Genvs {
         let architecture = Architecture::of(checkpoint)?;
         let refuse = |reason: String| Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
         if architecture.denoiser.is_none() {
-            return refuse("it has no denoiser, without which no picture is made here".to_owned());
+            return refuse("it has no denoiser".to_owned());
         }
         let own = architecture.image_side;
         if own != side as usize {
@@ -78,7 +78,7 @@ impl Genvs {
         Ok(Genvs { architecture, parameters, is_frozen: true })
     }
 
-    /// Its tensors, with what the file says of it beside them. Those that no picture depends on are zero.
+    /// Its tensors and metadata. Unused tensors are zero.
     pub(crate) fn checkpoint(&self) -> Result<Contents> {
         let mut tensors = self.parameters.values()?;
         let all = self.architecture.tensors();
@@ -99,8 +99,8 @@ impl Genvs {
         encoder::volumes(self.layers(ENCODER), &self.architecture.encoder, pictures)
     }
 
-    /// The features `[object and target][row][column][feature]` that targets see with weights `[object][view]` of the views,
-    /// from volumes `[object and view]`; samples lie on rays as the block says.
+    /// The feature images `[object and target][row][column][feature]` of targets with weights `[object][view]` of the
+    /// views, from volumes `[object and view]`, with the samples of the block.
     pub(crate) fn features(
         &self,
         volumes: &Tensor,
@@ -141,7 +141,7 @@ impl Genvs {
         enlarge(&seen.reshape((target_count, side / 2, side / 2, sizes.features))?, side, side)
     }
 
-    /// The parameters of the network at points in the order of [`LookSizes::parameter_count`].
+    /// The parameters of the point network in the order of [`LookSizes::parameter_count`].
     fn point_parameters(&self) -> Result<Tensor> {
         let layers = self.layers(MLP);
         let mut all = Vec::new();
@@ -154,7 +154,7 @@ impl Genvs {
     }
 
     /// The denoiser's network `F` on noisy pictures `[image][row][column][3]`, each at its own level, with their features.
-    /// What it believes is behind them is `c_skip noisy + c_out F`, see [`Preconditioning`].
+    /// Its estimate of the pictures is `c_skip noisy + c_out F`, see [`Preconditioning`].
     pub(crate) fn network(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
         let Some(sizes) = &self.architecture.denoiser else { candle_core::bail!("the network has no denoiser") };
         let scales = each(at.iter().map(|at| at.input), noisy)?;
@@ -163,21 +163,21 @@ impl Genvs {
         denoiser::run(self.layers(""), sizes, &inputs, &levels)
     }
 
-    /// What the denoiser believes is behind noisy pictures.
+    /// The denoiser's estimate of the pictures behind noisy ones.
     pub(crate) fn denoised(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
         let output = self.network(noisy, features, at)?.broadcast_mul(&each(at.iter().map(|at| at.output), noisy)?)?;
         output + noisy.broadcast_mul(&each(at.iter().map(|at| at.skip), noisy)?)?
     }
 }
 
-/// A number for each image, to be multiplied with images.
+/// A number for each image, in a shape for products with images.
 pub(crate) fn each(values: impl Iterator<Item = f32>, images: &Tensor) -> Result<Tensor> {
     let values: Vec<f32> = values.collect();
     let count = values.len();
     Tensor::from_vec(values, (count, 1, 1, 1), &Device::Cpu)?.to_dtype(images.dtype())
 }
 
-/// The tensors that pictures depend on.
+/// The used tensors.
 fn used(architecture: &Architecture) -> Vec<TensorShape> {
     let mut tensors = architecture.tensors();
     let unused = unused(&tensors);
@@ -190,7 +190,7 @@ fn first_values(tensor: &TensorShape, seed: u64) -> Vec<f32> {
     let count: usize = shape.iter().product();
     let is_denoiser = name.starts_with("denoiser.");
     let is_last_of_points = name.starts_with(&format!("{MLP}.2."));
-    // The last layer of a residual block, of attention, of the denoiser: nothing is added at first.
+    // The last layers of residual blocks, of attention and of the denoiser: zero at first.
     let zero = if is_denoiser {
         [".conv1.weight", ".proj.weight", "_aux_conv.weight"].iter().any(|end| name.ends_with(end))
     } else {
@@ -206,7 +206,7 @@ fn first_values(tensor: &TensorShape, seed: u64) -> Vec<f32> {
         // A norm.
         return vec![1.0; count];
     }
-    // An output pixel of a transposed convolution sees a single place of every input channel.
+    // An output pixel of a transposed convolution depends on a single place of every input channel.
     let inputs = if name.contains("upconv") { shape[0] } else { fan_in(tensor) };
     let gain = match () {
         () if name.ends_with(".qkv.weight") => 0.2,

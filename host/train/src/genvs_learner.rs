@@ -1,11 +1,11 @@
 //! A small GeNVS, with equal weights of the views as published.
 //!
 //! The loss is that of "Elucidating the design space of diffusion-based generative models" (Karras et al. 2022): noise of a
-//! random level on the truth, the network asked for what it would have to say, all levels of one weight. Two things are for
-//! small data and short runs. The first three features, beside everything else that they may become, are trained to be what
-//! a ray's colour lacks to white, so that volumes learn shapes before the denoiser learns to read them. And a share of the
-//! pictures has the level at which sampling begins, where the best answer is the mean of all pictures that the sources
-//! allow: what a single call gives, and what squared errors ask for.
+//! random level on the ground truth, the squared error of the network's output, all levels with one weight. Two changes are
+//! for small data and short runs. The first three features are also trained to be the difference of white and a ray's
+//! colour, so that volumes learn shapes before the denoiser learns to use them. And a share of the pictures has the largest
+//! noise level, where the best output is the mean of all pictures that the sources allow: the result of a single call, and
+//! the minimum of the squared error.
 
 use super::TrainError;
 use super::draw::{Draw, Purpose};
@@ -23,10 +23,10 @@ use viewfuse_field::genvs::Architecture;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// What a run is made of beside its schedule and scenes.
+/// The settings of a run besides its schedule and scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GenvsSettings {
-    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that goes on from a file has the
+    /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that continues from a file has the
     /// file's.
     pub width: usize,
     /// Side of the pictures.
@@ -35,19 +35,19 @@ pub struct GenvsSettings {
     pub objects: usize,
     /// Targets of each.
     pub targets: usize,
-    /// Samples of a ray, as many as a render will have: samples shade themselves, and more of them would be brighter.
+    /// Samples of a ray, as many as in renders: samples shade themselves, so another number changes the brightness.
     pub samples: u32,
 }
 
-/// How many sources a step has: drawn from this list.
+/// The numbers of sources of a step, one of which is drawn.
 const SOURCE_COUNTS: [usize; 4] = [1, 2, 3, 3];
 /// Mean and deviation of the logarithm of noise levels, as published.
 const LEVELS: [f32; 2] = [-1.2, 1.2];
-/// Share of the pictures that have the largest level.
+/// Share of the pictures with the largest level.
 const SHARE_OF_LARGEST: f32 = 0.25;
-/// Weight of the first features' squared error: at the largest level, that of the picture's has the same.
+/// Weight of the first features' squared error: that of the picture's at the largest level.
 const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
-/// Objects that validation looks at, and views of each.
+/// Objects in validation, and views of each.
 const VALIDATION_OBJECTS: usize = 24;
 const VALIDATION_VIEWS: ViewCounts = ViewCounts { sources: 3, targets: 1 };
 
@@ -58,7 +58,7 @@ struct GenvsLearner {
     settings: GenvsSettings,
 }
 
-/// Trains a GeNVS in `folder`, or goes on there: from scratch, or from a network that was learned before.
+/// Trains a GeNVS in `folder`, or continues there: from scratch, or from a trained network.
 ///
 /// # Errors
 /// [`TrainError`].
@@ -86,11 +86,11 @@ pub fn train_genvs(
     run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
 }
 
-/// Pictures with noise on them.
+/// Noisy pictures.
 pub(super) struct Noisy {
     /// `[image][row][column][3]`.
     pub(super) pictures: Tensor,
-    /// Of each image.
+    /// Noise level of each image.
     pub(super) at: Vec<Preconditioning>,
 }
 
@@ -103,8 +103,8 @@ impl Noisy {
         Ok(Noisy { pictures, at: levels.iter().map(|level| Preconditioning::at(*level)).collect() })
     }
 
-    /// What the network should say: `(truth - c_skip noisy) / c_out`, of variance 1 at every level.
-    fn wanted(&self, truth: &Tensor) -> Result<Tensor> {
+    /// The network's target output: `(truth - c_skip noisy) / c_out`, of variance 1 at every level.
+    fn target(&self, truth: &Tensor) -> Result<Tensor> {
         let skipped = self.pictures.broadcast_mul(&each(self.at.iter().map(|at| at.skip), truth)?)?;
         (truth - skipped)?.broadcast_div(&each(self.at.iter().map(|at| at.output), truth)?)
     }
@@ -120,12 +120,12 @@ fn levels(draw: &Draw, count: usize) -> Vec<f32> {
     (0..count).map(level).collect()
 }
 
-/// The picture `[image][row][column][3]` in `[-1, 1]` that the first features tell of: they are what it lacks to white.
+/// The picture `[image][row][column][3]` in `[-1, 1]` of the first features: they are its difference from white.
 pub(super) fn colours(features: &Tensor) -> Result<Tensor> {
     1.0 - features.narrow(3, 0, 3)?
 }
 
-/// The loss of some views, whose noise is the draw's.
+/// The loss of some views, with noise by `draw`.
 pub(super) fn loss(
     network: &Genvs,
     views: &Views,
@@ -136,13 +136,13 @@ pub(super) fn loss(
     let features = network.features(&network.volumes(&views.pictures)?, weights, views, samples)?;
     let noisy = Noisy::new(&views.truth, &levels(draw, views.truth.dim(0)?), draw)?;
     let said = network.network(&noisy.pictures, &features, &noisy.at)?;
-    let error = (said - noisy.wanted(&views.truth)?)?.sqr()?.mean_all()?;
+    let error = (said - noisy.target(&views.truth)?)?.sqr()?.mean_all()?;
     let colour_error = (colours(&features)? - &views.truth)?.sqr()?.mean_all()?;
     error + (colour_error * FEATURES_WEIGHT)?
 }
 
-/// Mean PSNR over scenes of what one call makes of noise of the largest level, and of the colours that the features tell of,
-/// with the weights that `weigh` gives the views: the same views and noise every time, whatever the run's seed.
+/// Mean PSNR over scenes of one call for noise of the largest level, and of the features' colours, with the weights `weigh`
+/// of the views: the same views and noise every time, for any seed of the run.
 pub(super) fn scores(
     network: &Genvs,
     scenes: &[TrainingScene],
@@ -187,7 +187,7 @@ impl Learner for GenvsLearner {
             scores(&self.network, &self.validation, VALIDATION_VIEWS, self.settings.samples, &|views| {
                 views.mean_weights()
             })?;
-        Ok(Validated { score, remark: format!("of the features {colour_score:.3} dB") })
+        Ok(Validated { score, remark: format!("features {colour_score:.3} dB") })
     }
 
     fn checkpoint(&self) -> Result<Contents> {

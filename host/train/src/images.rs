@@ -30,10 +30,10 @@ pub(crate) fn convolve_with(
     images.contiguous()?.apply_op3(&weights, &biases.contiguous()?, Apply(operation))
 }
 
-/// The largest of windows of 3x3, every second one, of images that are nowhere negative.
+/// Max pool with windows of 3x3 and stride 2, of images without negative values.
 pub(crate) fn max_pool(images: &Tensor) -> Result<Tensor> {
     let along = |images: &Tensor, axis: usize| -> Result<Tensor> {
-        // An even side is wanted; zeros outside change no maximum of what is not negative.
+        // The side must be even; zeros outside change no maximum of non-negative values.
         let odd = images.dim(axis)? % 2;
         let padded = images.pad_with_zeros(axis, 0, odd)?;
         let mut pairs = padded.dims().to_vec();
@@ -48,7 +48,7 @@ pub(crate) fn max_pool(images: &Tensor) -> Result<Tensor> {
     along(&along(images, 1)?, 2)
 }
 
-/// Bilinear enlargement that keeps the corners, as a product with constant matrices.
+/// Bilinear upsampling with aligned corners, as matrix products with constant matrices.
 pub(crate) fn enlarge(images: &Tensor, height: usize, width: usize) -> Result<Tensor> {
     let [count, in_height, in_width, channels] = dims4(images)?;
     if (in_height, in_width) == (height, width) {

@@ -1,21 +1,21 @@
-//! Training: networks from scratch, and the weighting of views for a network that stays as it is.
+//! Training: networks from scratch, and the weighting of views for a fixed network.
 //!
-//! Gradients are the library's (candle); what is ours are the networks' graphs, a few operations where the published
-//! networks do what the library cannot or does slowly (`operations`), and a run that can be killed at any moment and goes
-//! on where it was. Everything random is a function of the run's seed and the step (`draw`), and sums run in one order:
-//! a run that was interrupted ends in the same numbers as one that was not.
+//! Gradients are computed by candle. This crate has the networks' graphs, a few operations of the published networks
+//! that candle lacks or computes slowly (`operations`), and a run that can be killed at any time and continued. Every
+//! random draw is a function of the run's seed and the step (`draw`), and sums run in one order: an interrupted run
+//! gives the same numbers as an uninterrupted one.
 //!
 //! ```text
 //! scenes       pictures and cameras in memory            TrainingScene
 //! draw         random numbers of a step                  Draw
 //! batch        sources and target rays of a step         Batch
 //! operations   gradients of our own kernels              Convolution, PointNetwork, Look
-//! parameters   what is learned                           Parameters
+//! parameters   trained parameters                        Parameters
 //! images, compositing     parts of the graphs
 //! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
 //! attention    weighting of views as a graph             Attention
-//! adam, average           how it is learned
-//! state, curve            what a run needs to go on, and how it went
+//! adam, average           the optimiser
+//! state, curve            the saved state of a run, and its curves
 //! run          steps, validation, continuing             run, Settings
 //! pixelnerf_learner, genvs_learner, weighting_learner      losses
 //! ```
@@ -78,8 +78,8 @@ pub enum TrainError {
         /// Its height.
         height: u32,
     },
-    /// A scene has too few views for sources and a target.
-    #[error("{}: has {view_count} photographs; {least_views} are needed, as sources and one more", path.display())]
+    /// A scene has too few views for sources and a target view.
+    #[error("{}: has {view_count} photographs; {least_views} are needed, for the sources and a target", path.display())]
     FewViews {
         /// The scene.
         path: PathBuf,
@@ -91,42 +91,42 @@ pub enum TrainError {
     /// There are no scenes.
     #[error("there are no scenes to {purpose}")]
     NoScenes {
-        /// What for.
+        /// Their purpose.
         purpose: &'static str,
     },
-    /// The size of the pictures is unusable.
+    /// The size of the pictures is invalid.
     #[error("{}: cannot be resampled: {error}", path.display())]
     Pinhole {
         /// The scene.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         error: PinholeError,
     },
     /// A checkpoint could not be read.
     #[error(transparent)]
     Parameters(#[from] CheckpointError),
-    /// A checkpoint is not what can be trained on.
+    /// A checkpoint cannot be used for training.
     #[error("{}: {reason}", path.display())]
     Checkpoint {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// The folder holds a run with other settings.
-    #[error("{}: holds a run with other settings: {difference}; give another folder, or the same settings to go on", path.display())]
+    #[error("{}: holds a run with other settings: {difference}; give another folder, or the same settings to continue", path.display())]
     OtherRun {
         /// The file with the run's state.
         path: PathBuf,
-        /// What differs.
+        /// The difference.
         difference: String,
     },
-    /// The run's state cannot be used.
+    /// The run's state is invalid.
     #[error("{}: is not the state of a training run: {reason}", path.display())]
     State {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// The loss or a parameter became NaN or infinite.
@@ -134,16 +134,16 @@ pub enum TrainError {
     NotFinite {
         /// The step.
         step: u32,
-        /// What is not finite.
+        /// The value that is not finite.
         what: String,
     },
     /// An output could not be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// The library of automatic differentiation refused.
+    /// The library of automatic differentiation reported an error.
     #[error("the training graph: {0}")]
     Graph(#[from] candle_core::Error),
-    /// The person stopped the work.
+    /// The work was cancelled.
     #[error("{0}")]
     Interrupted(#[from] Interrupted),
 }

@@ -1,8 +1,8 @@
-//! Operations of our own inside the automatic differentiation: each knows its value and its gradient on plain numbers, in
-//! `f32` for training and in `f64` for the tests that compare gradients with central differences.
+//! Custom operations of the automatic differentiation: each computes its value and its gradient on plain numbers, in `f32`
+//! for training and in `f64` for the tests that compare gradients with central differences.
 //!
-//! An operation is its own only where the library has none with the published conventions, or where it would move whole
-//! images of intermediate numbers through memory for every step that a processor can take in its caches.
+//! There is a custom operation only where the library has none with the published conventions, or where the library would
+//! write whole images of intermediate numbers to memory that fit into a processor's caches.
 
 mod convolve;
 mod density;
@@ -47,7 +47,7 @@ impl Real for f64 {
 
 /// A function of `N` tensors, all contiguous and row-major, all of one type.
 pub(crate) trait Operation<const N: usize>: Send + Sync + 'static {
-    /// What it is called in messages.
+    /// Its name in messages.
     const NAME: &'static str;
 
     /// Shape of the result.
@@ -56,18 +56,18 @@ pub(crate) trait Operation<const N: usize>: Send + Sync + 'static {
     /// The result.
     fn forward<T: Real>(&self, inputs: [&[T]; N]) -> Vec<T>;
 
-    /// Gradients of the inputs (`None` where nobody asks), given the result and its gradient.
+    /// Gradients of the inputs (`None` where not needed), given the result and its gradient.
     fn backward<T: Real>(&self, inputs: [&[T]; N], output: &[T], gradient: &[T]) -> [Option<Vec<T>>; N];
 }
 
-/// An operation as the library takes it.
+/// An operation in the library's form.
 pub(crate) struct Apply<O>(pub(crate) O);
 
 fn slice<'a, T: WithDType>(storage: &'a CpuStorage, layout: &Layout) -> Result<&'a [T]> {
     let all = T::cpu_storage_as_slice(storage)?;
     match layout.contiguous_offsets() {
         Some((start, end)) => Ok(&all[start..end]),
-        None => candle_core::bail!("an operation of our own was given a tensor that is not contiguous"),
+        None => candle_core::bail!("a custom operation was given a tensor that is not contiguous"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Parameters that are learned, by the names that they have in a checkpoint.
+//! Trained parameters, by their names in a checkpoint.
 
 use super::TrainError;
 use candle_core::{DType, Device, Tensor, Var};
@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use viewfuse_core::random::{normal, threefry_2x32};
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 
-/// What becomes a checkpoint: tensors with their values, and what the file says beside them.
+/// The content of a checkpoint: tensors with their values, and metadata.
 pub(crate) type Contents = (Vec<(TensorShape, Vec<f32>)>, BTreeMap<String, String>);
 
 /// Named parameters.
@@ -36,7 +36,7 @@ impl Parameters {
         Parameters::new(tensors, dtype, |tensor| Ok(checkpoint.tensor(&tensor.name)?))
     }
 
-    /// The numbers that they are.
+    /// Their number of elements.
     pub(crate) fn dtype(&self) -> DType {
         self.dtype
     }
@@ -72,7 +72,7 @@ impl Parameters {
 
 /// Normally distributed numbers of this deviation: a function of the seed and the tensor's name.
 pub(crate) fn random(tensor: &TensorShape, seed: u64, deviation: f32) -> Vec<f32> {
-    // Names are told apart by a key of their own (FNV-1a).
+    // A key for each name (FNV-1a).
     let hash = tensor
         .name
         .bytes()

@@ -1,6 +1,6 @@
-//! PixelNeRF as a graph that can be differentiated: the family of [`viewfuse_field::pixelnerf`], with batch norms that keep
-//! the statistics they begin with (mean 0, variance 1), so that training and rendering compute the same, and one point
-//! network for both passes.
+//! PixelNeRF as a differentiable graph: the family of [`viewfuse_field::pixelnerf`], with batch norms of constant
+//! statistics (mean 0, variance 1), so that training and rendering compute the same, and one point network for both
+//! passes.
 
 #[cfg(test)]
 mod tests;
@@ -20,9 +20,9 @@ use viewfuse_field::pixelnerf::architecture::Architecture;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::resnet::has_shortcut;
 
-/// What the field adds to variances.
+/// Added to variances (epsilon), as in the field.
 const VARIANCE_FLOOR: f64 = 1.0e-5;
-/// Density that all of space begins with: light reaches every sample, and every sample a gradient.
+/// Initial density of all space: low, so that every sample has a weight and a gradient.
 const FIRST_DENSITY: f32 = 0.3;
 
 /// Samples of a ray.
@@ -41,13 +41,13 @@ pub(crate) struct PixelNerf {
     pub(crate) is_frozen: bool,
 }
 
-/// Statistics that batch norms keep.
+/// The constant statistics of batch norms.
 fn is_statistic(name: &str) -> bool {
     name.ends_with(".running_mean") || name.ends_with(".running_var")
 }
 
 impl PixelNerf {
-    /// At the beginning of training: He's initialisation, second layers of the blocks zero, as published.
+    /// Initial parameters: He's initialisation, second layers of the blocks zero, as published.
     pub(crate) fn new(
         architecture: Architecture,
         dtype: DType,
@@ -69,7 +69,7 @@ impl PixelNerf {
         Ok(PixelNerf { architecture, parameters, is_frozen: false })
     }
 
-    /// A trained one, to be left as it is.
+    /// A trained network, which is not changed.
     ///
     /// # Errors
     /// [`TrainError`] if the checkpoint is of another family, has a second point network, or batch norms with statistics.
@@ -77,13 +77,16 @@ impl PixelNerf {
         let architecture = Architecture::of(checkpoint)?;
         let refuse = |reason: String| TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason };
         if architecture.has_fine {
-            return Err(refuse("it has a second point network, which this training does not know".to_owned()));
+            return Err(refuse("it has a second point network, which this training does not support".to_owned()));
         }
         let mut tensors = architecture.tensors();
         for tensor in tensors.iter().filter(|tensor| is_statistic(&tensor.name)) {
             let kept = if tensor.name.ends_with("mean") { 0.0 } else { 1.0 };
             if checkpoint.tensor(&tensor.name)?.iter().any(|value| *value != kept) {
-                return Err(refuse(format!("{} is not {kept} everywhere; statistics are not known here", tensor.name)));
+                return Err(refuse(format!(
+                    "{} is not {kept} everywhere; batch-norm statistics are not supported",
+                    tensor.name
+                )));
             }
         }
         tensors.retain(|tensor| !is_statistic(&tensor.name));
@@ -91,7 +94,7 @@ impl PixelNerf {
         Ok(PixelNerf { architecture, parameters, is_frozen: true })
     }
 
-    /// Its tensors, with what the file says of it beside them.
+    /// Its tensors and metadata.
     pub(crate) fn checkpoint(&self) -> Result<Contents> {
         let mut tensors = self.parameters.values()?;
         for tensor in self.architecture.tensors().into_iter().filter(|tensor| is_statistic(&tensor.name)) {
@@ -122,8 +125,8 @@ impl PixelNerf {
         convolve(images, &weights, window, !is_first)?.broadcast_add(get(norm, "bias")?)
     }
 
-    /// From pictures `[image][row][column][3]` in `[-1, 1]` to what the point network adds to its flow,
-    /// `[image][row][column][block][width]`, rows and columns half as many.
+    /// The outputs of `lin_z` for pictures `[image][row][column][3]` in `[-1, 1]`:
+    /// `[image][row][column][block][width]`, half as many rows and columns.
     pub(crate) fn grids(&self, pictures: &Tensor) -> Result<Tensor> {
         let stem = Window { size: 7, stride: 2, padding: 3, dilation: 1 };
         let first = self.normalised(pictures, "conv1", "bn1", stem, true)?.relu()?;
@@ -178,7 +181,8 @@ impl PixelNerf {
         Tensor::cat(&all, 0)
     }
 
-    /// Densities and colours at points `[object][point]`: `[object and point][4]`, not yet rectified or squashed.
+    /// Densities and colours at points `[object][point]`: `[object and point][4]`, without rectification and logistic
+    /// function.
     fn raw(&self, network: &Seen<'_>, points: &[Vec<RayPoint>]) -> Result<Tensor> {
         let [_, height, width, _] = dims4(network.grids)?;
         let Architecture { frequency_count, frequency, pixel_centre, .. } = self.architecture;
@@ -190,7 +194,7 @@ impl PixelNerf {
     }
 
     /// The colours of a batch's rays, `[object and ray][3]` in `[0, 1]`, over white, with weights `[object][view]` of the
-    /// views. The first pass, which decides where the second looks, is not differentiated.
+    /// views. The first pass, which places the samples of the second, is not differentiated.
     pub(crate) fn render(&self, batch: &Batch, weights: &Tensor, draw: &Draw, counts: SampleCounts) -> Result<Tensor> {
         let (mut grids, mut parameters) = (self.grids(&batch.pictures)?, self.point_parameters()?);
         if self.is_frozen {
@@ -227,11 +231,11 @@ impl PixelNerf {
         let weights = sample_weights(&density(&raw, &lengths)?, &lengths)?;
         let colours = logistic(&raw.narrow(1, 0, 3)?)?.reshape((lengths.dim(0)?, lengths.dim(1)?, 3))?;
         let sum = weights.unsqueeze(1)?.matmul(&colours)?.squeeze(1)?;
-        // What is not stopped is white.
+        // The remaining transmittance is white.
         sum.broadcast_add(&(1.0 - weights.sum_keepdim(1)?)?)
     }
 
-    /// What the network says at samples, and the lengths `[object and ray][sample]` that they stand for.
+    /// The network's outputs at samples, and their lengths `[object and ray][sample]`.
     fn sampled(&self, seen: &Seen<'_>, batch: &Batch, depths: &[Vec<f32>]) -> Result<(Tensor, Tensor)> {
         let points: Vec<Vec<RayPoint>> =
             batch.rays.iter().zip(depths).map(|(rays, depths)| points(rays, depths)).collect();
@@ -243,7 +247,7 @@ impl PixelNerf {
     }
 }
 
-/// What the point network is asked with.
+/// The point network's inputs.
 struct Seen<'a> {
     cameras: &'a [Vec<viewfuse_core::camera::CameraBlock>],
     grids: &'a Tensor,
@@ -260,7 +264,7 @@ fn logistic(values: &Tensor) -> Result<Tensor> {
     (values.neg()?.exp()? + 1.0)?.recip()
 }
 
-/// What He's deviation is multiplied by: the last layer begins quietly.
+/// Factor of He's deviation: the last layer starts with small outputs.
 fn gain(name: &str) -> f32 {
     if name.ends_with("lin_out.weight") { 0.1 } else { 1.0 }
 }

@@ -14,10 +14,10 @@ use viewfuse_field::pixelnerf::architecture::Architecture;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// What a run is made of beside its schedule and scenes.
+/// The settings of a run besides its schedule and scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PixelNerfSettings {
-    /// Width of the point network; the trunk is as wide as fits to it. A network that goes on from a file has the file's.
+    /// Width of the point network; the trunk's width follows from it. A network that continues from a file has the file's.
     pub width: usize,
     /// Side of the pictures.
     pub side: u32,
@@ -31,10 +31,10 @@ pub struct PixelNerfSettings {
     pub fine: usize,
 }
 
-/// How many sources a step has: drawn from this list. Mostly three, so that what is learned can do with few, sometimes one
-/// or more, so that it can do with any weights.
+/// The numbers of sources of a step, one of which is drawn: mostly three, so that the network works with few sources,
+/// sometimes one or more, so that it works with any weights.
 const SOURCE_COUNTS: [usize; 8] = [1, 2, 3, 3, 3, 3, 4, 6];
-/// Objects and rays of each that validation looks at, sources, and samples.
+/// Objects in validation, rays of each, sources, and samples.
 const VALIDATION: BatchSize = BatchSize { objects: 24, rays: 192 };
 const VALIDATION_SOURCES: usize = 3;
 const VALIDATION_SAMPLES: SampleCounts = SampleCounts { coarse: 64, fine: 32 };
@@ -46,7 +46,7 @@ struct PixelNerfLearner {
     settings: PixelNerfSettings,
 }
 
-/// Trains a PixelNeRF in `folder`, or goes on there: from scratch, or from a network that was learned before.
+/// Trains a PixelNeRF in `folder`, or continues there: from scratch, or from a trained network.
 ///
 /// # Errors
 /// [`TrainError`].
@@ -76,8 +76,8 @@ pub(super) fn decibels(mean_square: &Tensor) -> Result<f64> {
     Ok(-10.0 * f64::from(mean_square.to_dtype(DType::F32)?.to_scalar::<f32>()?).log10())
 }
 
-/// Mean PSNR over some rays of scenes, with the weights that `weigh` gives the views: the same rays and sources every time,
-/// whatever the run's seed.
+/// Mean PSNR over some rays of scenes, with the weights `weigh` of the views: the same rays and sources every time,
+/// for any seed of the run.
 pub(super) fn score(
     network: &PixelNerf,
     scenes: &[TrainingScene],

@@ -1,8 +1,8 @@
-//! A training run: steps, validation, a state from which it goes on, and what it leaves in its folder.
+//! A training run: steps, validation, the saved state, and the files of its folder.
 //!
 //! ```text
-//! state.safetensors   to go on from
-//! model.safetensors   the learned parameters (their moving average), whenever the state is written
+//! state.safetensors   the state, for continuing
+//! model.safetensors   the trained parameters (their moving average), written with the state
 //! curve.svg           loss and validation over the steps
 //! record.json         settings, times, scores
 //! ```
@@ -24,7 +24,7 @@ use viewfuse_job::files::write_whole;
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
 
-/// How long, and how fast.
+/// Length and learning rate of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Schedule {
     /// Steps of the run.
@@ -32,11 +32,11 @@ pub struct Schedule {
     /// Learning rate after the first hundred steps, over which it rises; from there it falls along a cosine to
     /// 3 % of it.
     pub rate: f64,
-    /// Seed of every random number.
+    /// Seed of every random draw.
     pub seed: u64,
     /// Steps from one validation to the next.
     pub validate_every: u32,
-    /// Seconds from one writing of the state to the next; changes no number.
+    /// Seconds between writing the state; changes no number.
     #[serde(skip)]
     pub write_every: f64,
 }
@@ -49,7 +49,7 @@ const LAST_RATE: f64 = 0.03;
 const LOSS_EVERY: u32 = 50;
 /// Largest norm of a gradient.
 const MOST_GRADIENT: f64 = 1.0;
-/// Share of the average of the parameters that a step leaves.
+/// Decay of the parameters' average at each step.
 const AVERAGING: f64 = 0.999;
 
 impl Schedule {
@@ -62,8 +62,8 @@ impl Schedule {
     }
 }
 
-/// What the numbers of a run hang on: a run goes on only where all of it is the same. Files are told by what is in them,
-/// not by where they lie.
+/// The inputs that a run's numbers depend on: a run continues only if all of them are the same. Files are identified by
+/// their content, not by their path.
 pub(crate) fn settings(
     model: &str,
     own: &impl Serialize,
@@ -83,33 +83,33 @@ pub(crate) fn settings(
     }))
 }
 
-/// Something that is learned.
+/// A trainable model.
 pub(crate) trait Learner {
-    /// What is learned.
+    /// Its parameters.
     fn parameters(&self) -> &Parameters;
 
     /// The loss of a step.
     fn loss(&self, draw: &Draw) -> candle_core::Result<Tensor>;
 
-    /// How good it is on what it does not learn from; higher is better.
+    /// Its score on validation data; higher is better.
     fn validate(&self) -> candle_core::Result<Validated>;
 
-    /// The file that it becomes: tensors and metadata.
+    /// Its checkpoint: tensors and metadata.
     fn checkpoint(&self) -> candle_core::Result<Contents>;
 }
 
-/// What validation found.
+/// The result of validation.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Validated {
     pub(crate) score: f64,
-    /// What else there is to say.
+    /// A remark for the log.
     pub(crate) remark: String,
 }
 
-/// How a run ended.
+/// The outcome of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// The learned parameters.
+    /// The trained parameters.
     pub model: PathBuf,
     /// Seconds of all steps, those of earlier parts of the run included.
     pub seconds: f64,
@@ -117,7 +117,7 @@ pub struct Outcome {
     pub scores: Vec<(u32, f64)>,
 }
 
-/// Trains, or goes on, until all steps are made. Interrupted, it writes its state first.
+/// Trains, or continues, until all steps are done. On cancellation it writes its state first.
 pub(crate) fn run(
     learner: &dyn Learner,
     schedule: &Schedule,
@@ -196,7 +196,7 @@ impl Run<'_> {
         )
     }
 
-    /// The state last: whoever goes on from it finds the rest.
+    /// The state is written last, so that all other files exist when a run continues from it.
     fn write(&self, so_far: &Progressed, learned: &Learned<'_>) -> Result<(), TrainError> {
         let (tensors, metadata) = learned.as_written(|| self.learner.checkpoint())?;
         Checkpoint::in_memory("trained", tensors, metadata).write_safetensors(
@@ -209,7 +209,7 @@ impl Run<'_> {
             "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),
             "settings": self.settings,
             "steps": so_far.steps,
-            "steps_wanted": self.schedule.steps,
+            "steps_planned": self.schedule.steps,
             "seconds": so_far.seconds,
             "losses": so_far.losses,
             "score": self.score_name,

@@ -1,4 +1,4 @@
-//! Scenes to learn from, in memory: pictures over white at the size that is trained at, with their cameras.
+//! Training scenes in memory: pictures over white at the training size, with their cameras.
 
 use super::TrainError;
 use image::imageops::{FilterType, resize};
@@ -12,7 +12,7 @@ use viewfuse_job::digest::hexadecimal;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 
-/// What a run learns from, and what it is validated on.
+/// Training and validation scenes.
 pub(crate) struct Data {
     pub(crate) training: Vec<TrainingScene>,
     pub(crate) validation: Vec<TrainingScene>,
@@ -53,17 +53,17 @@ impl Data {
 /// One object with all its views.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrainingScene {
-    /// Where it was read from.
+    /// Its path.
     pub(crate) path: PathBuf,
-    /// Of the pictures at this size.
+    /// Cameras of the pictures at this size.
     pub(crate) cameras: Vec<Camera>,
     /// The same as kernels take them.
     pub(crate) blocks: Vec<CameraBlock>,
     /// Over white.
     pub(crate) pictures: Vec<RgbImage>,
-    /// First and last column and row of what is not white in each picture; all of an empty one.
+    /// First and last column and row of each picture's pixels that are not white; the whole of an empty picture.
     pub(crate) bounds: Vec<[u32; 4]>,
-    /// Where rays begin and end.
+    /// Near and far bounds.
     pub(crate) near_far: [f32; 2],
 }
 
@@ -101,7 +101,7 @@ impl TrainingScene {
         })
     }
 
-    /// Reads many, all cores at once.
+    /// Reads several scenes, on all cores.
     ///
     /// # Errors
     /// As [`TrainingScene::open`], and [`TrainError::FewViews`] where one has fewer than `least_views`.
@@ -129,7 +129,7 @@ impl TrainingScene {
         self.pictures[view].get_pixel(column, row).0.map(|value| f32::from(value) / 255.0)
     }
 
-    /// A picture as networks are shown it: `[row][column][channel]`, in `[-1, 1]`.
+    /// A picture as a network's input: `[row][column][channel]`, in `[-1, 1]`.
     pub(crate) fn shown(&self, view: usize) -> impl Iterator<Item = f32> + '_ {
         self.pictures[view].as_raw().iter().map(|value| f32::from(*value) / 127.5 - 1.0)
     }
@@ -145,7 +145,7 @@ fn over_white(pixels: &image::RgbaImage) -> RgbImage {
 fn bounds(picture: &RgbImage) -> [u32; 4] {
     let mut bounds = [u32::MAX, u32::MAX, 0, 0];
     for (column, row, pixel) in picture.enumerate_pixels() {
-        // What is left of a white background after resampling is no object.
+        // The rest of a white background after resampling is not part of the object.
         if pixel.0.iter().any(|value| *value < 250) {
             bounds = [bounds[0].min(column), bounds[1].min(row), bounds[2].max(column), bounds[3].max(row)];
         }

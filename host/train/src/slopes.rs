@@ -1,4 +1,4 @@
-//! What the tests of training share: toy photographs, random numbers, closeness, and gradients compared with slopes.
+//! Helpers of the training tests: toy photographs, random draws, comparison, and gradients compared with slopes.
 
 use candle_core::{DType, Device, Result, Tensor, Var};
 use viewfuse_core::camera::{Camera, Pinhole};

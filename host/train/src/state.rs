@@ -1,4 +1,5 @@
-//! What a run needs to go on: parameters, the optimiser's moments, and the curves so far, in one file that appears whole.
+//! The saved state of a run: parameters, the optimiser's moments, and the curves so far, in one file that is written
+//! completely or not at all.
 
 use super::TrainError;
 use super::adam::Adam;
@@ -12,12 +13,12 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use viewfuse_job::files::write_whole;
 
-/// What has happened so far.
+/// Progress of the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Progressed {
-    /// Steps that were made.
+    /// Completed steps.
     pub(crate) steps: u32,
-    /// Time that they took, seconds.
+    /// Their time, seconds.
     pub(crate) seconds: f64,
     /// Step and mean loss since the entry before.
     pub(crate) losses: Vec<(u32, f64)>,
@@ -30,7 +31,7 @@ pub(crate) struct Progressed {
 const SETTINGS: &str = "settings";
 const PROGRESSED: &str = "progressed";
 
-/// What a run changes.
+/// The variables of a run.
 pub(crate) struct Learned<'a> {
     pub(crate) parameters: &'a Parameters,
     pub(crate) adam: Adam,
@@ -38,7 +39,7 @@ pub(crate) struct Learned<'a> {
 }
 
 impl Learned<'_> {
-    /// Does something while the parameters are what the run's model is: their average.
+    /// Calls `work` while the parameters are those of the run's model: their average.
     pub(crate) fn as_written<R>(&self, work: impl FnOnce() -> candle_core::Result<R>) -> candle_core::Result<R> {
         self.average.during(self.parameters, work)
     }
@@ -82,10 +83,10 @@ pub(crate) fn write(
     Ok(write_whole(path, &file)?)
 }
 
-/// Reads the state into the parameters and moments, if there is one.
+/// Loads the state into the parameters and moments, if there is one.
 ///
 /// # Errors
-/// [`TrainError::OtherRun`] if it is that of other settings, [`TrainError::State`] if it cannot be used.
+/// [`TrainError::OtherRun`] if it has other settings, [`TrainError::State`] if it is invalid.
 pub(crate) fn read(
     path: &Path,
     settings: &serde_json::Value,
@@ -126,10 +127,10 @@ pub(crate) fn read(
     Ok(Some(progressed))
 }
 
-/// The first setting that differs, in words.
+/// The first difference of the settings, as text.
 fn difference(earlier: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
     let (Some(earlier), Some(now)) = (earlier.as_object(), now.as_object()) else {
-        return (earlier != now).then(|| "its settings are no list".to_owned());
+        return (earlier != now).then(|| "its settings are not a list".to_owned());
     };
     let keys = earlier.keys().chain(now.keys());
     let differing = keys.into_iter().find(|key| earlier.get(*key) != now.get(*key))?;

@@ -1,5 +1,5 @@
-//! The paper's learned weighting: the network stays as it is, and only the weighting of its views is learned, with the
-//! network's own loss.
+//! The paper's learned weighting: the network is fixed, and only the weighting of its views is trained, with the network's
+//! own loss.
 
 use super::TrainError;
 use super::attention::{Attention, Embedding};
@@ -23,10 +23,10 @@ use viewfuse_field::family::Family;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// What a run is made of beside its schedule, its scenes and the network.
+/// The settings of a run besides its schedule, its scenes and the network.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WeightingSettings {
-    /// How poses become vectors.
+    /// The embedding of poses.
     pub embedding: Embedding,
     /// Side of the pictures.
     pub side: u32,
@@ -36,7 +36,7 @@ pub struct WeightingSettings {
     pub rays: usize,
 }
 
-/// How many sources a step has: drawn from this list.
+/// The numbers of sources of a step, one of which is drawn.
 const SOURCE_COUNTS: [usize; 4] = [3, 4, 6, 8];
 /// Sources in validation.
 const VALIDATION_SOURCES: usize = 6;
@@ -44,7 +44,7 @@ const VALIDATION_SOURCES: usize = 6;
 const SAMPLES: SampleCounts = SampleCounts { coarse: 32, fine: 16 };
 const GENVS_SAMPLES: u32 = 64;
 
-/// A network that stays as it is.
+/// A fixed network.
 enum Frozen {
     PixelNerf(PixelNerf),
     Genvs(Genvs),
@@ -58,7 +58,7 @@ struct WeightingLearner {
     settings: WeightingSettings,
 }
 
-/// Trains the weighting for a network in `folder`, or goes on there.
+/// Trains the weighting for a network in `folder`, or continues there.
 ///
 /// # Errors
 /// [`TrainError`].

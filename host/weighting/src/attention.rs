@@ -1,6 +1,6 @@
 //! Parameters of attention weighting, read from safetensors files.
 //!
-//! Which variant a file holds is recognised by its tensors' names, those of the published `state_dict`s and of the
+//! The variant of a file is recognised by its tensors' names, those of the published `state_dict`s and of the
 //! paper's two embeddings:
 //!
 //! | tensors | variant |
@@ -31,7 +31,7 @@ pub enum AttentionError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         cause: std::io::Error,
     },
     /// The file is not in the safetensors format.
@@ -39,7 +39,7 @@ pub enum AttentionError {
     Format {
         /// The file.
         path: PathBuf,
-        /// What the reader said.
+        /// The reader's error.
         cause: safetensors::SafeTensorError,
     },
     /// No known variant has these tensors.
@@ -57,18 +57,18 @@ pub enum AttentionError {
         /// The tensor.
         tensor: String,
     },
-    /// A tensor is not what the variant needs.
-    #[error("{}: tensor '{tensor}' must be F32 {wanted:?}, but is {dtype:?} {shape:?}", path.display())]
+    /// A tensor has another type or shape than the variant needs.
+    #[error("{}: tensor '{tensor}' must be F32 {expected:?}, but is {dtype:?} {shape:?}", path.display())]
     Shape {
         /// The file.
         path: PathBuf,
         /// The tensor.
         tensor: String,
-        /// The shape that is needed.
-        wanted: Vec<usize>,
-        /// The type that is there.
+        /// The required shape.
+        expected: Vec<usize>,
+        /// The file's type.
         dtype: Dtype,
-        /// The shape that is there.
+        /// The file's shape.
         shape: Vec<usize>,
     },
     /// A tensor holds NaN or infinity.
@@ -78,7 +78,7 @@ pub enum AttentionError {
         path: PathBuf,
         /// The tensor.
         tensor: String,
-        /// Where.
+        /// The first such element, flat.
         index: usize,
     },
 }
@@ -97,11 +97,11 @@ pub enum AttentionModel {
     PoseSelf(PoseSelfAttention),
 }
 
-/// Where a model's tensors come from: name and shape to values, row-major.
+/// Reads a model's tensors: from name and shape to values, row-major.
 pub type TensorSource<'a, E> = dyn FnMut(&str, &[usize]) -> Result<Vec<f32>, E> + 'a;
 
 impl AttentionModel {
-    /// Reads the parameters of whichever variant the file holds.
+    /// Reads the parameters of the file's variant.
     ///
     /// # Errors
     /// [`AttentionError`], always with the file and the tensor.
@@ -127,7 +127,7 @@ impl AttentionModel {
     /// The paper's cross attention, Fourier embedding.
     ///
     /// # Errors
-    /// Those of `tensors`.
+    /// The errors of `tensors`.
     pub fn fourier<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
         Ok(AttentionModel::Fourier(FourierEmbedding {
             first: linear::<POSE_FEATURES, HIDDEN, E>(tensors, "paper.0")?,
@@ -139,7 +139,7 @@ impl AttentionModel {
     /// The paper's cross attention, flattened pose.
     ///
     /// # Errors
-    /// Those of `tensors`.
+    /// The errors of `tensors`.
     pub fn flat<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
         Ok(AttentionModel::Flat(FlatEmbedding {
             first: linear::<16, HIDDEN, E>(tensors, "paper_flat.0")?,
@@ -150,7 +150,7 @@ impl AttentionModel {
     /// The published learned cross attention.
     ///
     /// # Errors
-    /// Those of `tensors`.
+    /// The errors of `tensors`.
     pub fn learned_cross<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
         let mut layer = |name: &str| {
             let weight = tensors(name, &[POSE_FEATURES, POSE_FEATURES])?;
@@ -165,7 +165,7 @@ impl AttentionModel {
     /// The published relative-pose self attention.
     ///
     /// # Errors
-    /// Those of `tensors`.
+    /// The errors of `tensors`.
     pub fn pose_self<E>(tensors: &mut TensorSource<'_, E>) -> Result<AttentionModel, E> {
         const N: usize = POSE_FEATURES;
         let weight = tensors("multihead_attention.in_proj_weight", &[3 * N, N])?;
@@ -211,14 +211,19 @@ fn assemble<const I: usize, const O: usize>(weight: &[f32], bias: &[f32]) -> Lin
     layer
 }
 
-fn read_tensor(path: &Path, file: &SafeTensors<'_>, name: &str, wanted: &[usize]) -> Result<Vec<f32>, AttentionError> {
+fn read_tensor(
+    path: &Path,
+    file: &SafeTensors<'_>,
+    name: &str,
+    expected: &[usize],
+) -> Result<Vec<f32>, AttentionError> {
     let path = || path.to_path_buf();
     let view = file.tensor(name).map_err(|_| AttentionError::Missing { path: path(), tensor: name.to_owned() })?;
-    if view.dtype() != Dtype::F32 || view.shape() != wanted {
+    if view.dtype() != Dtype::F32 || view.shape() != expected {
         return Err(AttentionError::Shape {
             path: path(),
             tensor: name.to_owned(),
-            wanted: wanted.to_vec(),
+            expected: expected.to_vec(),
             dtype: view.dtype(),
             shape: view.shape().to_vec(),
         });

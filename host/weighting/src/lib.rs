@@ -1,10 +1,10 @@
-//! How much each source view counts for a target view: weighting schemes by name, attention with parameters from files, and
-//! weightings by code from outside.
+//! Weights of the source views for a target view: weighting schemes by name, attention with parameters from files, and
+//! weightings that other crates implement.
 //!
 //! ```text
-//! sources     how many sources there can be              SourcePoses, SourceWeights
+//! sources     the most sources of a run                  SourcePoses, SourceWeights
 //! attention   attention's parameters from files          AttentionModel
-//! spec        what a person types, opening no file       WeightingSpec, scheme_names, grammar
+//! spec        the text form, parsed without any file     WeightingSpec, scheme_names, grammar
 //! weighting   ready to weigh                             Weighting, Weigh
 //! ```
 

@@ -1,9 +1,9 @@
-//! How many source views a run can have, and what is kept of each.
+//! The most source views of a run, their poses and weights.
 
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weights::Weights;
 
-/// Most source views of one run: the capacity of every fixed-size array of views on the host.
+/// The most source views of a run: the capacity of every fixed-size array of views on the host.
 pub const MOST_SOURCES: usize = 256;
 
 /// The poses of a run's sources.

@@ -1,4 +1,4 @@
-//! What a person types for a weighting, read and checked. No file is opened here.
+//! The text form of a weighting, parsed and checked. No file is opened here.
 //!
 //! Names, keys, ranges and defaults of the formulas are those of [`viewfuse_core::weighting::ROWS`].
 
@@ -11,16 +11,15 @@ use viewfuse_core::weighting::{Choice, Parameter, ROWS, Row, Scheme};
 /// The published attention without parameters.
 const CROSS_ATTENTION: &str = "cross-attention";
 
-/// Learned attention; behind the colon stands its file.
+/// Learned attention; its file follows the colon.
 const ATTENTION: &str = "attention";
 
-/// Every scheme that needs no file, with its default parameters, as a person types it: the rows of tables over all
-/// schemes.
+/// Every scheme that needs no file, with its default parameters, in text form: the rows of tables over all schemes.
 pub fn scheme_names() -> Vec<&'static str> {
     ROWS.iter().flat_map(|row| row.tables).copied().chain([CROSS_ATTENTION]).collect()
 }
 
-/// What a person can type, for help texts: `mean, l1, ..., gaussian:beta=B, ..., attention:FILE`.
+/// The text forms, for help texts: `mean, l1, ..., gaussian:beta=B, ..., attention:FILE`.
 pub fn grammar() -> String {
     let formulas = ROWS.iter().map(row_grammar);
     formulas.chain([CROSS_ATTENTION.to_owned(), format!("{ATTENTION}:FILE")]).collect::<Vec<_>>().join(", ")
@@ -43,7 +42,7 @@ pub enum WeightingError {
     /// No scheme has this name.
     #[error("unknown weighting scheme '{name}'; there are: {}", grammar())]
     UnknownScheme {
-        /// What was given.
+        /// The given text.
         name: String,
     },
     /// The scheme has no such parameter.
@@ -51,31 +50,31 @@ pub enum WeightingError {
     UnknownParameter {
         /// The scheme.
         scheme: String,
-        /// What was given.
+        /// The given text.
         key: String,
     },
-    /// The parameter's value is not usable.
-    #[error("weighting scheme '{scheme}': {key} must be {wanted}, not '{value}'")]
+    /// The parameter's value is invalid.
+    #[error("weighting scheme '{scheme}': {key} must be {range}, not '{value}'")]
     BadValue {
         /// The scheme.
         scheme: String,
         /// The parameter.
         key: String,
-        /// What it must be.
-        wanted: String,
-        /// What was given.
+        /// The allowed values, as text.
+        range: String,
+        /// The given text.
         value: String,
     },
     /// Learned attention without its parameters.
     #[error("weighting scheme '{ATTENTION}' needs a file of parameters: {ATTENTION}:FILE")]
     NoFile,
-    /// The attention parameters could not be read. Only opening gives this, not parsing.
+    /// The attention parameters could not be read: an error of opening, not of parsing.
     #[error(transparent)]
     Attention(#[from] AttentionError),
 }
 
-/// A weighting as a person typed it: checked, but nothing is read yet. `open` makes a
-/// [`Weighting`](crate::Weighting) of it.
+/// A parsed and checked weighting; no file is read yet. `open` turns it into a
+/// [`Weighting`](crate::Weighting).
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightingSpec {
     pub(crate) text: String,
@@ -90,7 +89,7 @@ pub(crate) enum Kind {
 }
 
 impl WeightingSpec {
-    /// The file that opening reads, if it reads one.
+    /// The file that opening reads, if any.
     pub fn file(&self) -> Option<&Path> {
         match &self.kind {
             Kind::Attention(path) => Some(path),
@@ -113,7 +112,7 @@ impl From<Scheme> for WeightingSpec {
 }
 
 impl fmt::Display for WeightingSpec {
-    /// The text as it was typed.
+    /// The text as given.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
     }
@@ -122,7 +121,7 @@ impl fmt::Display for WeightingSpec {
 impl FromStr for WeightingSpec {
     type Err = WeightingError;
 
-    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not looked at.
+    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not read.
     fn from_str(text: &str) -> Result<WeightingSpec, WeightingError> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         if name == ATTENTION {
@@ -174,7 +173,7 @@ impl<'a> Pairs<'a> {
             }
         };
         Scheme::new(row.formula, choice, parameter).map_err(|_| match given {
-            Some((Parameter { key, wanted, .. }, text)) => self.bad(key, wanted, text),
+            Some((Parameter { key, range, .. }, text)) => self.bad(key, range, text),
             // The defaults are in their ranges.
             None => WeightingError::UnknownScheme { name: self.scheme.to_owned() },
         })
@@ -185,9 +184,9 @@ impl<'a> Pairs<'a> {
         Some(self.pairs.remove(at).1)
     }
 
-    fn bad(&self, key: &str, wanted: &str, value: &str) -> WeightingError {
-        let [scheme, key, wanted, value] = [self.scheme, key, wanted, value].map(str::to_owned);
-        WeightingError::BadValue { scheme, key, wanted, value }
+    fn bad(&self, key: &str, range: &str, value: &str) -> WeightingError {
+        let [scheme, key, range, value] = [self.scheme, key, range, value].map(str::to_owned);
+        WeightingError::BadValue { scheme, key, range, value }
     }
 
     fn finish(self) -> Result<(), WeightingError> {
@@ -201,7 +200,7 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// The number of an option. Of options that are numbers the value counts: `2.0` is `2`.
+/// The number of an option. Numeric options are compared by value: `2.0` is `2`.
 fn numbered(choice: &Choice, text: &str) -> Option<u32> {
     let value = |text: &str| text.parse::<f32>().ok();
     let is_meant = |option: &&str| *option == text || value(option).is_some_and(|number| value(text) == Some(number));

@@ -1,4 +1,4 @@
-//! Weightings that are ready to weigh: by formula, by attention, or by code from outside.
+//! Weightings that are ready for use: by formula, by attention, or implemented by another crate.
 
 use crate::attention::{AttentionError, AttentionModel};
 use crate::sources::{SourcePoses, SourceWeights};
@@ -10,17 +10,17 @@ use viewfuse_core::attention::published_cross_attention;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::{Scheme, weigh};
 
-/// How much each source counts for a target. What a crate outside implements for a weighting of its own, which
-/// [`Weighting::custom`] takes.
+/// Weights of the sources for a target. A crate outside implements this for a weighting of its own and passes it to
+/// [`Weighting::custom`].
 pub trait Weigh: Send + Sync {
-    /// What tables and records call it.
+    /// Its name in tables and records.
     fn name(&self) -> String;
 
     /// The weights of the sources for a target, in the order of the sources: as many as there are sources.
     fn weigh(&self, sources: &SourcePoses, target: &Pose) -> SourceWeights;
 }
 
-/// A weighting, ready to weigh.
+/// A weighting that is ready for use.
 #[derive(Clone)]
 pub struct Weighting {
     name: String,
@@ -44,18 +44,18 @@ impl Weighting {
         Ok(text.parse::<WeightingSpec>()?.open()?)
     }
 
-    /// A weighting by code from outside. Weights for another number of sources than there are, which it must not give, are
-    /// cut or filled up with 0 and made to sum to 1.
+    /// A weighting of another crate. If it returns weights for another number of sources, which it must not, they are
+    /// truncated or filled with 0 and normalised to the sum 1.
     pub fn custom(weigh: impl Weigh + 'static) -> Weighting {
         Weighting { name: weigh.name(), weighs: Weighs::Custom(Arc::new(weigh)) }
     }
 
-    /// The scheme used where a person names none: error weighting with `alpha = 1`, the best of the paper's formulas.
+    /// The default scheme: error weighting with `alpha = 1`, the best of the paper's formulas.
     pub fn default_scheme() -> Weighting {
         Weighting::from(Scheme::ERROR)
     }
 
-    /// The file of its parameters, if it has one.
+    /// The file of its parameters, if any.
     pub fn file(&self) -> Option<&Path> {
         match &self.weighs {
             Weighs::Attention { file, .. } => Some(file),
@@ -81,7 +81,7 @@ impl Weighting {
 }
 
 impl WeightingSpec {
-    /// The weighting, ready to weigh. Learned attention is read from its file.
+    /// Opens the weighting: learned attention is read from its file.
     ///
     /// # Errors
     /// [`AttentionError`], always with the file.
@@ -114,7 +114,7 @@ impl From<Scheme> for Weighting {
 }
 
 impl fmt::Display for Weighting {
-    /// What tables and records call it: the text that a person typed, or the name from outside.
+    /// Its name in tables and records: the given text, or the name of a custom weighting.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.name)
     }

@@ -1,6 +1,6 @@
-//! Where the shader compiler is: a Rust toolchain with rust-gpu's code generator.
+//! Finds the shader compiler: a Rust toolchain with rust-gpu's code generator.
 //!
-//! The first of these that is there:
+//! The first of these that exists:
 //! 1. the folder that [`HOME_VARIABLE`] names;
 //! 2. a folder `rust-gpu-0.10.0-*` in the user's cache;
 //! 3. rustup's toolchain [`NIGHTLY`], for which the code generator is built once, from its published sources.
@@ -19,19 +19,19 @@ pub const HOME_VARIABLE: &str = "RUST_GPU_HOME";
 pub const VERSION: &str = "0.10.0";
 /// The toolchain that this release is made for.
 pub const NIGHTLY: &str = "nightly-2026-07-03";
-/// What to do where there is no compiler.
+/// The advice if there is no compiler.
 const ADVICE: &str = "install the official toolchain, `rustup toolchain install nightly-2026-07-03 --component rust-src,rustc-dev,llvm-tools`, \
     or let RUST_GPU_HOME name a folder with bin/cargo, bin/rustc and the code generator of rust-gpu 0.10.0 in lib";
 
-/// Why there is no compiler.
+/// Why no compiler was found.
 #[derive(Debug, thiserror::Error)]
 pub enum BackendError {
-    /// The folder that was named is not one.
+    /// The named folder has no compiler.
     #[error("{HOME_VARIABLE} names {}, where {} is missing", home.display(), missing.display())]
     Incomplete {
         /// The folder.
         home: PathBuf,
-        /// What it should hold.
+        /// The missing file.
         missing: PathBuf,
     },
     /// None of the places has one.
@@ -40,9 +40,9 @@ pub enum BackendError {
     /// A program that should provide one failed.
     #[error("{program} failed: {reason}")]
     Failed {
-        /// What ran.
+        /// The program.
         program: String,
-        /// What it said last.
+        /// Its last message.
         reason: String,
     },
     /// A folder of our own could not be written.
@@ -50,17 +50,17 @@ pub enum BackendError {
     Write {
         /// The file or folder.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
 }
 
-/// A compiler that is there.
+/// An installed compiler.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Backend {
     /// rust-gpu's code generator.
     pub code_generator: PathBuf,
-    /// What to run it with.
+    /// How to run it.
     pub toolchain: Toolchain,
 }
 
@@ -77,7 +77,7 @@ impl Backend {
     /// The compiler in a folder.
     ///
     /// # Errors
-    /// What is missing there.
+    /// The missing file.
     pub fn in_folder(home: &Path) -> Result<Backend, PathBuf> {
         let program = |name: &str| home.join("bin").join(format!("{name}{}", env::consts::EXE_SUFFIX));
         let code_generator = home.join("lib").join(code_generator_name());
@@ -90,7 +90,7 @@ impl Backend {
     /// The compiler of this machine.
     ///
     /// # Errors
-    /// [`BackendError`], which says what to install.
+    /// [`BackendError`], with what to install.
     pub fn find() -> Result<Backend, BackendError> {
         if let Some(home) = env::var_os(HOME_VARIABLE).filter(|home| !home.is_empty()).map(PathBuf::from) {
             return Backend::in_folder(&home).map_err(|missing| BackendError::Incomplete { home, missing });
@@ -117,7 +117,7 @@ impl Backend {
         Ok(format!("rust-gpu {VERSION}, {}", rustc.trim()))
     }
 
-    /// The search path for programs under which plain `cargo` is the compiler's, where that is how it is chosen.
+    /// The search path under which plain `cargo` is the compiler's, if the compiler is a folder of programs.
     pub fn program_path(&self) -> Option<OsString> {
         match &self.toolchain {
             Toolchain::Folder(bin) => {
@@ -133,13 +133,13 @@ fn code_generator_name() -> String {
     format!("{}rustc_codegen_spirv{}", env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX)
 }
 
-/// The user's folder for what can be made again.
+/// The user's cache folder.
 fn cache() -> Option<PathBuf> {
     let named = |variable: &str| env::var_os(variable).filter(|value| !value.is_empty()).map(PathBuf::from);
     named("XDG_CACHE_HOME").or_else(|| Some(env::home_dir()?.join(".cache")))
 }
 
-/// The compiler in the cache: the last by name of those that are whole.
+/// The compiler in the cache: the last by name of the complete ones.
 fn cached() -> Option<Backend> {
     let prefix = format!("rust-gpu-{VERSION}-");
     let mut homes: Vec<PathBuf> = fs::read_dir(cache()?)
@@ -180,14 +180,14 @@ fn official() -> Result<Backend, BackendError> {
         }
         output_of(&mut cargo)?;
         if !code_generator.is_file() {
-            let reason = format!("{} is not there after it", code_generator.display());
+            let reason = format!("it did not build {}", code_generator.display());
             return Err(BackendError::Failed { program: format!("{cargo:?}"), reason });
         }
     }
     Ok(Backend { code_generator, toolchain: Toolchain::Rustup(NIGHTLY.to_owned()) })
 }
 
-/// What a program prints.
+/// The output of a program.
 fn output_of(command: &mut Command) -> Result<String, BackendError> {
     let failed = |command: &Command, reason: String| {
         let program = command.get_program().to_string_lossy().into_owned();

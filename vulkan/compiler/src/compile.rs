@@ -1,4 +1,4 @@
-//! Sources become a module.
+//! Compiles the sources to a module.
 //!
 //! rust-gpu's optimiser (SPIRV-Tools) is left out: it may rewrite float arithmetic that is not marked against
 //! contraction, such as `(a - b) + b` to `a`, and the marks come after it. rust-gpu's own passes (inlining, memory to
@@ -10,13 +10,13 @@ use spirv_builder::{SpirvBuilder, SpirvBuilderError};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the module runs on: Vulkan 1.1 and later.
+/// The target of the module: Vulkan 1.1 and later.
 pub const TARGET: &str = "spirv-unknown-vulkan1.1";
 
-/// Why there is no module.
+/// Why compiling failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CompileError {
-    /// The compiler failed; what it found wrong is already on the standard error output.
+    /// The compiler failed; its messages are already on standard error.
     #[error("the kernels do not compile: {0}")]
     Compiler(#[from] SpirvBuilderError),
     /// The module could not be read.
@@ -24,18 +24,18 @@ pub enum CompileError {
     Read {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// The module is none.
+    /// The module is invalid.
     #[error(transparent)]
     Refine(#[from] RefineError),
-    /// The validator has objections.
+    /// The validator rejected the module.
     #[error("spirv-val, for {environment}: {said}")]
     Invalid {
         /// The version of Vulkan.
         environment: String,
-        /// What it said.
+        /// Its message.
         said: String,
     },
 }
@@ -49,7 +49,7 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Vec<u8>,
     builder.rustc_codegen_spirv_location = Some(backend.code_generator.clone());
     builder.target_dir_path = Some(target.to_path_buf());
     builder.extra_args = vec!["--no-spirv-opt".to_owned()];
-    // We are no build script, nobody reads instructions to cargo.
+    // This is not a build script: no instructions to cargo.
     builder.build_script.defaults = false;
     if let Toolchain::Rustup(name) = &backend.toolchain {
         builder.toolchain_overwrite = Some(name.clone());
@@ -60,8 +60,8 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Vec<u8>,
     Ok(refine(&bytes)?)
 }
 
-/// Validates a module by `spirv-val`, for the versions of Vulkan that it is meant for. Returns whether there is such
-/// a program.
+/// Validates a module by `spirv-val`, for the versions of Vulkan that it is meant for. Returns whether the program
+/// is installed.
 ///
 /// # Errors
 /// [`CompileError::Invalid`], or [`CompileError::Read`] for a file that could not be written.

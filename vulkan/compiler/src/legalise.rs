@@ -1,15 +1,15 @@
-//! Composites that hold pointers go.
+//! Removes composites that hold pointers.
 //!
 //! A slice is a pointer and a length, `viewfuse_core::pages::Pages` are several slices: rust-gpu makes them composites of
-//! pointers that nobody may have in a module with logical addressing. It only ever puts such a composite together and
-//! takes its members out again, so each extracted member is replaced by what was put in, and what nobody then needs is
-//! left out.
+//! pointers, which a module with logical addressing must not have. It only constructs such a composite and extracts its
+//! members, so each extracted member is replaced by the inserted value, and unused instructions are
+//! removed.
 
 use rspirv::dr::{Function, Instruction, Module, Operand};
 use rspirv::spirv::Op;
 use std::collections::{HashMap, HashSet};
 
-/// Replaces members of composites by what they were made of, and leaves out what is not needed.
+/// Replaces members of composites by the values they were constructed from, and removes unused instructions.
 pub fn legalise(module: &mut Module) {
     // Not vectors: those can be made of vectors, and then their members are not operands.
     let is_aggregate = |kind: &&Instruction| matches!(kind.class.opcode, Op::TypeStruct | Op::TypeArray);
@@ -23,7 +23,7 @@ pub fn legalise(module: &mut Module) {
     leave_out_unneeded_globals(module);
 }
 
-/// How a composite was made.
+/// How a composite was constructed.
 enum Made {
     /// One member was replaced: the object, the composite before, the path to the member.
     Inserted { object: u32, before: u32, path: Vec<u32> },
@@ -99,7 +99,7 @@ fn forward_members(function: &mut Function, aggregates: &HashSet<u32>) -> bool {
     shortened || !replaced.is_empty()
 }
 
-/// Follows a path into a composite as far back as it is known how the composite was made.
+/// Follows a path into a composite as far back as its construction is known.
 fn source_of(made: &HashMap<u32, Made>, mut composite: u32, mut rest: Vec<u32>) -> (u32, Vec<u32>) {
     while !rest.is_empty() {
         match made.get(&composite) {
@@ -121,7 +121,7 @@ fn source_of(made: &HashMap<u32, Made>, mut composite: u32, mut rest: Vec<u32>) 
     (composite, rest)
 }
 
-/// Whether an instruction matters only through its result.
+/// Whether an instruction has no effect but its result.
 fn is_pure(operation: Op) -> bool {
     !matches!(operation, Op::FunctionCall | Op::Variable | Op::Label) && !format!("{operation:?}").starts_with("Atomic")
 }

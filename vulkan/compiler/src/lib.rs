@@ -1,15 +1,15 @@
 //! Makes `kernels.spv`, the kernels as one SPIR-V module, from the entry points in `vulkan/shaders`.
 //!
-//! The module is checked in: whoever uses viewfuse needs no shader compiler. `cargo shaders` makes it anew,
-//! `cargo shaders --check` compares it with what the sources give.
+//! The module is checked in: users of viewfuse need no shader compiler. `cargo shaders` compiles it again,
+//! `cargo shaders --check` compares it with a fresh compilation.
 //!
 //! ```text
-//! backend   where the compiler is            a folder named by RUST_GPU_HOME, a cache, or the official toolchain
+//! backend   finds the compiler               a folder named by RUST_GPU_HOME, a cache, or the official toolchain
 //! compile   sources -> module                spirv-builder, without its optimiser
 //! legalise  module -> module                 no composites of pointers
-//! share     module -> module                 a workgroup's memory is its invocations' common one
-//! refine    module -> module                 no trace of paths, no contraction of float arithmetic
-//! stamp     what the module was made from    sha256 of the sources and locked versions; kernels.toml
+//! share     module -> module                 workgroup memory is visible to all its invocations
+//! refine    module -> module                 no paths, no contraction of float arithmetic
+//! stamp     the sources of the module        sha256 of the sources and locked versions; kernels.toml
 //! ```
 
 pub mod backend;

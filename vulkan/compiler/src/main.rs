@@ -1,4 +1,4 @@
-//! `cargo shaders`: makes `kernels.spv` and `kernels.toml`, or checks that they are what the sources give.
+//! `cargo shaders`: writes `kernels.spv` and `kernels.toml`, or checks that they are up to date.
 
 use std::env;
 use std::error::Error;
@@ -15,10 +15,10 @@ Makes vulkan/src/kernels.spv and kernels.toml from the sources.
   --check    writes nothing; compiles and compares, exit code 1 if anything differs
 Exit code 3 if there is no shader compiler.";
 
-/// Exit code where there is no compiler: nothing is known to be wrong.
+/// Exit code if there is no compiler, so that nothing could be checked.
 const NO_COMPILER: u8 = 3;
 
-/// Environment variables by which somebody could change what is compiled.
+/// Environment variables that would change the compilation.
 const FORBIDDEN: [&str; 3] = ["RUSTGPU_CODEGEN_ARGS", "RUSTGPU_RUSTFLAGS", "RUSTGPU_CARGOFLAGS"];
 
 fn main() -> ExitCode {
@@ -58,7 +58,8 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     }
     let inputs = Inputs::read(&root)?;
     let program = env::current_exe()?;
-    let target = program.parent().and_then(Path::parent).ok_or("the program lies in no target folder")?.join("shaders");
+    let target =
+        program.parent().and_then(Path::parent).ok_or("the program is not in a target folder")?.join("shaders");
     let module = compile(&backend, &root, &target)?;
     let validated = validate(&module, &target)?;
     let stamp = Stamp { compiler: backend.version()?, module: sha256(&module), inputs };
@@ -67,19 +68,19 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     }
     fs::write(root.join(MODULE), &module).map_err(|error| format!("{MODULE}: {error}"))?;
     fs::write(root.join(STAMP), stamp.text()).map_err(|error| format!("{STAMP}: {error}"))?;
-    let validated = if validated { "spirv-val has no objection" } else { "not validated: there is no spirv-val" };
+    let validated = if validated { "accepted by spirv-val" } else { "not validated: spirv-val is not installed" };
     println!("{MODULE}: {} bytes by {}; {validated}", module.len(), stamp.compiler);
     Ok(ExitCode::SUCCESS)
 }
 
-/// Compares what was just compiled with what is checked in.
+/// Compares the fresh compilation with the checked-in module.
 fn compare(root: &Path, module: &[u8], compiled: &Stamp) -> Result<ExitCode, Box<dyn Error>> {
     let stored = fs::read(root.join(MODULE)).map_err(|error| format!("{MODULE}: {error}"))?;
     let stamp = Stamp::read(root)?;
     let mut stale = stamp.stale(&compiled.inputs, &stored);
     if stored != module {
         stale.push(format!(
-            "{MODULE} is not what the sources give: it has {} bytes, made by {}; compiled now: {} bytes by {}",
+            "{MODULE} is stale: it has {} bytes, compiled by {}; compiled now: {} bytes by {}",
             stored.len(),
             stamp.compiler,
             module.len(),
@@ -87,7 +88,7 @@ fn compare(root: &Path, module: &[u8], compiled: &Stamp) -> Result<ExitCode, Box
         ));
     }
     if stale.is_empty() {
-        println!("{MODULE} is what the sources give");
+        println!("{MODULE} is up to date");
         return Ok(ExitCode::SUCCESS);
     }
     stale.iter().for_each(|difference| eprintln!("{difference}"));
@@ -95,8 +96,8 @@ fn compare(root: &Path, module: &[u8], compiled: &Stamp) -> Result<ExitCode, Box
     Ok(ExitCode::FAILURE)
 }
 
-/// spirv-builder takes cargo from the search path and options from the environment. Where those are not as they must be,
-/// this program runs itself again in an environment that is, and returns how that ended.
+/// spirv-builder takes cargo from the search path and options from the environment. If those are not the required ones,
+/// this program runs itself again in a correct environment and returns the outcome.
 fn run_prepared(backend: &Backend) -> Result<Option<ExitCode>, Box<dyn Error>> {
     let search = backend.program_path();
     let is_right =

@@ -1,14 +1,14 @@
-//! What an invocation writes to its workgroup's memory is for the others.
+//! Makes an invocation's writes to workgroup memory visible to the others.
 //!
-//! In Vulkan's memory model what is read and written is an invocation's own affair, whatever barriers there are, unless
-//! each instruction says otherwise. rust-gpu never does. Here every access to a workgroup's memory gets the mark
-//! `NonPrivatePointer`; the barriers in `viewfuse-shaders` do the rest.
+//! In Vulkan's memory model, accesses are private to an invocation, despite barriers, unless each instruction is marked.
+//! rust-gpu sets no marks. Here every access to workgroup memory gets the mark `NonPrivatePointer`; the barriers in
+//! `viewfuse-shaders` do the rest.
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{MemoryAccess, Op, StorageClass};
 use std::collections::HashSet;
 
-/// Marks every access to the memory of a workgroup.
+/// Marks every access to workgroup memory.
 pub fn share(module: &mut Module) {
     let is_shared = |kind: &&Instruction| {
         kind.class.opcode == Op::TypePointer

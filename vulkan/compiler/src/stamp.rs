@@ -1,8 +1,7 @@
-//! What a module was made from: `kernels.toml`.
+//! The sources of a module: `kernels.toml`.
 //!
-//! It holds the sha256 of every file that decides the module's bytes, the locked versions of the libraries that become
-//! part of it, the sha256 of the module and the version of the compiler. Whether the checked-in module is fresh can so
-//! be told without a compiler.
+//! It holds the sha256 of every file that determines the module's bytes, the locked versions of the libraries that become
+//! part of it, the sha256 of the module and the version of the compiler. So a test without a compiler finds a stale module.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -12,9 +11,9 @@ use std::path::{Path, PathBuf};
 
 /// The module, relative to the repository.
 pub const MODULE: &str = "vulkan/src/kernels.spv";
-/// What it was made from.
+/// Its stamp.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
-/// Files, and folders with all their Rust files, that the module is made from.
+/// The module's source files, and folders with all their Rust files.
 pub const SOURCES: [&str; 8] = [
     "core/Cargo.toml",
     "core/src",
@@ -25,30 +24,30 @@ pub const SOURCES: [&str; 8] = [
     "vulkan/shaders/Cargo.toml",
     "vulkan/shaders/src",
 ];
-/// Libraries of which parts are in the module.
+/// Libraries with code in the module.
 pub const LIBRARIES: [&str; 6] = ["bytemuck", "bytemuck_derive", "glam", "libm", "spirv-std", "spirv-std-macros"];
 
-/// Why it cannot be told what a module was made from.
+/// Why the stamp cannot be computed or read.
 #[derive(Debug, thiserror::Error)]
 pub enum StampError {
     /// A file cannot be read or written.
     #[error("{}: {source}", path.display())]
     File {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// A file is not what it should be.
+    /// A file has invalid content.
     #[error("{}: {source}", path.display())]
     Format {
-        /// Which.
+        /// Its path.
         path: PathBuf,
-        /// Where and why.
+        /// The place and the problem.
         source: toml::de::Error,
     },
     /// A library is not locked.
-    #[error("{}: there is no package {library}", path.display())]
+    #[error("{}: has no package {library}", path.display())]
     Unlocked {
         /// Cargo.lock.
         path: PathBuf,
@@ -57,7 +56,7 @@ pub enum StampError {
     },
 }
 
-/// What decides a module's bytes.
+/// The inputs that determine a module's bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Inputs {
     /// Locked versions by library, with their checksums.
@@ -66,14 +65,14 @@ pub struct Inputs {
     pub sources: BTreeMap<String, String>,
 }
 
-/// What a module was made from, and by what.
+/// A module's inputs and compiler.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stamp {
     /// Versions of rust-gpu and rustc.
     pub compiler: String,
     /// sha256 of the module.
     pub module: String,
-    /// What it was made from.
+    /// Its stamp.
     #[serde(flatten)]
     pub inputs: Inputs,
 }
@@ -92,7 +91,7 @@ struct Locked {
 }
 
 impl Inputs {
-    /// Of the repository in `root` as it is now.
+    /// The inputs in the repository `root`.
     ///
     /// # Errors
     /// [`StampError`], with the file.
@@ -122,7 +121,7 @@ impl Inputs {
 }
 
 impl Stamp {
-    /// The one that is checked in.
+    /// The checked-in stamp.
     ///
     /// # Errors
     /// [`StampError`], with the file.
@@ -151,7 +150,7 @@ impl Stamp {
         let mut stale = differences("library", &self.inputs.libraries, &inputs.libraries);
         stale.extend(differences("source", &self.inputs.sources, &inputs.sources));
         if sha256(module) != self.module {
-            stale.push(format!("{MODULE} is not the module that {STAMP} speaks of"));
+            stale.push(format!("{MODULE} is not the module that {STAMP} describes"));
         }
         stale
     }

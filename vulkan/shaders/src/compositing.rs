@@ -1,4 +1,4 @@
-//! Views become one, samples become a pixel.
+//! Fusion of views, compositing of samples.
 
 use crate::Push;
 use spirv_std::glam::UVec3;

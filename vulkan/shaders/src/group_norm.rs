@@ -1,4 +1,4 @@
-//! Means of images and normalisation by them.
+//! Channel means and group norm of images.
 
 use crate::Push;
 use spirv_std::glam::UVec3;
@@ -20,7 +20,8 @@ pub fn channel_means(
     means[channel] = group_norm::channel_mean(inputs, &push.parameters, channel);
 }
 
-/// Moments of a group of channels in a part of the image, number `first + id.x`, flat in `[part][group]`.
+/// Mean and squared deviations of a group of channels in a part of the image, number `first + id.x`, flat in
+/// `[part][group]`.
 #[spirv(compute(threads(64), entry_point_name = "group_norm_partials"))]
 pub fn group_norm_partials(
     #[spirv(global_invocation_id)] id: UVec3,

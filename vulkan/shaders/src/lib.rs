@@ -1,11 +1,11 @@
 //! Entry points of the kernels on Vulkan devices.
 //!
 //! An entry point has the name of its kernel and takes its arrays in the order of the kernel's row
-//! ([`viewfuse_core::kernels`]), its parameters and the [`Piece`] as push constants. It checks whether its element exists,
-//! calls the kernel's body in `viewfuse-core` or the parts that the body is made of, and stores what that returns. Arrays
-//! that may be longer than a device can bind at once come as four pages. Two things are computed here: products of tiled
-//! kernels are summed in memory that a workgroup shares (`tile`), and a few short loops over a ray's samples or a row's
-//! columns stand in the entry point.
+//! ([`viewfuse_core::kernels`]), its parameters and the [`Piece`] as push constants. It checks whether its element
+//! exists, calls the kernel's body in `viewfuse-core` or the parts of that body, and stores the result. Arrays that may
+//! be longer than a device can bind at once come as four pages. Two things are computed here: the matrix products of
+//! tiled kernels are summed in workgroup memory (`tile`), and a few short loops over a ray's samples or a row's columns
+//! are in the entry point.
 //!
 //! On the host the same entry points are plain functions, which tests call.
 #![cfg_attr(target_arch = "spirv", no_std)]
@@ -31,8 +31,8 @@ pub use viewfuse_core::kernels::Piece;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct Push<P> {
-    /// What the kernel is told.
+    /// The kernel's parameters.
     pub parameters: P,
-    /// Which elements.
+    /// The elements of the dispatch.
     pub piece: Piece,
 }

@@ -1,4 +1,4 @@
-//! Products of matrices that are both computed, and softmax.
+//! Matrix products of two computed matrices, and softmax.
 
 use crate::Push;
 use crate::tile::{Shape, Shared, multiply};

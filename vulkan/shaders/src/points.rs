@@ -1,4 +1,4 @@
-//! What goes into PixelNeRF's network for points, and what comes out.
+//! The inputs of PixelNeRF's network at points, and radiance from its outputs.
 
 use crate::{Piece, Push};
 use spirv_std::glam::UVec3;
@@ -64,7 +64,7 @@ pub fn gather_latents(
     gathered[block.first() + element] = pixelnerf::gathered_value(views, points, grid, &residual, block, element);
 }
 
-/// What the network says of point number `first + id.x`, stored as the sample that the point is.
+/// Radiance of point number `first + id.x`, stored at the point's sample.
 #[spirv(compute(threads(64), entry_point_name = "radiance"))]
 pub fn radiance(
     #[spirv(global_invocation_id)] id: UVec3,

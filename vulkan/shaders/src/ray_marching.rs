@@ -1,4 +1,4 @@
-//! A target pixel's ray.
+//! Ray marching for a target pixel.
 
 use crate::Push;
 use spirv_std::glam::UVec3;

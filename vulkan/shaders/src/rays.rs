@@ -1,4 +1,4 @@
-//! Where along which rays to look, and what was seen there.
+//! Target rays, samples along them, and their weights.
 
 use crate::Push;
 use spirv_std::glam::UVec3;
@@ -82,7 +82,7 @@ pub fn weigh_samples(
     }
 }
 
-/// Random numbers of fine sample number `first + id.x`, flat in `[ray][sample]`.
+/// Random draws of fine sample number `first + id.x`, flat in `[ray][sample]`.
 #[spirv(compute(threads(64), entry_point_name = "random_draws"))]
 pub fn random_draws(
     #[spirv(global_invocation_id)] id: UVec3,

@@ -1,4 +1,4 @@
-//! From noise to a picture.
+//! Operations of the denoiser's sampler on pictures.
 
 use crate::Push;
 use spirv_std::glam::UVec3;

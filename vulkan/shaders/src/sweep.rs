@@ -1,4 +1,4 @@
-//! The depths of source pixels: where their rays enter the hull, and planes swept behind that.
+//! The depths of source pixels: the entry of their rays into the visual hull, and the plane sweep behind it.
 
 use crate::Push;
 use spirv_std::glam::UVec3;
@@ -37,7 +37,7 @@ pub fn hull_entry(
     entries.store((views[view as usize].first_texel + pixel) as usize, entry);
 }
 
-/// How badly other views match at all planes of pixel number `first + id.x` of the band.
+/// Matching costs of the other views at all planes of pixel number `first + id.x` of the band.
 #[spirv(compute(threads(64), entry_point_name = "match_cost"))]
 #[allow(clippy::too_many_arguments)]
 pub fn match_cost(

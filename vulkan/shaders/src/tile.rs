@@ -1,10 +1,10 @@
 //! A matrix product by workgroups, each of which computes a tile of the outputs.
 //!
-//! The workgroup walks along the inner index in steps: it fetches the rows of the left matrix and the columns of the right
-//! one that it needs into its own memory, each number once, and adds up the products from there.
+//! The workgroup proceeds along the inner index in steps: it fetches its rows of the left matrix and its columns of the
+//! right one into workgroup memory, each number once, and sums the products from there.
 //!
-//! Nothing here may panic, see [`crate::unchecked`]. Closures take what they need by value: references to references are
-//! nothing that a module with logical addressing can hold.
+//! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing cannot
+//! hold references to references.
 
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
@@ -21,7 +21,7 @@ const STRIDE: u32 = FOURS + 1;
 /// A step of either matrix in a workgroup's memory: `[inner][row or column]`, in fours.
 pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
 
-/// How large the matrices are.
+/// The sizes of the matrices.
 #[derive(Clone, Copy)]
 pub(crate) struct Shape {
     /// Rows of the left matrix and of the outputs.
@@ -32,9 +32,9 @@ pub(crate) struct Shape {
     pub(crate) column_count: u32,
 }
 
-/// Computes an invocation's part of the product of `left(row, inner)` and `right(inner, column)`, and hands it out as
-/// `store(row, column, sum)`. All invocations of a workgroup take part, whether they have outputs or not: what lies beyond
-/// the matrices is read as their last row or column and goes nowhere.
+/// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
+/// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices, the
+/// last row or column is read and the sum is not stored.
 #[inline(always)]
 pub(crate) fn multiply(
     invocation: u32,
@@ -101,7 +101,7 @@ pub(crate) fn multiply(
     }
 }
 
-/// Where a four of a step lies: within its array, whatever the indices.
+/// The place of a four of a step: within its array for all indices.
 #[inline(always)]
 fn place(inner: u32, four: u32) -> usize {
     (inner % STEP * STRIDE + four % FOURS) as usize
@@ -127,7 +127,7 @@ fn write(shared: &mut Shared, inner: u32, four: u32, value: Vec4) {
     unsafe { *shared.index_unchecked_mut(place(inner, four)) = value };
 }
 
-/// No invocation of the workgroup goes on before all are here, and each then sees what the others wrote.
+/// A workgroup barrier: each invocation waits for all, and then sees the others' writes.
 #[inline(always)]
 fn wait_for_all() {
     const WORKGROUP: u32 = Scope::Workgroup as u32;

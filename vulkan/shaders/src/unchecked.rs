@@ -1,10 +1,10 @@
-//! Reading and writing without a panic: one would end an invocation for which others of its workgroup wait.
+//! Reading and writing without a panic: a panic would end an invocation for which others of its workgroup wait.
 #![allow(unsafe_code)]
 
 use spirv_std::arch::IndexUnchecked;
 use viewfuse_core::pages::Fetch;
 
-/// An array with at least one element; beyond its end there is the last one again.
+/// An array with at least one element; an index beyond its end reads the last one.
 #[derive(Clone, Copy)]
 pub(crate) struct Endless<'a>(pub(crate) &'a [f32]);
 

@@ -1,4 +1,4 @@
-//! From volumes to a feature image, and the denoiser's inputs.
+//! Feature images from volumes, and the denoiser's inputs.
 
 use crate::Push;
 use spirv_std::glam::UVec3;

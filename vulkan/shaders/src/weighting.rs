@@ -1,4 +1,4 @@
-//! How relevant each source is: by formula and by attention.
+//! Weights of the source views: by formula and by attention.
 
 use crate::{Piece, Push};
 use spirv_std::glam::UVec3;

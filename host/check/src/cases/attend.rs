@@ -1,4 +1,4 @@
-//! [`Kernel::Attend`]: softmax of products of random embeddings, from nearly equal weights to one that has all.
+//! [`Kernel::Attend`]: softmax of products of random embeddings, from nearly equal weights to a single weight of 1.
 
 use crate::agreement::Limits;
 use crate::attention_oracle::attend;

@@ -1,4 +1,4 @@
-//! [`Kernel::Composite`]: rays from 1 to 128 samples through mist, through smoke and into walls; some samples hold nothing.
+//! [`Kernel::Composite`]: rays from 1 to 128 samples with low, medium and high optical depths; some samples are empty.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;

@@ -1,6 +1,6 @@
 //! [`Kernel::Convolve`] and [`Kernel::ConvolveTransposed`]: images of awkward sizes, inputs, residuals and outputs that are
-//! some of the channels of wider images, all that a convolution can be told. Behind what is read lies NaN, beside what is
-//! written nothing may change.
+//! some of the channels of wider images, every parameter of a convolution. Behind the inputs there is NaN, and beside the
+//! outputs no number may change.
 
 use super::linear::{Counts, Job, Linear, LoadedJob, read, spoil};
 use crate::agreement::Limits;
@@ -14,7 +14,7 @@ use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
-/// What a layer of convolutions is like.
+/// A layer of convolutions.
 #[derive(Clone, Copy)]
 struct Window {
     size: u32,
@@ -98,7 +98,7 @@ impl Case for Convolve {
         let job = |(index, window): (usize, Window)| {
             let Window { size: side, stride, padding, dilation, enlarge, channels, is_part, is_wide } = window;
             let [in_channels, out_channels] = channels;
-            // About as many output numbers as asked for; the window is never larger than image and border.
+            // About as many output numbers as requested; the window is never larger than image and border.
             let pixel_count = f64::from(size * stride * stride) / f64::from(out_channels * enlarge * enlarge);
             let reach = (side - 1) * dilation + 1;
             let least = reach.saturating_sub(2 * padding).max(1).div_ceil(enlarge);

@@ -1,4 +1,4 @@
-//! [`Kernel::CoarseDepths`] and [`Kernel::RandomDraws`]: what only seeds, pixels and rays decide.
+//! [`Kernel::CoarseDepths`] and [`Kernel::RandomDraws`]: functions of seeds, pixels and rays only.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -12,7 +12,7 @@ use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Rays};
 use viewfuse_vulkan::kernel::Kernel;
 
-/// Rays, and how to look along them.
+/// Rays, and the sampling along them.
 #[derive(Clone, Debug)]
 pub struct Job<B> {
     block: B,

@@ -1,4 +1,4 @@
-//! [`Kernel::EmbedPose`]: the paper's embedding with parameters by formula.
+//! [`Kernel::EmbedPose`]: the paper's embedding with deterministic initialisation.
 
 use crate::agreement::Limits;
 use crate::attention_oracle::embed;
@@ -13,7 +13,7 @@ use viewfuse_device::parallel::map;
 use viewfuse_nn::initialisation;
 use viewfuse_vulkan::kernel::Kernel;
 
-/// What is embedded, and by which parameters.
+/// Poses and parameters.
 #[derive(Clone, Debug)]
 pub struct Inputs {
     embedding: Vec<f32>,

@@ -1,5 +1,5 @@
-//! [`Kernel::WeighFeatures`], [`Kernel::SumFeatures`] and [`Kernel::DenoiserInput`]: rays from 1 to 128 samples through mist,
-//! through smoke and into walls, samples that shade themselves and such that do not; their features; pictures beside them.
+//! [`Kernel::WeighFeatures`], [`Kernel::SumFeatures`] and [`Kernel::DenoiserInput`]: rays from 1 to 128 samples with
+//! low, medium and high optical depths, inclusive and exclusive weights; their features; pictures with conditions.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -38,7 +38,7 @@ fn block(
     }
 }
 
-/// What a network and the points make of rays.
+/// A network's outputs at points on rays.
 #[derive(Clone, Debug)]
 pub struct Weighed {
     block: FeatureBlock,
@@ -149,7 +149,7 @@ impl Summed {
         (self.ray_count() * self.block.feature_count) as usize
     }
 
-    /// Where the sums begin.
+    /// Offset of the sums.
     fn first(&self) -> usize {
         (self.block.first_ray * self.block.feature_count) as usize
     }
@@ -233,7 +233,7 @@ impl Case for SumFeatures {
     }
 }
 
-/// A picture and what is beside it.
+/// A picture and its condition.
 #[derive(Clone, Debug)]
 pub struct Pictures {
     block: DenoiserInputBlock,

@@ -1,4 +1,5 @@
-//! [`Kernel::FineDepths`] and [`Kernel::MergeDepths`]: rays that saw nothing, mist, a wall, a few thin things.
+//! [`Kernel::FineDepths`] and [`Kernel::MergeDepths`]: empty rays, low optical depths, an opaque surface, a few thin
+//! surfaces.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -70,7 +71,7 @@ fn job(random: &mut Random, size: u32, index: usize, counts: [u32; 3]) -> Job {
     let fine_count = block.fine_count();
     let rays: Vec<TargetRay> = (0..size.div_ceil(fine_count)).map(|_| ray(random)).collect();
     let pixel = |random: &mut Random, ray: &TargetRay| {
-        // Sometimes nothing was met, whose depth is whatever it was said to be.
+        // Some rays are empty, with any depth.
         let depth = random.range(f64::from(ray.near), f64::from(ray.far)) as f32;
         if random.below(6) == 0 { [0.0, -7.0] } else { [random.unit() as f32, depth] }
     };

@@ -1,5 +1,5 @@
-//! [`Kernel::GatherLatents`]: grids of any size under images of any size, looked up inside, at borders, far outside and
-//! behind.
+//! [`Kernel::GatherLatents`]: grids of any size under images of any size, with points inside, at borders, far outside
+//! and behind the camera.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -33,7 +33,7 @@ impl Job {
     }
 }
 
-/// The same in a device's memory, and what is gathered.
+/// The same in a device's memory, and the gathered values.
 pub struct LoadedJob<D: Device> {
     views: D::Buffer<CameraBlock>,
     points: D::Buffer<RayPoint>,

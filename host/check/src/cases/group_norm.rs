@@ -1,6 +1,6 @@
-//! [`Kernel::ChannelMeans`], [`Kernel::GroupNormPartials`], [`Kernel::GroupNormStatistics`] and [`Kernel::GroupNorm`]: groups of one channel
-//! and of many, images from one pixel on that fill partials or do not, values far from 0, constant groups, images that are some
-//! of the channels of wider ones.
+//! [`Kernel::ChannelMeans`], [`Kernel::GroupNormPartials`], [`Kernel::GroupNormStatistics`] and [`Kernel::GroupNorm`]:
+//! groups of one channel and of many, images from one pixel on that fill partials or do not, values far from 0,
+//! constant groups, images that are some of the channels of wider ones.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -57,7 +57,7 @@ fn image(random: &mut Random, block: &GroupNormBlock, distance: f64) -> Vec<f32>
 }
 
 fn statistics_expected(statistics: impl Iterator<Item = [Bounded; 2]>) -> Vec<Option<Bounded>> {
-    // One more than is asked for.
+    // One more than requested.
     statistics.chain([[Bounded::ZERO; 2]]).flatten().map(Some).collect()
 }
 
@@ -267,7 +267,7 @@ impl Case for GroupNormStatistics {
     }
 }
 
-/// An image and what it is normalised with.
+/// An image with its statistics, weights and bias.
 #[derive(Clone, Debug)]
 pub struct Job {
     block: GroupNormBlock,

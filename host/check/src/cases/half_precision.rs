@@ -1,6 +1,6 @@
-//! [`Kernel::PackF16`] and [`Kernel::GatherVolumeF16`]: numbers from far below to far above those that have 16 bits, odd and
-//! even counts of them; volumes as in [`super::volumes`], of odd and even numbers of features. Halves are packed and read here
-//! by another hand than the kernels'.
+//! [`Kernel::PackF16`] and [`Kernel::GatherVolumeF16`]: numbers from far below to far above the range of half
+//! precision, odd and even counts of them; volumes as in [`super::volumes`], of odd and even numbers of features. An
+//! independent implementation packs and reads half precision here.
 
 use super::volumes::{self, Job, jobs};
 use crate::agreement::Limits;
@@ -103,7 +103,7 @@ impl Case for PackF16 {
     }
 }
 
-/// See the module. The nodes are numbers in half precision already, until one is spoilt.
+/// See the module. The nodes are exact in half precision, before one is changed by 1 %.
 pub enum GatherVolumeF16 {}
 
 /// Jobs in a device's memory, and what is gathered.

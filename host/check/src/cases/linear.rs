@@ -1,5 +1,5 @@
 //! [`Kernel::Linear`], and what the cases of all layers with weights share: matrices of awkward sizes, with and without
-//! residual and rectification. Behind what is read lies NaN, behind what is written nothing may change.
+//! residual and rectification. Behind the inputs there is NaN, and behind the outputs no number may change.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -15,7 +15,7 @@ use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 /// Numbers behind the last.
 const SLACK: usize = 5;
 
-/// What outputs hold where nothing is written.
+/// The value of unwritten outputs.
 pub(super) const UNTOUCHED: f32 = 3.0;
 
 /// A dispatch.
@@ -42,7 +42,7 @@ pub struct LoadedJob<D: Device> {
 /// How many numbers a layer has of each kind.
 pub(super) struct Counts {
     pub(super) inputs: usize,
-    /// Numbers that an output is made of.
+    /// Products of an output's sum.
     pub(super) inner: usize,
     /// Columns of the weights.
     pub(super) columns: usize,
@@ -89,8 +89,8 @@ impl<B> Job<B> {
         })
     }
 
-    /// What all outputs should be, in front of what is behind them: `output(index)` for each; `None` for what no output
-    /// is.
+    /// The expected buffer: `output(index)` for each output, then the numbers behind them; `None` for numbers that are not
+    /// outputs.
     pub(super) fn expected(
         &self,
         output: impl Fn(&LayerInputs, usize) -> Option<Bounded> + Sync,
@@ -103,7 +103,7 @@ impl<B> Job<B> {
     }
 }
 
-/// Puts an input of every dispatch off by 1 %.
+/// Changes an input of every dispatch by 1 %.
 pub(super) fn spoil<B>(jobs: &mut [Job<B>], input: impl Fn(&mut Job<B>) -> &mut [f32]) {
     jobs.iter_mut().for_each(|job| input(job).iter_mut().for_each(|value| *value *= 1.01));
 }

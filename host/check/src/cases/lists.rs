@@ -26,7 +26,7 @@ fn masks(random: &mut Random, size: u32) -> Vec<Vec<u32>> {
         .to_vec()
 }
 
-/// Every second marked element is no longer so: 1 % of a mark is a mark.
+/// Clears every second mark, as 1 % of a mark is a mark.
 fn unmark(mask: &mut [u32]) {
     mask.iter_mut().filter(|mark| **mark > 0).step_by(2).for_each(|mark| *mark = 0);
 }
@@ -47,7 +47,7 @@ fn offsets(counts: &[u32]) -> Vec<u32> {
     offsets
 }
 
-/// What came out, and zeros behind it.
+/// The results, and zeros behind them.
 fn exact(values: impl IntoIterator<Item = u32>, len: usize) -> Vec<Option<Bounded>> {
     let values = values.into_iter().chain(std::iter::repeat(0));
     values.take(len).map(|value| Some(Bounded::from(value))).collect()
@@ -166,7 +166,7 @@ impl Case for SumCounts {
     }
 }
 
-/// A mask, and where the list's parts begin.
+/// A mask, and the offsets of the list's parts.
 #[derive(Clone, Debug)]
 pub struct Listing {
     mask: Vec<u32>,

@@ -1,4 +1,4 @@
-//! [`Kernel::MarchRays`]: every pixel of a target, in two bands; every other seed's rays end early.
+//! [`Kernel::MarchRays`]: every pixel of a target, in two bands; with early termination for every other seed.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -11,7 +11,7 @@ use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, HullScene, Pixels};
 use viewfuse_vulkan::kernel::Kernel;
 
-/// The world, and how it is looked at.
+/// The world and the target.
 #[derive(Clone, Debug)]
 pub struct Inputs {
     world: World,

@@ -11,7 +11,7 @@ use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, HullScene};
 use viewfuse_vulkan::kernel::Kernel;
 
-/// What is swept.
+/// The world and the sweep.
 #[derive(Clone, Debug)]
 pub struct Inputs {
     world: World,

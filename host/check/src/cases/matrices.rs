@@ -1,5 +1,5 @@
 //! [`Kernel::MatrixProduct`] and [`Kernel::SoftmaxRows`]: matrices of awkward sizes, some of them columns of one wider
-//! matrix, on the right as they are or transposed; rows of scores from nearly equal ones to such that one has all.
+//! matrix, on the right as they are or transposed; rows of scores from nearly equal weights to a single weight of 1.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;

@@ -28,7 +28,7 @@ pub struct Loaded<D: Device> {
     scene: HullScene<D>,
     entries: D::Buffer<f32>,
     means: Vec<D::Buffer<f32>>,
-    /// With each guess, what is picked.
+    /// The picked depths with each guess.
     guesses: Vec<(D::Buffer<f32>, D::Buffer<f32>)>,
 }
 

@@ -1,5 +1,5 @@
-//! [`Kernel::MixPictures`] and [`Kernel::AddNoise`]: every number of results, and arrays that are not read because their
-//! coefficient is 0, of another length and full of NaN; noise of several streams on pictures of all sizes and on nothing.
+//! [`Kernel::MixPictures`] and [`Kernel::AddNoise`]: every number of results; arrays with coefficient 0, which are not
+//! read, have another length and hold NaN; noise of several streams on pictures of all sizes and on zeros.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -23,7 +23,7 @@ pub struct MixJob {
 /// See the module.
 pub enum MixPictures {}
 
-/// State, results, and what is written.
+/// State, results, and the combination.
 type LoadedMix<B> = (B, [B; MOST_RESULTS], B);
 
 impl Case for MixPictures {
@@ -100,7 +100,7 @@ impl Case for MixPictures {
     }
 }
 
-/// Puts all values off by 1 %: there is a job where each counts.
+/// Changes all values by 1 %: each has a coefficient in some job.
 fn spoil(values: &mut [f32]) {
     values.iter_mut().for_each(|value| *value *= 1.01);
 }

@@ -1,5 +1,5 @@
-//! [`Kernel::EmbedPoints`], [`Kernel::VisibleWeights`] and [`Kernel::Radiance`]: points around the origin and beyond, seen by
-//! 1 to 32 views, some of which have them behind.
+//! [`Kernel::EmbedPoints`], [`Kernel::VisibleWeights`] and [`Kernel::Radiance`]: points around the origin and beyond,
+//! seen by 1 to 32 views, some of which have them behind.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -17,7 +17,7 @@ use viewfuse_vulkan::kernel::Kernel;
 
 type Buffer<D, T> = <D as Memory>::Buffer<T>;
 
-/// So many views and points.
+/// The numbers of views and points.
 fn views_and_points(random: &mut Random, view_count: u32, point_count: u32) -> (Vec<CameraBlock>, Vec<RayPoint>) {
     let views: Vec<CameraBlock> = (0..view_count).map(|_| camera(random)).collect();
     let points = (0..point_count).map(|_| point(random, &views)).collect();
@@ -115,7 +115,7 @@ pub struct Visible {
     weights: Vec<f32>,
 }
 
-/// Views, weights, points, what comes out.
+/// Views, weights, points, and the outputs.
 pub type LoadedVisible<D> = (Buffer<D, CameraBlock>, Buffer<D, f32>, Buffer<D, RayPoint>, Buffer<D, f32>);
 
 /// See the module.
@@ -188,7 +188,7 @@ impl Case for VisibleWeights {
     }
 }
 
-/// What a network says of points.
+/// A network's outputs at points.
 #[derive(Clone, Debug)]
 pub struct Said {
     raw: Vec<f32>,

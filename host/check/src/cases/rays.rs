@@ -56,7 +56,7 @@ impl Case for CastRays {
     }
 
     fn load<D: Device>(device: &D, jobs: &Vec<Cast>) -> Result<Self::Loaded<D>, DeviceError> {
-        // One more than is asked for.
+        // One more than requested.
         let load = |job: &Cast| {
             let pixels = device.upload(&[&job.pixels[..], &[0]].concat())?;
             Ok(Rays { count: job.pixels.len() as u32, pixels, rays: device.zeros(job.pixels.len() + 1)? })
@@ -139,7 +139,7 @@ impl Case for PlacePoints {
             let mut depths = Vec::new();
             for ray in &rays {
                 let (near, far) = (f64::from(ray.near), f64::from(ray.far));
-                // Two passes may look at the same place.
+                // Two passes may have the same depth.
                 let mut own: Vec<f32> = (0..sample_count)
                     .map(|_| if random.below(8) == 0 { ray.far } else { random.range(near, far) as f32 })
                     .collect();

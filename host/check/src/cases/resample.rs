@@ -1,5 +1,5 @@
-//! [`Kernel::MaxPool`] and [`Kernel::Upsample`]: images from one pixel on, windows that reach over borders or hold no pixel,
-//! enlargements that hit nodes and others, some of the channels of a wider image.
+//! [`Kernel::MaxPool`] and [`Kernel::Upsample`]: images from one pixel on, windows that reach over borders or hold no
+//! pixel, enlargements that hit nodes and others, some of the channels of a wider image.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -98,7 +98,7 @@ impl Case for MaxPool {
     }
 }
 
-/// Rows and columns of inputs; rows and columns of outputs, 0 for as many as are asked for; channels of the inputs, the
+/// Rows and columns of inputs; rows and columns of outputs, 0 for as many as requested; channels of the inputs, the
 /// first of the outputs' that are theirs, those of the outputs.
 const SHAPES: [[u32; 7]; 6] = [
     [1, 1, 3, 5, 4, 0, 4],

@@ -1,5 +1,5 @@
-//! [`Kernel::WeighSamples`] and [`Kernel::SampleMask`]: rays through nothing, mist, smoke and walls, and where it is
-//! worth looking again, by what the ray itself saw and by what others around it saw.
+//! [`Kernel::WeighSamples`] and [`Kernel::SampleMask`]: empty rays, and rays with low, medium and high optical depths;
+//! masks by the weights of the ray itself and of the rays around it.
 
 use super::fine_depths::seen;
 use crate::agreement::Limits;
@@ -27,7 +27,7 @@ pub struct Samples {
 const KINDS: [(u32, f64, f64); 5] =
     [(1, 0.1, 2.0), (2, 1.0e-3, 1.0), (17, 1.0, 1.0e3), (64, 1.0e-3, 0.3), (128, 1.0e-5, 1.0e-2)];
 
-/// Results begin behind so many rays.
+/// Rays in front of the results.
 const FIRST_RAY: usize = 2;
 
 fn block(job: &Samples) -> RaysBlock {
@@ -106,7 +106,7 @@ impl Case for WeighSamples {
     }
 }
 
-/// Rays with samples, and what was seen before.
+/// Rays with samples, and the weights of a first pass.
 #[derive(Clone, Debug)]
 pub struct Looks {
     block: SampleMaskBlock,
@@ -116,7 +116,7 @@ pub struct Looks {
     seen: Vec<[f32; 2]>,
 }
 
-/// The same in a device's memory, and the answers.
+/// The same in a device's memory, and the mask.
 pub struct LoadedLooks<D: Device> {
     rays: Rays<D>,
     depths: D::Buffer<f32>,

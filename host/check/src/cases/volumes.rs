@@ -1,5 +1,5 @@
-//! [`Kernel::GatherVolume`]: volumes of any size over images of any size, looked up inside, between the last nodes and the
-//! zeros around them, far outside and behind.
+//! [`Kernel::GatherVolume`]: volumes of any size over images of any size, with points inside, between the last nodes
+//! and the zeros around them, far outside and behind the camera.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -31,7 +31,7 @@ impl Job {
     }
 }
 
-/// The same in a device's memory, and what is gathered.
+/// The same in a device's memory, and the gathered values.
 pub struct LoadedJob<D: Device> {
     views: D::Buffer<CameraBlock>,
     points: D::Buffer<RayPoint>,
@@ -66,7 +66,7 @@ pub(super) fn jobs(random: &mut Random, size: u32) -> Vec<Job> {
     kinds.map(|kind| job(random, size, kind)).to_vec()
 }
 
-/// What is gathered from them, and what stays untouched behind it.
+/// The gathered values, and unchanged numbers behind them.
 pub(super) fn expected(jobs: &[Job]) -> Vec<Option<Bounded>> {
     let mut expected = Vec::new();
     for Job { block, views, points, volumes } in jobs {
@@ -84,7 +84,7 @@ pub(super) fn expected(jobs: &[Job]) -> Vec<Option<Bounded>> {
 
 /// For every kernel that gathers from volumes.
 pub(super) const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
-/// What they read, off by 1 %.
+/// Their inputs, changed by 1 %.
 pub(super) const SPOILERS: &[Spoiler<Vec<Job>>] = &[
     ("views", |jobs| jobs.iter_mut().flat_map(|job| &mut job.views).for_each(|view| view.intrinsics[0] *= 1.01)),
     ("points", |jobs| jobs.iter_mut().flat_map(|job| &mut job.points).for_each(|point| point.position[1] *= 1.01)),

@@ -12,7 +12,7 @@ use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_vulkan::kernel::Kernel;
 
-/// Weights below this may be cut off: the exponential knows no subnormals, and devices may flush them.
+/// Weights below this may be 0: the exponential has no subnormal results, and devices may flush them.
 const NEGLIGIBLE: f64 = 4.0e-38;
 
 /// A dispatch.
@@ -24,13 +24,13 @@ pub struct Job {
     targets: Vec<PoseBlock>,
 }
 
-/// Where cameras stand; the number says which of the arrangements.
+/// The arrangement of cameras with this number.
 fn cameras(random: &mut Random, arrangement: u32, source_count: usize, target_count: usize) -> (Vec<Pose>, Vec<Pose>) {
     let scale = [1.0, 1.0e18, 1.0e-20, 1.0, 1.2, 1.0][arrangement as usize % 6];
     let mut sources: Vec<Pose> = (0..source_count).map(|_| random.pose(scale)).collect();
     let mut targets: Vec<Pose> = (0..target_count).map(|_| random.pose(scale)).collect();
     match arrangement % 6 {
-        // Every other target stands where a source does.
+        // Every other target is at a source's centre.
         3 => targets.iter_mut().step_by(2).enumerate().for_each(|(i, target)| *target = sources[i % source_count]),
         4 => {
             sources = ring(source_count, scale, 0.5, random.range(0.0, 1.0));

@@ -1,4 +1,4 @@
-//! [`Kernel::SumRow`] and [`Kernel::MeanColumn`]: costs as a sweep could give, a quarter of them outside the hull.
+//! [`Kernel::SumRow`] and [`Kernel::MeanColumn`]: costs of a plausible sweep, a quarter of them outside the visual hull.
 
 use crate::agreement::Limits;
 use crate::bounded::Bounded;
@@ -27,7 +27,7 @@ impl Inputs {
         Inputs { sweep, costs, row_sums }
     }
 
-    /// As though they were 1 % larger; those outside stay.
+    /// Increased by 1 %, except those outside.
     fn spoil_costs(&mut self) {
         self.costs.iter_mut().filter(|cost| **cost > 0.0).for_each(|cost| *cost *= 1.01);
     }

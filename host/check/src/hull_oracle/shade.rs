@@ -14,7 +14,7 @@ pub type Colour = (Bounded, [Bounded; 3]);
 
 const EMPTY: Colour = (Bounded::ZERO, [Bounded::ZERO; 3]);
 
-/// Depth of a map at an image coordinate; [`NOWHERE`] where nothing is seen.
+/// Depth of a map at an image coordinate; [`NOWHERE`] where there is no surface.
 pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, jump: Bounded) -> Option<Bounded> {
     let (columns, rows) = (tents(x, camera.width), tents(y, camera.height));
     let error = columns.error + rows.error;
@@ -38,7 +38,7 @@ pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, ju
     let mut surface: Option<Vec<bool>> = None;
     for candidate in candidates {
         if candidate >= NO_SURFACE && nodes.len() > 4 {
-            // Among which four to look for the nearest hangs on rounding.
+            // Which four nodes are the candidates depends on rounding.
             return None;
         }
         let anchor = Bounded::from(if candidate < NO_SURFACE { candidate } else { nearest });
@@ -68,10 +68,10 @@ pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, ju
     Some(Bounded { value, error: spread + 5.0 * ROUNDING * value })
 }
 
-/// Views by index, where they see a point, and what they show there.
+/// Views by index, with the projection of a point and their depth and colour there.
 type Witnesses = Vec<(usize, Seen, [Bounded; 4])>;
 
-/// The views that contain a point; the inner `None` if one of them shows background there.
+/// The views that contain a point; the inner `None` if it projects to the background of one of them.
 fn containing(scene: &Scene, place: Vector) -> Option<Option<Witnesses>> {
     let mut undecided = false;
     let mut views = Vec::new();
@@ -141,16 +141,17 @@ pub fn sample(scene: &Scene, footprints: &[f32], depths: &[f32], weights: &[f32]
 pub struct Pixel {
     /// Red, green, blue.
     pub colour: [Bounded; 3],
-    /// Depth; 0 where less than half is hidden. `None` where rounding decides about that.
+    /// Depth; 0 if the opacity is below a half. `None` if that depends on rounding.
     pub depth: Option<Bounded>,
-    /// How much of the background is hidden.
+    /// Opacity.
     pub opacity: Bounded,
 }
 
-/// Where rounding decides whether a ray ends, it ends if no more than this passes, and its error grows by what passes.
+/// If it depends on rounding whether a ray terminates, it does at this transmittance or less, and its error grows by the
+/// transmittance.
 const DARK: f64 = 1.0e-3;
 
-/// A target's ray: in equal steps of at most a footprint through the box, until no more than `termination` passes.
+/// A target's ray: in equal steps of at most a footprint through the box, until the transmittance is at most `termination`.
 #[allow(clippy::too_many_arguments)]
 pub fn march_ray(
     scene: &Scene,
@@ -219,7 +220,7 @@ pub fn march_ray(
 }
 
 /// A channel of layers before a background, by parts: `sum (T_i - T_(i+1)) c_i` is `c_0 + sum T_i (c_i - c_(i-1))`, so that
-/// an error of what passes counts as far as the colour changes there. `layers` say what passes behind each.
+/// an error of a transmittance contributes the change of the colour there. `layers` have the transmittance behind each.
 fn blended(layers: &[(Bounded, [Bounded; 3])], channel: usize, background: f32) -> Bounded {
     let background = Bounded::from(background);
     let colour = |layer: usize| layers.get(layer).map_or(background, |(_, colour)| colour[channel]);

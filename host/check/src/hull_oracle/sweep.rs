@@ -9,22 +9,22 @@ use viewfuse_core::visual_hull::sweep::{
 };
 use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 
-/// What lies outside the hull costs.
+/// The cost outside the hull.
 const OUT: Bounded = Bounded { value: OUTSIDE as f64, error: 0.0 };
 
 fn plane_depth(sweep: &SweepBlock, plane: u32) -> Bounded {
     Bounded::from(sweep.near) + (Bounded::from(plane) + Bounded::from(0.5)) * Bounded::from(sweep.plane_step)
 }
 
-/// Whether the pixel in which a coordinate lies is beyond doubt, and which it is.
+/// The pixel of a coordinate, if it does not depend on rounding.
 fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
     let index = |value: f64| value.floor().clamp(0.0, f64::from(count - 1)) as usize;
     let low = index(coordinate.value - coordinate.error);
     (low == index(coordinate.value + coordinate.error)).then_some(low)
 }
 
-/// Mean absolute difference between a pixel's colour and what the other views show at its point on a plane, a share of
-/// [`NO_WITNESS`] differing by [`MOST_DIFFERENCE`] in any case.
+/// Mean absolute difference between a pixel's colour and the other views' colours at its point on a plane; a share of
+/// [`NO_WITNESS`] always has the difference [`MOST_DIFFERENCE`].
 pub fn match_cost(
     scene: &Scene,
     sweep: &SweepBlock,

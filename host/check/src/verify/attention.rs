@@ -1,5 +1,5 @@
-//! The `attention_*` tensors of `genvs_srn.safetensors`: weights of the attention weighters, their parameters computed
-//! by formula from their names.
+//! The `attention_*` tensors of `genvs_srn.safetensors`: weights of the attention weighters, with deterministic
+//! initialisation.
 
 use super::{Measure, Quantity, Report, VerifyError};
 use safetensors::{Dtype, SafeTensors};
@@ -15,7 +15,7 @@ use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 const TOLERANCE: f64 = 1.0e-5;
 const EMBEDDING_TENSOR: &str = "attention_embedding.paper_fourier";
 
-/// Compares what is there; returns the names of the tensors that were used.
+/// Compares the file's quantities; returns the names of the used tensors.
 pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -> Result<Vec<String>, VerifyError> {
     let content = |place: &str, message: String| VerifyError::Content {
         path: path.to_path_buf(),
@@ -83,7 +83,7 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
     Ok(covered)
 }
 
-/// Parameters by formula, their names behind a prefix.
+/// Parameters by deterministic initialisation, their names behind a prefix.
 fn prefixed(prefix: &'static str) -> impl FnMut(&str, &[usize]) -> Result<Vec<f32>, Infallible> {
     move |name, shape| Ok(initialisation::tensor(&format!("{prefix}{name}"), shape))
 }

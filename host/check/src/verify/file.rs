@@ -24,7 +24,7 @@ pub(super) struct File<'a> {
 }
 
 impl File<'_> {
-    /// A tensor is not as it must be.
+    /// The error of an invalid tensor.
     pub(super) fn wrong(&self, name: &str, message: impl Into<String>) -> VerifyError {
         VerifyError::Content { path: self.path.to_path_buf(), place: name.to_owned(), message: message.into() }
     }
@@ -44,7 +44,7 @@ impl File<'_> {
         Ok(view.data().chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 
-    /// So many numbers, and no others.
+    /// Exactly `count` numbers.
     pub(super) fn many(&self, name: &str, count: usize) -> Result<Vec<f32>, VerifyError> {
         let values = self.floats(name)?;
         match values.len() == count {
@@ -53,7 +53,7 @@ impl File<'_> {
         }
     }
 
-    /// As many numbers for each of some rows, at least one.
+    /// The same number of values for each row, at least one.
     pub(super) fn many_a_row(&self, name: &str, row_count: usize) -> Result<Vec<f32>, VerifyError> {
         let values = self.floats(name)?;
         match !values.is_empty() && values.len() % row_count == 0 {
@@ -64,7 +64,7 @@ impl File<'_> {
         }
     }
 
-    /// Rows of so many numbers.
+    /// Rows of `N` numbers.
     pub(super) fn rows<const N: usize>(&self, name: &str) -> Result<Vec<[f32; N]>, VerifyError> {
         let values = self.floats(name)?;
         let (rows, rest) = values.as_chunks::<N>();

@@ -1,5 +1,6 @@
-//! GeNVS with parameters by formula: volumes, points, feature images, the denoiser, a sampled picture, noise levels. The
-//! official network at full size, or, where the file's metadata say `member` = `small`, the small member of the family.
+//! GeNVS with deterministic initialisation: volumes, points, feature images, the denoiser, a sampled picture, noise
+//! levels. The official network at full size, or, where the file's metadata say `member` = `small`, the small member of
+//! the family.
 
 use super::file::{File, compared, full};
 use super::{Measure, Quantity, Report, VerifyError};
@@ -18,15 +19,15 @@ use viewfuse_job::progress::Progress;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 
-/// Where the file's rays begin and end, in distances of an image plane that is the focal length away.
+/// Near and far bounds of the file's rays, in units of the distance of an image plane at the focal length.
 const NEAR_FAR: [f32; 2] = [0.8, 1.8];
-/// The weighting whose feature image the file has whole, and what we call it.
+/// The weighting whose whole feature image is in the file, and its name here.
 const WHOLE: &str = "error_alpha1_half";
-/// Weightings of feature images: the file's names, and ours.
+/// Weightings of feature images: the file's names, and those here.
 const WEIGHTINGS: [(&str, &str); 2] =
     [("baseline_mean", "mean"), ("error_weighing_alpha=1.0", "error:alpha=1,angle=full")];
 
-/// Compares everything in the file. Returns the names of the tensors that it knows; none if the file is another one.
+/// Compares everything in the file. Returns the names of the known tensors; none if the file has another content.
 pub(super) fn verify<D: Device>(
     path: &Path,
     tensors: &SafeTensors<'_>,
@@ -90,7 +91,7 @@ fn doubles(file: &File<'_>, name: &str) -> Result<Vec<f64>, VerifyError> {
 struct Comparison<'a, 'b, D: Device> {
     file: &'a File<'a>,
     reference: &'a mut Reference<'b, D>,
-    /// Of the images.
+    /// Side of the images.
     side: usize,
 }
 
@@ -107,13 +108,13 @@ impl<D: Device> Comparison<'_, '_, D> {
         values.ok_or_else(|| self.file.wrong(name, "holds an index that is too large"))
     }
 
-    /// Where number `index` of theirs (channel, row, column) lies in ours (row, column, channel).
+    /// The index in (row, column, channel) of number `index` in the file's (channel, row, column).
     fn place(&self, index: usize, channels: usize) -> usize {
         let pixels = self.side * self.side;
         index % pixels * channels + index / pixels
     }
 
-    /// Theirs, (channel, row, column), as ours.
+    /// Converts the file's (channel, row, column) to (row, column, channel).
     fn by_pixel(&self, values: &[f32], channels: usize) -> Vec<f32> {
         let pixels = self.side * self.side;
         (0..values.len()).map(|at| values[at % channels * pixels + at / channels]).collect()

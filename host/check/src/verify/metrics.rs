@@ -1,4 +1,5 @@
-//! `metrics.safetensors`: scores of pairs of pictures, the networks' parameters by formula, and Frechet distances of sets.
+//! `metrics.safetensors`: scores of pairs of pictures, the networks with deterministic initialisation, and Frechet
+//! distances of sets.
 
 use super::file::File;
 use super::{Measure, Quantity, Report, VerifyError};
@@ -27,13 +28,13 @@ const NETWORK_TOLERANCE: f64 = 1.0e-4;
 /// The reference's DISTS is 1 less a sum in `f32`: steps of `2^-24` around 1, and the sum's own rounding, in place of a
 /// share of the score.
 const DISTS_STEPS: f64 = 4.0 / (1 << 24) as f64;
-/// What the file's heads of LPIPS begin with; behind it they are named as published.
+/// The prefix of the file's LPIPS heads, which is followed by the published names.
 const LPIPS_PREFIX: &str = "lpips_";
 /// Sets of points.
 const FRECHET: [(&str, &str); 2] =
     [("frechet", "Frechet distance"), ("frechet_lowrank", "Frechet distance, few points")];
 
-/// Compares what is there; returns the names of the tensors that were used.
+/// Compares the file's quantities; returns the names of the used tensors.
 pub(super) fn verify<D: Device>(
     path: &Path,
     tensors: &SafeTensors<'_>,
@@ -62,7 +63,7 @@ fn doubles(file: &File<'_>, name: &str) -> Result<Vec<f64>, VerifyError> {
 /// A build without the feature `fid` computes no distances of sets.
 #[cfg(not(feature = "fid"))]
 fn frechet(file: &File<'_>, name: &str, _title: &str, _report: &mut Report) -> Result<Vec<String>, VerifyError> {
-    let reason = "is a Frechet distance, which this build leaves out: it is in builds with the feature `fid`";
+    let reason = "is a Frechet distance, which needs a build with the feature `fid`";
     Err(file.wrong(name, reason.to_owned()))
 }
 
@@ -203,7 +204,7 @@ impl<'a> Pairs<'a> {
 /// A score of a prediction and a truth.
 type Score<'a> = dyn Fn(&RgbImage, &RgbImage) -> Result<f64, VerifyError> + 'a;
 
-/// A trunk's parameters by formula from their names behind a prefix.
+/// A trunk's parameters by deterministic initialisation, their names behind a prefix.
 fn by_formula(steps: &[Step<Convolution>], prefix: &'static str) -> Checkpoint {
     let values = move |tensor: &TensorShape| initialisation::tensor(&format!("{prefix}{}", tensor.name), &tensor.shape);
     Checkpoint::computed("formula", tensors(steps, 3).0, BTreeMap::new(), values)

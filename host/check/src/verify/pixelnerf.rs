@@ -1,5 +1,5 @@
-//! PixelNeRF with parameters by formula: latents, points, rays. The official network at full size, or, where the file's
-//! metadata say `width`, the small member of the family of that width.
+//! PixelNeRF with deterministic initialisation: latents, points, rays. The official network at full size, or, where the
+//! file's metadata say `width`, the small member of the family of that width.
 
 use super::file::{File, compared, full};
 use super::{Quantity, Report, VerifyError};
@@ -18,7 +18,7 @@ const WEIGHTS: [&str; 3] = ["mean", "tilted", "one_hot"];
 const RAY_WEIGHTS: &str = "tilted";
 const PASSES: [(Pass, &str); 2] = [(Pass::Coarse, "coarse"), (Pass::Fine, "fine")];
 
-/// Compares everything in the file. Returns the names of the tensors that it knows; none if the file is another one.
+/// Compares everything in the file. Returns the names of the known tensors; none if the file has another content.
 pub(super) fn verify<D: Device>(
     path: &Path,
     tensors: &SafeTensors<'_>,
@@ -100,7 +100,7 @@ fn rays(file: &File<'_>) -> Result<Vec<TargetRay>, VerifyError> {
     Ok(file.rows::<8>("rays")?.into_iter().map(ray).collect())
 }
 
-/// One way of computing, compared with the file.
+/// One way of computing, for comparison with the file.
 struct Comparison<'a> {
     file: &'a File<'a>,
     suffix: &'static str,

@@ -87,7 +87,7 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
     Ok(Report { path: path.to_path_buf(), quantities, not_covered })
 }
 
-/// Our name for a method of the published code.
+/// The name here of a method of the published code.
 fn scheme_of(method: &str) -> Option<Weighting> {
     let name = match method {
         "baseline_mean" => "mean".to_owned(),

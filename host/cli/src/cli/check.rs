@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         match checked {
             Ok(checked) => report.devices.push(checked),
             Err(error @ CheckError::Interrupted(_)) => return Err(error.into()),
-            // One device that fails is no reason to lose what is known of the others.
+            // The results of the other devices are kept if one fails.
             Err(error) => report.failures.push(format!("{}: {:#}", device.name(), anyhow::Error::from(error))),
         }
     }
@@ -131,14 +131,14 @@ fn print_picture(picture: &PictureReport) -> std::io::Result<()> {
     ))?;
     if let Some(PictureVersusCpu { worst, differing, psnr }) = picture.versus_cpu {
         let psnr = psnr.map_or_else(|| "equal".to_owned(), |psnr| format!("PSNR {psnr:.1} dB"));
-        say(format_args!("from the CPU's: worst pixel {worst}/255, {differing} pixels differ, {psnr}"))?;
+        say(format_args!("against the CPU's: worst pixel {worst}/255, {differing} pixels differ, {psnr}"))?;
     }
     picture.breach.iter().try_for_each(|breach| say(format_args!("picture: {breach}")))
 }
 
-/// Where the bounds come from is the same for all devices.
+/// The derivation of the bounds is the same for all devices.
 fn print_reasons(report: &Report) -> std::io::Result<()> {
     let Some(device) = report.devices.first() else { return Ok(()) };
-    say("Differences are from f64; relative ones and ULP of numbers of a certain size. Bounds:")?;
+    say("Differences are against f64; relative ones and ULP only for numbers above a least size. Bounds:")?;
     device.kernels.iter().try_for_each(|kernel| say(format_args!("  {}: {}", kernel.kernel, kernel.reason)))
 }

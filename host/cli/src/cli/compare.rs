@@ -26,11 +26,11 @@ use viewfuse_job::progress::Progress;
 pub(crate) struct Arguments {
     /// A picture, or a folder of pictures (PNG, JPEG)
     prediction: PathBuf,
-    /// What it should be: a picture, or a folder that has one of each name
+    /// Its ground truth: a picture, or a folder with a picture of each name
     truth: PathBuf,
     #[command(flatten)]
     metrics: MetricOptions,
-    /// Seed of the subsets that KID of more than 1000 pictures is a mean of
+    /// Seed of the subsets whose mean is the KID of more than 1000 pictures
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
@@ -47,14 +47,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A picture's name, and where it and its truth are.
+/// A picture's name, its path, and the path of its ground truth.
 struct Pair {
     name: String,
     prediction: PathBuf,
     truth: PathBuf,
 }
 
-/// Every picture with its truth.
+/// Every picture with its ground truth.
 fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
     if !prediction.is_dir() {
         ensure!(!truth.is_dir(), "{}: is a folder, {} is not", truth.display(), prediction.display());
@@ -75,7 +75,7 @@ fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
     pairs.sort_by(|a, b| a.name.cmp(&b.name));
     match pairs.iter().find(|pair| !pair.truth.is_file()) {
         _ if pairs.is_empty() => bail!("{}: has no pictures (PNG, JPEG)", prediction.display()),
-        Some(pair) => bail!("{}: is not there, to compare {} with", pair.truth.display(), pair.prediction.display()),
+        Some(pair) => bail!("{}: is missing, to compare {} with", pair.truth.display(), pair.prediction.display()),
         None => Ok(pairs),
     }
 }
@@ -107,12 +107,12 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
         Some(inception) if pictures.len() > 1 => {
             print_distances(&metrics, inception.kind(), &pictures, device, arguments.seed)
         }
-        Some(_) => Ok(say("FID and KID: no; they compare sets of at least 2 pictures")?),
+        Some(_) => Ok(say("FID and KID need sets of at least 2 pictures")?),
         None => Ok(()),
     }
 }
 
-/// A row for each metric: the mean, and where it is worst. A metric that a picture is too small for counts where it can.
+/// A row for each metric: the mean, and the worst picture. A metric leaves out pictures that are too small for it.
 fn print_scores(pairs: &[Pair], scores: &[Vec<Scored>]) -> anyhow::Result<()> {
     let mut names: Vec<&str> = Vec::new();
     for score in scores.iter().flatten() {
@@ -153,11 +153,11 @@ fn print_distances<D: Device>(
     let [fid, kid] = distances(&predictions, &truths, seed)?;
     let network = match kind {
         InceptionKind::Fid => "the Inception that FID is defined with",
-        InceptionKind::Torchvision => "torchvision's Inception: not the numbers of tables",
+        InceptionKind::Torchvision => "torchvision's Inception, not comparable with published numbers",
     };
     say(format_args!("FID {fid:.3}, KID {kid:.6} ({network})"))?;
     if pictures.len() < predictions.dimension() {
-        say(format_args!("FID of {} pictures says little; KID does not depend on their number", pictures.len()))?;
+        say(format_args!("FID of {} pictures is biased; KID does not depend on their number", pictures.len()))?;
     }
     Ok(())
 }
@@ -170,7 +170,7 @@ fn distances(predictions: &Features, truths: &Features, seed: u64) -> anyhow::Re
     Ok([frechet_distance(predictions, truths)?, kernel_distance(predictions, truths, seed)?])
 }
 
-/// `--fid` was refused before ([`MetricOptions::open`]).
+/// `--fid` was rejected before ([`MetricOptions::open`]).
 #[cfg(not(feature = "fid"))]
 fn distances(_: &Features, _: &Features, _: u64) -> anyhow::Result<[f64; 2]> {
     Err(super::left_out::in_feature("FID and KID", "fid"))

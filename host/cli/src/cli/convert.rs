@@ -14,15 +14,15 @@ use viewfuse_weighting::attention::{AttentionModel, c_header};
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse convert pixel_nerf_latest pixelnerf.safetensors --half\n  \
     viewfuse convert weighting.safetensors attention.h\n      learned attention, for firmware that links the C face\n\n\
-    Read are safetensors, what torch.save writes, new and old, and networks that Python's pickle wrote (.pkl), such as \
-    snapshots of EDM's training. Nothing in a file is executed.")]
+    Input formats are safetensors, torch.save (new and old), and networks written by Python's pickle (.pkl), such as \
+    snapshots of EDM's training. No code in a file is executed.")]
 pub(crate) struct Arguments {
     /// The checkpoint
     input: PathBuf,
-    /// Where to write it, as safetensors; learned attention with the Fourier embedding also as a C header
+    /// The output, as safetensors; for learned attention with the Fourier embedding also a C header
     #[arg(value_name = "OUT.safetensors|OUT.h")]
     output: PathBuf,
-    /// Round floating point numbers to 16 bits
+    /// Round floating point numbers to half precision (f16)
     #[arg(long)]
     half: bool,
 }
@@ -32,7 +32,7 @@ fn header(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Arguments { input, output, .. } = arguments;
     check_writable(output)?;
     let AttentionModel::Fourier(embedding) = AttentionModel::open(input)? else {
-        bail!("{}: the C face knows only attention with the Fourier embedding (paper.0.weight)", input.display());
+        bail!("{}: the C face supports only attention with the Fourier embedding (paper.0.weight)", input.display());
     };
     let name = input.file_name().unwrap_or(input.as_os_str()).to_string_lossy();
     write_whole(output, c_header(&embedding, &name).as_bytes())?;
@@ -45,13 +45,13 @@ fn header(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let output = &arguments.output;
-    let ends_in = |wanted: &str| output.extension().is_some_and(|extension| extension == wanted);
+    let ends_in = |name: &str| output.extension().is_some_and(|extension| extension == name);
     if ends_in("h") && !arguments.half {
         return header(arguments);
     }
     ensure!(
         ends_in("safetensors"),
-        "{}: only safetensors are written, and learned attention as a C header; give a name that ends in .safetensors, \
+        "{}: output formats are safetensors, and a C header for learned attention; give a name that ends in .safetensors, \
          or in .h without --half",
         output.display()
     );

@@ -22,7 +22,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    // A machine without Vulkan is no failure: it is what was asked about.
+    // A machine without Vulkan is not a failure.
     let (adapters, problem) = match vulkan_devices(&instance_options()) {
         Ok((_, adapters)) => (adapters, None),
         Err(error) => (Vec::new(), Some(error.to_string())),

@@ -1,4 +1,4 @@
-//! The environment variables that the command heeds.
+//! The environment variables of the command.
 
 use std::env;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ pub(crate) fn instance_options() -> InstanceOptions {
     }
 }
 
-/// The environment's Vulkan, with devices that work like this.
+/// The environment's Vulkan, with these device options.
 pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
     DeviceOptions { instance: instance_options(), gpu }
 }

@@ -1,7 +1,7 @@
 //! `viewfuse evaluate`.
 //!
 //! ```text
-//! protocol   with --protocol: jobs, a folder that can be gone on with, shards
+//! protocol   with --protocol: jobs, a folder that can be continued, shards
 //! tables     means on the terminal, every score as CSV
 //! ```
 
@@ -33,16 +33,16 @@ use viewfuse_weighting::WeightingSpec;
     viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the other views from every third, two schemes\n  \
     viewfuse evaluate cars/*/ --protocol random --trials 3 -o runs/random\n      the paper's first table, with pictures for a report\n  \
     viewfuse evaluate cars/*/ --protocol count --shard 2/8 -o runs/count\n      the third of eight parts; the folder is shared, or copied together afterwards\n\n\
-    With --protocol, the same command again goes on with a folder after a kill, and prints the tables once every job is \
-    there, whichever shards did them. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
+    With --protocol, the same command continues a folder after an interruption, and prints the tables once every job of \
+    all shards is done. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
 pub(crate) struct Arguments {
     /// One or more scenes; with --split data sets
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
-    /// Take the scenes of a data set: those for train, val or test
+    /// Use the scenes of a data set for train, val or test
     #[arg(long, value_name = "SPLIT")]
     split: Option<Split>,
-    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
+    /// Views to render and compare, as for --sources [default: all views, each held out in turn; with --sources all others]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
     #[command(flatten)]
@@ -57,18 +57,18 @@ pub(crate) struct Arguments {
     model: ModelOptions,
     #[command(flatten)]
     metrics: MetricOptions,
-    /// Seed of every random number: of a protocol's draws, and of networks
+    /// Seed of every random draw: of protocols, and of networks
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Write every single score to this CSV file; with --protocol the folder of the evaluation
+    /// Write every score to this CSV file; with --protocol the folder of the evaluation
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// Where the scenes are.
+    /// The paths of the scenes.
     fn paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let Some(split) = self.split else { return Ok(self.scenes.clone()) };
         let sets: Vec<Dataset> = self.scenes.iter().map(|path| Dataset::open(path, split)).collect::<Result<_, _>>()?;
@@ -76,7 +76,7 @@ impl Arguments {
     }
 }
 
-/// `values` are all options and their values as a person would write them.
+/// `values` are all options and their values as on the command line.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
     let mut specs = or_every_scheme(&arguments.weights)?;

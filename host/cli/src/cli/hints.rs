@@ -1,4 +1,4 @@
-//! What a person can do about an error of the library, which knows no options: the words behind the error's.
+//! Hints at the command's options for errors of the library, printed behind the error.
 
 use viewfuse_evaluate::EvaluateError;
 use viewfuse_evaluate::run_folder::FolderError;
@@ -7,7 +7,7 @@ use viewfuse_field::training_free::NoObject;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_scene::photographs::PhotographsError;
 
-/// The option, if there is one, that may help with an error or one of its causes.
+/// The hint, if there is one, for an error or one of its causes.
 pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
     error.chain().find_map(|cause| {
         let few_shot = cause.downcast_ref::<SelectionError>().and_then(of_few_shot);
@@ -21,7 +21,7 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
 
 fn of_few_shot(error: &SelectionError) -> Option<&'static str> {
     match error {
-        SelectionError::TargetIsSource { .. } => Some("take it out of --sources or of --targets"),
+        SelectionError::TargetIsSource { .. } => Some("remove it from --sources or from --targets"),
         SelectionError::TooManySources { .. } => Some("choose with --sources or --views"),
         SelectionError::NoTargets { .. } => Some("give --targets NAMES or --orbit N"),
         SelectionError::NoOrbit { .. } => Some("give --targets"),
@@ -31,7 +31,7 @@ fn of_few_shot(error: &SelectionError) -> Option<&'static str> {
 
 fn of_photographs(error: &PhotographsError) -> Option<&'static str> {
     match error {
-        PhotographsError::NoSilhouette { .. } => Some("the colour is an option: --background"),
+        PhotographsError::NoSilhouette { .. } => Some("set the colour with --background"),
         _ => None,
     }
 }
@@ -47,14 +47,14 @@ fn of_render(error: &RenderError) -> Option<&'static str> {
     match error {
         RenderError::Shape { .. } | RenderError::Size { .. } => Some("give another --size"),
         RenderError::Unsuitable { reason, .. } if reason.is::<NoObject>() => {
-            Some("`viewfuse inspect` shows the poses, --background takes the background")
+            Some("`viewfuse inspect` shows the poses; --background sets the background")
         }
         RenderError::Photographs(error) => of_photographs(error),
         _ => None,
     }
 }
 
-/// Transparent errors stand for their cause, which is no link of the chain then.
+/// A transparent error replaces its cause, which is then not part of the chain.
 fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
     match error {
         EvaluateError::Selection(error) => of_few_shot(error),

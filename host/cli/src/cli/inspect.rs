@@ -17,7 +17,7 @@ use viewfuse_scene::photographs::BackgroundChoice;
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
-    /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
+    /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
     /// Print JSON instead of text

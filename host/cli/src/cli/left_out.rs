@@ -1,9 +1,10 @@
-//! Commands that a build leaves out: what compiling them costs most and serves fewest. They say in one line how to get them.
+//! Stand-ins for commands that a build leaves out because few people need them and they take long to compile. Each says in
+//! one line how to get the command.
 
 use super::wrong;
 use std::fmt::Display;
 
-/// What a person who asked for something of a feature is told.
+/// The error of a command or an option of a missing feature.
 pub(crate) fn in_feature(what: impl Display, feature: &str) -> anyhow::Error {
     wrong(format_args!(
         "this build has no {what}; `cargo run --release --features {feature} -- ...` has it, and so has \
@@ -20,7 +21,7 @@ macro_rules! stand_ins {
             use std::ffi::OsString;
             use std::process::ExitCode;
 
-            /// Whatever the command would take.
+            /// The command's arguments, which are ignored.
             #[derive(Args)]
             #[command(disable_help_flag = true)]
             pub(crate) struct Arguments {

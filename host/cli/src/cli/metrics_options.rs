@@ -1,4 +1,4 @@
-//! Which metrics score pictures, and where their networks' parameters are.
+//! The metrics, and the files of their networks' parameters.
 
 use super::left_out::in_feature;
 use super::wrong;
@@ -18,10 +18,10 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 /// Heading of these options.
 const METRICS: &str = "Options of metrics";
 
-/// What scores pictures besides PSNR and SSIM.
+/// Metrics besides PSNR and SSIM.
 #[derive(Args)]
 pub(crate) struct MetricOptions {
-    /// Score with LPIPS: its network (alex, vgg or squeeze) and torchvision's state_dict of that; may be given once for each
+    /// Score with LPIPS: its network (alex, vgg or squeeze) and torchvision's state_dict of it; may be given once for each
     /// network. The published heads are built in
     #[arg(long, value_name = "NETWORK=FILE[,heads=FILE]", value_parser = parse_lpips, help_heading = METRICS)]
     lpips: Vec<(LpipsTrunk, NetworkFile)>,
@@ -31,12 +31,12 @@ pub(crate) struct MetricOptions {
     /// Score sets of pictures with FID and KID: the Inception of pytorch-fid (pt_inception-2015-12-05), or torchvision's
     #[arg(long, value_name = "FILE", help_heading = METRICS)]
     fid: Option<PathBuf>,
-    /// Whose scores to compute: plain, pixelnerf or viewattention, as published evaluations did
+    /// Convention of the scores: plain, pixelnerf or viewattention, as in published evaluations
     #[arg(long, value_name = "CONVENTION", default_value_t, help_heading = METRICS)]
     metrics_as: Convention,
 }
 
-/// A network's parameters, and perhaps other heads than the published ones.
+/// The file of a network's parameters, and optionally other heads than the published ones.
 #[derive(Clone, Debug)]
 struct NetworkFile {
     trunk: PathBuf,
@@ -62,17 +62,17 @@ impl MetricOptions {
         files.chain(&self.fid).map(PathBuf::as_path).collect()
     }
 
-    /// Where pictures are scored one by one, sets of them are not compared.
+    /// Rejects `--fid` where pictures are scored one by one.
     pub(crate) fn refuse_sets(&self) -> anyhow::Result<()> {
         match self.fid {
-            Some(_) => {
-                Err(wrong("--fid compares sets of pictures, and here each is scored alone; see `viewfuse compare`"))
-            }
+            Some(_) => Err(wrong(
+                "--fid compares sets of pictures, but this command scores each picture alone; see `viewfuse compare`",
+            )),
             None => Ok(()),
         }
     }
 
-    /// Reads the networks and takes them to one of the devices.
+    /// Loads the networks to one of the devices.
     pub(crate) fn on<'a>(&self, device: &'a AnyDevice) -> anyhow::Result<Box<dyn Scorer + 'a>> {
         Ok(match device {
             AnyDevice::Cpu(device) => Box::new(MetricsOn { device, metrics: self.open(device)? }),
@@ -82,7 +82,7 @@ impl MetricOptions {
         })
     }
 
-    /// Reads the networks and takes them to a device.
+    /// Loads the networks to a device.
     pub(crate) fn open<D: Device>(&self, device: &D) -> anyhow::Result<Metrics<D>> {
         if self.fid.is_some() && cfg!(not(feature = "fid")) {
             return Err(in_feature("FID and KID", "fid"));

@@ -1,8 +1,8 @@
-//! Which field makes the pictures, and how.
+//! The field that renders, and its options.
 //!
 //! ```text
-//! name        what --model takes
-//! genvs       from noise to a picture
+//! name        the values of --model
+//! genvs       the denoiser's options of GeNVS
 //! ```
 
 mod genvs;
@@ -16,7 +16,7 @@ use anyhow::Context;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use genvs::{RunOptions, parse_noise};
-use name::Model;
+use name::{Model, model_help};
 use std::path::Path;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_field::AnyField;
@@ -30,70 +30,68 @@ const PIXELNERF: &str = "Options of PixelNeRF";
 /// Heading of the options of one family.
 pub(crate) const GENVS: &str = "Options of GeNVS";
 
-/// Which network makes the pictures, and where it looks.
+/// The network, and the samples on its rays.
 #[derive(Args)]
 pub(crate) struct NetworkOptions {
-    /// Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl); or one of the networks without training, for
-    /// measuring: formula[:WIDTH] and body[:WIDTH] are PixelNeRFs, genvs and genvs:small GeNVSs [default: the training-free
-    /// field]
-    #[arg(long, value_name = "FILE", help_heading = NETWORK)]
+    #[arg(long, value_name = "FILE", help = model_help(), help_heading = NETWORK)]
     model: Option<Model>,
-    /// Samples on a ray: of PixelNeRF in the first pass, in the second by weight, in the second around the depth; of GeNVS a
-    /// single number [default: 64,16,16 and 64]
+    /// Samples on a ray. PixelNeRF: three numbers, for the first pass, the second pass by weight, and the second pass
+    /// around the depth [default: 64,16,16]. GeNVS: one number [default: 64]
     #[arg(long, value_name = "N,N,N|N", value_parser = parse_samples, requires = "model", help_heading = NETWORK)]
     samples: Option<Samples>,
-    /// Where rays begin and end, world units [default: 8/13 and 18/13 of the cameras' distance from what they look at]
+    /// Near and far bounds of rays, world units [default: 8/13 and 18/13 of the cameras' distance from the point that they
+    /// look at]
     #[arg(long, value_name = "NEAR,FAR", value_parser = parse_near_far, requires = "model", help_heading = NETWORK)]
     near_far: Option<[f32; 2]>,
-    /// Second-pass samples around the depth that the published code takes (the sum of weights times depths, too near on
-    /// rays that are not opaque), not around the mean depth
+    /// Place second-pass samples around the depth of the published code (the sum of weights times depths, too near on
+    /// rays that are not opaque) instead of the mean depth
     #[arg(long, requires = "model", help_heading = PIXELNERF)]
     published_depth: bool,
-    /// Noise levels to start from and to end at [default: 80,0.002]
+    /// Largest and smallest noise level [default: 80,0.002]
     #[arg(long, value_name = "MAX,MIN", value_parser = parse_noise, requires = "model", help_heading = GENVS)]
     noise: Option<NoiseSchedule>,
 }
 
-/// Which network makes the pictures, and what it leaves out.
+/// The network and its omissions.
 #[derive(Args)]
 pub(crate) struct ModelOptions {
     #[command(flatten)]
     network: NetworkOptions,
-    /// Leave nothing out: every view, layer and sample, whether the scene needs it or not; of GeNVS also every call of the
-    /// published run, heun over 25 levels, unless --sampler, --steps or --tolerance say otherwise
+    /// Leave nothing out: compute every view, layer and sample, and with GeNVS every call of the published run, heun
+    /// over 25 levels, unless --sampler, --steps or --tolerance are given
     #[arg(long, conflicts_with_all = ["compute", "probe_step", "probe_error", "leave_out", "early_termination"], help_heading = NETWORK)]
     pub(crate) exact: bool,
-    /// Compute these although the scene does not need them
+    /// Switch these omissions off: compute what the scene does not need
     #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(computable()), value_delimiter = ',', requires = "model", help_heading = NETWORK)]
     compute: Vec<String>,
     /// Probe one ray in every square of this many pixels on a side for empty space [default: 4]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(2..=64), requires = "model", help_heading = PIXELNERF)]
     probe_step: Option<u32>,
-    /// Let more of space count as empty while the probes' colours change by no more than this in the root of the mean
-    /// square, 1 being from black to white [default: 1/128]
+    /// Raise the threshold of empty space while the probes' colours change by at most this, root mean square; 1 is from
+    /// black to white [default: 1/128]
     #[arg(long, value_name = "ERROR", value_parser = parse_share, requires = "model", help_heading = PIXELNERF)]
     probe_error: Option<f32>,
     #[command(flatten)]
     run: RunOptions,
 }
 
-/// What `--samples` says.
+/// The value of `--samples`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Samples(Vec<u32>);
 
-/// What `--compute` takes.
+/// The values of `--compute`.
 fn computable() -> Vec<PossibleValue> {
     let all = [VIEWS].into_iter().chain(Family::ALL.into_iter().flat_map(|family| family.computable()).copied());
     all.map(|(name, help)| PossibleValue::new(name).help(help)).collect()
 }
 
 impl NetworkOptions {
-    /// Where the network comes from, if there is one.
+    /// The source of the network, if there is one.
     pub(crate) fn label(&self) -> Option<String> {
         self.model.as_ref().map(Model::to_string)
     }
 
-    /// The file of the network's parameters, if they come from one.
+    /// The file of the network's parameters, if there is one.
     pub(crate) fn file(&self) -> Option<&Path> {
         match &self.model {
             Some(Model::File(path)) => Some(path),
@@ -101,13 +99,13 @@ impl NetworkOptions {
         }
     }
 
-    /// Reads the field, as it is unless a person says otherwise.
+    /// Opens the field with its default options.
     #[cfg(feature = "pareto")]
     pub(crate) fn open(&self, seed: u64) -> anyhow::Result<AnyField> {
         self.open_with(FieldOptions { seed, ..FieldOptions::default() })
     }
 
-    /// Reads the field, with further options.
+    /// Opens the field, with further options.
     fn open_with(&self, options: FieldOptions) -> anyhow::Result<AnyField> {
         let Some(model) = &self.model else { return Ok(AnyField::default()) };
         let options = FieldOptions {
@@ -127,17 +125,17 @@ impl NetworkOptions {
 }
 
 impl ModelOptions {
-    /// Where the network comes from, if there is one.
+    /// The source of the network, if there is one.
     pub(crate) fn label(&self) -> Option<String> {
         self.network.label()
     }
 
-    /// The file of the network's parameters, if they come from one.
+    /// The file of the network's parameters, if there is one.
     pub(crate) fn file(&self) -> Option<&Path> {
         self.network.file()
     }
 
-    /// Reads the field. A GeNVS starts each frame from the one before at level `reuse`, if there is one.
+    /// Opens the field. With `reuse`, a GeNVS starts each frame from the one before at that noise level.
     pub(crate) fn open(&self, seed: u64, reuse: Option<f32>) -> anyhow::Result<AnyField> {
         let ModelOptions { exact, probe_step, probe_error, .. } = *self;
         let compute = self.compute.clone();

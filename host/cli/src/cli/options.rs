@@ -13,20 +13,21 @@ use viewfuse_scene::few_shot::Selection;
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
-/// How pictures are made.
+/// Options of pictures.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
     /// Size of the pictures; without --model the sources are resampled to the same scale [default: the views' size, at most
     /// 512, of a GeNVS at most the size that it was trained for]
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<[u32; 2]>,
-    /// What is behind the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
+    /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
     /// Leave out the least relevant sources while their weights together stay at or below this
     #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
     leave_out: f32,
-    /// A ray ends where less than this share of the light still passes; rays of a GeNVS go on to the end [default: 1/256]
+    /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a GeNVS
+    /// [default: 1/256]
     #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share)]
     early_termination: Option<f32>,
     /// Work on this many threads [default: all cores]
@@ -35,10 +36,10 @@ pub(crate) struct PictureOptions {
 }
 
 impl PictureOptions {
-    /// With `exact`, nothing is left out. What the field does not know must not have been given.
+    /// With `exact`, nothing is left out. Options that the field does not have are rejected.
     pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
         if self.early_termination.is_some() && !field.ends_rays {
-            return Err(wrong("--early-termination cannot be used with a GeNVS, whose rays go on to the end"));
+            return Err(wrong("--early-termination cannot be used with a GeNVS, which has no early termination"));
         }
         let early_termination =
             if exact || !field.ends_rays { 0.0 } else { self.early_termination.unwrap_or(DEFAULT_EARLY_TERMINATION) };
@@ -47,14 +48,13 @@ impl PictureOptions {
     }
 }
 
-/// Where kernels run.
+/// Options of the device.
 #[derive(Args)]
 pub(crate) struct DeviceOptions {
     /// Device: auto (a GPU if there is one, otherwise the CPU), cpu, vulkan, vulkan:NUMBER or vulkan:NAME
     #[arg(long, value_name = "DEVICE", default_value = "auto")]
     device: DeviceChoice,
-    /// Longest time that a submission to a Vulkan device may run [default: 120 on a GPU, none on a software
-    /// driver]
+    /// Time limit of a submission to a Vulkan device [default: 120 on a GPU, none on a software driver]
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     time_limit: Option<Duration>,
 }
@@ -65,13 +65,13 @@ impl DeviceOptions {
     }
 }
 
-/// Which views are sources.
+/// The choice of source views.
 #[derive(Args)]
 pub(crate) struct SourceOptions {
     /// Source views: names, ranges A..B, `all`, each with /STEP, separated by commas [default: all but the targets]
     #[arg(long, value_name = "VIEWS")]
     sources: Option<String>,
-    /// At most this many sources, spread as far apart as possible
+    /// Use at most this many sources, as far apart as possible
     #[arg(long, value_name = "K", value_parser = parse_count)]
     views: Option<usize>,
 }
@@ -82,7 +82,7 @@ impl SourceOptions {
     }
 }
 
-/// Every option of the command that was given, by its long name, with its values as a person would write them, defaults
+/// Every option of the command that was given, by its long name, with its values as on the command line, defaults
 /// included.
 pub(crate) fn values(command: &Command, matches: &ArgMatches) -> BTreeMap<String, String> {
     let Some((name, matches)) = matches.subcommand() else { return BTreeMap::new() };

@@ -28,12 +28,12 @@ use viewfuse_weighting::WeightingSpec;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse pareto car/ --targets 5 --sources all/3 --model body:64 --size 64x64 -o out\n      each omission alone, all together, and fewer samples, on every device\n  \
-    viewfuse pareto car/ --targets 5 --sources all/3 --model genvs:small --size 32x32 --only all -o out\n      samplers are not tried, and what is left out is\n  \
+    viewfuse pareto car/ --targets 5 --sources all/3 --model genvs:small --size 32x32 --only all -o out\n      only settings whose words begin with all\n  \
     viewfuse pareto dino/ --targets 1,7 --size 160x120 --device cpu --repeat 5 -o out\n      the training-free field, on the CPU\n\n\
     Writes pareto.csv, pareto.svg and pareto.json. The first setting, exact, leaves nothing out; the others are compared \
-    with its pictures before rounding. The setting `all` leaves out what --leave-out and --early-termination say and every omission \
-    of the network. Times are medians over rounds through all settings; what else a shared machine does still shows in \
-    them. A * marks settings that are the best for their time: no other is at once as fast and as near. Exit code 1 if a \
+    with its pictures before rounding. The setting `all` has --leave-out, --early-termination and every omission \
+    of the network. Times are medians over rounds through all settings; other load on the machine still affects \
+    them. A * marks the best settings: no other is both as fast and as near. Exit code 1 if a \
     device fails.")]
 pub(crate) struct Arguments {
     /// The scene's folder, or its transforms.json or *_par.txt
@@ -50,13 +50,13 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     network: NetworkOptions,
-    /// Seed of every random number (the training-free field draws none)
+    /// Seed of every random draw (the training-free field makes none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Measure on this device: cpu, vulkan, vulkan:NUMBER or vulkan:NAME; may be given several times [default: all]
     #[arg(long, value_name = "DEVICE")]
     device: Vec<DeviceChoice>,
-    /// Take the time of every setting this many times, after a round that is not timed
+    /// Time every setting this many times, after a round that is not timed
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeat: u32,
     /// Measure, besides exact, only settings whose words begin with this; may be given several times
@@ -103,7 +103,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         let (name, measured) = on_threads(arguments.picture.threads, || (device.name(), sweep.on(&device, &field)))?;
         let measured = match measured {
             Ok(measured) => measured,
-            // One device that fails is no reason to lose what is known of the others.
+            // The results of the other devices are kept if one fails.
             Err(Failure::Device(failure)) => {
                 record.failures.push(format!("{name}: {failure}"));
                 continue;
@@ -119,7 +119,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
     let title = title(&record);
     if !record.devices.is_empty() {
-        // All are made before the first is written, the record of it all last.
+        // All are computed before the first is written; the record is written last.
         let plot = plot::svg(&title, &record.devices)?;
         let (table, whole) = (csv_of(&record)?, serde_json::to_vec_pretty(&record)?);
         write_whole(&csv, &table)?;
@@ -140,11 +140,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 enum Failure {
     /// The device's own fault.
     Device(String),
-    /// No device would do it.
+    /// The settings', on every device.
     Other(anyhow::Error),
 }
 
-/// What is done on every device.
+/// The measurement on every device.
 struct Sweep<'a> {
     subject: Subject<'a>,
     options: &'a RenderOptions,
@@ -159,7 +159,7 @@ impl Sweep<'_> {
         let begins = |setting: &Setting, words: &String| setting.words.starts_with(words.as_str());
         if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
             let all: Vec<&str> = settings.iter().map(|setting| setting.words.as_str()).collect();
-            let message = format!("--only {none}: no setting begins with it; there are: {}", all.join("; "));
+            let message = format!("--only {none}: no setting begins with it; the settings are: {}", all.join("; "));
             return Err(Failure::Other(wrong(message)));
         }
         let is_exact = |setting: &Setting| setting.words == EXACT;
@@ -180,7 +180,7 @@ fn title(record: &ParetoRecord) -> String {
     let scene = record.scene.trim_end_matches('/').rsplit('/').next().unwrap_or_default();
     let network = match model {
         None => (*field).to_owned(),
-        // The networks without training that are named after their field.
+        // Test networks that are named after their field.
         Some(model) if model.split(':').next() == Some(*field) => model.clone(),
         Some(model) => format!("{field} {model}"),
     };
@@ -188,7 +188,7 @@ fn title(record: &ParetoRecord) -> String {
     format!("{scene}: {network}, {targets} of {width}x{height} from {} sources, {}", sources.len(), record.weighting)
 }
 
-/// A device's points, and which to take.
+/// A device's points, and the recommended ones.
 fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     say(&device.device)?;
     let has_truth = device.points.iter().any(|point| point.truth_psnr.is_some());
@@ -218,7 +218,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     say(format_args!("fastest at {SAME_LOOK} dB or more from exact: {}", named(&device.fastest_of_same_look)))?;
     if let Some(difference) = &device.exact_versus_first {
         let (ratio, largest) = (ratio(difference), largest(difference));
-        say(format_args!("its exact pictures from the first device's: PSNR {ratio}, largest difference {largest}"))?;
+        say(format_args!("its exact pictures against the first device's: PSNR {ratio}, largest difference {largest}"))?;
     }
     let changing: Vec<&str> =
         device.points.iter().filter(|point| !point.repeatable).map(|point| point.setting.as_str()).collect();

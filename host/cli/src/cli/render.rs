@@ -22,7 +22,7 @@ use viewfuse_weighting::WeightingSpec;
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
-    viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with the error\n  \
+    viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with scores\n  \
     viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n\n\
     Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_sheet.png for each target, and \
     run.json.")]
@@ -43,12 +43,13 @@ pub(crate) struct Arguments {
     picture: PictureOptions,
     #[command(flatten)]
     model: ModelOptions,
-    /// Start each frame from the one before, with noise of this level, as large as what may be different: for orbits
+    /// Start each frame from the one before with noise of this level, about the size of the differences between frames: for
+    /// orbits
     #[arg(long, value_name = "LEVEL", value_parser = parse_level, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
     reuse: Option<f32>,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Seed of every random number (the training-free field draws none)
+    /// Seed of every random draw (the training-free field makes none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Folder for the results; made if missing
@@ -95,7 +96,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What a person is told of a run.
+/// Prints the summary of a run.
 fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
     for frame in &record.frames {
         say(format_args!("{}", summary(frame, folder)))?;

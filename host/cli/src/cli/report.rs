@@ -11,7 +11,7 @@ use viewfuse_job::files::{check_writable, write_whole};
 #[command(after_help = "Examples:\n  \
     viewfuse report runs/random runs/close runs/count -o report.html\n      three evaluations with their tables, figures and pictures\n  \
     viewfuse report runs/count --pareto out/pareto.json --training trained -o report.html\n      with error over run time, and the curves of a training\n\n\
-    The page holds everything it shows: no network, no scripts, readable on a phone. Evaluations may still be under way.")]
+    The page is a single file without scripts and without links to other files. Evaluations may still be running.")]
 pub(crate) struct Arguments {
     /// Folders of `evaluate --protocol`
     #[arg(value_name = "DIR", required_unless_present_any = ["pareto", "training"])]

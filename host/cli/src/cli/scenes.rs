@@ -16,32 +16,32 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Make objects of one kind and photograph them: training, validation and test scenes in SRN's layout.
+    /// Generate and render objects of one kind: training, validation and test scenes in SRN's layout.
     Make(MakeArguments),
 }
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse scenes make cars learn/ --train 400 --val 10 --test 20 --size 64\n      learn/cars_train, learn/cars_val and learn/cars_test, one folder for each object\n\n\
-    Training views stand at random on a sphere, nine of ten on its upper half; validation and test views on the spiral of\n\
-    SRN's test scenes. The same settings give the same pictures; after an interruption the same command goes on, and with\n\
-    a larger number of objects it adds the missing ones.")]
+    Training cameras are random points on a sphere, nine of ten on its upper half; validation and test cameras are on the\n\
+    spiral of SRN's test scenes. The same settings give the same pictures. After an interruption the same command\n\
+    continues, and with a larger number of objects it adds the missing ones.")]
 struct MakeArguments {
-    /// What to make: cars, chairs or toys
+    /// Kind of objects: cars, chairs or toys
     kind: Kind,
-    /// The folder that gets KIND_train, KIND_val and KIND_test
+    /// The output folder, with KIND_train, KIND_val and KIND_test
     #[arg(value_name = "OUT_FOLDER")]
     out: PathBuf,
-    /// Objects to learn from
+    /// Training objects
     #[arg(long, value_name = "N", default_value_t = 400, value_parser = object_count())]
     train: u32,
-    /// Objects to watch the learning with
+    /// Validation objects
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = object_count())]
     val: u32,
-    /// Objects to measure the result with
+    /// Test objects
     #[arg(long, value_name = "N", default_value_t = 20, value_parser = object_count())]
     test: u32,
-    /// Views of an object to learn from
+    /// Views of a training object
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = view_count())]
     views: u32,
     /// Views of the other objects
@@ -50,7 +50,7 @@ struct MakeArguments {
     /// Pixels of a picture along each side: 64 or 128
     #[arg(long, value_name = "N", default_value = "128", value_parser = parse_size)]
     size: u32,
-    /// Seed of every random number
+    /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Work on this many threads [default: all cores]
@@ -70,7 +70,7 @@ fn parse_size(text: &str) -> Result<u32, String> {
     match text {
         "64" => Ok(64),
         "128" => Ok(128),
-        _ => Err("64 or 128 is wanted".to_owned()),
+        _ => Err("the size must be 64 or 128".to_owned()),
     }
 }
 
@@ -87,6 +87,6 @@ fn run_make(arguments: &MakeArguments) -> anyhow::Result<ExitCode> {
     let progress = Terminal::new("making");
     let made = on_threads(*threads, || make(out, *kind, &settings, counts, &progress))??;
     drop(progress);
-    say(format_args!("{}: {} new scenes, {} were there", out.display(), made.new_count, made.kept_count))?;
+    say(format_args!("{}: {} new scenes, {} existing", out.display(), made.new_count, made.kept_count))?;
     Ok(ExitCode::SUCCESS)
 }

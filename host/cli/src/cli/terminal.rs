@@ -1,4 +1,4 @@
-//! The person at the terminal: a bar of progress, warnings, news, and Ctrl-C.
+//! The terminal: a progress bar, warnings, messages, and Ctrl-C.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use viewfuse_job::progress::Progress;
 
-/// Set by Ctrl-C and by a polite kill.
+/// Set by Ctrl-C and by SIGTERM.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
 
-/// Makes Ctrl-C (and a polite kill) set the flag instead of ending the process. A second one ends it at once.
+/// Makes Ctrl-C (and SIGTERM) set the flag instead of ending the process. A second one ends it at once.
 ///
 /// # Errors
 /// If another handler is already installed.
@@ -22,7 +22,7 @@ pub(crate) fn listen() -> Result<(), ctrlc::Error> {
     })
 }
 
-/// A bar on a terminal, nothing elsewhere; warnings on standard error, news on standard output.
+/// A progress bar on a terminal, none elsewhere; warnings on standard error, messages on standard output.
 pub(crate) struct Terminal {
     bar: ProgressBar,
     /// Warnings that were shown.
@@ -50,7 +50,7 @@ impl Progress for Terminal {
         self.bar.inc(1);
     }
 
-    /// Once, however often it is given.
+    /// Shows each warning once.
     fn warn(&self, warning: &str) {
         let Ok(mut told) = self.told.lock() else { return };
         if !told.iter().any(|earlier| earlier == warning) {
@@ -59,7 +59,7 @@ impl Progress for Terminal {
         }
     }
 
-    /// A reader that has gone away is no reason to stop.
+    /// A closed pipe is ignored.
     fn note(&self, news: &str) {
         self.bar.suspend(|| writeln!(std::io::stdout().lock(), "{news}").ok());
     }

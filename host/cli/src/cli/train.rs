@@ -19,7 +19,7 @@ use viewfuse_train::{
     viewfuse train genvs learn/cars -o runs/genvs\n  \
     viewfuse train weighting runs/pixelnerf/model.safetensors learn/cars -o runs/weighting --steps 1000\n      \
     the paper's attention weighting for it\n\n\
-    The same command again goes on with a run that was stopped, and ends in the same numbers.")]
+    The same command continues an interrupted run, with the same results as an uninterrupted one.")]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     what: What,
@@ -27,20 +27,20 @@ pub(crate) struct Arguments {
 
 #[derive(Subcommand)]
 enum What {
-    /// A small PixelNeRF, from scratch or from a network that was learned before.
+    /// A small PixelNeRF, from scratch or from a trained network.
     Pixelnerf(PixelNerfArguments),
-    /// A small GeNVS, from scratch or from a network that was learned before: volumes, feature images and the denoiser, all at once.
+    /// A small GeNVS, from scratch or from a trained network: volumes, feature images and the denoiser together.
     Genvs(GenvsArguments),
-    /// The weighting of views for a network that stays as it is.
+    /// The weighting of views for a fixed network.
     Weighting(WeightingArguments),
 }
 
-/// What every run has.
+/// Options of every run.
 #[derive(Args)]
 struct RunOptions {
     /// Data: ROOT/cars for ROOT/cars_train and ROOT/cars_val, or a folder that holds such folders
     data: PathBuf,
-    /// Folder of the run: its state, the learned model, curves and a record. A run that is there already goes on
+    /// Folder of the run: its state, the trained model, curves and a record. An existing run is continued
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     /// Steps of the run
@@ -49,13 +49,13 @@ struct RunOptions {
     /// Learning rate; it rises over the first hundred steps and falls along a cosine
     #[arg(long, value_name = "RATE", default_value_t = 1.0e-3)]
     rate: f64,
-    /// Seed of every random number
+    /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     /// Steps from one validation to the next
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
     validate_every: u32,
-    /// Seconds from one writing of the state to the next
+    /// Seconds between writing the state
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     write_every: f64,
     /// Work on this many threads [default: all cores]
@@ -74,7 +74,7 @@ impl RunOptions {
 struct PixelNerfArguments {
     #[command(flatten)]
     run: RunOptions,
-    /// Go on from what this network has learned, with steps, rates and data of a run of its own
+    /// Start from the parameters of this network, with new steps, rates and data
     #[arg(long, value_name = "FILE", conflicts_with = "width")]
     from: Option<PathBuf>,
     /// Width of the point network
@@ -89,10 +89,10 @@ struct PixelNerfArguments {
     /// Rays of each object
     #[arg(long, value_name = "N", default_value_t = 64)]
     rays: usize,
-    /// Samples of a ray that decide where to look
+    /// Samples of a ray in the first pass
     #[arg(long, value_name = "N", default_value_t = 32)]
     coarse: usize,
-    /// Samples that are added where there is something
+    /// Samples that the second pass adds
     #[arg(long, value_name = "N", default_value_t = 16)]
     fine: usize,
 }
@@ -101,7 +101,7 @@ struct PixelNerfArguments {
 struct GenvsArguments {
     #[command(flatten)]
     run: RunOptions,
-    /// Go on from what this network has learned, with steps, rates and data of a run of its own
+    /// Start from the parameters of this network, with new steps, rates and data
     #[arg(long, value_name = "FILE", conflicts_with = "width")]
     from: Option<PathBuf>,
     /// Channels of the denoiser's first level, a multiple of 4
@@ -116,7 +116,7 @@ struct GenvsArguments {
     /// Targets of each object
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
     targets: usize,
-    /// Samples of a ray: as many as renders will have
+    /// Samples of a ray: as many as in renders
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
     samples: u32,
 }
@@ -149,7 +149,7 @@ struct WeightingArguments {
     model: PathBuf,
     #[command(flatten)]
     run: RunOptions,
-    /// How poses become vectors
+    /// Embedding of poses
     #[arg(long, value_enum, default_value = "fourier")]
     embedding: EmbeddingName,
     /// Side of the pictures, pixels
@@ -223,7 +223,7 @@ fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
     report(&outcome)
 }
 
-/// Scenes to learn from and to validate on.
+/// Training and validation scenes.
 fn scenes(data: &Path) -> anyhow::Result<[Vec<PathBuf>; 2]> {
     Ok([Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes])
 }

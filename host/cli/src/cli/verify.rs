@@ -32,7 +32,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             AnyDevice::Cpu(cpu) => verify(path, cpu, &progress),
             AnyDevice::Vulkan(vulkan) => verify(path, vulkan.as_ref(), &progress),
         };
-        // Whatever an interrupted comparison says, it was interrupted.
+        // The error of a cancelled comparison is the cancellation.
         progress.check()?;
         drop(progress);
         let report = report?;

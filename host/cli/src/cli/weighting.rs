@@ -1,4 +1,4 @@
-//! `--weights`: what can be typed, and what it means.
+//! `--weights`: its values and help.
 
 use viewfuse_weighting::attention::AttentionError;
 use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec, grammar, scheme_names};
@@ -14,7 +14,7 @@ pub(crate) fn many_help() -> String {
     format!("A weighting scheme; may be given several times: {grammar} [default: every scheme that needs no file]")
 }
 
-/// What was given, or every scheme that needs no file.
+/// The given schemes, or every scheme that needs no file.
 pub(crate) fn or_every_scheme(given: &[WeightingSpec]) -> Result<Vec<WeightingSpec>, WeightingError> {
     if given.is_empty() { scheme_names().into_iter().map(str::parse).collect() } else { Ok(given.to_vec()) }
 }

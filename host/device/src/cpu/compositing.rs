@@ -1,4 +1,4 @@
-//! The views become one, samples become a pixel.
+//! Fusion of views, compositing of samples.
 
 use crate::parallel::{for_each_row, for_each_row_of_two};
 use viewfuse_core::composite::{CompositeBlock, composite_samples};

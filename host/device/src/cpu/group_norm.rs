@@ -1,4 +1,4 @@
-//! Means of images and normalisation by them, all channels of a pixel together.
+//! Channel means and group norm of images, all channels of a pixel together.
 
 use super::scratch::with_scratch;
 use crate::parallel::{for_each_row, for_each_rows};
@@ -17,7 +17,7 @@ pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]
 
 pub(super) fn group_norm_partials(block: &GroupNormBlock, inputs: &[f32], partials: &mut [[f32; 2]]) {
     let groups = block.group_count as usize;
-    // A part of an image is work enough for a core.
+    // A part of an image is enough work for a core.
     for_each_row(&mut partials[..block.part_count() as usize * groups], groups, 1, |part, statistics| {
         with_scratch(2 * block.channels as usize, |sums| {
             Arch::new().dispatch(GroupNormPartials { block, inputs, part, sums, statistics });
@@ -86,8 +86,8 @@ impl WithSimd for Normalised<'_> {
     }
 }
 
-/// [`viewfuse_core::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the channels of
-/// a group then summed.
+/// [`viewfuse_core::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the
+/// channels of a group then summed.
 struct GroupNormPartials<'a> {
     block: &'a GroupNormBlock,
     inputs: &'a [f32],

@@ -1,31 +1,31 @@
-//! A matrix product for a core: a tile of the outputs stays in registers while a panel of the weights streams by.
+//! A matrix product on one core: a tile of the outputs stays in registers while a panel of the weights is read.
 //!
 //! With 32 vector registers a tile is 12 rows of two vectors (24 sums, two vectors of weights, one input in every lane),
 //! with 16 it is 6 rows: per step of the inner index the arithmetic takes longer than the loads. Rows are copied into a
-//! small array first, so that their places are constants and they stay in the first-level cache; weights are put in order
-//! once and for all ([`Panels`]): a panel is read from front to back. Bias, residual and rectification are part of
+//! small array first, so that their offsets are constants and they stay in the first-level cache. Weights are packed
+//! once ([`Panels`]): a panel is read from front to back. Bias, residual and rectification are part of
 //! writing a tile. Sums run along the inner index, [`DEPTH`] products at a time; a multiplication is fused with its
 //! addition where the core can.
 //!
-//! The crate `pulp` picks the widest instructions of the machine; nothing here is written for one of them.
+//! The crate `pulp` chooses the widest vector instructions of the machine; no code here is specific to one of them.
 
 use crate::parallel::for_each_part;
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
 use viewfuse_core::network::linear::rectified;
 
-/// Products that are summed before outputs are written: most of the layers in one go.
+/// Products that are summed before outputs are written: most layers need one pass.
 const DEPTH: usize = 512;
-/// Space behind a row, so that rows do not fall on the same places of the cache.
+/// Padding behind a row, so that rows do not map to the same cache lines.
 const GAP: usize = 16;
 
-/// A line of the cache: panels begin at one.
+/// A cache line: panels are aligned to it.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
 struct Line([f32; 16]);
 
-/// Weights in the order in which they are needed: `[panel][inner][column of the panel]`, two vectors wide, zeros behind
-/// the last column.
+/// Packed weights, in the order in which they are read: `[panel][inner][column of the panel]`, two vectors wide, zeros
+/// behind the last column.
 pub struct Panels {
     lines: Vec<Line>,
     inner: usize,
@@ -41,7 +41,7 @@ impl Panels {
         })
     }
 
-    /// Those of a matrix that is read piece by piece: `read(inner, first column, values)`.
+    /// The panels of a matrix that is read in pieces: `read(inner, first column, values)`.
     pub(super) fn of(inner: usize, columns: usize, read: impl Fn(usize, usize, &mut [f32]) + Sync) -> Panels {
         let width = Arch::new().dispatch(PanelWidth);
         let panel_lines = (inner * width).div_ceil(16);
@@ -68,7 +68,7 @@ impl Panels {
     }
 }
 
-/// Rows of a layer's inputs and outputs, each with its own distance from one to the next.
+/// Rows of a layer's inputs and outputs, with their pitches.
 pub(super) struct Rows<'a> {
     /// How many there are.
     pub(super) row_count: usize,
@@ -78,7 +78,7 @@ pub(super) struct Rows<'a> {
     pub(super) in_pitch: usize,
     /// Whether negative inputs count as 0.
     pub(super) relu_inputs: u32,
-    /// What is done with the sums.
+    /// The operations on the sums.
     pub(super) ending: Ending<'a>,
     /// `[row][column]`.
     pub(super) outputs: &'a mut [f32],
@@ -86,12 +86,12 @@ pub(super) struct Rows<'a> {
     pub(super) out_pitch: usize,
 }
 
-/// What is done with sums before they are written.
+/// The operations on sums before they are written: bias, residual, scale, rectification.
 #[derive(Clone, Copy)]
 pub(super) struct Ending<'a> {
     /// `[column]`.
     pub(super) bias: &'a [f32],
-    /// `[row][column]`, and how far it is from a row to the next: 0 if all have the same.
+    /// `[row][column]` and its pitch: 0 if all rows have the same residual.
     pub(super) residual: Option<(&'a [f32], usize)>,
     /// Factor of the sums with bias and residual.
     pub(super) scale: f32,
@@ -105,7 +105,7 @@ impl<'a> Ending<'a> {
         Ending { residual: self.residual.map(|(residual, pitch)| (&residual[row * pitch..], pitch)), ..self }
     }
 
-    /// What is written for columns `start..end` of a row, from their sums.
+    /// The outputs for columns `start..end` of a row, from their sums.
     #[inline(always)]
     pub(super) fn finish<S: Simd>(&self, simd: S, sum: S::f32s, row: usize, start: usize, end: usize) -> S::f32s {
         self.close(simd, self.open(simd, sum, row, start, end))
@@ -217,7 +217,7 @@ fn tile<S: Simd, const R: usize>(
     sums
 }
 
-/// Where a tile belongs.
+/// The position of a tile.
 struct Place {
     first_row: usize,
     first_column: usize,
@@ -227,7 +227,7 @@ struct Place {
     inner: usize,
 }
 
-/// Adds a tile's sums to bias and residual, or to what the outputs hold already; ends them with the last sums.
+/// Adds a tile's sums to bias and residual, or to the outputs so far; the last sums are scaled and rectified.
 #[inline(always)]
 fn write<S: Simd, const R: usize>(simd: S, sums: &[[S::f32s; 2]; R], rows: &mut Rows<'_>, place: &Place) {
     let Place { first_row, first_column, columns, first, inner } = *place;
@@ -252,7 +252,7 @@ fn write<S: Simd, const R: usize>(simd: S, sums: &[[S::f32s; 2]; R], rows: &mut 
     }
 }
 
-/// A vector from as many numbers or fewer.
+/// A vector from at most as many numbers as it has lanes.
 #[inline(always)]
 pub(super) fn load<S: Simd>(simd: S, values: &[f32]) -> S::f32s {
     match S::as_simd_f32s(values).0.first() {
@@ -261,7 +261,7 @@ pub(super) fn load<S: Simd>(simd: S, values: &[f32]) -> S::f32s {
     }
 }
 
-/// As many numbers of a vector as there is room for.
+/// Stores the first lanes of a vector: as many as `values` has elements.
 #[inline(always)]
 pub(super) fn store<S: Simd>(simd: S, values: &mut [f32], vector: S::f32s) {
     match S::as_mut_simd_f32s(values).0.first_mut() {

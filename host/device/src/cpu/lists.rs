@@ -4,7 +4,7 @@ use crate::parallel::for_each;
 use viewfuse_core::compact::{RUN, list_run, marked_in_run, run_offsets};
 use viewfuse_core::finite::{FINITE_RUN, first_non_finite};
 
-/// Runs that a thread takes at least.
+/// The fewest runs for a thread.
 const LEAST_RUNS: usize = 64;
 
 pub(super) fn count_marked(element_count: &u32, mask: &[u32], counts: &mut [u32]) {
@@ -20,7 +20,7 @@ pub(super) fn sum_counts(run_count: &u32, counts: &[u32], offsets: &mut [u32], t
     });
 }
 
-/// Runs one after the other: where a run's part of the list ends, only its mask knows, and there is nothing but copying.
+/// Runs one after the other: the length of a run's part of the list follows from its mask, and the work is copying only.
 pub(super) fn list_marked(element_count: &u32, mask: &[u32], offsets: &[u32], list: &mut [u32]) {
     for run in 0..element_count.div_ceil(RUN) {
         list_run(mask, offsets, *element_count, run, |place, element| list[place] = element);

@@ -1,4 +1,4 @@
-//! Products of matrices that are both computed, and softmax.
+//! Matrix products of two computed matrices, and softmax.
 
 use super::linear::{Ending, Panels};
 use super::network::multiply;

@@ -1,5 +1,5 @@
-//! Layers of networks: blocked matrix products, convolutions as products of the image's patches or by Winograd's way, rows
-//! spread over the cores.
+//! Layers of networks: blocked matrix products, convolutions as matrix products of the image's patches or by Winograd's
+//! algorithm, rows spread over the cores.
 
 use super::linear::{Ending, Panels, Rows};
 use super::scratch::with_scratch;
@@ -13,13 +13,13 @@ use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_core::network::transpose::TransposedBlock;
 
-/// Most rows that a core takes at once: their inputs and outputs (512 columns) stay in its second-level cache, beside the
-/// weights, and the last ones keep no core waiting for long.
+/// The most rows that a core computes at once: their inputs and outputs (512 columns) stay in its second-level cache,
+/// beside the weights, and the cores finish at about the same time.
 const MOST_ROWS: usize = 96;
 /// Rows of a product's tile (or a multiple): fewer at once are wasted.
 const ROW_STEP: usize = 12;
 
-/// A layer's weights in the order in which they are needed.
+/// A layer's weights, packed for its algorithm.
 pub enum Weights {
     /// For products of matrices.
     Panels(Panels),
@@ -43,7 +43,7 @@ impl Weights {
                 assert_eq!(panels.size(), [inner, columns], "a layer has one size");
                 panels
             }
-            Weights::Winograd(_) => panic!("a layer for large images is used for nothing else"),
+            Weights::Winograd(_) => panic!("a layer for large images has no matrix form"),
         }
     }
 }
@@ -72,7 +72,7 @@ pub(super) fn convolve(
     let patch_len = block.patch_len() as usize;
     let panels = weights.panels(patch_len, columns);
     let rows = chunk_rows(pixel_count);
-    // Windows of one pixel are what lies in the image already.
+    // Patches of one pixel are the image itself.
     let is_plain = [block.size, block.stride, block.enlarge, block.padding] == [1, 1, 1, 0];
     let run = |patches: &mut [f32], chunk: usize, outputs: &mut [f32]| {
         let first = chunk * rows;
@@ -170,7 +170,7 @@ pub(super) fn linear(
     multiply(panels, inputs, inner, block.relu_inputs, ending, &mut outputs[..row_count * columns]);
 }
 
-/// A product of rows that lie side by side, spread over the cores.
+/// A matrix product of contiguous rows, spread over the cores.
 pub(super) fn multiply(
     panels: &Panels,
     inputs: &[f32],
@@ -201,13 +201,14 @@ fn window(outputs: &mut [f32], first: u32, count: usize, pitch: usize, columns: 
     &mut outputs[first..first + count.saturating_sub(1) * pitch + columns]
 }
 
-/// How many of these rows a core takes at once.
+/// The rows that a core computes at once.
 fn chunk_rows(row_count: usize) -> usize {
     let share = row_count.div_ceil(rayon::current_num_threads()).next_multiple_of(ROW_STEP);
     share.clamp(ROW_STEP, MOST_ROWS)
 }
 
-/// What output pixel `pixel` sees, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at a time.
+/// The patch of output pixel `pixel`, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at
+/// a time.
 fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f32]) {
     let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
     for (place, values) in (0..).zip(patch.chunks_exact_mut(block.in_channels as usize)) {

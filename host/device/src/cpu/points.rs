@@ -1,4 +1,4 @@
-//! What goes into PixelNeRF's network for points, and what comes out.
+//! The inputs of PixelNeRF's network at points, and radiance from its outputs.
 
 use crate::parallel::for_each_row;
 use pulp::Arch;

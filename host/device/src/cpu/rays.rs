@@ -1,4 +1,4 @@
-//! Where along which rays to look, and what was seen there.
+//! Target rays, samples along them, and their weights.
 
 use crate::parallel::{for_each, for_each_row};
 use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, fine_depth, merged_depth, random_draw};

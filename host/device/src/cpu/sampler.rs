@@ -1,9 +1,9 @@
-//! From noise to a picture.
+//! Operations of the denoiser's sampler on pictures.
 
 use crate::parallel::for_each;
 use viewfuse_core::sampler::{Mix, NoiseBlock, mixed_element, noisy_element};
 
-/// Elements that a thread takes at least: fewer are done before another one is awake.
+/// The fewest elements for a thread: fewer take less time than waking a thread.
 const LEAST_ELEMENTS: usize = 4096;
 
 #[allow(clippy::too_many_arguments)]

@@ -1,5 +1,4 @@
-//! Scratch buffers, one a thread: what a kernel needs in between is not allocated and cleared anew for every part of its
-//! work.
+//! Scratch buffers, one a thread, so that a kernel does not allocate and clear memory for every part of its work.
 
 use std::cell::RefCell;
 
@@ -7,7 +6,7 @@ thread_local! {
     static SCRATCH: RefCell<Vec<f32>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Runs something with a scratch buffer of `len` numbers, which may be anything. Within it nothing may ask for another.
+/// Calls `run` with a scratch buffer of `len` undefined numbers. `run` must not request another one.
 pub(super) fn with_scratch<T>(len: usize, run: impl FnOnce(&mut [f32]) -> T) -> T {
     SCRATCH.with_borrow_mut(|scratch| {
         if scratch.len() < len {

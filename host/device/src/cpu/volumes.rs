@@ -1,4 +1,4 @@
-//! From volumes to a feature image, and the denoiser's inputs.
+//! Feature images from volumes, and the denoiser's inputs.
 
 use crate::parallel::{for_each, for_each_row};
 use pulp::Arch;
@@ -7,8 +7,8 @@ use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock, 
 use viewfuse_core::half_precision::{fetch_f16, packed_f16, word_count};
 use viewfuse_core::rays::RayPoint;
 
-/// Adds up what the eight nodes around each point have: `add(first, weight, gathered)` adds the features of the node whose
-/// first one is number `first` of the volume.
+/// Sums the features of the eight nodes around each point: `add(first, weight, gathered)` adds those of the node whose
+/// first feature is number `first` of the volume.
 fn gather_nodes(
     block: &VolumeBlock,
     views: &[CameraBlock],

@@ -1,4 +1,4 @@
-//! How relevant each source is.
+//! Weights of the source views.
 
 use crate::parallel::for_each_row;
 use viewfuse_core::attention::{self, EMBEDDING, FourierEmbedding, PoseEmbedding};

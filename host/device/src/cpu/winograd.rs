@@ -1,9 +1,9 @@
-//! Convolution with windows of 3x3 by Winograd's way: tiles of 4x4 outputs from 6x6 inputs with 36 products a channel
+//! Convolution with windows of 3x3 by Winograd's algorithm: tiles of 4x4 outputs from 6x6 inputs with 36 products a channel
 //! instead of 144.
 //!
 //! Source: Lavin and Gray, "Fast algorithms for convolutional neural networks" (2016), F(4x4, 3x3). With the matrices
-//! `B`, `G`, `A` below, inputs `d` and weights `g`: `A^T ((G g G^T) * (B^T d B)) A`, where `*` goes number by number and
-//! is summed over the input channels: 36 matrix products with a tile's place in place of the pixel. In `f32` its error is
+//! `B`, `G`, `A` below, inputs `d` and weights `g`: `A^T ((G g G^T) * (B^T d B)) A`, where `*` is the element-wise
+//! product, summed over the input channels: 36 matrix products, one for each place of a tile. In `f32` its error is
 //! about five times that of the sum it replaces, at worst ten times (the transforms multiply by up to 8 and subtract);
 //! parity cases hold it to a bound that is derived in [`viewfuse_check::winograd_oracle`].
 
@@ -24,7 +24,7 @@ const REACH: usize = 6;
 const PLACES: usize = REACH * REACH;
 /// Rows of a product's tile.
 const ROW_STEP: usize = 12;
-/// Most tiles that a core takes at once.
+/// The most tiles that a core computes at once.
 const MOST_TILES: usize = 48;
 
 /// Weights of a layer, transformed.
@@ -66,7 +66,7 @@ impl Winograd {
     /// The whole convolution. `outputs` starts at the first output and ends behind the last.
     pub(super) fn convolve(&self, block: &ConvolveBlock, inputs: &[f32], ending: Ending<'_>, outputs: &mut [f32]) {
         let way = [block.size, block.stride, block.dilation];
-        assert_eq!(way, [3, 1, 1], "a layer for large images is used with windows of 3x3 at every pixel");
+        assert_eq!(way, [3, 1, 1], "a layer for large images has windows of 3x3 at every pixel");
         assert_eq!([self.channels, self.columns], [block.in_channels as usize, block.out_channels as usize]);
         let (width, pitch) = (block.out_width as usize, block.out_pitch as usize);
         let tiles_across = width.div_ceil(SIDE);
@@ -112,7 +112,8 @@ impl Winograd {
     }
 }
 
-/// How many rows of tiles a core takes at once: as many as waste least of the cores and of the products' rows.
+/// Rows of tiles that a core computes at once: the number that leaves the least of the cores and of the products' rows
+/// unused.
 fn tile_rows_at_once(row_count: usize, tiles_across: usize) -> usize {
     let cost = |rows: &usize| {
         let rounds = row_count.div_ceil(*rows).div_ceil(rayon::current_num_threads());
@@ -204,7 +205,7 @@ fn times<S: Simd>(simd: S, factor: f32, x: S::f32s, y: S::f32s) -> S::f32s {
     simd.mul_add_f32s(simd.splat_f32s(factor), x, y)
 }
 
-/// `A^T m A` for tiles of the products, with bias and what follows.
+/// `A^T m A` for tiles of the products, with bias, residual, scale and rectification.
 struct Put<'a, T: Iterator<Item = [usize; 2]>> {
     /// `[place][tile][channel]`.
     products: &'a [f32],

@@ -1,12 +1,13 @@
 //! The family of networks: which tensors a checkpoint must have, by its sizes.
 //!
 //! Names and shapes are those of the official `state_dict` (ViewAttention, `genvs/cars/genvs/models/{genvs,genvs_encoder,
-//! pixel_nerf_net}.py` and `training/networks.py`). It has tensors that no picture depends on: all batch norms of the
-//! encoder are switched off, and a segmentation head is left of the network that the encoder was made from. They are part
-//! of the architecture; nothing reads their values.
+//! pixel_nerf_net}.py` and `training/networks.py`). It has unused tensors: all batch norms of the
+//! encoder are switched off, and a segmentation head remains from the network that the encoder is based on. They are part
+//! of the architecture; their values are not read.
 //!
-//! Sizes are read off the tensors. What they do not tell is the same in all members ([`ASPP_RATES`], [`group_count`]); only
-//! the side of the images, which the denoiser's names tell, stands in the metadata of a checkpoint without denoiser.
+//! Sizes are read from the tensors' names and shapes. Other sizes are the same in all members ([`ASPP_RATES`],
+//! [`group_count`]), except the side of the images: it is part of the denoiser's names, and a checkpoint without denoiser
+//! has it in its metadata.
 
 mod denoiser;
 mod encoder;
@@ -20,12 +21,12 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
 /// Channels of a picture.
 pub const COLOUR_CHANNELS: usize = 3;
 
-/// Of a checkpoint's metadata: the side of the images of a network without denoiser.
+/// The metadata key of the images' side in a network without denoiser.
 pub(super) const IMAGE_SIDE: &str = "viewfuse.image_side";
-/// The sides of an image are whole multiples of this: so often the encoder halves it.
+/// The sides of an image are multiples of this, the encoder's output stride.
 const ENCODER_STRIDE: usize = 16;
 
-/// What the names of the tensors of the network at points begin with; a number follows.
+/// The prefix of the point network's tensors; a number follows.
 pub const MLP: &str = "pixel_nerf_net.mlp.layers";
 
 /// Sizes of a member of the family.
@@ -36,7 +37,7 @@ pub struct Architecture {
     pub image_side: usize,
     /// From an image to a volume of features.
     pub encoder: Encoder,
-    /// Width of both hidden layers of the network that turns a point's features into its density and features.
+    /// Width of both hidden layers of the point network, which computes a point's density and features.
     pub mlp_width: usize,
     /// From features and noise to a picture. Without one, the first three features are the picture's colours in
     /// `[-1, 1]`.
@@ -56,7 +57,7 @@ impl Architecture {
     }
 
     /// A small member for machines without a GPU: images of half the side, a quarter of the encoder's widths, a denoiser
-    /// of three levels. Everything that the published network has it has, too.
+    /// of three levels. It has every kind of layer of the published network.
     pub fn small() -> Architecture {
         let encoder = Encoder::small();
         Architecture {
@@ -67,8 +68,9 @@ impl Architecture {
         }
     }
 
-    /// A member narrow enough to be trained on a single core: a denoiser whose first level has `width` channels (a multiple
-    /// of 4), an encoder that has twice as many behind its trunk, and volumes of half as many depths as the small one's.
+    /// A member that is narrow enough for training on a single core: a denoiser whose first level has `width` channels
+    /// (a multiple of 4), an encoder that has twice as many behind its trunk, and volumes of half as many depths as the
+    /// small one's.
     pub fn narrow(image_side: usize, width: usize) -> Architecture {
         let encoder = Encoder::narrow(2 * width);
         Architecture {
@@ -79,7 +81,7 @@ impl Architecture {
         }
     }
 
-    /// Reads the sizes off a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
+    /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
     ///
     /// # Errors
     /// [`CheckpointError`] if it is not of this family.
@@ -116,7 +118,7 @@ impl Architecture {
         // Numbers of a volume are counted in 32 bits.
         let numbers = image_side as u64 * image_side as u64 * (encoder.feature_count * encoder.volume_depth) as u64;
         if numbers > u64::from(u32::MAX) {
-            return Err(sizes.refuse(format!("a volume of {numbers} numbers, of which there may be {}", u32::MAX)));
+            return Err(sizes.refuse(format!("a volume of {numbers} numbers; the limit is {}", u32::MAX)));
         }
         let architecture = Architecture { image_side, encoder, mlp_width, denoiser };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
@@ -124,7 +126,7 @@ impl Architecture {
         Ok(architecture)
     }
 
-    /// Every tensor that it has, in the order of the data.
+    /// All of its tensors, in the order of the data.
     pub fn tensors(&self) -> Vec<TensorShape> {
         let mut tensors = self.encoder.tensors();
         let features = self.encoder.feature_count;
@@ -136,7 +138,7 @@ impl Architecture {
         tensors
     }
 
-    /// Tensors that official checkpoints may have beside these: counters, the filters with which the denoiser halves and
+    /// Optional tensors of official checkpoints: counters, the filters with which the denoiser halves and
     /// doubles images (all means of four pixels, see [`Architecture::check_filters`]), its input for augmented training
     /// images, and parameters of a learned weighting.
     fn is_optional(&self, name: &str) -> bool {
@@ -150,21 +152,21 @@ impl Architecture {
         self.denoiser.is_some() && name.starts_with(denoiser::PREFIX) && name.ends_with(".resample_filter")
     }
 
-    /// Refuses a denoiser that resamples in another way than with the mean of two by two pixels.
+    /// Rejects a denoiser whose resampling filter is not the mean of 2x2 pixels.
     fn check_filters(&self, sizes: &Sizes<'_>) -> Result<(), CheckpointError> {
         const MEAN: [f32; 4] = [0.25; 4];
         for (name, shape) in sizes.checkpoint().shapes().iter().filter(|(name, _)| self.is_filter(name)) {
             // The shape first: it says how much there is to read.
             if *shape != [1, 1, 2, 2] || sizes.checkpoint().tensor(name)? != MEAN {
                 return Err(sizes.refuse(format!(
-                    "{name}, of shape {shape:?}, is not the mean of 2x2 pixels; denoisers with other filters are not run"
+                    "{name}, of shape {shape:?}, is not the mean of 2x2 pixels; denoisers with other filters are not supported"
                 )));
             }
         }
         Ok(())
     }
 
-    /// Numbers in all its tensors, those that no picture depends on included.
+    /// Numbers in all its tensors, unused ones included.
     pub fn parameter_count(&self) -> usize {
         self.tensors().iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum()
     }
@@ -184,7 +186,7 @@ fn image_side(sizes: &Sizes<'_>) -> Result<usize, CheckpointError> {
     }
 }
 
-/// A layer: its weight, and a bias for each of its outputs, which stand on the weight's first axis.
+/// A layer: its weight, and a bias for each of its outputs, the weight's first axis.
 fn with_bias(tensors: &mut Vec<TensorShape>, name: &str, shape: &[usize]) {
     tensors.push(TensorShape { name: format!("{name}.weight"), shape: shape.to_vec() });
     tensors.push(TensorShape { name: format!("{name}.bias"), shape: shape[..1].to_vec() });

@@ -1,9 +1,9 @@
-//! The denoiser's network: a U-Net of residual blocks with group normalisation and self-attention, told the noise level,
-//! its encoder fed with the halved input once more at every level.
+//! The denoiser's network: a U-Net of residual blocks with group norm and self-attention, conditioned on the noise
+//! level. Its encoder receives the halved input again at every level.
 //!
 //! Source: `networks.py` (`SongUNet` with `residual` encoder and `positional` embedding), from Karras et al. 2022 and Song
-//! et al. 2021. An image that skips from the encoder to the decoder is written, when it is made, behind the channels that
-//! will stand in front of it there: nothing is copied.
+//! et al. 2021. The image of a skip connection is written directly behind the channels that the decoder concatenates
+//! it with: nothing is copied.
 
 use viewfuse_device::DeviceError;
 mod block;
@@ -25,7 +25,7 @@ use viewfuse_nn::scratch::Scratch;
 
 /// Channels of a picture.
 const PICTURE_CHANNELS: u32 = COLOUR_CHANNELS as u32;
-/// What group norms add to variances (`networks.py`).
+/// Added to variances by group norms (epsilon, `networks.py`).
 const GROUP_NORM_EPSILON: f32 = 1.0e-6;
 
 const PLAIN: ConvolutionOptions = ConvolutionOptions::PLAIN;
@@ -37,15 +37,15 @@ fn group_norm<D: Device>(loader: &Loader<'_, D>, name: &str) -> Result<GroupNorm
 
 /// A level of the encoder.
 struct Level<D: Device> {
-    /// What halves the image of the level before; at the first level there is none.
+    /// The block that halves the image of the level before; the first level has none.
     down: Option<Down<D>>,
     blocks: Vec<Block<D>>,
 }
 
-/// From a level to the next.
+/// The step from a level to the next.
 struct Down<D: Device> {
     block: Block<D>,
-    /// The network's input, or what it became a level before, halved and brought to the level's channels.
+    /// The residual input of the level before, halved and mapped to the level's channels.
     aux_residual: Convolution<D>,
 }
 
@@ -65,7 +65,7 @@ pub(super) struct Denoiser<D: Device> {
     aux_conv: Convolution<D>,
 }
 
-/// Reads blocks, and gathers what the noise level shifts in each.
+/// Loads blocks, and collects their layers for the noise level.
 struct Blocks<'a, 'b, D: Device> {
     loader: &'a Loader<'b, D>,
     shifts: ShiftLayers,
@@ -78,7 +78,7 @@ impl<D: Device> Blocks<'_, '_, D> {
         Block::load(self.loader, &name, resample, side, first_shift)
     }
 
-    /// `block0`, `block1` and so on, as many as there are.
+    /// `block0`, `block1` and so on.
     fn load_all(&mut self, level: &str, side: u32) -> Result<Vec<Block<D>>, FieldError> {
         let mut blocks = Vec::new();
         while self.loader.tensors.has(&format!("{level}_block{}.norm0.weight", blocks.len())) {
@@ -89,8 +89,8 @@ impl<D: Device> Blocks<'_, '_, D> {
 }
 
 impl<D: Device> Denoiser<D> {
-    /// Reads it, for pictures of at least `side` rows and columns. `resolutions` are its levels' in the names of the
-    /// tensors, from the largest, at least one.
+    /// Loads it, for pictures of at least `side` rows and columns. `resolutions` are those of its levels in the names
+    /// of the tensors, the largest first, at least one.
     ///
     /// # Errors
     /// If the checkpoint cannot be read, or the device has no memory left.
@@ -161,7 +161,7 @@ impl<D: Device> Denoiser<D> {
         Ok(output)
     }
 
-    /// All that skips to the decoder, in the order in which it is made.
+    /// The images of all skip connections, in the order in which they are computed.
     fn encode(
         &self,
         scratch: &mut Scratch<'_, D>,
@@ -208,7 +208,7 @@ impl<D: Device> Denoiser<D> {
         Ok(skips)
     }
 
-    /// How many channels will stand in front of each image that skips, in the order in which they are made.
+    /// The channels in front of the image of each skip connection, in the order in which these are computed.
     fn channels_in_front(&self) -> Vec<u32> {
         let mut made = Vec::new();
         for level in &self.levels {

@@ -24,7 +24,7 @@ pub(super) const SIDE_STEP: u32 = 16;
 const PLAIN: ConvolutionOptions = ConvolutionOptions::PLAIN;
 const RELU: ConvolutionOptions = ConvolutionOptions::RELU;
 
-/// A depthwise convolution, then a rectified one of single pixels.
+/// A depthwise convolution, then a rectified 1x1 convolution.
 struct SeparableConvolution<D: Device> {
     depthwise: DepthwiseConvolution<D>,
     pointwise: Convolution<D>,
@@ -50,8 +50,8 @@ pub(super) struct Encoder<D: Device> {
     volume: Convolution<D>,
 }
 
-/// Atrous spatial pyramid pooling (`decoder.aspp`): windows of several dilations and the mean of the whole image,
-/// concatenated and mixed.
+/// Atrous spatial pyramid pooling (`decoder.aspp`): convolutions of several dilations and the mean of the whole image,
+/// concatenated, then a 1x1 convolution.
 struct Aspp<D: Device> {
     plain: Convolution<D>,
     dilated: Vec<SeparableConvolution<D>>,
@@ -61,7 +61,7 @@ struct Aspp<D: Device> {
 }
 
 impl<D: Device> Encoder<D> {
-    /// Reads it, for images of at least `side` rows and columns.
+    /// Loads it, for images of at least `side` rows and columns.
     ///
     /// # Errors
     /// If the checkpoint cannot be read, or the device has no memory left.
@@ -71,7 +71,7 @@ impl<D: Device> Encoder<D> {
         side: u32,
     ) -> Result<Encoder<D>, FieldError> {
         let trunk = ResNet::new(sizes.stem_channels, &sizes.levels).try_map(|layer: &ResNetLayer| {
-            // Only the first level has windows at every pixel, without gaps, throughout.
+            // Only the first level has stride 1 and no dilation throughout.
             loader.convolution(&format!("encoder.{}", layer.name), if layer.level == 1 { side / 4 } else { 0 })
         })?;
         let stage = |name: &str, side: u32| {
@@ -94,15 +94,15 @@ impl<D: Device> Encoder<D> {
             head_stages: [stage(&format!("{head}.stage1"), side / 2)?, stage(&format!("{head}.stage2"), side)?],
             head_upconvs: [upconv(format!("{head}.upconv1"))?, upconv(format!("{head}.upconv2"))?],
             volume: loader.changed_convolution("volume_head.reshape_conv", 0, |weights| {
-                // Published: [feature][depth]. A point looks up all features of a node: they lie together.
+                // Published: [feature][depth]. A look-up reads all features of a node, so here they are adjacent.
                 let (features, depths) = (sizes.feature_count, sizes.volume_depth);
                 weights.with_outputs_reordered(|column| column % features * depths + column / features)
             })?,
         })
     }
 
-    /// What the last layer makes a volume of, for an image (red, green, blue in `[-1, 1]`) whose rows and columns are
-    /// multiples of [`SIDE_STEP`].
+    /// The last layer's input, for an image (red, green, blue in `[-1, 1]`) whose rows and columns are multiples of
+    /// [`SIDE_STEP`].
     ///
     /// # Errors
     /// If the device is lost or has no memory left.
@@ -144,7 +144,7 @@ impl<D: Device> Encoder<D> {
         image.with_channels(self.volume.channels)
     }
 
-    /// The last layer: some rows of the volume from what [`Encoder::encode`] made.
+    /// The last layer: some rows of the volume from the result of [`Encoder::encode`].
     ///
     /// # Errors
     /// If the device is lost.
@@ -235,7 +235,8 @@ impl<D: Device> SeparableConvolution<D> {
     }
 }
 
-/// A step of a decoder: the image doubled by a transposed convolution, concatenated behind the skipped one, through a stage.
+/// A step of a decoder: the image doubled by a transposed convolution, concatenated behind the skipped one, through a
+/// stage.
 fn run_up<D: Device>(
     scratch: &mut Scratch<'_, D>,
     upconv: &TransposedConvolution<D>,

@@ -1,5 +1,5 @@
-//! From volumes to a target's feature image: rays at half the resolution, points looked up in every view's volume, the
-//! views fused, a small network, compositing; then bilinear enlargement.
+//! A target's feature image from volumes: rays at half the resolution, look-ups in every view's volume, fusion of the
+//! views, the point network, compositing; then bilinear upsampling.
 //!
 //! Source: `pixel_nerf_net.py`, with the mean over views replaced by weights.
 
@@ -21,14 +21,14 @@ use viewfuse_nn::loader::Loader;
 use viewfuse_nn::resample::upsample;
 use viewfuse_nn::scratch::Scratch;
 
-/// Rays that the CPU takes at once: their points' activations stay in its caches.
+/// Rays that the CPU computes at once: their points' activations stay in its caches.
 const LEAST_RAYS: usize = 64;
-/// Length of the last sample as published: whatever is there is opaque.
+/// Length of the last sample as published: any density there is opaque.
 pub const LAST_LENGTH: f32 = 1.0e10;
 
 /// The views that a target uses.
 pub(super) struct Views<'a, D: Device> {
-    /// Their cameras; width and height are those of the images that were encoded.
+    /// Their cameras; width and height are those of the encoded images.
     pub(super) cameras: D::Buffer<CameraBlock>,
     /// Their weights, which sum to 1.
     pub(super) weights: D::Buffer<f32>,
@@ -36,7 +36,7 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) volumes: Vec<&'a Volume<D>>,
 }
 
-/// The network that is asked about points, on a device.
+/// The point network on a device.
 pub(super) struct PointNetwork<D: Device> {
     layers: [Linear<D>; 3],
     /// Features of a point.
@@ -45,13 +45,13 @@ pub(super) struct PointNetwork<D: Device> {
 }
 
 impl<D: Device> PointNetwork<D> {
-    /// Reads it: `features` of a point, `width` inside.
+    /// Loads it for `features` of a point and hidden layers of `width`.
     pub(super) fn load(loader: &Loader<'_, D>, features: u32, width: u32) -> Result<PointNetwork<D>, FieldError> {
         let layer = |index: usize| loader.linear(&format!("mlp.layers.{index}"));
         Ok(PointNetwork { layers: [layer(0)?, layer(1)?, layer(2)?], features, width })
     }
 
-    /// Density and what is added to each feature, `raw[point][1 + feature]`, from `fused[point][feature]`; not rectified.
+    /// Density and a residual of each feature, `raw[point][1 + feature]`, from `fused[point][feature]`; not rectified.
     pub(super) fn run(
         &self,
         device: &D,
@@ -68,14 +68,14 @@ impl<D: Device> PointNetwork<D> {
         third.run(device, point_count, LinearOptions::PLAIN, next, None, raw)
     }
 
-    /// Buffers for the hidden layers at so many points.
+    /// Buffers for the hidden layers at this many points.
     pub(super) fn hidden(&self, device: &D, point_count: usize) -> Result<[D::Buffer<f32>; 2], DeviceError> {
         let hidden = || device.zeros(point_count * self.width as usize);
         Ok([hidden()?, hidden()?])
     }
 }
 
-/// The features `[row][column][feature]` that a target sees; its rows and columns are even.
+/// A target's feature image `[row][column][feature]`; its rows and columns are even.
 pub(super) fn render<D: Device>(
     device: &D,
     scratch: &mut Scratch<'_, D>,
@@ -87,7 +87,7 @@ pub(super) fn render<D: Device>(
 ) -> Result<Image<D>, FieldError> {
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
     let at_once = (device.busy_elements() / ray_sampling.sample_count as usize).max(LEAST_RAYS);
-    // What is looked up in all views is bound as a whole.
+    // The buffer of the looked-up features of all views is bound as a whole.
     let a_ray = ray_sampling.sample_count as usize * network.features as usize * views.volumes.len();
     let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);
     let pixels: Vec<u32> = (0..half.pixel_count()).collect();
@@ -124,8 +124,8 @@ pub fn cast_block(target: &CameraBlock, [near, far]: [f32; 2], sample_count: u32
     CastBlock { camera, near: near - beyond, far: far + beyond, pixel_centre: 0.0, along_axis: 1 }
 }
 
-/// How long a ray is from its first to its last sample in the lengths that the network's densities are for, unless a person
-/// says otherwise: as published for SRN, 1 over the focal length in halves of the image's height.
+/// The default length of a ray from its first to its last sample, in the unit of length of the network's densities: as
+/// published for SRN, 1 over the focal length in halves of the image's height.
 pub fn ray_length(target: &CameraBlock) -> f32 {
     target.height as f32 / (2.0 * target.intrinsics[1])
 }

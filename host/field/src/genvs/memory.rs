@@ -1,11 +1,11 @@
-//! What a run takes of memory, before anything is allocated.
+//! Estimate of a run's memory, before anything is allocated.
 
 use super::architecture::Architecture;
 use super::options::GenvsOptions;
 use viewfuse_device::Device;
 
-/// Bytes that a run takes beside photographs and pictures: parameters in the order in which products need them, each view's
-/// volume and what its last layer makes it of (or half of the volume), and the images of the largest level of one network at a time.
+/// Bytes that a run takes beside photographs and pictures: packed parameters, each view's volume and its last layer's input
+/// (or half of the volume), and the images of the largest level of one network at a time.
 pub(super) fn estimate<D: Device>(
     _device: &D,
     architecture: &Architecture,

@@ -1,4 +1,4 @@
-//! A GeNVS from a checkpoint, as a person asks for it.
+//! Opens a GeNVS from a checkpoint with a person's options.
 
 use super::sampling::{Plan, Steps};
 use super::{Genvs, GenvsOptions, Omissions, Rays};
@@ -8,13 +8,13 @@ use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// What may be left out and computed nevertheless.
+/// Omissions that `compute` switches off.
 pub const COMPUTABLE: &[Computable] = &[
     ("rows", "GeNVS: rows of volumes that no ray reaches"),
-    ("calls", "GeNVS: calls of the denoiser that change nothing that can be seen"),
+    ("calls", "GeNVS: calls of the denoiser without a visible effect"),
 ];
 
-/// Reads the network and sets it up.
+/// Opens the network with these options.
 ///
 /// # Errors
 /// [`OpenError`] if the checkpoint cannot be used, or an option does not fit.
@@ -37,13 +37,13 @@ pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, 
     };
     let field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options), omissions })?;
     match (options.given().first(), &field.architecture().denoiser) {
-        // All that only this family knows is about the denoiser, or about pictures one after another.
+        // All options of this family alone concern the denoiser or sequences of pictures.
         (Some(option), None) => Err(OpenError::cannot(*option, "has no denoiser")),
         _ => Ok(AnyField::new(field)),
     }
 }
 
-/// The published run if nothing is to be left out, otherwise the fast one, but for what was said.
+/// The published run if nothing may be left out, otherwise the fast one; given options take precedence.
 fn plan(options: &FieldOptions) -> Plan {
     let seed = options.seed;
     let plan = if options.exact { Plan::published(seed) } else { Plan::fast(seed) };

@@ -1,24 +1,24 @@
-//! What a person can set about a GeNVS render, and what may be left out of it.
+//! Settings of a GeNVS render, and its omissions.
 
 use super::super::Denoising;
 use super::sampling::{Plan, Steps};
 use viewfuse_core::sampler::Sampler;
 
-/// Samples on a ray, and where they go.
+/// Samples on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rays {
-    /// How many samples a ray has, evenly spread from its beginning to its end, at least 2.
+    /// The number of samples on a ray, evenly spaced from the near to the far bound, at least 2.
     pub sample_count: u32,
-    /// How far samples stray at random, in halves of their distance: 1 as published, 0 (the default) not at all, so that
+    /// Jitter of the samples, in halves of their distance: 1 as published, 0 (the default) for none, so that
     /// neighbouring frames have the same error.
     pub jitter: f32,
-    /// Depths along the target's principal axis where rays begin and end; `None`: by the sources' distance from what they
-    /// look at. The first must be smaller.
+    /// Near and far bounds, depths along the target's principal axis; `None`: from the sources' distance to the point that
+    /// they look at. The near bound must be smaller.
     pub near_far: Option<[f32; 2]>,
-    /// How long a ray is in the lengths that the network's densities are for; `None`: as published for SRN, 1 over the
-    /// focal length in halves of the image's height.
+    /// Length of a ray in the unit of length of the network's densities; `None`: as published for SRN, 1 over the focal
+    /// length in halves of the image's height.
     pub length: Option<f32>,
-    /// Whether samples shade themselves, as in published checkpoints.
+    /// Whether weights are inclusive, as in published checkpoints: samples shade themselves.
     pub inclusive: bool,
 }
 
@@ -29,25 +29,25 @@ impl Default for Rays {
     }
 }
 
-/// What may be left out. Each is a switch of its own; how many calls of the denoiser there are is the plan's.
+/// Omissions. Each has a switch of its own; the number of calls of the denoiser is part of the plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Omissions {
     /// The encoding of views that no target uses. Exact.
     pub unused_views: bool,
     /// Rows of volumes that no ray of a target reaches, at the encoder's last layer. Exact.
     pub unseen_rows: bool,
-    /// Levels of the denoiser above this one, where there is a frame before: it is given noise of that level, and the run
-    /// goes on from there. `None`: every frame starts from noise alone.
+    /// Noise levels above this one, if there is an earlier frame: noise of that level is added to it, and the run
+    /// starts from the result. `None`: every frame starts from noise alone.
     pub reuse: Option<f32>,
-    /// Half of the bits of volumes: features are off by up to 2^-11 of what they are, beyond 65504 they are that. All rows
-    /// are computed at once then.
+    /// Half of the bits of volumes (f16): features have a relative error of at most 2^-11, and are limited to 65504.
+    /// All rows are computed at once then.
     pub half_volumes: bool,
 }
 
 impl Omissions {
     /// Nothing is left out.
     pub const NONE: Omissions = Omissions { unused_views: false, unseen_rows: false, reuse: None, half_volumes: false };
-    /// All that is left out unless a person says otherwise: what costs nothing.
+    /// The default omissions: those without a visible effect.
     pub const EXACT: Omissions = Omissions { unused_views: true, unseen_rows: true, reuse: None, half_volumes: false };
 }
 
@@ -63,21 +63,21 @@ impl Default for Omissions {
 pub struct GenvsOptions {
     /// Samples on a ray.
     pub rays: Rays,
-    /// From noise to a picture. Its seed is that of jitter as well.
+    /// The denoiser's run. Its seed is that of jitter as well.
     pub plan: Plan,
-    /// What may be left out.
+    /// Omissions.
     pub omissions: Omissions,
 }
 
 impl Default for GenvsOptions {
-    /// Fast, from seed 0.
+    /// The fast run with seed 0.
     fn default() -> GenvsOptions {
         GenvsOptions { rays: Rays::default(), plan: Plan::fast(0), omissions: Omissions::default() }
     }
 }
 
 impl GenvsOptions {
-    /// What a run record says of them, with so many calls made and so many saved.
+    /// Their form in the run record, with the calls that were made and saved.
     pub(super) fn denoising(&self, calls: u64, saved_calls: u64) -> Denoising {
         let Plan { steps, schedule, churn, early_termination, .. } = self.plan;
         let (sampler, levels, tolerance) = match steps {
@@ -97,7 +97,7 @@ impl GenvsOptions {
         }
     }
 
-    /// With at least two samples on a ray.
+    /// These settings with at least two samples on a ray.
     pub(super) fn checked(self) -> GenvsOptions {
         GenvsOptions { rays: Rays { sample_count: self.rays.sample_count.max(2), ..self.rays }, ..self }
     }

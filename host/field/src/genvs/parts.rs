@@ -1,5 +1,4 @@
-//! The network's parts on a device, and what each makes of its inputs. NaN and infinity are reported at the part that produced
-//! them.
+//! The network's parts on a device and their evaluation. NaN and infinity are reported at the part that produced them.
 
 use super::architecture::{Architecture, COLOUR_CHANNELS};
 use super::denoiser::Denoiser;
@@ -27,12 +26,12 @@ use viewfuse_nn::scratch::Scratch;
 pub(super) struct Parts<D: Device> {
     encoder: Encoder<D>,
     points: PointNetwork<D>,
-    /// Without one, the first features are the picture.
+    /// Without a denoiser, the first features are the picture.
     denoiser: Option<Denoiser<D>>,
 }
 
 impl<D: Device> Parts<D> {
-    /// Reads them, for images of at least `side` rows and columns.
+    /// Loads them, for images of at least `side` rows and columns.
     ///
     /// # Errors
     /// If the checkpoint cannot be read, or the device has no memory left.
@@ -56,13 +55,13 @@ impl<D: Device> Parts<D> {
         })
     }
 
-    /// A view's volume, without its rows.
+    /// A view's encoding, without the rows of its volume.
     pub(super) fn encode(&self, device: &D, values: &[f32], size: Size, view: usize) -> Result<Volume<D>, FieldError> {
         check_finite(values, &encoding(view), "image [row][column][3]")?;
         Ok(Volume::encode(device, &self.encoder, values, size)?)
     }
 
-    /// Computes rows of a volume that are not there yet. Returns how many.
+    /// Computes missing rows of a volume. Returns how many.
     pub(super) fn fill(
         &self,
         device: &D,
@@ -80,7 +79,7 @@ impl<D: Device> Parts<D> {
         Ok(new_rows)
     }
 
-    /// The features that a target sees.
+    /// A target's feature image.
     pub(super) fn features(
         &self,
         device: &D,
@@ -93,13 +92,13 @@ impl<D: Device> Parts<D> {
         render(device, scratch, &self.points, views, target, ray_sampling, progress)
     }
 
-    /// The network at points.
+    /// The point network.
     pub(super) fn points(&self) -> &PointNetwork<D> {
         &self.points
     }
 
-    /// The picture `[row][column][3]` in `[-1, 1]` that features tell of, and how many calls of the denoiser it took; those
-    /// that were planned are its calls and what it left out.
+    /// The picture `[row][column][3]` in `[-1, 1]` for a feature image, with the calls of the denoiser that were made
+    /// and left out.
     pub(super) fn picture(
         &self,
         device: &D,
@@ -119,8 +118,8 @@ impl<D: Device> Parts<D> {
         })
     }
 
-    /// What the denoiser believes is behind a noisy picture of a level, given the features: `c_skip x + c_out F(c_in x)`.
-    /// Without denoiser, nothing is written.
+    /// The denoiser's estimate of the picture behind a noisy one of a level, given the features:
+    /// `c_skip x + c_out F(c_in x)`. Without a denoiser, nothing is written.
     pub(super) fn denoise(
         &self,
         device: &D,

@@ -1,4 +1,4 @@
-//! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
+//! The parts of a render on given inputs, for comparison with reference values.
 
 use super::ray_sampling::RaySampling;
 use super::sampling::{Plan, Start};
@@ -20,7 +20,7 @@ pub struct Reference<'a, D: Device> {
 }
 
 impl<'a, D: Device> Reference<'a, D> {
-    /// Takes sources and network to the device. Long work asks `progress` whether to go on.
+    /// Takes sources and network to the device. Long work checks `progress` for cancellation.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -38,7 +38,7 @@ impl<'a, D: Device> Reference<'a, D> {
         &self.views.field.architecture
     }
 
-    /// Computes a view's volume, all of its rows, unless it is there already.
+    /// Computes a view's volume with all rows, if it is not computed yet.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -80,8 +80,8 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok(values)
     }
 
-    /// The features `[row][column][feature]` that a target of the network's size sees, with these weights of all views.
-    /// Depths along principal axes; `ray_length` as [`super::Rays::length`].
+    /// The feature image `[row][column][feature]` of a target of the network's size, with these weights of all views.
+    /// Depths are along principal axes; `ray_length` as [`super::Rays::length`].
     ///
     /// # Errors
     /// [`FieldError`].
@@ -114,7 +114,7 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok(device.download(&image.values)?)
     }
 
-    /// What the denoiser believes is behind a noisy picture `[row][column][3]` of a level, given features
+    /// The denoiser's estimate of the picture behind a noisy one `[row][column][3]` of a level, given features
     /// `[row][column][feature]` of a picture of this many rows and columns.
     ///
     /// # Errors
@@ -135,7 +135,7 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok(device.download(&denoised)?)
     }
 
-    /// The picture `[row][column][3]` in `[-1, 1]` that a plan makes of latents of variance 1, given features.
+    /// The picture `[row][column][3]` in `[-1, 1]` that a plan computes from latents of variance 1, given features.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -155,12 +155,12 @@ impl<'a, D: Device> Reference<'a, D> {
         Ok(device.download(&sampled.picture)?)
     }
 
-    /// How many sources there are.
+    /// The number of sources.
     pub fn view_count(&self) -> usize {
         self.views.images.len()
     }
 
-    /// Encodes a view, but for the rows of its volume, unless it is.
+    /// Encodes a view, without the rows of its volume, if it is not encoded yet.
     fn encode_rowless(&mut self, view: usize) -> Result<(), FieldError> {
         self.progress.check()?;
         if self.views.volumes[view].is_none() {

@@ -1,11 +1,11 @@
-//! From noise to a picture: the driver of the samplers in [`viewfuse_core::sampler`], for any device and any denoiser.
+//! Diffusion sampling: the driver of the samplers in [`viewfuse_core::sampler`], for any device and any denoiser.
 //!
-//! A denoiser is a function from a noisy picture and its level to the picture that it believes is behind; a call of it is
-//! what costs. The state is in `f32` (`tests/numerics/sampler.rs` measures what that costs against `f64`).
+//! A denoiser is a function from a noisy picture and its level to an estimate of the picture; its calls take nearly all the
+//! time. The state is in `f32` (`tests/numerics/sampler.rs` measures the error against `f64`).
 //!
 //! ```text
-//! plan    which sampler, which levels, which noise       Plan, Steps
-//! run     one picture on its way                         buffers, calls, what is known of earlier calls
+//! plan    sampler, noise levels, noise, seed             Plan, Steps
+//! run     the run for one picture                        buffers, calls, results of earlier calls
 //! ```
 
 mod plan;
@@ -18,17 +18,17 @@ use run::Run;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 
-/// What a run starts from.
+/// The start of a run.
 pub enum Start<'a, D: Device> {
     /// Noise of the plan's seed.
     Noise,
-    /// Noise that is given: numbers of variance 1, which are multiplied by the largest level.
+    /// Given noise: numbers of variance 1, which are multiplied by the largest level.
     Latents(&'a D::Buffer<f32>),
-    /// A picture with noise of the plan's seed: that of an earlier frame of the same orbit, say.
+    /// A picture with noise of the plan's seed: for example an earlier frame of the same orbit.
     Picture {
-        /// Its values, as many as the run's picture has.
+        /// The picture's values, as many as the run's picture has.
         picture: &'a D::Buffer<f32>,
-        /// The level to start at: as large as what may be different. Levels above it are left out.
+        /// The noise level to start at: about the size of the expected differences. Levels above it are left out.
         level: f32,
     },
 }
@@ -43,32 +43,31 @@ impl<D: Device> Start<'_, D> {
     }
 }
 
-/// What a run made.
+/// The result of a run.
 pub struct Sampled<D: Device> {
-    /// The picture: what the denoiser said last.
+    /// The picture: the last result of the denoiser.
     pub picture: D::Buffer<f32>,
     /// The levels at which the denoiser was called, in the order of the calls.
     pub levels: Vec<f32>,
-    /// How many calls of those that were planned were left out, because of an earlier picture or because nothing changed
-    /// any more. Where levels are chosen on the way no number is planned, and this is 0.
+    /// The planned calls that were left out, because of an earlier picture or because the picture did not change any more.
+    /// With adaptive levels no number is planned, and this is 0.
     pub left_out: u32,
 }
 
 impl<D: Device> Sampled<D> {
-    /// How often the denoiser was called.
+    /// The number of calls of the denoiser.
     pub fn call_count(&self) -> u32 {
         u32::try_from(self.levels.len()).unwrap_or(u32::MAX)
     }
 }
 
-/// What running a plan can end with.
-/// Makes a picture of `element_count` values. `denoise(state, level, denoised)` writes what it believes is behind a noisy
-/// picture at a level. The noise is that of the plan's seed, the same on every device; progress counts calls. Between calls
-/// the run can be interrupted.
+/// The outcome of running a plan. Computes a picture of `element_count` values. `denoise(state, level, denoised)`
+/// writes the estimate of the picture behind a noisy one at a level. The noise is that of the plan's seed, the same on
+/// every device; progress counts calls. Between calls the run can be cancelled.
 ///
 /// # Errors
-/// [`FieldError::NotFinite`] if the denoiser gives NaN or infinity, [`FieldError::Interrupted`], and what `denoise`
-/// gives.
+/// [`FieldError::NotFinite`] if the denoiser gives NaN or infinity, [`FieldError::Interrupted`], and the errors of
+/// `denoise`.
 pub fn sample<D: Device>(
     device: &D,
     plan: &Plan,

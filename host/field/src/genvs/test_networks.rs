@@ -1,11 +1,11 @@
-//! Test networks: checkpoints that are computed, not trained, for checking against other implementations, and for measuring.
+//! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for timing.
 
 use super::architecture::{Architecture, IMAGE_SIDE};
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::initialisation;
 
-/// By what tensors of test networks are multiplied, so that volumes and densities vary.
+/// Factors of tensors of test networks, so that volumes and densities vary.
 const GAINS: [(&str, f32); 2] =
     [("pixel_nerf_net.encoder.volume_head.reshape_conv.weight", 8.0), ("pixel_nerf_net.mlp.layers.2.weight", 4.0)];
 
@@ -25,7 +25,7 @@ pub fn deterministic(architecture: &Architecture) -> Checkpoint {
     })
 }
 
-/// [`deterministic`] of the published size, or with a number, whatever it is, of the small member of the family.
+/// [`deterministic`] of the published size, or with any number of the small member of the family.
 pub fn deterministic_of_size(small: Option<u16>) -> Checkpoint {
     deterministic(&small.map_or_else(Architecture::published, |_| Architecture::small()))
 }

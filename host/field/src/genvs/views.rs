@@ -1,4 +1,4 @@
-//! Source views on a device: their volumes, and the pictures that are made of them.
+//! Source views on a device, with their volumes.
 
 use super::encoder::SIDE_STEP;
 use super::feature_image;
@@ -32,21 +32,21 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) counts: Counts,
 }
 
-/// A source as the encoder is shown it: over white, with rows and columns added until it can be halved often enough.
+/// A source as the encoder's input: over white, padded to multiples of the encoder's output stride.
 pub(super) struct SourceView {
     pub(super) size: Size,
     values: Vec<f32>,
     pub(super) camera: CameraBlock,
 }
 
-/// What was done and what was left out so far.
+/// Counts of computed and omitted work so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     volume_rows: u64,
     filled_rows: u64,
-    /// As they are computed.
+    /// As computed.
     volume_bytes: u64,
-    /// As they are kept.
+    /// As kept.
     kept_bytes: u64,
     planned_calls: u64,
     calls: u64,
@@ -61,7 +61,7 @@ impl<D: Device> Views<'_, D> {
         let (row_count, whole_bytes) = (encoded.row_count(), encoded.byte_count());
         let mut filled_rows = 0;
         if field.options.omissions.half_volumes {
-            // One view after the other: never is more than one there in full.
+            // One view after the other: at most one is in memory at full precision.
             filled_rows = parts.fill(*device, &mut encoded, 0..row_count, view)?;
             encoded.pack(*device)?;
         }
@@ -73,7 +73,7 @@ impl<D: Device> Views<'_, D> {
         Ok(())
     }
 
-    /// Computes rows of a view's volume that are not there yet; nothing if it is not encoded.
+    /// Computes missing rows of a view's volume; nothing if it is not encoded.
     pub(super) fn fill(&mut self, view: usize, rows: impl FnOnce(&Volume<D>) -> Range<u32>) -> Result<(), FieldError> {
         let Some(volume) = &mut self.volumes[view] else { return Ok(()) };
         let rows = rows(volume);
@@ -81,7 +81,7 @@ impl<D: Device> Views<'_, D> {
         Ok(())
     }
 
-    /// Computes the rows of volumes that a target looks at.
+    /// Computes the rows of volumes that a target's rays reach.
     pub(super) fn fill_seen(
         &mut self,
         views: &[usize],
@@ -109,7 +109,7 @@ impl<D: Device> Views<'_, D> {
         })
     }
 
-    /// How rays go through volumes, for a target.
+    /// The sampling of rays for a target.
     fn ray_sampling(&self, target: &Camera) -> RaySampling {
         let Rays { sample_count, jitter, length, inclusive, .. } = self.field.options.rays;
         let focal = 2.0 * target.pinhole.focal()[1] / target.pinhole.height() as f32;
@@ -178,7 +178,7 @@ impl<D: Device> Prepared for Views<'_, D> {
                 ends || reuse.is_some(),
                 planned_calls - calls,
                 planned_calls,
-                "changes of a pixel that cannot be seen; what starting from the frame before costs, only a measurement tells",
+                "invisible changes of a pixel; the error of starting from the frame before must be measured",
             ),
         ];
         let has_denoiser = architecture.denoiser.is_some();
@@ -188,7 +188,7 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 }
 
-/// A source as the encoder is shown it, with white around its right and lower border.
+/// A source as the encoder's input, padded with white at its right and lower border.
 pub(super) fn padded(image: &SourceImage) -> SourceView {
     let (width, height) = (image.camera.pinhole.width(), image.camera.pinhole.height());
     let size = Size {
@@ -203,7 +203,7 @@ pub(super) fn padded(image: &SourceImage) -> SourceView {
             value.copy_from_slice(&over_white(*texel));
         }
     }
-    // Nothing moves: the image's pixels are where they were.
+    // The padding does not move the image's pixels.
     SourceView { size, values, camera: CameraBlock { height: size.height, width: size.width, ..image.camera.block(0) } }
 }
 

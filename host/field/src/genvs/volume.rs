@@ -1,5 +1,5 @@
-//! A view's volume of features, whose rows are computed when a target first looks at them; or all at once, and then kept in
-//! 16 bits.
+//! A view's volume of features. Its rows are computed when a target's rays first reach them, or all at once and then kept
+//! in half precision (f16).
 
 use super::encoder::Encoder;
 use super::ray_sampling::RaySampling;
@@ -14,20 +14,20 @@ use viewfuse_device::DeviceError;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
 
-/// What is known of a view.
+/// A view's encoding.
 pub(super) struct Volume<D: Device> {
-    /// Rows, columns, and what a pixel has: `[depth][feature]`.
+    /// Rows, columns, and a pixel's `[depth][feature]`.
     pub(super) size: Size,
     nodes: Nodes<D>,
-    /// Rows that are there already.
+    /// Computed rows.
     filled: Range<u32>,
 }
 
 /// Features `[row][column][depth][feature]`.
 enum Nodes<D: Device> {
-    /// As they are computed.
+    /// In `f32`.
     Whole {
-        /// What the last layer makes rows of.
+        /// The last layer's input.
         deep: Image<D>,
         image: Image<D>,
     },
@@ -46,21 +46,21 @@ impl<D: Device> Volume<D> {
         values: &[f32],
         size: Size,
     ) -> Result<Volume<D>, DeviceError> {
-        // Its own: what an encoding needs in between is not kept beside the volumes.
+        // Its own scratch buffers, which are not kept beside the volumes.
         let mut scratch = Scratch::new(device);
         let deep = encoder.encode(&mut scratch, values, size)?;
         let size = encoder.volume_size(size);
-        // Rows that no target looks at are never written.
+        // Rows that no target's rays reach are never written.
         let image = Image::zeros(device, size)?;
         Ok(Volume { size, nodes: Nodes::Whole { deep, image }, filled: 0..0 })
     }
 
-    /// How many rows it has.
+    /// The number of rows.
     pub(super) fn row_count(&self) -> u32 {
         self.size.height
     }
 
-    /// How many features all its nodes have.
+    /// The number of features of all its nodes.
     fn number_count(&self) -> u32 {
         self.size.pixel_count() * self.size.channels
     }
@@ -71,7 +71,7 @@ impl<D: Device> Volume<D> {
         u64::from(if matches!(self.nodes, Nodes::F16(_)) { word_count(numbers) } else { numbers }) * 4
     }
 
-    /// Computes rows that are not there yet. Returns how many.
+    /// Computes missing rows. Returns how many.
     ///
     /// # Errors
     /// If the device is lost.
@@ -96,7 +96,7 @@ impl<D: Device> Volume<D> {
         Ok(missing.iter().map(|rows| rows.len() as u32).sum())
     }
 
-    /// The rows that are there, in an image; `None` once they are packed.
+    /// The computed rows, in an image; `None` once they are packed.
     pub(super) fn image(&self) -> Option<&Image<D>> {
         match &self.nodes {
             Nodes::Whole { image, .. } => Some(image),
@@ -104,7 +104,7 @@ impl<D: Device> Volume<D> {
         }
     }
 
-    /// Keeps what is there in half precision (f16), and nothing that further rows could be made of: all rows are filled.
+    /// Packs the volume, all of whose rows are computed, into half precision (f16), and drops the last layer's input.
     ///
     /// # Errors
     /// If the device is lost or has no memory left.
@@ -117,7 +117,7 @@ impl<D: Device> Volume<D> {
         Ok(())
     }
 
-    /// Looks up every feature of points in it, by [`VolumeBlock`].
+    /// Interpolates every feature at points, by [`VolumeBlock`].
     ///
     /// # Errors
     /// If the device is lost.
@@ -135,7 +135,7 @@ impl<D: Device> Volume<D> {
         }
     }
 
-    /// Its features, those that are packed as they are read.
+    /// Its features as `f32`.
     ///
     /// # Errors
     /// If the device is lost.
@@ -150,8 +150,8 @@ impl<D: Device> Volume<D> {
         }
     }
 
-    /// The rows that rays of a target can reach: the projections of the corners of what they go through, and a node
-    /// beyond. All of them where a corner is not in front of the view.
+    /// The rows that rays of a target can reach: the projections of the corners of the target's frustum, and one node
+    /// beyond. All rows if a corner is not in front of the view.
     pub(super) fn rows_seen(&self, view: &CameraBlock, target: &CameraBlock, ray_sampling: &RaySampling) -> Range<u32> {
         let (width, height) = (target.width as f32, target.height as f32);
         let mut seen = f32::MAX..-f32::MAX;
@@ -170,7 +170,7 @@ impl<D: Device> Volume<D> {
         // Nodes lie at halves of the image's rows: a look-up reads one before and one behind, and one more is for rounding.
         let scale = self.row_count() as f32 / view.height as f32;
         let (first, last) = (seen.start * scale - 2.0, seen.end * scale + 3.0);
-        // Saturating: what lies outside has no rows.
+        // Saturating: outside there are no rows.
         (first as u32).min(self.row_count())..(last as u32).min(self.row_count())
     }
 }

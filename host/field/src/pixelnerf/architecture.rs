@@ -1,8 +1,8 @@
 //! The family of networks: which tensors a checkpoint must have, by its sizes.
 //!
 //! Names and shapes are those of the official `state_dict` (pixelNeRF, `src/model/{models,encoder,resnetfc}.py`; the
-//! trunk is torchvision's ResNet of basic blocks). Sizes are read off the tensors: trunk width and depth, how many trunk
-//! levels there are latents of, the width and depth of the two point networks, how many blocks latents are injected into.
+//! trunk is torchvision's ResNet of basic blocks). Sizes are read from the tensors: trunk width and depth, the number of
+//! trunk levels for latents, the width and depth of the two point networks, the number of `lin_z` layers.
 
 pub use viewfuse_nn::resnet::Level;
 
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
 use viewfuse_nn::resnet;
 
-/// Most octaves: sines of more are noise in `f32`.
+/// The most octaves: sines of more are noise in `f32`.
 const MOST_OCTAVES: usize = 20;
 
 /// Sizes of a member of the family.
@@ -18,13 +18,13 @@ const MOST_OCTAVES: usize = 20;
 pub struct Architecture {
     /// Channels after the first convolution (7x7, stride 2).
     pub stem_channels: usize,
-    /// The levels behind it that latents are taken from.
+    /// The levels behind it whose images are part of the latents.
     pub levels: Vec<Level>,
     /// Width of the point networks.
     pub width: usize,
     /// Residual blocks of a point network.
     pub block_count: usize,
-    /// Blocks in front of which latents are injected; behind them the views are combined.
+    /// Blocks with a latent layer `lin_z` in front; behind them the views are combined.
     pub injected_count: usize,
     /// Octaves of sines and cosines.
     pub frequency_count: usize,
@@ -46,7 +46,7 @@ pub enum Pass {
 }
 
 impl Pass {
-    /// What its tensors' names start with.
+    /// The prefix of its tensors' names.
     pub fn prefix(self) -> &'static str {
         match self {
             Pass::Coarse => "mlp_coarse",
@@ -89,7 +89,7 @@ impl Architecture {
         self.stem_channels + self.levels.iter().map(|level| level.channels).sum::<usize>()
     }
 
-    /// Numbers that describe a point in a view.
+    /// Inputs of the point networks for a point in a view.
     pub fn embedded_len(&self) -> usize {
         6 + 6 * self.frequency_count
     }
@@ -99,7 +99,7 @@ impl Architecture {
         if self.has_fine { &[Pass::Coarse, Pass::Fine] } else { &[Pass::Coarse] }
     }
 
-    /// Reads the sizes off a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
+    /// Reads the sizes from a checkpoint's tensors, and checks that it has every tensor of the architecture and no other.
     ///
     /// # Errors
     /// [`CheckpointError`] if it is not of this family.
@@ -161,7 +161,7 @@ impl Architecture {
         Ok(architecture)
     }
 
-    /// Every tensor that it needs, in the order of the data.
+    /// All required tensors, in the order of the data.
     pub fn tensors(&self) -> Vec<TensorShape> {
         let mut tensors = resnet::tensors("encoder.model", self.stem_channels, &self.levels);
         for pass in self.passes() {
@@ -179,8 +179,8 @@ impl Architecture {
         tensors
     }
 
-    /// Tensors that official checkpoints have and that are not needed: trunk levels that no latents are taken from,
-    /// counters, and buffers that code recomputes.
+    /// Optional tensors of official checkpoints: unused trunk levels, counters, and buffers that are computed from other
+    /// values.
     fn is_optional(&self, name: &str) -> bool {
         let unused_level = name
             .strip_prefix("encoder.model.layer")
@@ -202,7 +202,7 @@ impl Architecture {
             || BUFFERS.contains(&name)
     }
 
-    /// What a checkpoint's metadata say of it that its tensors do not tell.
+    /// Sizes in a checkpoint's metadata that its tensors do not determine.
     pub fn metadata(&self) -> BTreeMap<String, String> {
         let number = |key: &str, value: f32| (key.to_owned(), value.to_string());
         BTreeMap::from([
@@ -211,7 +211,7 @@ impl Architecture {
         ])
     }
 
-    /// Numbers of all parameters that it needs.
+    /// The number of required parameters.
     pub fn parameter_count(&self) -> usize {
         self.tensors().iter().map(|tensor| tensor.shape.iter().product::<usize>()).sum()
     }
@@ -222,7 +222,7 @@ fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count
     tensors.push(TensorShape { name: format!("{name}.bias"), shape: vec![out_count] });
 }
 
-/// The lowest frequency: of the checkpoint's own table if it has one, otherwise the published one.
+/// The lowest frequency: from the checkpoint's table if it has one, otherwise the published one.
 fn frequency(sizes: &Sizes<'_>, octaves: usize) -> Result<f32, CheckpointError> {
     const TABLE: &str = "code._freqs";
     let published = Architecture::published().frequency;

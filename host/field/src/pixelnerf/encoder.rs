@@ -1,5 +1,5 @@
-//! From a source image to its latents: the trunk, its levels upsampled to the stem's size and concatenated, and on request
-//! the latents already multiplied with the layers `lin_z`.
+//! The latents of a source image: the trunk's levels, upsampled to the stem's size and concatenated, and optionally the
+//! outputs of the layers `lin_z` for them.
 
 use super::architecture::Architecture;
 use super::parameters::{DeviceParameters, PointNetwork};
@@ -12,16 +12,16 @@ use viewfuse_nn::resample::upsample;
 use viewfuse_nn::resnet::ResNet;
 use viewfuse_nn::scratch::Scratch;
 
-/// What is known of a view.
+/// A view's encoding.
 pub(super) struct ViewLatents<D: Device> {
-    /// Grids that points are looked up in: the latents themselves, or `[network][block]` what `lin_z` makes of them.
+    /// Grids for look-ups at points: the latents themselves, or their `lin_z` outputs, `[network][block]`.
     pub(super) grids: Vec<Vec<D::Buffer<f32>>>,
     /// Rows and columns of a grid.
     pub(super) grid_size: [u32; 2],
 }
 
-/// Encodes an image (red, green, blue in `[-1, 1]`). With `maps`, the grids are what each network's `lin_z` make; without,
-/// the one grid of the one list holds the latents.
+/// Encodes an image (red, green, blue in `[-1, 1]`). With `maps`, the grids are the outputs of each network's `lin_z`;
+/// without, the only grid holds the latents.
 pub(super) fn encode<D: Device>(
     device: &D,
     architecture: &Architecture,

@@ -1,4 +1,4 @@
-//! What a run takes of memory, before anything is allocated.
+//! Estimate of a run's memory, before anything is allocated.
 
 use super::architecture::Architecture;
 use super::network::workspace_bytes;
@@ -6,10 +6,10 @@ use super::options::{PixelNerfOptions, Sampling};
 use super::pass::{ray_bytes, rays_at_once};
 use viewfuse_device::Device;
 
-/// Bytes that a run takes beside the photographs and the pictures: parameters (on the host, on the device, and there in the
-/// order in which products need them), what is known of every view (`source_sizes[view]` is width and height),
-/// activations, the rays of a tile. Probes come on top: 8 bytes a first-pass sample of one ray in every square that is
-/// probed, which is half a byte a pixel and sample for squares of 4.
+/// Bytes that a run takes beside the photographs and the pictures: parameters (on the host, on the device, and packed
+/// there), the encoding of every view (`source_sizes[view]` is width and height), activations, the rays of a tile. Probes
+/// take 8 bytes more a first-pass sample of one ray in every square, which is half a byte a pixel and sample for squares
+/// of 4.
 pub(super) fn estimate<D: Device>(
     device: &D,
     architecture: &Architecture,

@@ -1,4 +1,4 @@
-//! A point network, asked about many points at once: each view's blocks, the views fused, the blocks behind.
+//! A point network, evaluated at many points at once: each view's blocks, fusion of the views, the blocks behind.
 
 use super::architecture::Architecture;
 use super::encoder::ViewLatents;
@@ -12,10 +12,10 @@ use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_nn::linear::{Linear, LinearOptions};
 
-/// Floats that a buffer of activations holds on the CPU: 4 MiB, which a few cores' caches hold together. Quarter and four
-/// times as many took the same time.
+/// Floats of a buffer of activations on the CPU: 4 MiB, which fit into the caches of a few cores. A quarter and four times
+/// as many took the same time.
 const LEAST_ACTIVATIONS: usize = 1 << 20;
-/// Outputs of a product that an invocation computes.
+/// Outputs of a matrix product that an invocation computes.
 const OUTPUTS_AN_INVOCATION: usize = 64;
 
 /// The views that a target uses, with their weights.
@@ -24,20 +24,20 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) cameras: D::Buffer<CameraBlock>,
     /// Their weights, which sum to 1.
     pub(super) weights: D::Buffer<f32>,
-    /// What is known of each.
+    /// Their encodings.
     pub(super) latents: Vec<&'a ViewLatents<D>>,
 }
 
-/// Buffers for activations, used again for every chunk of points.
+/// Buffers for activations, reused for every chunk of points.
 pub(super) struct Workspace<D: Device> {
-    /// Most points at once.
+    /// The most points at once.
     pub(super) point_count: u32,
     pub(super) points: D::Buffer<RayPoint>,
     embedded: D::Buffer<f32>,
-    /// `[view][point][channel]`; empty where the grids hold what `lin_z` makes of them.
+    /// `[view][point][channel]`; empty where the grids hold `lin_z` outputs.
     latents: D::Buffer<f32>,
-    /// `[view][point][width]`, later `[point][width]`: what flows through the blocks, what comes behind it, and what is
-    /// inside a block.
+    /// `[view][point][width]`, later `[point][width]`: the residual stream, its next value, and a block's hidden
+    /// layer.
     flow: D::Buffer<f32>,
     next: D::Buffer<f32>,
     inside: D::Buffer<f32>,
@@ -71,7 +71,7 @@ impl<D: Device> Workspace<D> {
     }
 }
 
-/// How many points [`Workspace::new`] has buffers for.
+/// The number of points of [`Workspace::new`].
 fn points_at_once<D: Device>(
     device: &D,
     architecture: &Architecture,
@@ -99,7 +99,7 @@ pub(super) fn workspace_bytes<D: Device>(
     points * (view_count * row * size_of::<f32>() + size_of::<RayPoint>() + 4 * size_of::<f32>())
 }
 
-/// A network on a device, with what it needs to be asked.
+/// A network on a device, with the data of its evaluation.
 pub(super) struct Network<'a, D: Device> {
     pub(super) device: &'a D,
     pub(super) architecture: &'a Architecture,
@@ -148,7 +148,7 @@ impl<D: Device> Network<'_, D> {
         layers.lin_out.run(device, point_count, options, &workspace.flow, None, &mut workspace.raw)
     }
 
-    /// Looks the latents up in every view.
+    /// Interpolates the latents in every view.
     fn gather_latents(
         &self,
         workspace: &mut Workspace<D>,
@@ -164,7 +164,7 @@ impl<D: Device> Network<'_, D> {
         Ok(())
     }
 
-    /// Adds what a block's `lin_z` makes of the latents: from the grids that hold it already, or at the points.
+    /// Adds a block's `lin_z` output for the latents: interpolated in the grids that hold it, or computed at the points.
     fn add_latents(
         &self,
         workspace: &mut Workspace<D>,

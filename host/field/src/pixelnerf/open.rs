@@ -1,11 +1,11 @@
-//! A PixelNeRF from a checkpoint, as a person asks for it.
+//! Opens a PixelNeRF from a checkpoint with a person's options.
 
 use super::{Omissions, PixelNerf, PixelNerfOptions, Sampling};
 use crate::AnyField;
 use crate::options::{Computable, FieldOptions, OpenError};
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// What may be left out and computed nevertheless.
+/// Omissions that `compute` switches off.
 pub const COMPUTABLE: &[Computable] = &[
     ("layers", "PixelNeRF: latent layers at every point instead of once on the grid"),
     ("space", "PixelNeRF: first-pass samples in empty space"),
@@ -14,7 +14,7 @@ pub const COMPUTABLE: &[Computable] = &[
     ("hidden", "PixelNeRF: second-pass samples behind surfaces"),
 ];
 
-/// Reads the network and sets it up.
+/// Opens the network with these options.
 ///
 /// # Errors
 /// [`OpenError`] if the checkpoint cannot be used, or an option does not fit.

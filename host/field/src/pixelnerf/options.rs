@@ -1,23 +1,24 @@
-//! What a person can set about a PixelNeRF render, and what may be left out of it.
+//! Settings of a PixelNeRF render, and its omissions.
 
-/// Samples on a ray, and where they go.
+/// Samples on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampling {
-    /// Evenly spread samples of the first pass, at least 1.
+    /// Evenly spaced samples of the first pass, at least 1.
     pub coarse_count: u32,
-    /// Samples that the second pass adds where the first saw something.
+    /// Importance samples of the second pass, by the weights of the first.
     pub importance_count: u32,
-    /// Samples that it adds around the depth that the first saw.
+    /// Samples of the second pass around the first pass's depth.
     pub depth_count: u32,
     /// Standard deviation of those, world units.
     pub depth_deviation: f32,
-    /// Around which depth: as published the sum of weights times depths, which is too near on rays that are not opaque.
+    /// Whether that depth is the published one, the sum of weights times depths, which is too near on rays that are not
+    /// opaque.
     pub published_depth: bool,
-    /// How far samples stray at random in their part of the ray: 1 as published, 0 not at all.
+    /// Jitter of the samples in their parts of the ray: 1 as published, 0 for none.
     pub jitter: f32,
-    /// Seed of every random number.
+    /// Seed of every random draw.
     pub seed: u64,
-    /// Where rays begin and end; `None`: by the sources' distance from what they look at.
+    /// Near and far bounds; `None`: from the sources' distance to the point that they look at.
     pub near_far: Option<[f32; 2]>,
 }
 
@@ -37,8 +38,8 @@ impl Default for Sampling {
     }
 }
 
-/// What may be left out. Each is a switch of its own; none at all are [`Omissions::NONE`], all are
-/// [`Omissions::ALL`] and the default.
+/// Omissions. Each has a switch of its own; [`Omissions::NONE`] leaves nothing out, [`Omissions::ALL`] is the
+/// default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Omissions {
     /// The encoding of views that no target uses. Exact.
@@ -46,25 +47,23 @@ pub struct Omissions {
     /// Latent layers at points: they are applied once at every node of a view's grid, before looking up. Exact up to
     /// rounding, because looking up is linear.
     pub latent_layers: bool,
-    /// First-pass samples in empty space: a ray in every square of this many pixels on a side is looked at first, and
-    /// the others only where the four around them met something. 0 or 1: no.
+    /// First-pass samples in empty space: one ray in every square of this side in pixels (a probe) is computed first, the
+    /// others only where the four probes around them are not empty. 0 or 1: no probes.
     pub empty_space: u32,
-    /// How much the probes' colours may change in the root of the mean square, `1` from black to white, if parts of rays
-    /// that stop little light count as empty: the largest share of the light that is no more than that is taken instead of
-    /// [`LEAST_SHARE`]. 0: always [`LEAST_SHARE`].
+    /// The largest change of the probes' colours, root mean square, `1` from black to white: the largest threshold of a
+    /// part's opacity that stays within it replaces [`LEAST_SHARE`]. 0: always [`LEAST_SHARE`].
     pub probe_error: f32,
-    /// Second-pass samples on rays in whose first pass less than [`LEAST_OPACITY`] stopped.
+    /// Second-pass samples on rays whose first pass has an opacity below [`LEAST_OPACITY`].
     pub empty_rays: bool,
-    /// Second-pass samples in parts of a ray where the first pass, one part to either side included, met nothing.
+    /// Second-pass samples in parts of a ray that the first pass found empty, one part to either side included.
     pub empty_parts: bool,
-    /// Second-pass samples behind where the first pass's transmittance falls to the run's limit of early termination.
+    /// Second-pass samples behind the point where the first pass's transmittance falls to the run's early termination.
     pub hidden_samples: bool,
 }
 
-/// A part is empty if it stops less than this share of the light that reaches it: 1/512, half of a half of a level of 256.
-/// Where probes show that more costs little, it is more.
+/// A part is empty if its opacity is below this: 1/512, half of a step of 1/256. The probes may raise this threshold.
 pub const LEAST_SHARE: f32 = 1.0 / 512.0;
-/// A ray is empty if it stops less than this share of the light.
+/// A ray is empty if its opacity is below this.
 pub const LEAST_OPACITY: f32 = 1.0 / 256.0;
 
 impl Omissions {
@@ -79,7 +78,7 @@ impl Omissions {
         hidden_samples: false,
     };
 
-    /// All that is left out unless a person says otherwise.
+    /// The default omissions.
     pub const ALL: Omissions = Omissions {
         unused_views: true,
         latent_layers: true,
@@ -103,12 +102,12 @@ impl Default for Omissions {
 pub struct PixelNerfOptions {
     /// Samples on a ray.
     pub sampling: Sampling,
-    /// What may be left out.
+    /// Omissions.
     pub omissions: Omissions,
 }
 
 impl PixelNerfOptions {
-    /// With at least one sample in the first pass.
+    /// These settings with at least one sample in the first pass.
     pub(super) fn checked(self) -> PixelNerfOptions {
         let coarse_count = self.sampling.coarse_count.max(1);
         PixelNerfOptions { sampling: Sampling { coarse_count, ..self.sampling }, ..self }

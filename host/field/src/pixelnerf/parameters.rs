@@ -1,4 +1,4 @@
-//! A checkpoint's parameters as the layers take them: batch norms folded into the convolutions, matrices transposed.
+//! A checkpoint's parameters in the layers' form: batch norms folded into the convolutions, matrices transposed.
 
 use super::architecture::{Architecture, Pass};
 use viewfuse_device::Device;
@@ -10,14 +10,14 @@ use viewfuse_nn::loader::Tensors;
 use viewfuse_nn::resnet::{BATCH_NORM_EPSILON, ResNet};
 use viewfuse_nn::weights::{ConvolutionWeights, LinearWeights};
 
-/// What the names of the trunk's tensors begin with.
+/// The prefix of the trunk's tensors.
 const TRUNK: &str = "encoder.model.";
 
 /// A point network.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PointNetwork<L> {
     pub(super) lin_in: L,
-    /// Latents into the first blocks.
+    /// `lin_z` of the first blocks.
     pub(super) lin_z: Vec<L>,
     /// `fc_0` and `fc_1` of each block.
     pub(super) blocks: Vec<[L; 2]>,
@@ -49,7 +49,7 @@ impl HostParameters {
 
     /// Takes them to a device.
     pub(super) fn load<D: Device>(&self, device: &D) -> Result<DeviceParameters<D>, DeviceError> {
-        // No other way for large images: a view is encoded once, and rounding stays the same for all sizes.
+        // Not the algorithm for large images: a view is encoded once, and rounding is the same for all sizes.
         let trunk = self.trunk.try_map(|convolution| convolution.load(device, 0))?;
         let network = |network: &PointNetwork<LinearWeights>| {
             let block = |[fc_0, fc_1]: &[LinearWeights; 2]| Ok([fc_0.load(device)?, fc_1.load(device)?]);

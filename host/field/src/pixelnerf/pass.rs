@@ -1,4 +1,4 @@
-//! Rays of a target, some at a time: a first pass finds where something is, a second looks there closely.
+//! The two passes along a target's rays, some rays at a time: the first finds surfaces, the second adds samples there.
 
 use super::network::{Network, Views, Workspace};
 use super::options::{LEAST_OPACITY, LEAST_SHARE, Omissions, Sampling};
@@ -11,16 +11,16 @@ use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_job::progress::Progress;
 
-/// Most rays at a time.
+/// The most rays at a time.
 pub(super) const MOST_RAYS: usize = 4096;
 
-/// How many rays at a time: as many as a buffer of the device holds the samples of.
+/// Rays at a time: as many as a buffer of the device holds the samples of.
 pub(super) fn rays_at_once<D: Device>(device: &D, sampling: &Sampling) -> usize {
     let samples = sampling.coarse_count as usize + sampling.importance_count as usize + sampling.depth_count as usize;
     MOST_RAYS.min(device.most_elements::<[f32; 4]>() / samples).max(1)
 }
 
-/// Bytes that a ray takes on its way through both passes.
+/// Bytes of a ray in both passes.
 pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
     // Depth, colour with optical depth, mark and place in the list, of both passes' samples; weights and transmittances
     // of the first's; random numbers and depth of the second's.
@@ -29,24 +29,24 @@ pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
     (2 * coarse + fine) * sample + (coarse + fine) * size_of::<[f32; 2]>() + fine * size_of::<f32>() + 64
 }
 
-/// How many samples a pass had, and how many of them the network was asked about.
+/// The samples of a pass, and those at which the network was evaluated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Asked {
+pub(super) struct Evaluated {
     pub(super) samples: u64,
-    pub(super) asked: u64,
+    pub(super) evaluated: u64,
 }
 
-/// What was seen of some rays by a first pass.
+/// The weights of a first pass along some rays.
 pub(super) struct Seen<D: Device> {
     /// `[ray][part]` of weight and transmittance in front.
     pub(super) values: D::Buffer<[f32; 2]>,
     pub(super) columns: u32,
     pub(super) rows: u32,
-    /// A part is empty if it stops less than this share of the light that reaches it.
+    /// A part is empty if its opacity is below this.
     pub(super) least_share: f32,
 }
 
-/// Everything that the rays of a target share.
+/// The common data of a target's rays.
 pub(super) struct Renderer<'a, D: Device> {
     pub(super) device: &'a D,
     pub(super) coarse: Network<'a, D>,
@@ -54,7 +54,7 @@ pub(super) struct Renderer<'a, D: Device> {
     pub(super) views: &'a Views<'a, D>,
     pub(super) sampling: Sampling,
     pub(super) omissions: Omissions,
-    /// Transmittance at which a ray may end.
+    /// Transmittance of early termination.
     pub(super) early_termination: f32,
     pub(super) cast: CastBlock,
     pub(super) background: [f32; 3],
@@ -90,11 +90,11 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         pixels: &[u32],
         seen: Option<&Seen<D>>,
-        asked: &mut [Asked; 2],
+        evaluated: &mut [Evaluated; 2],
     ) -> Result<Pixels<D>, FieldError> {
         let device = self.device;
         let rays = self.rays(pixels)?;
-        let coarse = self.first_pass(workspace, &rays, seen, &mut asked[0])?;
+        let coarse = self.first_pass(workspace, &rays, seen, &mut evaluated[0])?;
         let mut found = self.pixels(pixels.len())?;
         self.composite(&coarse, rays.count, &mut found)?;
         let block = self.fine_block();
@@ -113,7 +113,7 @@ impl<D: Device> Renderer<'_, D> {
         let mut fine = self.samples(ray_count, count)?;
         device.merge_depths(&block, rays.count, &coarse.depths, &added, &mut fine.depths)?;
         let Omissions { empty_rays, empty_parts, hidden_samples, .. } = self.omissions;
-        let wanted = (empty_rays || empty_parts || hidden_samples).then_some(SampleMaskBlock {
+        let mask = (empty_rays || empty_parts || hidden_samples).then_some(SampleMaskBlock {
             sample_count: count,
             part_count: coarse.count,
             least_share: if empty_parts { seen.map_or(LEAST_SHARE, |seen| seen.least_share) } else { 0.0 },
@@ -122,29 +122,29 @@ impl<D: Device> Renderer<'_, D> {
             width: self.cast.camera.width,
             ..SampleMaskBlock::default()
         });
-        let list = self.list(&rays, &fine, wanted.as_ref().map(|block| (block, &parts)))?;
-        self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut asked[1])?;
+        let list = self.list(&rays, &fine, mask.as_ref().map(|block| (block, &parts)))?;
+        self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut evaluated[1])?;
         self.composite(&fine, rays.count, &mut found)?;
         Ok(found)
     }
 
-    /// Evenly spread samples; where rays were probed, only those that the probes around a ray want.
+    /// Evenly spaced samples; with probes, only those in the sample mask of the probes around a ray.
     pub(super) fn first_pass(
         &self,
         workspace: &mut Workspace<D>,
         rays: &Rays<D>,
         seen: Option<&Seen<D>>,
-        asked: &mut Asked,
+        evaluated: &mut Evaluated,
     ) -> Result<Samples<D>, FieldError> {
         let block = self.coarse_block();
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
         self.device.coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)?;
-        let wanted = seen.map(|seen| {
+        let mask = seen.map(|seen| {
             let block = SampleMaskBlock {
                 sample_count: block.sample_count,
                 part_count: block.sample_count,
                 least_share: seen.least_share,
-                // What is hidden on the probes' rays is not on a ray that passes beside their surfaces.
+                // Samples that are hidden on the probes' rays may be visible on a ray beside their surfaces.
                 termination: -1.0,
                 least_opacity: 0.0,
                 step: self.omissions.empty_space,
@@ -154,21 +154,21 @@ impl<D: Device> Renderer<'_, D> {
             };
             (block, &seen.values)
         });
-        let list = self.list(rays, &samples, wanted.as_ref().map(|(block, seen)| (block, *seen)))?;
-        self.ask(&self.coarse, workspace, rays, &mut samples, &list, asked)?;
+        let list = self.list(rays, &samples, mask.as_ref().map(|(block, seen)| (block, *seen)))?;
+        self.ask(&self.coarse, workspace, rays, &mut samples, &list, evaluated)?;
         Ok(samples)
     }
 
-    /// The samples that are wanted, as a list that stays on the device. How many they are comes to the host: it decides how
-    /// much work there is.
+    /// The samples in the mask, as a list that stays on the device. Only its length is downloaded, for the sizes of the
+    /// dispatches.
     fn list(
         &self,
         rays: &Rays<D>,
         samples: &Samples<D>,
-        wanted: Option<(&SampleMaskBlock, &D::Buffer<[f32; 2]>)>,
+        mask: Option<(&SampleMaskBlock, &D::Buffer<[f32; 2]>)>,
     ) -> Result<List<D>, FieldError> {
         let (device, all) = (self.device, rays.count * samples.count);
-        let Some((block, seen)) = wanted else { return Ok(List { samples: None, count: all }) };
+        let Some((block, seen)) = mask else { return Ok(List { samples: None, count: all }) };
         let mut mask = self.zeros(all as usize)?;
         device.sample_mask(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut mask)?;
         let run_count = all.div_ceil(RUN);
@@ -181,7 +181,7 @@ impl<D: Device> Renderer<'_, D> {
         Ok(List { samples: Some(list), count })
     }
 
-    /// Asks a network about samples, as many at a time as the workspace holds. The others stay empty.
+    /// Evaluates a network at samples, as many at a time as the workspace holds. The others stay empty.
     fn ask(
         &self,
         network: &Network<'_, D>,
@@ -189,11 +189,11 @@ impl<D: Device> Renderer<'_, D> {
         rays: &Rays<D>,
         samples: &mut Samples<D>,
         list: &List<D>,
-        asked: &mut Asked,
+        evaluated: &mut Evaluated,
     ) -> Result<(), FieldError> {
         let device = self.device;
-        asked.samples += u64::from(rays.count * samples.count);
-        asked.asked += u64::from(list.count);
+        evaluated.samples += u64::from(rays.count * samples.count);
+        evaluated.evaluated += u64::from(list.count);
         for first in (0..list.count).step_by(workspace.point_count as usize) {
             self.progress.check()?;
             let count = workspace.point_count.min(list.count - first);
@@ -207,7 +207,7 @@ impl<D: Device> Renderer<'_, D> {
     }
 
     fn composite(&self, samples: &Samples<D>, ray_count: u32, pixels: &mut Pixels<D>) -> Result<(), FieldError> {
-        // A ray that meets nothing ends where looking ends.
+        // The depth of an empty ray is its far bound.
         let CastBlock { far, .. } = self.cast;
         let block = CompositeBlock { background: self.background, empty_depth: far, sample_count: samples.count };
         let Pixels { colours, depths } = pixels;

@@ -1,23 +1,23 @@
-//! Probes: a first look along few rays tells where space is empty, and how much of it may count as empty.
+//! Probes: the first pass along a few rays finds empty space, and the threshold below which space counts as empty.
 
 use super::network::Workspace;
 use super::options::LEAST_SHARE;
-use super::pass::{Asked, Renderer, Seen, rays_at_once};
+use super::pass::{Evaluated, Renderer, Seen, rays_at_once};
 use crate::FieldError;
 use viewfuse_core::composite::Compositor;
 use viewfuse_device::Device;
 
-/// Shares of the light below which a part of a ray may count as empty, the largest first. After them comes
-/// [`LEAST_SHARE`], which needs no proof.
+/// Candidate thresholds of the opacity below which a part of a ray counts as empty, the largest first. The last is
+/// [`LEAST_SHARE`], which is always allowed.
 const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 
 impl<D: Device> Renderer<'_, D> {
-    /// Looks at one ray in every square of `step` pixels, and at those of the last row and column, by the first pass.
+    /// Runs the first pass along one ray in every square of `step` pixels, and along those of the last row and column.
     pub(super) fn probe(
         &self,
         workspace: &mut Workspace<D>,
         step: u32,
-        asked: &mut Asked,
+        evaluated: &mut Evaluated,
     ) -> Result<Seen<D>, FieldError> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
         let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
@@ -30,7 +30,7 @@ impl<D: Device> Renderer<'_, D> {
         let mut changes = [0.0; SHARES.len()];
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
-            let samples = self.first_pass(workspace, &rays, None, asked)?;
+            let samples = self.first_pass(workspace, &rays, None, evaluated)?;
             self.device.weigh_samples(&samples.block(first_ray), rays.count, &samples.values, &mut values)?;
             first_ray += rays.count;
             if self.omissions.probe_error > 0.0 {
@@ -48,8 +48,8 @@ impl<D: Device> Renderer<'_, D> {
     }
 }
 
-/// Mean square over the channels of how a ray's colour changes if samples that stop less than `share` of the light are
-/// left out. Samples are colour and optical depth.
+/// Mean square over the channels of the change of a ray's colour if samples with an opacity below `share` are left
+/// out. Samples are colour and optical depth.
 fn change(ray: &[[f32; 4]], share: f32, background: &[f32; 3]) -> f64 {
     let colour = |least: f32| {
         let mut compositor = Compositor::<3>::START;

@@ -1,4 +1,4 @@
-//! Parts of a render one at a time, on inputs given from outside: what reference values are compared with.
+//! The parts of a render on given inputs, for comparison with reference values.
 
 use super::encoder::encode;
 use super::network::Workspace;
@@ -17,7 +17,7 @@ pub struct Reference<'a, D: Device> {
     views: Views<'a, D>,
 }
 
-/// What was seen of rays.
+/// The result of compositing rays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeenRays {
     /// `[ray][sample]`.
@@ -42,7 +42,7 @@ impl<'a, D: Device> Reference<'a, D> {
         &self.views.field.architecture
     }
 
-    /// How many sources there are.
+    /// The number of sources.
     pub fn view_count(&self) -> usize {
         self.views.images.len()
     }
@@ -87,7 +87,7 @@ impl<'a, D: Device> Reference<'a, D> {
         device.download(&samples)
     }
 
-    /// What is seen of rays at `depths[ray][sample]`.
+    /// Composites rays with samples at `depths[ray][sample]`.
     ///
     /// # Errors
     /// If the device fails.
@@ -107,7 +107,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let block = PlaceBlock { sample_count, ..PlaceBlock::default() };
         device.place_points(&block, point_count, None, &rays.rays, &depths, &mut points)?;
         let points: Vec<RayPoint> = device.download(&points)?;
-        // The density first, because that is what comes out of a length of 1.
+        // With a length of 1, the optical depth is the density.
         let unit: Vec<RayPoint> = points.iter().map(|point| RayPoint { length: 1.0, ..*point }).collect();
         let mut samples = self.radiance(pass, weights, &unit)?;
         for (sample, point) in samples.iter_mut().zip(&points) {

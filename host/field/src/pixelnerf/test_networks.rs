@@ -1,4 +1,4 @@
-//! Test networks: checkpoints that are computed, not trained, for checking against other implementations, and for measuring.
+//! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for timing.
 
 use super::architecture::Architecture;
 use std::collections::BTreeMap;
@@ -8,8 +8,8 @@ use viewfuse_nn::initialisation;
 /// Outputs of test networks are multiplied by this, so that densities vary.
 const OUTPUT_GAIN: f32 = 6.0;
 
-/// Every tensor by [`initialisation`]; space is full of mist. With [`Architecture::published`] it is the network of the reference
-/// values.
+/// Every tensor by [`initialisation`]; the density is small everywhere. With [`Architecture::published`] it is the
+/// network of the reference values.
 pub fn deterministic(architecture: &Architecture) -> Checkpoint {
     computed("formula", architecture, |tensor| {
         let gain = if tensor.name.ends_with("lin_out.weight") { OUTPUT_GAIN } else { 1.0 };
@@ -19,12 +19,12 @@ pub fn deterministic(architecture: &Architecture) -> Checkpoint {
     })
 }
 
-/// A solid ball-like body around the world's origin, of a radius near 0.3, coloured by what the views show and empty
-/// outside: a network for measuring what can be left out, as long as there is no trained one.
+/// A solid, nearly spherical body around the world's origin, of a radius near 0.3, coloured by the views, with empty space
+/// outside: a network for measuring omissions.
 ///
-/// It is [`deterministic`] with one channel of the flow set aside: it enters as the sum of the cosines of the lowest
-/// frequency, which falls with the distance from the origin whatever the view's axes, passes all blocks unchanged, and
-/// decides the density.
+/// It is [`deterministic`] with one channel of the residual stream reserved: its input is the sum of the cosines of the
+/// lowest frequency, which decreases with the distance from the origin for any axes of the view; it passes all blocks
+/// unchanged, and determines the density.
 pub fn body(architecture: &Architecture) -> Checkpoint {
     let frequency_axes = 6..9;
     let frequency = architecture.frequency;
@@ -50,7 +50,7 @@ pub fn body(architecture: &Architecture) -> Checkpoint {
                 density[0] = DENSITY_SLOPE;
             }
             "lin_out.bias" => values[3] = -DENSITY_OFFSET,
-            // Nothing else touches the channel: not the second layers of blocks, not the latents.
+            // Neither the second layers of blocks nor the latents change the channel.
             _ if leaf.ends_with("fc_1.weight") || leaf.contains("lin_z") && leaf.ends_with("weight") => {
                 values[..columns].fill(0.0);
             }
@@ -67,7 +67,7 @@ const SURFACE_COORDINATE: f32 = 0.18;
 const DENSITY_SLOPE: f32 = 2000.0;
 /// Density below zero just outside of the surface.
 const DENSITY_OFFSET: f32 = 2.0;
-/// What is left of the initialisation's own density.
+/// Factor of the initialisation's own density.
 const DENSITY_NOISE: f32 = 0.02;
 
 fn initial_values(tensor: &TensorShape) -> Vec<f32> {

@@ -21,6 +21,10 @@ impl Space {
         Space { points }
     }
 
+    pub(super) fn count(&self) -> usize {
+        self.points.len()
+    }
+
     /// Least and greatest disparity in a camera's frustum, from the points that it sees; `None` if it sees too few.
     pub(super) fn disparities(&self, camera: &CameraBlock) -> Option<[f32; 2]> {
         let seen = self.points.iter().map(|point| camera.project(*point)).filter(|seen| seen.in_image);

@@ -3,6 +3,7 @@
 
 use super::space::{Space, first_guess};
 use crate::{FieldError, Prepared, Rendered, Request};
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::plane_sweep::blend::BlendBlock;
 use viewfuse_core::plane_sweep::census::REACH;
@@ -21,6 +22,8 @@ use viewfuse_weighting::sources::SourceWeights;
 const RANGE_SIDE: u32 = 128;
 /// Planes of that search.
 const RANGE_PLANES: u32 = 128;
+/// Neighbours that a view is compared with there.
+const RANGE_NEIGHBOURS: usize = 4;
 /// Confidence from which on a pixel counts there.
 const RANGE_CONFIDENCE: f32 = 0.6;
 /// Most pairs that are compared, for each view.
@@ -127,8 +130,8 @@ impl<D: Device> Views<'_, D> {
         let device = self.device;
         let small = Images::upload(device, images)?;
         let cameras: Vec<Camera> = images.iter().map(|image| image.camera).collect();
-        let guess = first_guess(&cameras);
-        let mut points = Vec::new();
+        let range = Range::new(first_guess(&cameras), RANGE_PLANES);
+        let mut maps = device.zeros(images.iter().map(|image| image.texels.len()).sum())?;
         for (view, camera) in cameras.iter().enumerate() {
             progress.check()?;
             let mut near: Vec<(usize, f32)> = (0..cameras.len())
@@ -136,31 +139,19 @@ impl<D: Device> Views<'_, D> {
                 .map(|other| (other, camera.pose.centre_world().distance(cameras[other].pose.centre_world())))
                 .collect();
             near.sort_by(|a, b| a.1.total_cmp(&b.1));
-            near.truncate(4);
+            near.truncate(RANGE_NEIGHBOURS);
             let mut weights: Vec<(usize, f32)> =
                 near.iter().map(|(other, gap)| (*other, 1.0 / (gap * gap + 1.0e-12))).collect();
             let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
             weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
             weights.push((view, 1.0));
-            let range = Range::new(guess, RANGE_PLANES);
             let swept = self.swept(&small, &small, &weights, false);
             let costs = self.costs(small.cameras[view], range, &small, &swept, progress)?;
-            let mut map = device.zeros(images.iter().map(|image| image.texels.len()).sum())?;
             let frustum = self.frustum(small.cameras[view], range, &swept);
-            device.pick_disparity(&frustum, &costs, &mut map)?;
-            let map = device.download(&map)?;
-            let block = &small.cameras[view];
-            let first = block.first_texel as usize;
-            for row in 2..block.height.saturating_sub(2) {
-                for column in 2..block.width.saturating_sub(2) {
-                    let [disparity, confidence] = map[first + (row * block.width + column) as usize];
-                    if confidence > RANGE_CONFIDENCE && disparity > 0.5 * range.step {
-                        let towards = block.towards(column as f32 + 0.5, row as f32 + 0.5);
-                        points.push(block.centre_world() + towards / disparity);
-                    }
-                }
-            }
+            device.pick_disparity(&frustum, &costs, &mut maps)?;
         }
+        let maps = device.download(&maps)?;
+        let points = consistent_points(&small.cameras, &maps, range.step);
         Ok(Space::new(points))
     }
 
@@ -193,6 +184,7 @@ impl<D: Device> Views<'_, D> {
             view_count: swept.len().min(MOST_MATCHED) as u32,
             pair_count: pairs(swept).len() as u32,
             has_silhouettes: u32::from(self.has_silhouettes),
+            dissent_share: ef("VF_VOTE", 0.0625),
             first_row: 0,
             row_count: camera.height,
         }
@@ -235,7 +227,7 @@ impl<D: Device> Views<'_, D> {
             )?;
             device.census_cost(&band, halo, kept, &pair_buffer, &grey, &evidence, &mut costs)?;
         }
-        let window = WindowBlock::new(&whole);
+        let window = WindowBlock::new(&whole, ef("VF_NEAR", 0.005));
         let mut sums = device.zeros::<Planes>(6 * volume)?;
         device.row_sums(&window, &costs, &mut sums)?;
         drop(costs);
@@ -257,8 +249,44 @@ impl<D: Device> Views<'_, D> {
             cameras.filter_map(|camera| self.space.disparities(camera)).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
         };
         let bounds = self.space.disparities(camera).or_else(all).unwrap_or([0.0, 1.0]);
+        let bounds = std::env::var("VF_NF").ok().map_or(bounds, |v| {
+            let v: Vec<f32> = v.split(',').map(|v| v.parse().unwrap()).collect();
+            [1.0 / v[1], 1.0 / v[0]]
+        });
+        if std::env::var("T").is_ok() {
+            eprintln!(
+                "bounds {bounds:?} depths {:?} points {}",
+                [1.0 / bounds[1], 1.0 / bounds[0]],
+                self.space.count()
+            );
+        }
         Range::new(bounds, self.settings.plane_count)
     }
+}
+
+/// Points of confident pixels whose disparity another view's map confirms to within a plane and a half.
+fn consistent_points(cameras: &[CameraBlock], maps: &[[f32; 2]], step: f32) -> Vec<Vec3> {
+    let mut points = Vec::new();
+    for (view, camera) in cameras.iter().enumerate() {
+        for row in 2..camera.height.saturating_sub(2) {
+            for column in 2..camera.width.saturating_sub(2) {
+                let [disparity, confidence] = maps[(camera.first_texel + row * camera.width + column) as usize];
+                if confidence < RANGE_CONFIDENCE || disparity < 0.5 * step {
+                    continue;
+                }
+                let towards = camera.towards(column as f32 + 0.5, row as f32 + 0.5);
+                let point = camera.centre_world() + towards / disparity;
+                let confirms = |other: &CameraBlock| {
+                    let seen = other.project(point);
+                    seen.in_image && (maps[other.texel_at(seen.x, seen.y)][0] - 1.0 / seen.depth).abs() < 1.5 * step
+                };
+                if cameras.iter().enumerate().any(|(other, camera)| other != view && confirms(camera)) {
+                    points.push(point);
+                }
+            }
+        }
+    }
+    points
 }
 
 /// The pairs that are compared, of the greatest products of weights.
@@ -350,4 +378,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         }
         Ok(Rendered { colours, depths: device.download(&depths)?, width, height })
     }
+}
+
+fn ef(n: &str, d: f32) -> f32 {
+    std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d)
 }

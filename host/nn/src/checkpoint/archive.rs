@@ -1,7 +1,7 @@
-//! What `torch.save` has written since PyTorch 1.6: a zip archive with `ARCHIVE/data.pkl`, the description, and
+//! The format of `torch.save` since PyTorch 1.6: a zip archive with `ARCHIVE/data.pkl`, the description, and
 //! `ARCHIVE/data/KEY`, the storages.
 //!
-//! PyTorch compresses nothing, so an entry is a stretch of the file, and how much it holds is no matter of belief.
+//! PyTorch does not compress, so an entry is a range of the file, and its size can be checked.
 
 use super::error::{Problem, shortened};
 use super::input::Input;

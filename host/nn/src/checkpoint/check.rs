@@ -4,10 +4,10 @@ use super::TensorShape;
 use super::error::shortened;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Names that one message repeats of each kind.
+/// The most names of each kind in a message.
 const MOST_NAMES: usize = 8;
 
-/// What is wrong, if anything is.
+/// The differences, if there are any.
 pub(super) fn compare(
     shapes: &BTreeMap<String, Vec<usize>>,
     expected: &[TensorShape],
@@ -46,7 +46,7 @@ fn list(names: impl IntoIterator<Item = String>) -> Option<String> {
     (!first.is_empty()).then(|| format!("{}{rest}", first.join(", ")))
 }
 
-/// Whether the names differ by what they begin with.
+/// A hint if the names differ by a prefix.
 fn prefix(missing: &[&str], unexpected: &[&str]) -> Option<String> {
     let in_file = longer(missing, unexpected).map(|prefix| {
         format!("the names in the file begin with '{}', those of the architecture do not", shortened(prefix))
@@ -60,7 +60,7 @@ fn prefix(missing: &[&str], unexpected: &[&str]) -> Option<String> {
     })
 }
 
-/// What the `long` names have in front of the `short` ones, if most of these are found so.
+/// The prefix by which most of the `long` names differ from the `short` ones.
 fn longer<'a>(short: &[&str], long: &[&'a str]) -> Option<&'a str> {
     let first = short.first()?;
     let candidates = long.iter().filter_map(|name| name.strip_suffix(first)).filter(|prefix| !prefix.is_empty());

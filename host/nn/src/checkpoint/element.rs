@@ -1,4 +1,4 @@
-//! What a tensor's elements are, and their value in `f32`.
+//! Element types of tensors, and their values as numbers.
 
 use half::{bf16, f16};
 use safetensors::Dtype;
@@ -12,7 +12,7 @@ pub enum Element {
     F32,
     /// 16-bit floating point of IEEE 754.
     F16,
-    /// The upper half of a 32-bit floating point number.
+    /// bfloat16: the upper half of a 32-bit floating point number.
     Bf16,
     /// Signed integer of 64 bits.
     I64,
@@ -24,7 +24,7 @@ pub enum Element {
     I8,
     /// Unsigned integer of 8 bits.
     U8,
-    /// A byte that is 0 or not.
+    /// Boolean: a byte that is 0 or not.
     Bool,
 }
 
@@ -58,7 +58,7 @@ impl Element {
         self.row().1
     }
 
-    /// Whether it is a floating point number, which can be infinite or none at all.
+    /// Whether it is a floating point type, which can hold infinity and NaN.
     pub fn is_float(self) -> bool {
         matches!(self, Element::F64 | Element::F32 | Element::F16 | Element::Bf16)
     }
@@ -79,13 +79,13 @@ impl Element {
         self.row().3
     }
 
-    /// The list is in the order of the declaration: a test holds it to that.
+    /// The list is in the order of the declaration; a test checks that.
     fn row(self) -> &'static (Element, &'static str, &'static str, Dtype) {
         &ALL[self as usize]
     }
 
-    /// The elements that these bytes are, in `f64`, which holds all of them but large 64-bit integers exactly. Bytes
-    /// that are no whole element are left out.
+    /// The elements of these bytes in `f64`, which is exact for all types but large 64-bit integers. An incomplete last
+    /// element is left out.
     pub(super) fn values(self, bytes: &[u8]) -> impl Iterator<Item = f64> {
         bytes.chunks_exact(self.size()).map(move |element| self.value(element))
     }

@@ -1,4 +1,4 @@
-//! What can be wrong with a checkpoint.
+//! The errors of checkpoints.
 //!
 //! Every message is one line and begins with the path of the file, followed by the place or tensor in it.
 
@@ -9,39 +9,39 @@ use viewfuse_job::files::WriteError;
 /// Why a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
-    /// The operating system did not let us read it.
+    /// The operating system reported an error while reading it.
     #[error("{}: cannot be read: {cause}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         cause: std::io::Error,
     },
-    /// It is something else.
-    #[error("{}: no checkpoint: {what}", path.display())]
+    /// It is not a checkpoint.
+    #[error("{}: not a checkpoint: {what}", path.display())]
     NoCheckpoint {
         /// The file.
         path: PathBuf,
-        /// What it seems to be, and what to do.
+        /// What it appears to be, and what to do.
         what: String,
     },
-    /// It is a checkpoint that cannot be used.
+    /// It is a checkpoint with invalid content.
     #[error("{}: {what}", path.display())]
     Content {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with which entry or tensor in it.
+        /// The problem, with the entry or tensor.
         what: String,
     },
-    /// Its description of itself cannot be read.
+    /// Its description of its tensors cannot be read.
     #[error("{}: {fault}", path.display())]
     Pickle {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and where.
+        /// The problem and its position.
         fault: PickleError,
     },
-    /// More than any network that is meant here.
+    /// It would take more memory than the supported networks.
     #[error(
         "{}: {what} would take {bytes} bytes of memory, at most {limit} are allowed; the file is damaged, malicious, or \
          of another network", path.display()
@@ -51,17 +51,17 @@ pub enum CheckpointError {
         path: PathBuf,
         /// A tensor, or all of them.
         what: String,
-        /// What reading it takes.
+        /// Memory that reading it would take.
         bytes: u128,
-        /// What it may take.
+        /// The limit.
         limit: u64,
     },
-    /// Tensors are not those of the architecture.
+    /// Its tensors are not those of the architecture.
     #[error("{}: {detail}", path.display())]
     Tensors {
         /// The file.
         path: PathBuf,
-        /// Which are missing, unexpected, or of another shape.
+        /// Those that are missing, unexpected, or of another shape.
         detail: String,
     },
     /// There is no tensor of this name.
@@ -72,7 +72,7 @@ pub enum CheckpointError {
         /// The name.
         tensor: String,
     },
-    /// NaN, infinity, or a value beyond what the type that is asked for holds.
+    /// NaN, infinity, or a value out of the requested type's range.
     #[error("{}: tensor '{tensor}': element {index} is {value:?}, {problem}", path.display())]
     Value {
         /// The file.
@@ -83,18 +83,18 @@ pub enum CheckpointError {
         index: u64,
         /// Its value.
         value: f64,
-        /// What is wrong with it.
+        /// The problem.
         problem: &'static str,
     },
-    /// A file that was to be made cannot be.
+    /// An output file cannot be written.
     #[error(transparent)]
     Write(WriteError),
-    /// The work was stopped.
+    /// The work was cancelled.
     #[error(transparent)]
     Interrupted(viewfuse_job::progress::Interrupted),
 }
 
-/// What can be wrong with the content of a file, before it is said which file.
+/// A problem with the content of a file, without the file's path.
 #[derive(Debug)]
 pub(super) enum Problem {
     Read(std::io::Error),
@@ -120,7 +120,7 @@ impl From<PickleError> for Problem {
 }
 
 impl Problem {
-    /// The error of this file.
+    /// The error with the file's path.
     pub(super) fn of(self, path: &Path) -> CheckpointError {
         let path = path.to_path_buf();
         match self {
@@ -133,7 +133,7 @@ impl Problem {
     }
 }
 
-/// A name as far as messages repeat it.
+/// A name, shortened for messages.
 pub(super) fn shortened(name: &str) -> String {
     const LONGEST: usize = 100;
     let mut short: String = name.chars().take(LONGEST).flat_map(char::escape_debug).collect();

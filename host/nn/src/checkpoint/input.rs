@@ -1,9 +1,9 @@
-//! A stretch of a file, read from its start: nothing is reserved for more bytes than are there.
+//! A range of a file, read from its start: memory is allocated for at most as many bytes as it has.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
-/// A stretch of a file and the place in it.
+/// A range of a file and the position in it.
 #[derive(Debug)]
 pub struct Input<'a> {
     reader: BufReader<&'a File>,
@@ -12,10 +12,10 @@ pub struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
-    /// The bytes from offset `start` up to `end`. While it lives, nothing else may read from the same file.
+    /// The bytes from offset `start` up to `end`. While it exists, nothing else may read from the same file.
     ///
     /// # Errors
-    /// If the system cannot go there.
+    /// If the system cannot seek to `start`.
     pub fn new(file: &'a File, start: u64, end: u64) -> io::Result<Input<'a>> {
         let mut reader = BufReader::new(file);
         reader.seek(SeekFrom::Start(start))?;
@@ -38,13 +38,13 @@ impl<'a> Input<'a> {
     /// The next byte.
     ///
     /// # Errors
-    /// If there is none, or if the system does not let us read.
+    /// If there is none, or if the system reports an error.
     pub fn byte(&mut self) -> io::Result<u8> {
         let [byte] = self.array()?;
         Ok(byte)
     }
 
-    /// The next bytes, as many as the caller wants.
+    /// The next `N` bytes.
     ///
     /// # Errors
     /// As [`Input::byte`].
@@ -54,7 +54,7 @@ impl<'a> Input<'a> {
         Ok(bytes)
     }
 
-    /// Fills `bytes` with the next.
+    /// Fills `bytes` with the next bytes.
     ///
     /// # Errors
     /// As [`Input::byte`].
@@ -86,7 +86,7 @@ impl<'a> Input<'a> {
         Ok(bytes)
     }
 
-    /// Passes over the next `length` bytes.
+    /// Skips the next `length` bytes.
     ///
     /// # Errors
     /// As [`Input::byte`].

@@ -1,4 +1,4 @@
-//! What a file is, by its first bytes, whatever its name.
+//! The kind of a file, by its first bytes, independent of its name.
 
 use super::error::Problem;
 use super::legacy;
@@ -10,19 +10,19 @@ use std::io::{Read, Seek};
 pub enum Kind {
     /// Safetensors.
     Safetensors,
-    /// What `torch.save` has written since PyTorch 1.6.
+    /// The zip archive of `torch.save` since PyTorch 1.6.
     TorchZip,
-    /// What it wrote before.
+    /// The format of `torch.save` before PyTorch 1.6.
     TorchLegacy,
     /// A network that Python's own `pickle` wrote, as an object.
     Snapshot,
 }
 
-/// As much as the header of a tar archive takes.
+/// The length of a tar archive's header.
 const LOOK: u64 = 512;
-/// How far into a file PyTorch's old magic number ends.
+/// Where PyTorch's old magic number ends in a file.
 const MAGIC_WITHIN: usize = 32;
-/// Where such a header names itself, and how.
+/// The position and text of a tar header's magic number.
 const TAR: (usize, &[u8]) = (257, b"ustar");
 
 impl Kind {
@@ -36,7 +36,7 @@ impl Kind {
         }
     }
 
-    /// Looks at a file.
+    /// Recognises a file.
     pub(super) fn of(mut file: &File) -> Result<Kind, Problem> {
         let mut start = Vec::new();
         file.rewind()?;

@@ -1,4 +1,4 @@
-//! What `torch.save` wrote before PyTorch 1.6: pickles one after another (a magic number, a version, the machine, the
+//! The format of `torch.save` before PyTorch 1.6: pickles one after another (a magic number, a version, the machine, the
 //! description, the keys of the storages), then each storage as its number of elements (`i64`) and their bytes.
 
 use super::error::{Problem, shortened};
@@ -11,7 +11,7 @@ use std::fs::File;
 
 /// The magic number 0x1950a86a20f9469cfc6c as pickles hold it.
 pub(super) const MAGIC: [u8; 10] = [0x6c, 0xfc, 0x9c, 0x46, 0xf9, 0x20, 0x6a, 0xa8, 0x50, 0x19];
-/// The only version there ever was.
+/// The only version.
 const VERSION: i64 = 1001;
 
 /// Opens the file.
@@ -32,7 +32,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Prob
     Ok((found, places))
 }
 
-/// The description, behind what every file of this format begins with.
+/// The description, behind the header of this format.
 pub(super) fn description(input: &mut Input<'_>) -> Result<Pickle, Problem> {
     let magic = Pickle::read(input)?;
     if magic.wide(magic.root()) != Some(&MAGIC) {
@@ -48,10 +48,10 @@ pub(super) fn description(input: &mut Input<'_>) -> Result<Pickle, Problem> {
     Ok(Pickle::read(input)?)
 }
 
-/// Refuses numbers in another byte order.
+/// Rejects another byte order.
 fn check_machine(machine: &Pickle) -> Result<(), Problem> {
     let Value::Dict(facts) = machine.value(machine.root()) else {
-        return Err(Problem::Content("does not say on which kind of machine it was written".to_owned()));
+        return Err(Problem::Content("does not state the byte order of its numbers".to_owned()));
     };
     let little = facts.iter().find(|&&(key, _)| machine.text(key) == Some("little_endian"));
     match little.map(|&(_, value)| machine.value(value)) {
@@ -62,7 +62,7 @@ fn check_machine(machine: &Pickle) -> Result<(), Problem> {
     }
 }
 
-/// Offset and length in the file of each storage that a description names. `input` stands behind the description, in
+/// Offset and length in the file of each storage that a description names. `input` is behind the description, in
 /// front of the list of the storages' keys; the storages end at offset `end`.
 pub(super) fn lay_out<'a>(
     pickle: &'a Pickle,

@@ -1,23 +1,23 @@
-//! Networks that stand in a pickle as objects: which tensors their `state_dict` would have.
+//! Networks that a pickle holds as objects: the tensors that their `state_dict` would have.
 //!
-//! An object of PyTorch's modules, whatever its class, has among its attributes the tables `_parameters`, `_buffers` and
-//! `_modules`; the names in a `state_dict` are the way through these. The attributes are the object's state, or, of
-//! classes that carry their source text with them (`torch_utils.persistence` of NVIDIA's projects), the `state` of the
-//! description from which the object would be made. The text is never looked at.
+//! An object of any class of PyTorch's modules has among its attributes the tables `_parameters`, `_buffers` and
+//! `_modules`; the names in a `state_dict` are the paths through these. The attributes are the object's state, or, for
+//! classes with their source text (`torch_utils.persistence` of NVIDIA's projects), the `state` of the
+//! description from which the object would be created. The source text is not read.
 //!
-//! Modules can contain themselves, and one another many times over: names are bounded, and so is the work.
+//! Modules can contain themselves and each other many times: the length of names and the work are limited.
 
 use super::error::shortened;
 use super::pickle::{Id, Object, Pickle, Value};
 use std::collections::HashSet;
 
-/// Bytes of a tensor's name.
+/// The most bytes of a tensor's name.
 const LONGEST_NAME: usize = 256;
 
-/// Entries of tables that are looked at again, beside one for each value of the pickle.
+/// The most entries of tables that are read again, beside one for each value of the pickle.
 const FEW_ENTRIES: usize = 1000;
 
-/// What is looked for among the attributes of a module.
+/// The attributes of a module that are read.
 #[derive(Default)]
 struct Module<'a> {
     parameters: &'a [(Id, Id)],
@@ -32,11 +32,10 @@ pub(super) fn is_module(pickle: &Pickle, id: Id) -> bool {
     Walk::new(pickle).module(id).is_ok_and(|module| module.is_some())
 }
 
-/// Hands out the name of each parameter and each buffer of a module and of all modules in it, and the value that is to be
-/// a tensor.
+/// Calls `take` with the name and the value of each parameter and each buffer of a module and of all modules in it.
 ///
 /// # Errors
-/// What is wrong with the modules, or what `take` says.
+/// A problem with the modules, or the error of `take`.
 pub(super) fn each_tensor(
     pickle: &Pickle,
     id: Id,
@@ -48,15 +47,15 @@ pub(super) fn each_tensor(
 /// A walk through modules.
 struct Walk<'a> {
     pickle: &'a Pickle,
-    /// Tables that were looked at.
+    /// Tables that were read.
     seen: HashSet<Id>,
-    /// Entries of these that may be looked at again.
+    /// Entries of these that may be read again.
     left: usize,
 }
 
 impl<'a> Walk<'a> {
-    /// Modules that are shared by a few others are walked through a few times, but not as often as there are ways to
-    /// them: the work stays in proportion to the pickle.
+    /// Modules that a few others share are visited a few times, but not once a path: the work stays proportional to the
+    /// pickle's size.
     fn new(pickle: &'a Pickle) -> Walk<'a> {
         Walk { pickle, seen: HashSet::new(), left: pickle.values().len() + FEW_ENTRIES }
     }
@@ -134,7 +133,7 @@ impl<'a> Walk<'a> {
         Ok((tables >= 3).then_some(module))
     }
 
-    /// What would become the attributes of an object.
+    /// The attributes that an object would have.
     fn attributes(&mut self, id: Id) -> Result<Option<&'a [(Id, Id)]>, String> {
         let Some(object) = self.pickle.object(id) else { return Ok(None) };
         if let Some(state) = object.state {
@@ -152,7 +151,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// The entries of a `dict` or of an object that is filled like one.
+    /// The entries of a `dict`, or of an object with items.
     fn table(&mut self, id: Id) -> Result<Option<&'a [(Id, Id)]>, String> {
         let pairs = match self.pickle.value(id) {
             Value::Dict(pairs) => pairs,
@@ -177,7 +176,7 @@ impl<'a> Walk<'a> {
         Ok(elements)
     }
 
-    /// Looking at a table for the first time is free: all tables together are no larger than the pickle.
+    /// The first read of a table is free: all tables together are no larger than the pickle.
     fn spend(&mut self, id: Id, count: usize) -> Result<(), String> {
         if !self.seen.insert(id) {
             let left = self.left.checked_sub(count + 1);

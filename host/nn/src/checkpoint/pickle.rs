@@ -1,13 +1,13 @@
-//! Python pickles as data: a pickle is a program for a stack machine, and here that program only ever builds values.
+//! Python pickles as data: a pickle is a program for a stack machine, and this machine only builds values.
 //!
-//! What Python would import, call or set up stays a description of itself: a [`Value::Global`] is a name, and every
-//! call of one is a [`Value::Object`] that remembers what was to be called with what. Nothing is looked up, so nothing
-//! can be executed; who reads the values gives meaning to the few names that it knows.
+//! Imports, calls and object states are kept as descriptions: a [`Value::Global`] is a name, and every call of one is a
+//! [`Value::Object`] with the function's name and its arguments. No name is resolved, so no code can be executed; the
+//! reader of the values interprets the few names that it knows.
 //!
-//! Read are the opcodes that Python writes at protocols 2 to 5, without out-of-band buffers and without the registry of
-//! extensions. Values live in one list and refer to each other by number, as Python's do by address: what is shared in
-//! the pickle is shared here, cycles do no harm, and neither reading nor dropping recurses. Texts are copied out of the
-//! file once; the contents of `bytes`, which can be large, stay in it. The constants below bound the rest.
+//! The supported opcodes are those that Python writes at protocols 2 to 5, without out-of-band buffers and without the
+//! registry of extensions. Values are in one list and refer to each other by index, as Python's do by address: shared
+//! values are shared here, cycles are allowed, and neither reading nor dropping recurses. Texts are copied from the
+//! file once; the contents of `bytes`, which can be large, stay in the file. The constants below limit the rest.
 //!
 //! Source: CPython's `Lib/pickletools.py` and `Lib/pickle.py`.
 
@@ -17,38 +17,38 @@ use super::input::Input;
 use machine::Machine;
 use std::io;
 
-/// Opcodes that one pickle may have. A `state_dict` takes about 40 a tensor.
+/// The most opcodes of a pickle. A `state_dict` takes about 40 a tensor.
 pub const MOST_STEPS: u64 = 4_000_000;
-/// Values that one pickle may build, and places on its stack and in its memo.
+/// The most values of a pickle, and the most entries of its stack and its memo.
 pub const MOST_VALUES: usize = 500_000;
-/// Bytes of all its texts together.
+/// The most bytes of all its texts together.
 pub const LONGEST_TEXTS: usize = 16 << 20;
-/// Memory that reading one pickle takes at most, in bytes: of the above, with lists that double when they are full.
+/// The most memory for reading one pickle, in bytes: for the limits above, with lists that double when they are full.
 pub const PICKLE_BYTES: u64 = 256 << 20;
 
-/// Why a pickle was not read.
+/// Why a pickle could not be read.
 #[derive(Debug, thiserror::Error)]
 #[error("byte {at}: {fault}")]
 pub struct PickleError {
     /// Offset in the file of the opcode at fault.
     pub at: u64,
-    /// What is wrong there.
+    /// The problem.
     pub fault: Fault,
 }
 
-/// What is wrong with a pickle.
+/// A problem with a pickle.
 #[derive(Debug, thiserror::Error)]
 pub enum Fault {
-    /// The operating system did not let us read it.
+    /// The operating system reported an error while reading it.
     #[error("cannot be read: {0}")]
     Io(io::Error),
     /// It ends before its last opcode.
     #[error("the pickle ends too early; the file is cut off or damaged")]
     Ends,
-    /// No opcode of those that are read.
+    /// An unsupported opcode.
     #[error("opcode 0x{0:02x} is not one that torch.save writes; the file is damaged or made by something else")]
     Opcode(u8),
-    /// A protocol from the future, or one that Python 3 does not write by default.
+    /// An unsupported protocol: a newer one, or one that Python 3 does not write by default.
     #[error("pickle protocol {0} is not read (2 to 5 are)")]
     Protocol(u8),
     /// Fewer values than the opcode takes.
@@ -57,18 +57,18 @@ pub enum Fault {
     /// Values of a kind that the opcode does not take.
     #[error("opcode 0x{0:02x} finds values that it does not apply to; the file is damaged")]
     Kind(u8),
-    /// A value that was never remembered.
+    /// A memo entry that was never set.
     #[error("memo {0} was never set; the file is damaged")]
     Memo(u32),
-    /// A text that is not UTF-8.
+    /// A text is not UTF-8.
     #[error("a text is not UTF-8; the file is damaged")]
     Text,
-    /// More than is ever needed.
+    /// A limit is exceeded.
     #[error("more than {limit} {what}, which no checkpoint needs; the file is damaged or malicious")]
     TooMany {
-        /// What there is too much of.
+        /// The limited quantity.
         what: &'static str,
-        /// How much is allowed.
+        /// The limit.
         limit: u64,
     },
 }
@@ -83,7 +83,7 @@ impl From<io::Error> for Fault {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Id(u32);
 
-/// A piece of the pickle's texts.
+/// A range of the pickle's texts.
 #[derive(Clone, Copy, Debug)]
 pub struct Span {
     start: u32,
@@ -105,7 +105,7 @@ pub enum Value {
     Float(f64),
     /// `str`: see [`Pickle::text`].
     Text(Span),
-    /// `bytes`, `bytearray`, or a `str` of Python 2 that is no text: where they stand in the file.
+    /// `bytes`, `bytearray`, or a `str` of Python 2 that is not a text: its range in the file.
     Bytes {
         /// Offset of the first byte in the file.
         start: u64,
@@ -127,26 +127,26 @@ pub enum Value {
         /// Its name there.
         name: Span,
     },
-    /// Something that is stored outside the pickle under this identity.
+    /// A value that is stored outside the pickle under this identity.
     Persistent(Id),
-    /// What Python would get by a call.
+    /// The result of a call.
     Object(Box<Object>),
 }
 
-/// What Python would get by a call, and do with it afterwards.
+/// The result of a call, with the state that Python would set afterwards.
 #[derive(Debug)]
 pub struct Object {
-    /// What would be called.
+    /// The function or class.
     pub callable: Id,
-    /// With which arguments.
+    /// Its arguments.
     pub arguments: Id,
-    /// And with which named ones.
+    /// Its keyword arguments.
     pub named: Option<Id>,
-    /// What would become its attributes.
+    /// The state from which its attributes would be set.
     pub state: Option<Id>,
-    /// What would be set in it as in a dict.
+    /// Items that would be set as in a dict.
     pub items: Vec<(Id, Id)>,
-    /// What would be added to it as to a list.
+    /// Elements that would be appended as to a list.
     pub elements: Vec<Id>,
 }
 
@@ -160,7 +160,7 @@ pub struct Pickle {
 }
 
 impl Pickle {
-    /// Reads one pickle; `input` then stands behind it.
+    /// Reads one pickle; `input` is then behind it.
     ///
     /// # Errors
     /// [`PickleError`].
@@ -176,7 +176,7 @@ impl Pickle {
         Err(PickleError { at: input.position(), fault })
     }
 
-    /// The value that the whole pickle stands for.
+    /// The value of the whole pickle.
     pub fn root(&self) -> Id {
         self.root
     }
@@ -223,7 +223,7 @@ impl Pickle {
         }
     }
 
-    /// What is in a tuple or list.
+    /// The elements of a tuple or list.
     pub fn sequence(&self, id: Id) -> Option<&[Id]> {
         match self.value(id) {
             Value::Tuple(elements) | Value::List(elements) => Some(elements),
@@ -231,7 +231,7 @@ impl Pickle {
         }
     }
 
-    /// What Python would get by a call.
+    /// The result of a call.
     pub fn object(&self, id: Id) -> Option<&Object> {
         match self.value(id) {
             Value::Object(object) => Some(object),

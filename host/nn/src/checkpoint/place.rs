@@ -1,4 +1,4 @@
-//! Where a tensor's elements stand in a file, and reading them from there.
+//! The position of a tensor's elements in a file, and reading them.
 
 use super::element::Element;
 use super::error::Problem;
@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
-/// Memory that one tensor may take as `f32`, in bytes.
+/// The most memory of one tensor as `f32`, in bytes.
 pub const LARGEST_TENSOR_BYTES: u64 = 4 << 30;
-/// Memory that all tensors of a file may take as `f32`, in bytes.
+/// The most memory of all tensors of a file as `f32`, in bytes.
 pub const LARGEST_TOTAL_BYTES: u64 = 16 << 30;
-/// Elements that a tensor may have although its storage has fewer.
+/// The most elements of a tensor whose storage has fewer.
 const LARGEST_REPEATED: u64 = 1 << 20;
 /// Bytes that are read at once.
 pub(super) const CHUNK_BYTES: usize = 1 << 16;
@@ -30,17 +30,17 @@ pub(super) struct Place {
     pub(super) shape: Vec<usize>,
     /// Steps along each axis, in elements; `None` for row-major order without gaps.
     pub(super) strides: Option<Vec<usize>>,
-    /// Elements from its first to behind its last, those between that are not its own included.
+    /// Elements from its first to its last, those between that are not its own included.
     pub(super) extent: u64,
 }
 
-/// The number of elements of a shape, if it is a number that can be.
+/// The number of elements of a shape, if it does not overflow.
 pub(super) fn element_count(shape: &[usize]) -> Option<u64> {
     shape.iter().try_fold(1u64, |product, &length| product.checked_mul(length as u64))
 }
 
-/// Checks that a tensor of this shape is not absurdly large, and gives the number of its elements. An axis of length 0
-/// does not make the others sensible: it counts as 1.
+/// Checks the size of a tensor of this shape against the limits, and returns the number of its elements. For the check, an
+/// axis of length 0 counts as 1.
 pub(super) fn check_size(name: &str, shape: &[usize]) -> Result<u64, Problem> {
     let bytes = shape.iter().fold(4u128, |product, &length| product.saturating_mul(length.max(1) as u128));
     if bytes > LARGEST_TENSOR_BYTES.into() {
@@ -111,13 +111,13 @@ impl Place {
         element_count(&self.shape).unwrap_or(0)
     }
 
-    /// Memory that reading it takes beside the result, in bytes.
+    /// Memory for reading it, beside the result, in bytes.
     pub(super) fn working_bytes(&self) -> u64 {
         let window = self.strides.as_ref().map_or(0, |_| self.extent * self.element.size() as u64);
         window + CHUNK_BYTES as u64
     }
 
-    /// Hands its elements out as bytes, row-major, whole elements in each piece.
+    /// Calls `take` with its elements as bytes, row-major, whole elements in each piece.
     pub(super) fn read<E: From<Problem>>(
         &self,
         mut file: &File,

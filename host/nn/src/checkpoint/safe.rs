@@ -1,5 +1,5 @@
 //! Safetensors: a length, a JSON header, and the tensors' bytes without gaps. The crate of that name reads the header
-//! and checks that the stretches fit their shapes, follow one another and overlap nowhere.
+//! and checks that the byte ranges fit their shapes, are contiguous and do not overlap.
 
 use super::element::Element;
 use super::error::{Problem, shortened};
@@ -10,10 +10,10 @@ use safetensors::tensor::Metadata;
 use std::collections::BTreeMap;
 use std::fs::File;
 
-/// Bytes of a header; a tensor takes about 100.
+/// The most bytes of a header; a tensor takes about 100.
 const LONGEST_HEADER: u64 = 16 << 20;
 
-/// Opens the file: its tensors, and what else it says.
+/// Opens the file: its tensors and its metadata.
 pub(super) fn open(file: &File, length: u64) -> Result<(Places, BTreeMap<String, String>), Problem> {
     let mut input = Input::new(file, 0, length)?;
     let header_length = input.length(8)?;
@@ -31,7 +31,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(Places, BTreeMap<String,
     }
     let header = input.take(header_length)?;
     let header: Metadata = serde_json::from_slice(&header)
-        .map_err(|error| Problem::Content(format!("its header is no header of safetensors: {error}")))?;
+        .map_err(|error| Problem::Content(format!("its header is not one of safetensors: {error}")))?;
     let start = input.position();
     let missing = (start + header.data_len() as u64).abs_diff(length);
     if missing > 0 {

@@ -2,11 +2,10 @@
 
 use super::{Checkpoint, CheckpointError};
 
-/// Largest size of anything in an architecture: more is no network that is meant here but a mistake, or an attempt to
-/// fill the memory.
+/// The largest size in an architecture. Larger ones are a mistake, or an attempt to fill the memory.
 pub const LARGEST_SIZE: usize = 1 << 14;
 
-/// A checkpoint's shapes, to read the sizes of a member of a family of networks off.
+/// A checkpoint's shapes, from which the sizes of a network are read.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes<'a> {
     checkpoint: &'a Checkpoint,
@@ -14,7 +13,7 @@ pub struct Sizes<'a> {
 }
 
 impl<'a> Sizes<'a> {
-    /// Of this checkpoint, which is to be of the family of this name.
+    /// The sizes of this checkpoint, which should be of the family of this name.
     pub fn new(checkpoint: &'a Checkpoint, family: &'static str) -> Sizes<'a> {
         Sizes { checkpoint, family }
     }
@@ -30,12 +29,12 @@ impl<'a> Sizes<'a> {
         CheckpointError::Tensors { path: self.checkpoint.path().to_path_buf(), detail }
     }
 
-    /// The shape of a tensor that may be there.
+    /// The shape of an optional tensor.
     pub fn shape(&self, name: &str) -> Option<&'a [usize]> {
         self.checkpoint.shapes().get(name).map(Vec::as_slice)
     }
 
-    /// One extent of a tensor that must be there, with this number of dimensions.
+    /// One extent of a required tensor with this number of dimensions.
     ///
     /// # Errors
     /// [`CheckpointError`] if it is not, or if the extent is not from 1 to [`LARGEST_SIZE`].
@@ -48,21 +47,21 @@ impl<'a> Sizes<'a> {
         }
         match shape.get(axis).copied().unwrap_or(0) {
             size @ 1..=LARGEST_SIZE => Ok(size),
-            size => {
-                Err(self.refuse(format!("{name} has the size {size} on axis {axis}; 1 to {LARGEST_SIZE} is usable")))
-            }
+            size => Err(self.refuse(format!(
+                "{name} has the size {size} on axis {axis}; sizes from 1 to {LARGEST_SIZE} are supported"
+            ))),
         }
     }
 
-    /// How many tensors of numbered names there are, counted from 0.
+    /// The number of tensors with numbered names, counted from 0.
     pub fn count(&self, name: impl Fn(usize) -> String) -> usize {
         (0..).take_while(|index| self.shape(&name(*index)).is_some()).count()
     }
 
-    /// A number that the file may say in its metadata.
+    /// An optional number of the metadata.
     ///
     /// # Errors
-    /// [`CheckpointError`] if it says something there that is no finite number.
+    /// [`CheckpointError`] if it is not a finite number.
     pub fn number(&self, key: &str, otherwise: f32) -> Result<f32, CheckpointError> {
         let Some(text) = self.checkpoint.metadata().get(key) else { return Ok(otherwise) };
         match text.parse::<f32>() {

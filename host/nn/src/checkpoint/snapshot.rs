@@ -1,4 +1,4 @@
-//! What Python's own `pickle` wrote of a network, as EDM's training does with its snapshots (`network-snapshot-*.pkl`):
+//! Networks written by Python's own `pickle`, such as the snapshots of EDM's training (`network-snapshot-*.pkl`):
 //! one pickle, in which the storage of each tensor is a byte string that is a whole file of `torch.save`'s old format.
 //!
 //! Source: NVlabs/edm, `training/training_loop.py` and `torch_utils/persistence.py`; PyTorch, `torch/storage.py`.
@@ -15,11 +15,11 @@ use std::fs::File;
 
 /// A storage in the file.
 struct Stored {
-    /// What it is called in messages.
+    /// Its name in messages.
     key: String,
     element: Option<Element>,
     count: u64,
-    /// Offset of its elements, and how many bytes they are.
+    /// Offset and bytes of its elements.
     start: u64,
     available: u64,
 }
@@ -72,7 +72,7 @@ fn nested(pickle: &Pickle, value: &Value) -> Option<(u64, u64)> {
     }
 }
 
-/// The storage that a byte string holds.
+/// The storage of a byte string.
 fn read(file: &File, start: u64, length: u64) -> Result<Stored, Problem> {
     let wrong = |what: String| Problem::Content(format!("the storage in bytes {start} to {}: {what}", start + length));
     let opened = || -> Result<Stored, Problem> {

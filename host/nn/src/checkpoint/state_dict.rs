@@ -1,9 +1,9 @@
-//! The `state_dict` in a pickle of PyTorch: which tensors there are, and where each stands in which storage.
+//! The `state_dict` in a pickle of PyTorch: its tensors, and the storage and offset of each.
 //!
 //! Only a few names have a meaning here: `collections.OrderedDict`, the functions of `torch._utils` that put a tensor
-//! or a parameter together, `torch.Size`, and the classes of storages. Everything else (optimizers, schedulers, a
-//! class of somebody's own, `os.system`) may stand in the file and means nothing. In place of a `state_dict` may stand
-//! the network itself, as an object: see [`modules`].
+//! or a parameter together, `torch.Size`, and the classes of storages. All other names (optimizers, schedulers,
+//! classes of other projects, `os.system`) are ignored. The network itself, as an object, may take the place of a
+//! `state_dict`: see [`modules`].
 
 use super::element::Element;
 use super::error::shortened;
@@ -13,33 +13,33 @@ use std::collections::{BTreeMap, HashSet};
 
 /// Keys under which training scripts put the `state_dict`, in the order in which they are tried.
 pub const PLACES: [&str; 5] = ["state_dict", "model", "model_state_dict", "net", "ema"];
-/// What `DataParallel` puts before every name.
+/// The prefix that `DataParallel` adds to every name.
 const PARALLEL_PREFIX: &str = "module.";
-/// Tensors that a checkpoint may have.
+/// The most tensors of a checkpoint.
 pub(super) const MOST_TENSORS: usize = 50_000;
-/// PyTorch's own limit.
+/// The most axes of a tensor: PyTorch's own limit.
 pub(super) const MOST_AXES: usize = 64;
-/// Settings beside the tensors that are kept, and how long each may be.
+/// The most settings beside the tensors, and the most bytes of each.
 const MOST_SETTINGS: usize = 64;
 const LONGEST_SETTING: usize = 1024;
 
-/// What a file's pickle says about its tensors.
+/// The description of a file's tensors.
 #[derive(Debug)]
 pub(super) struct StateDict {
-    /// The key under which it stood, if it was not the whole.
+    /// The key of the `state_dict`, if it is not the whole pickle.
     pub(super) place: Option<&'static str>,
-    /// What was taken from the front of every name.
+    /// The prefix that was removed from every name.
     pub(super) prefix: &'static str,
     /// The tensors by name.
     pub(super) claims: BTreeMap<String, Claim>,
-    /// Numbers and short texts that stood beside it.
+    /// Numbers and short texts beside it.
     pub(super) settings: BTreeMap<String, String>,
 }
 
-/// What a tensor is, as far as the pickle says. Nothing of it is checked against the file yet.
+/// A tensor as the pickle describes it, not yet checked against the file.
 #[derive(Debug)]
 pub(super) struct Claim {
-    /// What stands for its storage: see [`storage`].
+    /// The value that describes its storage: see [`storage`].
     pub(super) storage: Id,
     /// The type of its elements.
     pub(super) element: Element,
@@ -47,18 +47,18 @@ pub(super) struct Claim {
     pub(super) first: u64,
     /// Its shape.
     pub(super) shape: Vec<usize>,
-    /// How many elements of the storage lie between neighbours along each axis.
+    /// Strides along each axis, in elements of the storage.
     pub(super) strides: Vec<usize>,
 }
 
-/// What a pickle says of a storage.
+/// A storage as the pickle describes it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Storage<'a> {
     /// Its key among the storages.
     pub(super) key: &'a str,
     /// The type of its elements; bytes if it has none.
     pub(super) element: Option<Element>,
-    /// How many it holds.
+    /// Its element count.
     pub(super) count: u64,
 }
 
@@ -69,13 +69,13 @@ impl Storage<'_> {
     }
 }
 
-/// What a tensor's storage is, by the value that stands for it.
+/// Reads the value that describes a tensor's storage.
 pub(super) type StorageOf<'a> = dyn Fn(Id) -> Result<Storage<'a>, String> + 'a;
 
 /// Finds the `state_dict`.
 ///
 /// # Errors
-/// What is wrong: with which key or tensor, and how.
+/// The problem, with the key or tensor.
 pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateDict, String> {
     let root = pickle.root();
     let holds_tensors = |id: Id| {
@@ -114,13 +114,13 @@ pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateD
     if modules::is_module(pickle, found) {
         modules::each_tensor(pickle, found, &mut |name, value| match claim(pickle, value, name, storage_of)? {
             Some(claim) => keep(name, claim),
-            None => Err(format!("holds '{}' where a tensor is to be, which is none", shortened(name))),
+            None => Err(format!("holds '{}' in place of a tensor", shortened(name))),
         })?;
     } else {
         for (key, value) in entries(pickle, found).unwrap_or_default() {
             let name = pickle.text(key);
             let Some(claim) = claim(pickle, value, name.unwrap_or("?"), storage_of)? else { continue };
-            keep(name.ok_or("holds a tensor under a key that is no text")?, claim)?;
+            keep(name.ok_or("holds a tensor under a key that is not a text")?, claim)?;
         }
     }
     let mut prefix = "";
@@ -145,10 +145,10 @@ pub(super) fn storages(pickle: &Pickle) -> Result<Vec<Storage<'_>>, String> {
     persistent.map(|identity| identified(pickle, identity)).collect()
 }
 
-/// A storage that stands outside of its pickle.
+/// A storage outside of its pickle.
 ///
 /// # Errors
-/// What about it is not understood.
+/// The problem.
 pub(super) fn storage(pickle: &Pickle, id: Id) -> Result<Storage<'_>, String> {
     match *pickle.value(id) {
         Value::Persistent(identity) => identified(pickle, identity),
@@ -156,10 +156,10 @@ pub(super) fn storage(pickle: &Pickle, id: Id) -> Result<Storage<'_>, String> {
     }
 }
 
-/// What is said of a value that should stand for a storage and does not.
+/// The message for a value that should describe a storage and does not.
 pub(super) const NO_STORAGE: &str = "has no storage; the file is damaged, or it is no file of torch.save";
 
-/// What the identity of a storage says: `('storage', class, key, device, element count)`.
+/// The identity of a storage: `('storage', class, key, device, element count)`.
 fn identified(pickle: &Pickle, identity: Id) -> Result<Storage<'_>, String> {
     let unknown = || "refers to something stored outside its description that is no storage of tensors".to_owned();
     let fields = pickle.sequence(identity).ok_or_else(unknown)?;
@@ -181,7 +181,7 @@ fn identified(pickle: &Pickle, identity: Id) -> Result<Storage<'_>, String> {
     Ok(Storage { key, element, count })
 }
 
-/// The pairs of a `dict`, of an `OrderedDict`, or of a class of somebody's own that is filled like one.
+/// The pairs of a `dict`, of an `OrderedDict`, or of another class with items.
 fn entries(pickle: &Pickle, id: Id) -> Option<Vec<(Id, Id)>> {
     if let Value::Dict(pairs) = pickle.value(id) {
         return Some(pairs.clone());
@@ -200,7 +200,7 @@ fn entries(pickle: &Pickle, id: Id) -> Option<Vec<(Id, Id)>> {
     Some(pairs.chain(object.items.iter().copied()).collect())
 }
 
-/// The call that puts a tensor together, behind one that makes it a parameter.
+/// The call that builds a tensor, without the call that makes it a parameter.
 fn tensor_call(pickle: &Pickle, id: Id) -> Option<(&Object, &str)> {
     let call = |id: Id| {
         let object = pickle.object(id)?;
@@ -282,7 +282,7 @@ fn settings(pickle: &Pickle, root: &[(Id, Id)]) -> BTreeMap<String, String> {
 /// Why there is no `state_dict` in a pickle.
 fn no_tensors(pickle: &Pickle) -> String {
     match (entries(pickle, pickle.root()), pickle.object(pickle.root())) {
-        (Some(table), _) => format!("holds no tensors where they are looked for: {}", keys_of(pickle, &table)),
+        (Some(table), _) => format!("holds no tensors in the expected places: {}", keys_of(pickle, &table)),
         (None, Some(object)) => {
             format!("holds an object ({}), not a table of named tensors; {RESAVE}", modules::class_of(pickle, object))
         }

@@ -1,6 +1,6 @@
 //! Writing safetensors, one tensor after another.
 //!
-//! Format: <https://github.com/huggingface/safetensors>. Tensors stand in the order of falling element size, then of
+//! Format: <https://github.com/huggingface/safetensors>. Tensors are in the order of decreasing element size, then of
 //! their names, as the crate of that name writes them, so that every element is aligned.
 
 use super::error::shortened;
@@ -15,32 +15,32 @@ use std::path::Path;
 use viewfuse_job::files::WholeFile;
 use viewfuse_job::progress::Progress;
 
-/// The key of what is no tensor.
+/// The key of the metadata.
 const METADATA: &str = "__metadata__";
-/// Headers are filled up to a multiple of this with spaces.
+/// Headers are padded with spaces to a multiple of this.
 const ALIGNMENT: usize = 8;
 
-/// In which precision floating point numbers are written. Integers are written as they are.
+/// The precision in which floating point numbers are written. Integers are written unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Precision {
-    /// As they are.
+    /// Unchanged.
     Kept,
-    /// In 16 bits, rounded to nearest.
+    /// Half precision (f16), rounded to nearest.
     Half,
 }
 
-/// What was written.
+/// The result of writing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
     /// Name, type, shape and bytes of each tensor, in the order of the file.
     pub tensors: Vec<(String, Element, Vec<usize>, u64)>,
     /// Length of the file in bytes.
     pub bytes: u64,
-    /// Largest relative error by rounding, of values that are normal numbers in half precision.
+    /// Largest relative rounding error of values that are normal numbers in half precision.
     pub relative_error: f64,
-    /// How many values are smaller than those.
+    /// The number of smaller values.
     pub tiny_count: u64,
-    /// Largest absolute error by rounding these.
+    /// Their largest absolute rounding error.
     pub tiny_error: f64,
 }
 
@@ -53,12 +53,11 @@ enum Entry<'a> {
 }
 
 impl Checkpoint {
-    /// Writes it as safetensors, whole or not at all, with its metadata. Beside one piece of a tensor nothing is held
-    /// in memory.
+    /// Writes it as safetensors, completely or not at all, with its metadata. At most one piece of a tensor is in memory.
     ///
     /// # Errors
     /// [`CheckpointError`] if a tensor cannot be read, holds a NaN or an infinity or a number that the precision cannot
-    /// hold, or if the file cannot be written, or if the work is stopped.
+    /// hold, or if the file cannot be written, or if the work is cancelled.
     pub fn write_safetensors(
         &self,
         path: &Path,
@@ -74,7 +73,7 @@ impl Checkpoint {
             if name == METADATA {
                 return Err(CheckpointError::Content {
                     path: self.path().to_path_buf(),
-                    what: format!("a tensor is called '{METADATA}', which safetensors keep for other things"),
+                    what: format!("a tensor is called '{METADATA}', a name that safetensors reserve"),
                 });
             }
             let element = target(self.element(name).unwrap_or(Element::F32));
@@ -132,7 +131,7 @@ impl Checkpoint {
                     tensor: shortened(name),
                     index: done + at as u64,
                     value,
-                    problem: "which f16 cannot hold (it ends at 65504); convert without rounding to it",
+                    problem: "which f16 cannot hold (at most 65504); convert without rounding to it",
                 });
             }
             let error = (rounded.to_f64() - value).abs();

@@ -1,5 +1,5 @@
-//! The denoiser's network, as [`viewfuse_field::genvs`] runs it: a U-Net of residual blocks with group normalisation and
-//! self-attention, told the noise level, its encoder fed with the halved input once more at every level.
+//! The denoiser's network, as [`viewfuse_field::genvs`] runs it: a U-Net of residual blocks with group norm and
+//! self-attention, conditioned on the noise level, whose encoder receives the halved input again at every level.
 
 use super::super::images::dims4;
 use super::super::operations::Window;
@@ -11,9 +11,9 @@ use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_field::genvs::{Architecture, Block, COLOUR_CHANNELS, Denoiser, DenoiserStep, Resampling};
 use viewfuse_nn::checkpoint::TensorShape;
 
-/// What the names of its tensors begin with; the architecture's own names have it already.
+/// The prefix of its tensors' names; the architecture's own names have it already.
 const PREFIX: &str = "denoiser.model.";
-/// Channels of a group of the norms, but in very wide layers.
+/// Channels of a group of the norms, except in very wide layers.
 const GROUP: usize = 4;
 /// Ratio of the highest frequency of the embedding to the lowest.
 const FREQUENCY_RATIO: f32 = 10_000.0;
@@ -52,14 +52,14 @@ pub(super) fn run(layers: Layers<'_>, sizes: &Denoiser, inputs: &Tensor, levels:
     layers.convolved(&convolution.name, &layers.normalised(&norm, &x, true)?, Window::same(3), false)
 }
 
-/// First values of a layer that hands on what it gets: the first convolution, those of the halved inputs, and the shortcuts
-/// of blocks; of other tensors `None`.
+/// Initial values of layers that copy their inputs: the first convolution, those of the halved inputs, and the shortcuts of
+/// blocks; `None` for other tensors.
 ///
-/// As published, the features are scaled down with the noisy picture, at the largest noise level to an eightieth, beside
-/// noise of variance 1. Where layers mix both at random, short runs do not learn that there are any features. Here noise and
-/// features begin in groups of channels of their own, of [`GROUP`], and stay so on all shortcuts; the last block's hands on
-/// the inputs. The first group of features, in which the colours are, begins so large that at the largest level, too, it
-/// is there when the last norm has been, and the last convolution can read colours off it from the first step on.
+/// As published, the features are scaled down with the noisy picture, at the largest noise level to an eightieth,
+/// beside noise of variance 1. If layers mix both at random, short runs do not learn to use the features. Here noise
+/// and features start in separate groups of [`GROUP`] channels, and stay so on all shortcuts; the last block's shortcut
+/// copies the inputs. The first group of features, which has the colours, starts large enough to remain after the last
+/// norm at the largest level, so that the last convolution can read the colours from the first step on.
 pub(super) fn handed_on(architecture: &Architecture, tensor: &TensorShape) -> Option<Vec<f32>> {
     let sizes = architecture.denoiser.as_ref()?;
     let name = tensor.name.strip_suffix(".weight")?;
@@ -102,7 +102,7 @@ fn block(layers: Layers<'_>, sizes: &Block, image: &Tensor, embedded: &Tensor) -
     let inside = layers.normalised(&name("norm1"), &inside, true)?;
     let inside = layers.convolved(&name("conv1"), &inside, Window::same(3), false)?;
     let beside = match sizes.has_skip() {
-        // Pixels are mixed where there are fewer of them: neither doubling nor halving knows of channels.
+        // Channels are mixed at the lower resolution: doubling and halving do not depend on channels.
         true if sizes.resampling == Resampling::Up => {
             resampled(layers.convolved(&name("skip"), image, Window::same(1), false)?)?
         }
@@ -113,12 +113,12 @@ fn block(layers: Layers<'_>, sizes: &Block, image: &Tensor, embedded: &Tensor) -
     if sizes.has_attention { attended(layers, sizes, &sum) } else { Ok(sum) }
 }
 
-/// The image and what its pixels make of one another.
+/// The image plus its self-attention.
 fn attended(layers: Layers<'_>, sizes: &Block, image: &Tensor) -> Result<Tensor> {
     let name = |leaf: &str| format!("{}.{leaf}", sizes.name);
     let [count, height, width, channels] = dims4(image)?;
     let normalised = layers.normalised(&name("norm2"), image, false)?;
-    // Published: query, key and value of a channel lie together.
+    // Published: query, key and value of a channel are adjacent.
     let triples = layers.convolved(&name("qkv"), &normalised, Window::same(1), false)?;
     let triples = triples.reshape((count, height * width, channels, 3))?;
     let part = |index: usize| triples.narrow(3, index, 1)?.squeeze(3)?.contiguous();
@@ -155,7 +155,7 @@ fn silu(values: &Tensor) -> Result<Tensor> {
     values / (values.neg()?.exp()? + 1.0)?
 }
 
-/// Sines, then cosines, of the number times frequencies from 1 down to 1 / [`FREQUENCY_RATIO`], evenly spread in their
+/// Sines, then cosines, of the number times frequencies from 1 down to 1 / [`FREQUENCY_RATIO`], evenly spaced in their
 /// logarithms, both included.
 fn waves(noise: f32, count: usize) -> Vec<f32> {
     let half = count / 2;

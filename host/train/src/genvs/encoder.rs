@@ -1,4 +1,4 @@
-//! From pictures to volumes, as [`viewfuse_field::genvs`] encodes them: a residual trunk at output stride 16, spatial pyramid
+//! Volumes from pictures, as [`viewfuse_field::genvs`] encodes them: a residual trunk at output stride 16, spatial pyramid
 //! pooling, and a decoder up to the pictures' own size.
 
 use super::super::images::{dims4, max_pool};
@@ -20,7 +20,7 @@ pub(super) fn volumes(layers: Layers<'_>, sizes: &Encoder, pictures: &Tensor) ->
     let x = layers.separable("decoder.block2.0", &Tensor::cat(&[&x, &near], 3)?, 1)?;
     let x = rise(layers, "volume_head.up", [1, 1], &x, &half)?;
     let x = rise(layers, "volume_head.up", [2, 2], &x, pictures)?;
-    // Published: [feature][depth]. A point looks up all features of a node: they lie together.
+    // Published: [feature][depth]. A look-up reads all features of a node, so here they are adjacent.
     let Encoder { feature_count, volume_depth, .. } = *sizes;
     let reordered = |leaf: &str| -> Result<Tensor> {
         let given = layers.get(&format!("volume_head.reshape_conv.{leaf}"))?;
@@ -39,7 +39,7 @@ fn trunk(layers: Layers<'_>, sizes: &Encoder, stem: &Tensor) -> Result<[Tensor; 
         for block in 0..sizes.block_count {
             let name = format!("encoder.layer{level}.{block}");
             let stride = if matches!(level, 2 | 3) && block == 0 { 2 } else { 1 };
-            // The fourth level would halve the image once more; its windows have gaps instead.
+            // The fourth level would halve the image once more; its windows are dilated instead.
             let dilation = if level == 4 { 2 } else { 1 };
             let window = Window { padding: dilation, dilation, ..Window::same(3) };
             let inside = layers.plain(&format!("{name}.conv1"), &image, Window { stride, ..window }, true)?;
@@ -62,7 +62,7 @@ fn trunk(layers: Layers<'_>, sizes: &Encoder, stem: &Tensor) -> Result<[Tensor; 
     }
 }
 
-/// Windows of several reaches and the mean of the whole image, side by side, mixed.
+/// Convolutions of several dilations and the mean of the whole image, concatenated, then a 1x1 convolution.
 fn pyramid(layers: Layers<'_>, image: &Tensor) -> Result<Tensor> {
     let pyramid = "decoder.aspp.0";
     let [count, height, width, _] = dims4(image)?;
@@ -78,7 +78,7 @@ fn pyramid(layers: Layers<'_>, image: &Tensor) -> Result<Tensor> {
     layers.separable("decoder.aspp.1", &mixed, 1)
 }
 
-/// A step up: the image doubled, behind the skipped one, through a stage.
+/// A step of the decoder: the upsampled image, concatenated behind the skip connection's, through a stage.
 fn rise(layers: Layers<'_>, name: &str, [up, next]: [usize; 2], image: &Tensor, skip: &Tensor) -> Result<Tensor> {
     let doubled = layers.doubled(&format!("{name}.upconv{up}.0"), image)?;
     stage(layers, &format!("{name}.stage{next}"), &Tensor::cat(&[skip, &doubled], 3)?)

@@ -6,16 +6,16 @@ use super::super::parameters::Parameters;
 use candle_core::{Result, Tensor};
 use viewfuse_field::genvs::group_count;
 
-/// What is added to variances, as the field has it.
+/// Added to variances (epsilon), as in the field.
 const VARIANCE_FLOOR: f64 = 1.0e-6;
 
 /// Layers of a part of the network.
 #[derive(Clone, Copy)]
 pub(super) struct Layers<'a> {
     pub(super) parameters: &'a Parameters,
-    /// What all names begin with.
+    /// The prefix of all names.
     pub(super) prefix: &'a str,
-    /// Whether nobody asks for the parameters' gradients.
+    /// Whether the parameters need no gradients.
     pub(super) is_frozen: bool,
 }
 
@@ -39,7 +39,7 @@ impl Layers<'_> {
         convolved(images, [&weights, &biases], window, rectifies)
     }
 
-    /// A filter for every channel, then single pixels mixed, rectified.
+    /// A depthwise convolution, then a 1x1 convolution, rectified.
     pub(super) fn separable(&self, name: &str, images: &Tensor, dilation: usize) -> Result<Tensor> {
         let weights = self.get(&format!("{name}.0.weight"))?;
         let weights = weights.flatten_from(1)?.t()?.contiguous()?;
@@ -49,7 +49,7 @@ impl Layers<'_> {
         self.plain(&format!("{name}.1"), &inside, Window::same(1), true)
     }
 
-    /// Every pixel as a square of four, rectified.
+    /// A transposed 2x2 convolution, rectified.
     pub(super) fn doubled(&self, name: &str, images: &Tensor) -> Result<Tensor> {
         let [count, height, width, channels] = dims4(images)?;
         let weights = self.get(&format!("{name}.weight"))?;
@@ -78,7 +78,7 @@ impl Layers<'_> {
     }
 }
 
-/// A convolution with these weights and biases. Pictures, the first thing that is looked at, need no gradient.
+/// A convolution with these weights and biases. The input pictures need no gradient.
 pub(super) fn convolved(images: &Tensor, layer: [&Tensor; 2], window: Window, rectifies: bool) -> Result<Tensor> {
     convolve_with(images, layer, window, images.track_op(), rectifies)
 }

@@ -1,4 +1,4 @@
-//! What one step learns from: a few objects, of each some views as sources and some as targets.
+//! The batch of a step: a few objects, with some views of each as sources and some as targets.
 
 use super::super::draw::{Draw, Purpose};
 use super::super::scenes::TrainingScene;
@@ -6,7 +6,7 @@ use candle_core::{DType, Device, Result, Tensor};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_field::learned::default_near_far;
 
-/// How many views of each object a step looks at.
+/// The numbers of views of each object in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ViewCounts {
     pub(crate) sources: usize,
@@ -27,12 +27,12 @@ pub(crate) struct Views {
     pub(crate) targets: Vec<Vec<CameraBlock>>,
     /// `[object and target][row][column][3]`, in `[-1, 1]`.
     pub(crate) truth: Tensor,
-    /// Where rays begin and end, `[object]`: of the sources, as the field has it.
+    /// Near and far bounds of rays, `[object]`: from the sources, as in the field.
     pub(crate) near_far: Vec<[f32; 2]>,
 }
 
 impl Views {
-    /// Draws objects at random, and of each its views.
+    /// Draws objects at random, and views of each.
     pub(crate) fn draw(
         scenes: &[TrainingScene],
         draw: &Draw,

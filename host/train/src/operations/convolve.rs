@@ -1,7 +1,7 @@
 //! Convolutions of images `[image][row][column][channel]`, as matrix products of windows laid out in rows.
 //!
-//! The library's own go the other way round in memory, have no gradient for what the published networks do with them
-//! (dilation beside stride, one filter a channel) or take many times as long.
+//! The library's own have another memory layout, have no gradient for the published networks' options (dilation with
+//! stride, depthwise), or take many times as long.
 
 use super::{Operation, Real};
 use ndarray::linalg::general_mat_mul;
@@ -9,29 +9,29 @@ use ndarray::{ArrayView2, ArrayViewMut2};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Numbers of unfolded windows that are there at once.
+/// The most numbers of unfolded windows in memory at once.
 const MOST_UNFOLDED: usize = 1 << 16;
 
-/// How windows lie on an image.
+/// Positions of windows on an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Window {
     /// Side of a window.
     pub(crate) size: usize,
     /// Pixels from one to the next.
     pub(crate) stride: usize,
-    /// How far they reach over the border, where zeros are.
+    /// Padding with zeros.
     pub(crate) padding: usize,
     /// Pixels between neighbours in a window.
     pub(crate) dilation: usize,
 }
 
 impl Window {
-    /// Of this side, every pixel, over the border so that the image keeps its size.
+    /// Windows of this side at every pixel, padded so that the output has the input's size.
     pub(crate) fn same(size: usize) -> Window {
         Window { size, stride: 1, padding: size / 2, dilation: 1 }
     }
 
-    /// How many there are on a side.
+    /// The number of windows along a side.
     pub(crate) fn count(&self, side: usize) -> usize {
         (side + 2 * self.padding - self.dilation * (self.size - 1) - 1) / self.stride + 1
     }
@@ -40,7 +40,7 @@ impl Window {
         self.size == 1 && self.stride == 1 && self.padding == 0
     }
 
-    /// Calls `visit(first number of a pixel, place in the window)` for what of an output's window lies on the image.
+    /// Calls `visit(first number of a pixel, place in the window)` for the pixels of the image in an output's window.
     fn visit(&self, [height, width]: [usize; 2], row: usize, column: usize, mut visit: impl FnMut(usize, usize)) {
         for place_row in 0..self.size {
             let y = (row * self.stride + place_row * self.dilation).wrapping_sub(self.padding);
@@ -68,7 +68,7 @@ pub(crate) struct Convolution {
     pub(crate) has_own_biases: bool,
     /// Whether negative results become 0.
     pub(crate) rectifies: bool,
-    /// Whether anybody asks for the gradient of the images.
+    /// Whether the gradient of the images is needed.
     pub(crate) differentiates_input: bool,
 }
 
@@ -107,7 +107,7 @@ impl Convolution {
         scratch
     }
 
-    /// The sum of the rows' numbers where they came from.
+    /// Adds the rows' numbers at the places that they were read from.
     fn fold<T: Real>(&self, rows: &[T], strip: &Range<usize>, image: &mut [T]) {
         let [_, height, width, channels] = self.input;
         let [_, out_width] = self.out_size();
@@ -146,7 +146,7 @@ impl Operation<3> for Convolution {
                 let count = strip.len() * out_width;
                 add_product(matrix(rows, count, row_len), weights.t(), matrix_mut(own, count, outs));
                 if self.rectifies {
-                    // NaN stays: the loss must show it.
+                    // NaN stays NaN, so that the loss shows it.
                     own.iter_mut().for_each(|own| *own = if *own < T::zero() { T::zero() } else { *own });
                 }
             }
@@ -274,7 +274,7 @@ pub(super) fn matrix<T>(values: &[T], rows: usize, columns: usize) -> ArrayView2
     ArrayView2::from_shape((rows, columns), values).expect("as many numbers as the matrix has")
 }
 
-/// As [`matrix`], to be written.
+/// A mutable [`matrix`].
 pub(super) fn matrix_mut<T>(values: &mut [T], rows: usize, columns: usize) -> ArrayViewMut2<'_, T> {
     ArrayViewMut2::from_shape((rows, columns), values).expect("as many numbers as the matrix has")
 }

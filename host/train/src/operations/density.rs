@@ -1,12 +1,12 @@
-//! Densities: what is below zero counts as zero.
+//! Densities: negative values count as zero.
 //!
-//! Plainly rectified, a network whose densities are all below zero has no gradient at all and stays empty for ever; that is
-//! how training from scratch on objects before white mostly ends. So where a density that is zero had better be larger,
-//! part of the gradient passes; where it had better be smaller, none does, because it is as small as it can be.
+//! With plain rectification, a network whose densities are all negative has no gradient and stays empty; training from
+//! scratch on objects before white mostly ends so. Therefore a part of the gradient passes where a density of zero should
+//! increase; where it should decrease, none passes, because it is minimal already.
 
 use super::{Operation, Real};
 
-/// Share of the gradient that passes where a density is zero and should not be.
+/// Share of the gradient that passes where a density of zero should increase.
 pub(crate) const LEAK: f64 = 0.1;
 
 /// Inputs: densities before rectification, of any shape.

@@ -13,7 +13,7 @@ pub(super) fn linear<T: Real>(rows: &[T], layer: &[T], inner: usize, outer: usiz
     output
 }
 
-/// The way back through a rectification and the layer behind it: adds to the gradient of what goes in, and to that of the
+/// Backward pass through a rectification and the layer behind it: adds to the gradients of the input and of the
 /// layer.
 pub(super) fn linear_back<T: Real>(
     before: &[T],
@@ -51,11 +51,11 @@ pub(super) fn layer_gradient<T: Real>(rows: &[T], gradient: &[T], inner: usize, 
 
 /// Negative numbers become 0.
 pub(super) fn rectified<T: Real>(values: &[T]) -> Vec<T> {
-    // NaN stays: the loss must show it.
+    // NaN stays NaN, so that the loss shows it.
     values.iter().map(|value| if *value < T::zero() { T::zero() } else { *value }).collect()
 }
 
-/// The gradient of what goes into a layer, not rectified: adds to it.
+/// Adds to the gradient of a layer's input, without rectification.
 pub(super) fn input_gradient<T: Real>(layer: &[T], gradient: &[T], inner: usize, outer: usize, of_rows: &mut [T]) {
     let count = gradient.len() / outer;
     let weights = matrix(&layer[..inner * outer], outer, inner);

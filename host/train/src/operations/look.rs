@@ -1,8 +1,8 @@
-//! GeNVS's way from volumes to what rays see, as one operation: points looked up in the views' volumes, the views fused, a
-//! small network, compositing.
+//! GeNVS's features of rays from volumes, as one operation: look-ups in the views' volumes at points, fusion of the views,
+//! the point network, compositing.
 //!
-//! Some rays at a time go all the way through, so that what is in between stays in a core's caches; on the way back it is
-//! computed again.
+//! Chunks of rays go through all steps, so that intermediate values stay in a core's caches; the backward pass computes
+//! them again.
 
 use super::convolve::sum;
 use super::linear::{input_gradient, layer_gradient, linear, linear_back, rectified};
@@ -15,7 +15,7 @@ use viewfuse_core::depths::{CoarseBlock, coarse_depth};
 use viewfuse_core::genvs::{VolumeBlock, VolumePlace};
 use viewfuse_core::rays::{RayPoint, TargetRay, place_point};
 
-/// Rays that go through together.
+/// Rays of a chunk.
 const CHUNK: usize = 4;
 /// Nodes around a point.
 const CORNERS: u32 = 8;
@@ -48,15 +48,15 @@ impl LookSizes {
     }
 }
 
-/// What one object's rays go through, and how.
+/// The views and the sampling of one object's rays.
 #[derive(Clone, Debug)]
 pub(crate) struct Sight {
-    /// Of the views.
+    /// Cameras of the views.
     pub(crate) cameras: Vec<CameraBlock>,
     pub(crate) rays: Vec<TargetRay>,
-    /// Between which depths, along the views' axes, their volumes lie.
+    /// Near and far bounds of the volumes, along the views' axes.
     pub(crate) near_far: [f32; 2],
-    /// What lengths of points are multiplied by for the network's densities.
+    /// Factor from world units to the unit of length of the network's densities.
     pub(crate) length_scale: f32,
 }
 
@@ -67,17 +67,17 @@ pub(crate) struct Look {
     pub(crate) sizes: LookSizes,
     /// `[object]`; all have as many views and rays.
     pub(crate) sights: Arc<Vec<Sight>>,
-    /// Where on a ray samples lie.
+    /// Depths of the samples on a ray.
     pub(crate) samples: CoarseBlock,
     /// Length of a ray's last sample.
     pub(crate) last_length: f32,
-    /// Whether samples shade themselves.
+    /// Whether weights are inclusive: samples shade themselves.
     pub(crate) inclusive: bool,
-    /// Whether anybody asks for the gradients of volumes and parameters, or only for that of the weights.
+    /// Whether the gradients of volumes and parameters are needed, or only that of the weights.
     pub(crate) is_frozen: bool,
 }
 
-/// What a chunk's way back needs of its way.
+/// Values of a chunk's forward pass for its backward pass.
 struct Way<T> {
     /// Nodes around points and their shares, `[view][point][corner]`.
     places: Vec<(u32, f32)>,
@@ -88,7 +88,7 @@ struct Way<T> {
     hidden: [Vec<T>; 2],
     raw: Vec<T>,
     lengths: Vec<T>,
-    /// Optical depth of each sample, and the light that reaches it.
+    /// Optical depth of each sample, and the transmittance in front of it.
     own: Vec<T>,
     reaching: Vec<T>,
 }
@@ -190,7 +190,7 @@ impl Look {
         way
     }
 
-    /// Share of the light that a sample sends, and its slope by the sample's own optical depth.
+    /// A sample's compositing weight, and its derivative by the sample's own optical depth.
     fn share<T: Real>(&self, own: T, reaching: T) -> (T, T) {
         let passes = (T::zero() - own).exponential();
         match self.inclusive {
@@ -199,7 +199,7 @@ impl Look {
         }
     }
 
-    /// Adds what a chunk's rays see.
+    /// Computes the features of a chunk's rays.
     fn composite<T: Real>(&self, way: &Way<T>, seen: &mut [T]) {
         let features = self.sizes.features;
         for (index, fused) in way.fused.chunks_exact(features).enumerate() {
@@ -227,7 +227,7 @@ impl Look {
         let mut of_fused = vec![T::zero(); way.fused.len()];
         for ray in 0..chunk.len() {
             let gradient = &gradient[ray * features..][..features];
-            // What the samples behind would lose by a little more depth here.
+            // The loss of the samples behind by more optical depth here.
             let mut behind = T::zero();
             for index in (ray * samples..(ray + 1) * samples).rev() {
                 let (share, slope) = self.share(way.own[index], way.reaching[index]);

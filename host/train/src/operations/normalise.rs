@@ -1,4 +1,4 @@
-//! Group normalisation with SiLU behind it, as [`viewfuse_core::network::group_norm`] has it.
+//! Group norm with optional SiLU, as [`viewfuse_core::network::group_norm`] has it.
 
 use super::{Operation, Real};
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ pub(crate) struct Normalise {
     pub(crate) input: [usize; 4],
     /// Groups of neighbouring channels.
     pub(crate) group_count: usize,
-    /// What is added to variances.
+    /// Added to variances (epsilon).
     pub(crate) variance_floor: f64,
     /// Whether results go through `x / (1 + e^-x)`.
     pub(crate) silu: bool,
@@ -20,7 +20,8 @@ impl Normalise {
         self.input[1..].iter().product()
     }
 
-    /// Sums over pixels of `value(channel, number)`, one a channel, then those of each group as a mean, one a channel again.
+    /// Sums over pixels of `value(channel, number)`, one a channel, then those of each group as a mean, one a channel
+    /// again.
     fn means<T: Real>(&self, image: &[T], value: impl Fn(usize, T) -> T) -> Vec<T> {
         let channels = self.input[3];
         let mut sums = vec![T::zero(); channels];
@@ -44,7 +45,7 @@ impl Normalise {
         shared
     }
 
-    /// Mean of each channel's group, and what its deviations are multiplied by.
+    /// Mean of each channel's group, and the factor of its deviations.
     fn moments<T: Real>(&self, image: &[T]) -> [Vec<T>; 2] {
         let means = self.means(image, |_, own| own);
         let spreads = self.means(image, |channel, own| (own - means[channel]) * (own - means[channel]));

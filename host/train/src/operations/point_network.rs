@@ -1,8 +1,8 @@
-//! PixelNeRF's network at points as one operation: a view's blocks, the views fused, the blocks behind.
+//! PixelNeRF's point network as one operation: a view's blocks, fusion of the views, the blocks behind.
 //!
-//! Some dozens of points at a time go all the way through, so that what is between the layers stays in a core's caches; on
-//! the way back it is computed again. In steps of the library's the same work moves 90 times the activations through
-//! memory.
+//! Chunks of some dozens of points go through all layers, so that activations stay in a core's caches; the backward pass
+//! computes them again. The library's operations would move 90 times the activations through memory for the same
+//! work.
 
 use super::convolve::sum;
 use super::linear::{layer_gradient, linear, linear_back, rectified};
@@ -14,13 +14,13 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_axes, waves};
 use viewfuse_core::rays::RayPoint;
 
-/// Points that go through together.
+/// Points of a chunk.
 const CHUNK: usize = 64;
 
 /// Sizes of the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct PointNetworkSizes {
-    /// Numbers that describe a point in a view.
+    /// Inputs for a point in a view.
     pub(crate) embedded_len: usize,
     /// Width of all layers.
     pub(crate) width: usize,
@@ -31,13 +31,13 @@ pub(crate) struct PointNetworkSizes {
 }
 
 impl PointNetworkSizes {
-    /// How many parameters there are, in this order: the entry, two layers a block, the exit; of each layer the weights
+    /// How many parameters there are, in this order: `lin_in`, two layers a block, `lin_out`; of each layer the weights
     /// `[output][input]`, then the biases.
     pub(crate) fn parameter_count(&self) -> usize {
         self.layer(Part::Exit).end
     }
 
-    /// Where a layer's parameters are.
+    /// The offset of a layer's parameters.
     fn layer(&self, part: Part) -> Range<usize> {
         let w = self.width;
         let (entry, layer) = (w * self.embedded_len + w, w * w + w);
@@ -62,18 +62,18 @@ enum Part {
     Exit,
 }
 
-/// Where points appear in the views of their object. `[object][view][point]`.
+/// Projections of points in the views of their object. `[object][view][point]`.
 pub(crate) struct Points {
     pub(crate) object_count: usize,
     pub(crate) view_count: usize,
-    /// Of one object.
+    /// Those of one object.
     pub(crate) point_count: usize,
     embedded_len: usize,
     embedded: Vec<f32>,
     places: Vec<Place>,
 }
 
-/// Nodes of a view's grid around a point, how much of each, and whether the view has the point in front of it.
+/// Nodes of a view's grid around a point with their shares, and whether the point is in front of the view.
 #[derive(Clone, Copy)]
 struct Place {
     nodes: [u32; 4],
@@ -139,19 +139,19 @@ pub(crate) struct PointNetwork {
     pub(crate) points: Arc<Points>,
     /// Nodes of a view's grid.
     pub(crate) node_count: usize,
-    /// Whether anybody asks for the gradients of latents and parameters, or only for that of the weights.
+    /// Whether the gradients of latents and parameters are needed, or only that of the weights.
     pub(crate) is_frozen: bool,
 }
 
-/// What a chunk's way back needs of its way.
+/// Values of a chunk's forward pass for its backward pass.
 struct Way<T> {
     embedded: Vec<T>,
-    /// What flows into each block, and what is between its layers.
+    /// The input of each block, and its hidden layer.
     flows: Vec<Vec<T>>,
     insides: Vec<Vec<T>>,
-    /// What flows out of the views' blocks.
+    /// The output of the views' blocks.
     of_views: Vec<T>,
-    /// What flows out of the last block.
+    /// The output of the last block.
     last: Vec<T>,
     raw: Vec<T>,
 }
@@ -161,7 +161,7 @@ impl PointNetwork {
         self.sizes.injected_count * self.sizes.width
     }
 
-    /// Weights of the views that have a point in front of them, with what they were divided by.
+    /// Weights of the views that have a point in front of them, with their sum before normalisation.
     fn shares<T: Real>(&self, weights: &[T], object: usize, point: usize) -> (Vec<T>, T) {
         let points = &*self.points;
         let views = points.view_count;
@@ -276,7 +276,7 @@ impl PointNetwork {
         layer_gradient(&way.embedded, &flow, embedded_len, width, entry);
     }
 
-    /// The way back through the fusion of views.
+    /// Backward pass through the fusion of views.
     fn unfuse<T: Real>(
         &self,
         of_views: &[T],

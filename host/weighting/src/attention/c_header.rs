@@ -3,8 +3,8 @@
 use viewfuse_core::attention::FourierEmbedding;
 
 /// A header that defines `viewfuse_attention_parameters[VIEWFUSE_ATTENTION_PARAMETERS]`, as `viewfuse_attend_8` and its
-/// sisters take them: constant, so that they stay in flash. A compiler reads the same bits. `origin` says in a comment
-/// what it was made from.
+/// sisters take them: constant, so that they stay in flash. A compiler reads the same bits. `origin` names its
+/// source in a comment.
 pub fn c_header(embedding: &FourierEmbedding, origin: &str) -> String {
     let numbers: Vec<String> = embedding.flat().map(|number| format!("{number:e}f")).collect();
     let lines: Vec<String> = numbers.chunks(8).map(|line| format!("    {},\n", line.join(", "))).collect();

@@ -28,28 +28,28 @@ use viewfuse_scene::photographs::Album;
 use viewfuse_weighting::Weighting;
 
 const PROTOCOLS: &str = "Options of protocols";
-/// Options that change no number, or that the settings hold in another form.
+/// Options that change no number, or that the settings have in another form.
 const NO_SETTINGS: [&str; 7] = ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol"];
-/// Missing jobs and notes that are told; of more, how many there are.
+/// The most missing jobs and notes in a message.
 const NAMED: usize = 8;
 
 #[derive(Args)]
 pub(crate) struct ProtocolOptions {
-    /// Choose sources and targets by a protocol: random[:sources=N] (3), close[:sources=N,degrees=D] (5 sources, exactly one
-    /// within 10 degrees of the target), count[:sources=N+N+...] (2+8+16+32), fixed[:cars|chairs|pixelnerf-1|pixelnerf-2]
-    /// (published lists) or fixed:SOURCES:TARGETS
+    /// Choose sources and targets by a protocol: random[:sources=N] (3), close[:sources=N,degrees=D] (5 sources,
+    /// exactly one within 10 degrees of the target), count[:sources=N+N+...] (2+8+16+32),
+    /// fixed[:cars|chairs|pixelnerf-1|pixelnerf-2] (published lists) or fixed:SOURCES:TARGETS
     #[arg(long, value_name = "PROTOCOL", requires = "output", conflicts_with_all = ["targets", "sources", "views"], help_heading = PROTOCOLS)]
     pub(super) protocol: Option<Protocol>,
-    /// Draw sources and targets this many times for every scene
+    /// Number of trials: draws of sources and targets for every scene
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = PROTOCOLS)]
     trials: u32,
     /// Targets of a trial
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=10_000), help_heading = PROTOCOLS)]
     targets_per_trial: u16,
-    /// Do only part INDEX of COUNT, counted from 0: every COUNT-th job
+    /// Run only part INDEX of COUNT, counted from 0: every COUNT-th job
     #[arg(long, value_name = "INDEX/COUNT", requires = "protocol", help_heading = PROTOCOLS)]
     shard: Option<Shard>,
-    /// Keep the pictures of this many jobs, the first ones, for the report
+    /// Keep the pictures of the first N jobs for the report
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = PROTOCOLS)]
     pictures: usize,
 }
@@ -132,7 +132,7 @@ pub(super) fn run(
         let named: Vec<String> = missing.iter().take(NAMED).map(usize::to_string).collect();
         let more = missing.len().saturating_sub(NAMED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        say(format_args!("missing: {}{more}; the tables come with the last of them", named.join(", ")))?;
+        say(format_args!("missing: {}{more}; the tables are printed after the last of them", named.join(", ")))?;
     }
     say(format_args!("device: {}, {reason}", device.name()))?;
     Ok(ExitCode::SUCCESS)
@@ -157,7 +157,7 @@ impl Jobs<'_> {
     fn run(&self, device: &AnyDevice, field: &AnyField) -> anyhow::Result<(RunFolder, usize)> {
         let Jobs { path, settings, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
         let (renderer, scorer) = (field.on(device), metrics.on(device)?);
-        // Only now, that nothing which a person gave can be wrong: a folder keeps its settings.
+        // Only after all arguments are checked: a folder keeps its settings.
         let folder = RunFolder::begin(path, settings.clone())?;
         let mut journal = folder.journal(shard)?;
         let finished = folder.finished()?;

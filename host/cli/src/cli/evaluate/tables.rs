@@ -78,7 +78,7 @@ fn line(row: &Row, metrics: &[Metric], has_reference: bool) -> Vec<String> {
     line
 }
 
-/// A score, with what stands before it on its line.
+/// A score, with the first columns of its line.
 pub(super) type Line<'a> = (Vec<String>, &'a Score);
 
 /// Every score, a line each, behind columns of other names. A metric that a picture lacks is empty.

@@ -1,4 +1,4 @@
-//! GeNVS: from noise to a picture.
+//! Options of GeNVS's diffusion sampling.
 
 use super::GENVS;
 use clap::Args;
@@ -6,28 +6,28 @@ use viewfuse_core::sampler::Sampler;
 use viewfuse_core::schedule::NoiseSchedule;
 use viewfuse_field::options::FieldOptions;
 
-/// How a run goes from noise to a picture, and what it keeps of the views.
+/// The sampler, its levels, and the precision of the views' features.
 #[derive(Args)]
 pub(crate) struct RunOptions {
     #[arg(long, value_name = "NAME", requires = "model", help = sampler_help(), help_heading = GENVS)]
     sampler: Option<Sampler>,
-    /// Noise levels: a call of the denoiser each, with heun two, but for the last [default: 10, with --exact 25]
+    /// Noise levels. Each takes one call of the denoiser; with heun two, except the last [default: 10, with --exact 25]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "model", help_heading = GENVS)]
     steps: Option<u32>,
-    /// Choose the levels on the way, each step's error below this (root mean square, of values between -1 and 1); 0.01 is
-    /// about what can be seen
+    /// Choose the levels adaptively, with each step's error below this (root mean square, of values between -1 and 1);
+    /// 0.01 is just visible
     #[arg(long, value_name = "ERROR", value_parser = parse_tolerance, requires = "model", conflicts_with_all = ["sampler", "steps"], help_heading = GENVS)]
     tolerance: Option<f32>,
-    /// Add noise on the way, as much as this over the whole run; samplers that look back begin anew each time, so take heun
+    /// Add this amount of noise between steps over the whole run; multistep samplers start again each time, so use heun
     #[arg(long, value_name = "AMOUNT", value_parser = parse_churn, requires = "model", conflicts_with = "tolerance", help_heading = GENVS)]
     churn: Option<f32>,
-    /// Keep views' features in half precision (f16): half the memory, every row of them computed
+    /// Keep views' features in half precision (f16): half the memory, but every row of them is computed
     #[arg(long, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
     half_volumes: bool,
 }
 
 impl RunOptions {
-    /// Options with what was given of these.
+    /// `options` with those that were given here.
     pub(super) fn given_to(&self, options: FieldOptions) -> FieldOptions {
         let RunOptions { sampler, steps, tolerance, churn, half_volumes } = *self;
         FieldOptions { sampler, steps, tolerance, churn, half_volumes, ..options }
@@ -41,7 +41,7 @@ fn sampler_help() -> String {
 fn parse_tolerance(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(tolerance) if tolerance > 0.0 && tolerance <= 1.0 => Ok(tolerance),
-        _ => Err("an error is a number above 0, at most 1".to_owned()),
+        _ => Err("an error is a number above 0 and at most 1".to_owned()),
     }
 }
 

@@ -1,4 +1,4 @@
-//! What `--model` takes.
+//! The values of `--model`.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -6,7 +6,24 @@ use std::str::FromStr;
 use viewfuse_field::family::{Family, Small, TestNetwork};
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// Where a network's parameters come from.
+/// Help of `--model`: the families with their test networks.
+pub(crate) fn model_help() -> String {
+    let families = Family::ALL.map(|family| format!("a {family}")).join(" or ");
+    let sizes = |network: &TestNetwork| match network.small {
+        Small::Width => format!("{}[:WIDTH]", network.name),
+        Small::One => format!("{}[:small]", network.name),
+    };
+    let tests = Family::ALL.map(|family| {
+        format!("{} ({family})", family.test_networks().iter().map(sizes).collect::<Vec<_>>().join(", "))
+    });
+    format!(
+        "Checkpoint of {families} (.pth, .pt, .safetensors, .pkl), or a test network with deterministic initialisation: \
+         {} [default: the training-free field]",
+        tests.join(", ")
+    )
+}
+
+/// The source of a network's parameters.
 #[derive(Clone)]
 pub(crate) enum Model {
     /// A checkpoint.
@@ -31,7 +48,7 @@ impl FromStr for Model {
             (_, None) => None,
             (Small::One, Some("small")) => Some(0),
             (Small::One, Some(_)) => {
-                return Err(format!("'{text}': there is {name}, of the published size, and {name}:small"));
+                return Err(format!("'{text}': the sizes are {name}, the published one, and {name}:small"));
             }
             (Small::Width, Some(width)) => match width.parse::<u16>() {
                 Ok(width) if (8..=2048).contains(&width) && width % 8 == 0 => Some(width),
@@ -66,6 +83,16 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::Model;
+
+    #[test]
+    fn the_help_names_every_test_network() {
+        assert_eq!(
+            super::model_help(),
+            "Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl), or a test network with deterministic \
+             initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS) [default: the training-free \
+             field]"
+        );
+    }
 
     #[test]
     fn models_by_name() {

@@ -1,16 +1,16 @@
-//! From features and noise to a picture: the U-Net of DDPM++ with residual inputs (`SongUNet` in the code of "Elucidating
-//! the Design Space of Diffusion-Based Generative Models"), step by step.
+//! The denoiser's architecture: the U-Net of DDPM++ with residual inputs (`SongUNet` in the code of "Elucidating the Design
+//! Space of Diffusion-Based Generative Models"), block by block.
 
 use super::{COLOUR_CHANNELS, with_bias};
 use viewfuse_nn::checkpoint::{CheckpointError, Sizes, TensorShape};
 
-/// What the names of its tensors begin with.
+/// The prefix of its tensors' names.
 pub(in crate::genvs) const PREFIX: &str = "denoiser.model";
 
-/// Most blocks of a level.
+/// The most blocks of a level.
 const MOST_BLOCKS: usize = 64;
 
-/// Groups in which the group norms of the family take channels: 32, but no fewer than 4 channels each.
+/// Groups of the family's group norms: 32, but at least 4 channels each.
 pub fn group_count(channels: usize) -> usize {
     (channels / 4).clamp(1, 32)
 }
@@ -20,7 +20,7 @@ pub fn group_count(channels: usize) -> usize {
 pub struct DenoiserLevel {
     /// Its channels.
     pub channels: usize,
-    /// Whether its blocks attend to the whole image: all on the way down, the last on the way up.
+    /// Whether it has self-attention: in all blocks of the encoder, in the last block of the decoder.
     pub has_attention: bool,
 }
 
@@ -33,30 +33,30 @@ pub struct Denoiser {
     pub in_channels: usize,
     /// Channels after the first convolution.
     pub base_channels: usize,
-    /// Numbers that the noise level is embedded in: as many cosines as sines.
+    /// Length of the noise level's embedding: as many cosines as sines.
     pub noise_channels: usize,
-    /// Numbers that every block takes of the noise level.
+    /// Length of the noise level's vector that every block reads.
     pub embedding_channels: usize,
     /// The levels.
     pub levels: Vec<DenoiserLevel>,
-    /// Blocks of a level on the way down. On the way up there is one more.
+    /// Blocks of a level in the encoder. The decoder has one more.
     pub block_count: usize,
 }
 
 /// A 3x3 convolution with bias.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Convolution {
-    /// What its tensors' names begin with.
+    /// The prefix of its tensors' names.
     pub name: String,
-    /// Channels that it takes.
+    /// Channels of its input.
     pub in_channels: usize,
-    /// Channels that it makes.
+    /// Channels of its output.
     pub out_channels: usize,
-    /// Side of the image that it makes; of a residual input, side of what is made of that.
+    /// Side of its output; of a residual input, the side after the mean of 2x2 pixels.
     pub side: usize,
 }
 
-/// What a block does to the side of an image, in front of its convolutions `conv0` and `skip`.
+/// Resampling of a block, before its convolutions `conv0` and `skip`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Resampling {
     /// Nothing.
@@ -71,18 +71,18 @@ pub enum Resampling {
 /// change, and `norm2`, `qkv`, `proj` where it attends.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// What its tensors' names begin with.
+    /// The prefix of its tensors' names.
     pub name: String,
-    /// Channels that it takes, those that are joined included.
+    /// Channels of its input, those of the skip connection included.
     pub in_channels: usize,
-    /// Channels of these, the last, that come from the way down: the newest of what was kept and not used yet. 0 where
-    /// nothing is joined.
+    /// Channels of the skip connection, the last of the input: the latest kept result that is not used yet. 0 without a
+    /// skip connection.
     pub joined_channels: usize,
-    /// Channels that it makes.
+    /// Channels of its output.
     pub out_channels: usize,
-    /// Side of the image that it makes.
+    /// Side of its output.
     pub side: usize,
-    /// What it does to the side.
+    /// Its resampling.
     pub resampling: Resampling,
     /// Whether every pixel attends to all, with one head.
     pub has_attention: bool,
@@ -95,31 +95,31 @@ impl Block {
     }
 }
 
-/// A step on the way down. Results are kept for the way up.
+/// A step of the U-Net's encoder. Results are kept for the decoder's skip connections.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DenoiserStep {
-    /// The first; its result is kept.
+    /// The first convolution; its result is kept.
     Convolution(Convolution),
     /// A block; its result is kept.
     Block(Block),
-    /// The residual input: a convolution of the last residual input (the first time, of the network's own input), of which
-    /// the mean of 2x2 pixels is taken then. Sum of it and the image so far, divided by the square root of 2, it becomes
-    /// the image, replaces what was kept last, and is the next residual input.
+    /// The residual input: a convolution of the last residual input (at first, of the network's own input), then the
+    /// mean of 2x2 pixels. The sum of the result and the image so far, divided by the square root of 2, becomes the
+    /// image, replaces the last kept result, and is the next residual input.
     Residual(Convolution),
 }
 
 impl Denoiser {
-    /// Of the published network.
+    /// Those of the published network.
     pub(super) fn published(in_channels: usize) -> Denoiser {
         Denoiser::with_multipliers([128, in_channels, 128, 4], &[1, 1, 2, 2, 2])
     }
 
-    /// With a quarter of the channels, for images of half the side, of three levels.
+    /// Those with a quarter of the channels, for images of half the side, with three levels.
     pub(super) fn small(in_channels: usize) -> Denoiser {
         Denoiser::with_multipliers([64, in_channels, 32, 2], &[1, 2, 2])
     }
 
-    /// With these channels at the first level, twice as many at every further one, and a block a level.
+    /// Those with these channels at the first level, twice as many at every further one, and one block a level.
     pub(super) fn narrow(image_side: usize, in_channels: usize, base_channels: usize) -> Denoiser {
         Denoiser::with_multipliers([image_side, in_channels, base_channels, 1], &[1, 2, 4])
     }
@@ -144,7 +144,7 @@ impl Denoiser {
         }
     }
 
-    /// Reads the sizes off the tensors.
+    /// Reads the sizes from the tensors.
     pub(super) fn of(sizes: &Sizes<'_>) -> Result<Denoiser, CheckpointError> {
         let part = format!("{PREFIX}.enc.");
         let side_of = |name: &str| {
@@ -192,7 +192,7 @@ impl Denoiser {
         Ok(denoiser)
     }
 
-    /// Refuses sizes that no network can have.
+    /// Rejects impossible sizes.
     fn check(&self, sizes: &Sizes<'_>) -> Result<(), CheckpointError> {
         if !self.noise_channels.is_multiple_of(2) {
             return Err(sizes.refuse(format!(
@@ -218,7 +218,7 @@ impl Denoiser {
         Ok(())
     }
 
-    /// The steps on the way down, in order.
+    /// The steps of the encoder, in order.
     pub fn down(&self) -> Vec<DenoiserStep> {
         let mut steps = Vec::new();
         let (mut channels, mut residual_channels) = (self.base_channels, self.in_channels);
@@ -244,7 +244,7 @@ impl Denoiser {
         steps
     }
 
-    /// The blocks on the way up, in order.
+    /// The blocks of the decoder, in order.
     pub fn up(&self) -> Vec<Block> {
         let keep = |step| match step {
             DenoiserStep::Convolution(convolution) => Some(convolution.out_channels),
@@ -317,7 +317,7 @@ impl Convolution {
 }
 
 impl Block {
-    /// Without attention, and nothing joined.
+    /// A block without attention and without skip connection.
     fn new(name: String, in_channels: usize, out_channels: usize, side: usize, resampling: Resampling) -> Block {
         Block { name, in_channels, joined_channels: 0, out_channels, side, resampling, has_attention: false }
     }

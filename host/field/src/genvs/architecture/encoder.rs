@@ -7,17 +7,17 @@ use viewfuse_nn::resnet::{self, Level, batch_norm_tensors};
 /// Dilations of the three dilated branches of the ASPP module (atrous spatial pyramid pooling).
 pub const ASPP_RATES: [usize; 3] = [12, 24, 36];
 
-/// What the names of its tensors begin with.
+/// The prefix of its tensors' names.
 pub(in crate::genvs) const PREFIX: &str = "pixel_nerf_net.encoder";
 
 /// Sizes of the encoder.
 ///
-/// With `s` the image's side: the stem (7x7, stride 2) has side `s / 2`; behind a 3x3 maximum with stride 2, the levels
+/// With `s` the image's side: the stem (7x7, stride 2) has side `s / 2`; behind a 3x3 max pool with stride 2, the levels
 /// have `s / 4`, `s / 8`, `s / 16` and, with dilation 2 in place of the stride, `s / 16` again. On the last level follows
 /// the ASPP module. Three stages of convolutions lead up again, to `s / 4`: each sees the levels of its side (the last
-/// two levels and ASPP's result, the second level, the first). What they make and the first level's high-resolution
+/// two levels and ASPP's result, the second level, the first). Their result and the first level's high-resolution
 /// channels are fused, two more stages lead up to `s` beside the stem's channels and the image's own, and a 1x1
-/// convolution makes of every pixel the features of a row of voxels. Norms are all switched off.
+/// convolution maps every pixel to the features of a row of voxels. All norms are switched off.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Encoder {
     /// Channels after the first convolution.
@@ -26,7 +26,7 @@ pub struct Encoder {
     pub levels: [Level; 4],
     /// Channels of everything behind the trunk.
     pub decoder_channels: usize,
-    /// Channels that are made of the first level's for fusing.
+    /// Channels to which the first level's are reduced for fusing.
     pub high_resolution_channels: usize,
     /// Features of a voxel.
     pub feature_count: usize,
@@ -35,7 +35,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Of the published network.
+    /// Those of the published network.
     pub(super) fn published() -> Encoder {
         let level = |channels, block_count| Level { channels, block_count };
         Encoder {
@@ -48,7 +48,7 @@ impl Encoder {
         }
     }
 
-    /// With a quarter of the channels, and two blocks a level.
+    /// Those with a quarter of the channels, and two blocks a level.
     pub(super) fn small() -> Encoder {
         let published = Encoder::published();
         Encoder {
@@ -61,7 +61,7 @@ impl Encoder {
         }
     }
 
-    /// The small one with a narrower decoder, whose images are large, and half as many depths.
+    /// The small ones with a narrower decoder, whose images are large, and half as many depths.
     pub(super) fn narrow(decoder_channels: usize) -> Encoder {
         let small = Encoder::small();
         Encoder { decoder_channels, volume_depth: small.volume_depth / 2, ..small }
@@ -72,7 +72,7 @@ impl Encoder {
         self.feature_count * self.volume_depth
     }
 
-    /// Reads the sizes off the tensors; the features' number is in other ones.
+    /// Reads the sizes from the tensors; the number of features is given.
     pub(super) fn of(sizes: &Sizes<'_>, feature_count: usize) -> Result<Encoder, CheckpointError> {
         let size = |name: &str, axis| sizes.size(&format!("{PREFIX}.{name}"), 4, axis);
         let level = |level: usize| {
@@ -82,7 +82,7 @@ impl Encoder {
         let volume_channels = size("volume_head.reshape_conv.weight", 0)?;
         if volume_channels % feature_count != 0 {
             return Err(sizes.refuse(format!(
-                "{PREFIX}.volume_head.reshape_conv makes {volume_channels} channels, which are no voxels of {feature_count} \
+                "{PREFIX}.volume_head.reshape_conv has {volume_channels} output channels, not whole voxels of {feature_count} \
                  features"
             )));
         }
@@ -120,7 +120,7 @@ impl Encoder {
         batch_norm_tensors(&mut tensors, &format!("{decoder}.block1.1"), high);
         separable(&mut tensors, &format!("{decoder}.block2.0"), inner, inner + high);
         batch_norm_tensors(&mut tensors, &format!("{decoder}.block2.1"), inner);
-        // Convolutions by what they see, and transposed ones between that double the side.
+        // Convolutions by their inputs' channels, with transposed ones between that double the side.
         let up = format!("{decoder}.modified_up");
         stage(&mut tensors, &format!("{up}.stage1"), inner, third + last + inner);
         doubling(&mut tensors, &format!("{up}.upconv1"), inner);
@@ -143,13 +143,13 @@ fn pointwise(tensors: &mut Vec<TensorShape>, name: &str, out_channels: usize, in
     tensors.push(TensorShape { name: format!("{name}.weight"), shape: vec![out_channels, in_channels, 1, 1] });
 }
 
-/// A 3x3 convolution of each channel by itself, then a 1x1 convolution, both without bias.
+/// A 3x3 depthwise convolution, then a 1x1 convolution, both without bias.
 fn separable(tensors: &mut Vec<TensorShape>, name: &str, out_channels: usize, in_channels: usize) {
     tensors.push(TensorShape { name: format!("{name}.0.weight"), shape: vec![in_channels, 1, 3, 3] });
     pointwise(tensors, &format!("{name}.1"), out_channels, in_channels);
 }
 
-/// Three 3x3 convolutions; what has no parameters stands between them.
+/// Three 3x3 convolutions; the layers between them have no parameters.
 fn stage(tensors: &mut Vec<TensorShape>, name: &str, out_channels: usize, in_channels: usize) {
     for (layer, in_channels) in [(0, in_channels), (2, out_channels), (4, out_channels)] {
         with_bias(tensors, &format!("{name}.{layer}"), &[out_channels, in_channels, 3, 3]);

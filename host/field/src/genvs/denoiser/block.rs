@@ -13,7 +13,7 @@ use viewfuse_nn::norm::GroupNorm;
 use viewfuse_nn::scratch::Scratch;
 use viewfuse_nn::weights::ConvolutionWeights;
 
-/// What a block does to its image's size. The published filter is `[1, 1]`: the mean of 2x2 pixels, or each of them
+/// Resampling of a block. The published filter is `[1, 1]`: the mean of 2x2 pixels, or each of them
 /// repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Resample {
@@ -31,29 +31,29 @@ pub(super) struct Block<D: Device> {
     halving: Option<DepthwiseConvolution<D>>,
     norm0: GroupNorm<D>,
     conv0: Convolution<D>,
-    /// Where the block's shifts by noise level start.
+    /// Offset of the block's shifts by noise level.
     first_shift: u32,
     norm1: GroupNorm<D>,
     conv1: Convolution<D>,
     /// The shortcut's convolution (`skip`), where sizes or channels change.
     shortcut: Option<Convolution<D>>,
     attention: Option<Attention<D>>,
-    /// Of its input.
+    /// Channels of its input.
     pub(super) in_channels: u32,
-    /// Of its output.
+    /// Channels of its output.
     pub(super) channels: u32,
 }
 
 /// Self-attention with one head.
 struct Attention<D: Device> {
     norm2: GroupNorm<D>,
-    /// To queries, keys and values, one behind the other.
+    /// The layer of queries, keys and values, concatenated.
     qkv: Convolution<D>,
     proj: Convolution<D>,
 }
 
 impl<D: Device> Block<D> {
-    /// Reads it, for images of at least `side` rows and columns (of its output).
+    /// Loads it, for images of at least `side` rows and columns (of its output).
     pub(super) fn load(
         loader: &Loader<'_, D>,
         name: &str,
@@ -71,7 +71,7 @@ impl<D: Device> Block<D> {
         let attention = || {
             Ok::<_, FieldError>(Attention {
                 norm2: group_norm(loader, &layer("norm2"))?,
-                // Published: the three of a channel lie together.
+                // Published: query, key and value of a channel are adjacent.
                 qkv: loader.changed_convolution(&layer("qkv"), 0, |weights| {
                     let channels = weights.out_channels / 3;
                     weights.with_outputs_reordered(|column| column % channels * 3 + column / channels)
@@ -134,7 +134,7 @@ impl<D: Device> Block<D> {
             None => None,
         };
         let residual = Residual::Image(shortcut.as_ref().unwrap_or(image));
-        // The sum of two independent images is brought back to the variance of one.
+        // The sum of two independent images is scaled to the variance of one.
         let options = ConvolutionOptions { scale: FRAC_1_SQRT_2, ..PLAIN };
         match &self.attention {
             None => self.conv1.run_into(scratch.device(), options, &normalised, residual, output)?,
@@ -153,7 +153,7 @@ impl<D: Device> Block<D> {
 }
 
 impl<D: Device> Attention<D> {
-    /// The image plus what attention makes of it.
+    /// The image plus its self-attention.
     fn run_into(
         &self,
         scratch: &mut Scratch<'_, D>,

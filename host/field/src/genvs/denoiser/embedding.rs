@@ -1,7 +1,8 @@
-//! The noise level as the network's blocks take it: what each adds to its channels.
+//! The embedding of the noise level, and the shifts of the blocks' channels that follow from it.
 //!
 //! Source: `networks.py` (`PositionalEmbedding` with `endpoint`, its halves exchanged, and `map_layer0`, `map_layer1`,
-//! `affine`). The embedding runs on the host, once a call and not once a pixel; the layers of all blocks are one linear layer.
+//! `affine`). The embedding runs on the host, once a call and not once a pixel; the layers of all blocks are one linear
+//! layer.
 
 use crate::FieldError;
 use viewfuse_core::math::{exp, ln, sin_cos};
@@ -16,7 +17,7 @@ use viewfuse_nn::weights::LinearWeights;
 /// Ratio of the highest frequency to the lowest.
 const FREQUENCY_RATIO: f32 = 10_000.0;
 
-/// The blocks' layers `affine`, as they are read.
+/// The blocks' layers `affine`, while they are loaded.
 #[derive(Default)]
 pub(super) struct ShiftLayers {
     layers: Vec<LinearWeights>,
@@ -24,7 +25,7 @@ pub(super) struct ShiftLayers {
 }
 
 impl ShiftLayers {
-    /// Reads a block's layer. Returns where its shifts will start.
+    /// Loads a block's layer. Returns the offset of its shifts.
     pub(super) fn push(&mut self, tensors: &Tensors<'_>, block: &str) -> Result<u32, CheckpointError> {
         let layer = tensors.linear(&format!("{block}.affine"))?;
         let first = self.out_count;
@@ -34,11 +35,11 @@ impl ShiftLayers {
     }
 }
 
-/// From noise level to shifts.
+/// The layers from a noise level to the shifts.
 pub(super) struct Embedding<D: Device> {
     map_layer0: LinearWeights,
     map_layer1: LinearWeights,
-    /// Those of all blocks.
+    /// The shifts' layers of all blocks.
     affine: Linear<D>,
 }
 
@@ -63,7 +64,7 @@ impl<D: Device> Embedding<D> {
     }
 }
 
-/// Sines, then cosines, of the number times frequencies from 1 down to 1 / [`FREQUENCY_RATIO`], evenly spread in their
+/// Sines, then cosines, of the number times frequencies from 1 down to 1 / [`FREQUENCY_RATIO`], evenly spaced in their
 /// logarithms, both included.
 fn waves(noise: f32, count: usize) -> Vec<f32> {
     let half = count / 2;

@@ -1,20 +1,20 @@
-//! What a person decides about a run.
+//! The settings of a run.
 
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::sampler::control::HALF_A_LEVEL;
 use viewfuse_core::schedule::NoiseSchedule;
 
-/// How a run goes from noise to a picture.
+/// The settings of a run from noise to a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// The sampler and its levels.
     pub steps: Steps,
-    /// Where the levels begin and end.
+    /// The largest and the smallest noise level.
     pub schedule: NoiseSchedule,
-    /// Noise that is added on the way. Results from before are then forgotten: multistep samplers begin anew.
+    /// Noise that is added between steps (churn). Earlier results are then dropped: multistep samplers start again.
     pub churn: Churn,
-    /// The run ends when no value of the picture will change by more than this; `None` to go on to the last level.
+    /// The run stops when no value of the picture will change by more than this; `None` to run to the last level.
     pub early_termination: Option<f32>,
     /// Seed of the noise.
     pub seed: u64,
@@ -27,14 +27,14 @@ pub enum Steps {
     Fixed {
         /// The sampler.
         sampler: Sampler,
-        /// How many levels above 0 there are, at least 1.
+        /// The number of levels above 0, at least 1.
         level_count: u32,
     },
-    /// Chosen on the way by `unipc`, without churn: the flow changes evenly nowhere, and steps are as long as it allows.
+    /// Adaptive levels by `unipc`, without churn: each step is as long as its estimated error allows.
     Chosen {
-        /// The error that a step may make, root mean square over the picture.
+        /// The largest error of a step, root mean square over the picture.
         tolerance: f32,
-        /// How many calls are allowed. After them the picture is what it is.
+        /// The most calls, after which the run stops.
         most_calls: u32,
     },
 }
@@ -46,16 +46,16 @@ impl Plan {
         Plan { steps, schedule: NoiseSchedule::published(), churn: Churn::NONE, early_termination: None, seed }
     }
 
-    /// The default: `ipndm` with 10 calls, a fifth of the published run's, and an end when nothing visible changes any more.
-    /// On mixtures of normal distributions with deviations of 0.1 and 0.2 to 0.3 its error is 0.032 and 0.033, that of the
-    /// published run 0.006 and 0.010 (`tests/numerics/sampler.rs`); with 18 calls it is 0.009 and 0.008. Where data are much
-    /// narrower, [`Plan::careful`] is better.
+    /// The default: `ipndm` with 10 calls, a fifth of the published run's, and an early stop when no visible change
+    /// remains. On mixtures of normal distributions with deviations of 0.1 and 0.2 to 0.3 its error is 0.032 and 0.033,
+    /// that of the published run 0.006 and 0.010 (`tests/numerics/sampler.rs`); with 18 calls it is 0.009 and 0.008.
+    /// Where data are much narrower, [`Plan::careful`] is better.
     pub fn fast(seed: u64) -> Plan {
         let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: 10 };
         Plan { steps, early_termination: Some(HALF_A_LEVEL), ..Plan::published(seed) }
     }
 
-    /// Levels that are chosen on the way, for an error of about a level of 255 (root mean square, 0.01 of values between -1
+    /// Adaptive levels, for an error of about a level of 255 (root mean square, 0.01 of values between -1
     /// and 1): 15 or 16 calls on the same data, and on data 0.001 wide as well.
     pub fn careful(seed: u64) -> Plan {
         let steps = Steps::Chosen { tolerance: 0.01, most_calls: 49 };

@@ -1,4 +1,4 @@
-//! One picture on its way from noise.
+//! The run for one picture.
 
 use super::{Plan, Sampled, Start};
 use crate::FieldError;
@@ -13,25 +13,25 @@ use viewfuse_job::progress::Progress;
 /// The noise that a run starts from; the noise before level `index` is number `index + 1`.
 const START: u32 = 0;
 
-/// A run: what it needs, and what it knows.
+/// The state of a run.
 pub(super) struct Run<'a, D: Device, F> {
     device: &'a D,
     plan: &'a Plan,
     element_count: usize,
     progress: &'a dyn Progress,
     denoise: F,
-    /// Buffers that nobody needs any more.
+    /// Free buffers.
     free: Vec<D::Buffer<f32>>,
-    /// What is kept of the calls, the newest first, and at which levels they were.
+    /// The kept results of the calls, the newest first, and their levels.
     results: VecDeque<D::Buffer<f32>>,
     history: History,
     /// Levels of all calls.
     levels: Vec<f32>,
-    /// What the denoiser said last, and at which level.
+    /// The denoiser's last result, and its level.
     last: Option<(Vec<f32>, f32)>,
 }
 
-/// What the denoiser says: on the device, and on the host.
+/// A result of the denoiser: on the device, and on the host.
 struct Denoised<D: Device> {
     buffer: D::Buffer<f32>,
     values: Vec<f32>,
@@ -62,7 +62,7 @@ where
         }
     }
 
-    /// Over the levels of the schedule.
+    /// Runs over the levels of the schedule.
     pub(super) fn over_levels(
         mut self,
         sampler: Sampler,
@@ -115,11 +115,11 @@ where
                 Corrected::Never | Corrected::ByAnotherCall => self.free.push(before),
             }
         }
-        // Not reached: the level behind the last is 0. A schedule without levels has the picture it started with.
+        // Not reached: the level behind the last is 0. Without levels, the result is the start.
         Ok(self.finished(state, planned))
     }
 
-    /// Over levels that are chosen on the way.
+    /// Runs over adaptive levels.
     pub(super) fn by_tolerance(
         mut self,
         tolerance: f32,
@@ -166,7 +166,7 @@ where
         }
     }
 
-    /// A call of the denoiser. What it says is finite.
+    /// A call of the denoiser, whose result is checked to be finite.
     fn call(&mut self, state: &D::Buffer<f32>, sigma: f32) -> Result<Denoised<D>, FieldError> {
         self.progress.check()?;
         let mut buffer = self.buffer()?;
@@ -177,7 +177,7 @@ where
         Ok(Denoised { buffer, values })
     }
 
-    /// Whether no value of the picture changes any more by what can be seen.
+    /// Whether no visible change of the picture remains.
     fn may_end(&self, values: &[f32], sigma: f32) -> bool {
         let (Some(early_termination), Some((before, level))) = (self.plan.early_termination, &self.last) else {
             return false;
@@ -186,7 +186,7 @@ where
         change_to_come(change, *level, sigma) <= early_termination
     }
 
-    /// Keeps what later steps need of a call.
+    /// Keeps the result of a call for later steps.
     fn keep(
         &mut self,
         sampler: Sampler,
@@ -212,13 +212,13 @@ where
         Ok(())
     }
 
-    /// Forgets all calls: noise was added.
+    /// Drops the results of all calls: noise was added.
     fn forget(&mut self) {
         self.history = History::NONE;
         self.free.extend(self.results.drain(..));
     }
 
-    /// A combination of a state and of what is kept, behind what was just said, if it was.
+    /// A combination of a state, the latest result, if given, and the kept results.
     fn mixed(
         &mut self,
         mix: &Mix,
@@ -226,7 +226,7 @@ where
         said: Option<&D::Buffer<f32>>,
     ) -> Result<D::Buffer<f32>, FieldError> {
         let mut mixed = self.buffer()?;
-        // What is not there has coefficient 0.
+        // A missing result has coefficient 0.
         let mut all = said.into_iter().chain(&self.results);
         let [newest, second, third, fourth] = std::array::from_fn(|_| all.next().unwrap_or(state));
         let count = self.element_count as u32;
@@ -277,7 +277,7 @@ where
     }
 }
 
-/// In `f64`; infinite or NaN where a value is.
+/// Root mean square in `f64`; infinite or NaN if a value is.
 fn root_mean_square(values: &[f32]) -> f32 {
     let sum: f64 = values.iter().map(|value| f64::from(*value) * f64::from(*value)).sum();
     (sum / values.len().max(1) as f64).sqrt() as f32

@@ -1,11 +1,11 @@
-//! The stack machine that a pickle is a program for. Every opcode builds a value, moves values on the stack, or fills a
-//! value; none does anything else.
+//! The stack machine of pickles. Every opcode builds a value, moves values on the stack, or fills a value; none has another
+//! effect.
 
 use super::super::input::Input;
 use super::{Fault, Id, LONGEST_TEXTS, MOST_VALUES, Object, Span, Value};
 use std::collections::HashMap;
 
-/// Bytes of the name of a module or class.
+/// The most bytes of the name of a module or class.
 const LONGEST_NAME: usize = 4096;
 
 /// The stack machine.
@@ -19,7 +19,7 @@ pub(super) struct Machine {
     memo: HashMap<u32, Id>,
 }
 
-/// Values that every pickle has from the start, so that a file's every byte does not make another.
+/// Values that exist from the start, so that single-byte opcodes do not each build a new one.
 const NONE: Id = Id(0);
 const FALSE: Id = Id(1);
 const TRUE: Id = Id(2);
@@ -37,7 +37,7 @@ impl Machine {
         }
     }
 
-    /// Does what one opcode says; gives the result after the last.
+    /// Executes one opcode; the last one returns the result.
     pub(super) fn step(&mut self, input: &mut Input<'_>) -> Result<Option<Id>, Fault> {
         let opcode = input.byte()?;
         match opcode {
@@ -142,7 +142,7 @@ impl Machine {
             b'b' => {
                 let state = self.pop(opcode)?;
                 let top = self.top(opcode)?;
-                // Attributes of anything else, of an integer say, would change nothing that is asked for here.
+                // Attributes of other values, such as integers, are not read.
                 if let Value::Object(object) = &mut self.values[top.0 as usize] {
                     object.state = Some(state);
                 }
@@ -170,7 +170,7 @@ impl Machine {
         self.add(Value::Object(Box::new(object)))
     }
 
-    /// Height of the stack below which the innermost open mark forbids to go.
+    /// Height of the stack at the innermost open mark, below which no value may be taken.
     fn floor(&self) -> usize {
         self.marks.last().map_or(0, |&mark| mark as usize)
     }
@@ -266,11 +266,11 @@ impl Machine {
         }
     }
 
-    /// Reads this many bytes, if texts may still grow by as many.
+    /// Reads this many bytes, if the limit of all texts allows it.
     fn take(&self, input: &mut Input<'_>, length: u64) -> Result<Vec<u8>, Fault> {
         let room = LONGEST_TEXTS - self.texts.len() - self.wide.len();
         if length > room as u64 {
-            // A length that the file cannot hold tells of damage, whatever it is.
+            // A length beyond the end of the file is damage.
             input.check(length)?;
             return Err(Fault::TooMany { what: "bytes of text", limit: LONGEST_TEXTS as u64 });
         }
