@@ -37,7 +37,7 @@ mod undistort;
 
 use check::Checked;
 pub use error::SceneError;
-pub use fault::{IntrinsicsFault, NumpyFault, Place};
+pub use fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
