@@ -47,6 +47,34 @@ fn large_photographs_are_reduced_once() {
 }
 
 #[test]
+fn a_lens_is_undone_after_the_reduction() {
+    let folder = Folder::new();
+    let pixel = |x: u32, y: u32| image::Rgb([(x / 8) as u8, (y / 6) as u8, 90]);
+    image::RgbImage::from_fn(1600, 1200, pixel).save(folder.file("images/1.png")).expect("a photograph");
+    let transforms = serde_json::json!({
+        "fl_x": 1500, "k1": 0.2, "w": 1600, "h": 1200,
+        "frames": [{ "file_path": "images/1.png", "transform_matrix": scenes::opengl_matrix() }],
+    });
+    folder.write("transforms.json", transforms.to_string());
+    let scene = open(&folder);
+    let texels = |album: &Album| {
+        let images = album.sources(&[0], 100, BackgroundChoice::None, &Silent).expect("sources").images;
+        images[0].texels.clone()
+    };
+    let whole = texels(&Album::open(&scene, [0], &Silent).expect("a photograph"));
+    let reduced = texels(&Album::open_at(&scene, [0], 100, &Silent).expect("a photograph"));
+    // The corners were not seen: nothing is there. Along the border of what was seen, shares of pixels differ.
+    assert_eq!((whole[0], reduced[0]), ([0.0; 4], [0.0; 4]));
+    let inside = whole.iter().zip(&reduced).filter(|(a, b)| a[3] == 1.0 && b[3] == 1.0);
+    let mut count = 0;
+    for (a, b) in inside {
+        count += 1;
+        assert!((0..4).all(|channel| (a[channel] - b[channel]).abs() < 2.0 / 255.0), "{a:?} and {b:?}");
+    }
+    assert!(count > 6000, "{count}");
+}
+
+#[test]
 fn photographs_of_a_usual_size_are_kept_as_they_are() {
     let folder = folder(64);
     let scene = open(&folder);

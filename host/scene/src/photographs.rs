@@ -202,9 +202,11 @@ impl<'a> Album<'a> {
     }
 
     fn read(&self, view: usize) -> Result<Photograph, SceneError> {
-        let photograph = self.scene.photograph(view)?;
         let size = self.kept_size(view);
-        Ok(if size == photograph.pixels.dimensions() { photograph } else { resample::reduced(&photograph, size) })
+        self.scene.photograph_after(view, |stored| match stored.pixels.dimensions() == size {
+            true => stored,
+            false => resample::reduced(&stored, size),
+        })
     }
 
     fn photograph(&self, view: usize) -> Result<Cow<'_, Photograph>, SceneError> {

@@ -11,28 +11,30 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
     let stride = 4 * own_width as usize;
     let bytes = photograph.pixels.as_raw();
     let mut averaged = vec![[0_u8; 4]; width as usize * height as usize];
-    averaged.par_chunks_mut(width as usize).zip(&rows).for_each(|(output, row)| {
-        let mut sums = vec![[0.0_f32; 5]; output.len()];
-        for (y, share_y) in row {
-            let line = &bytes[y * stride..(y + 1) * stride];
-            for (sum, column) in sums.iter_mut().zip(&columns) {
-                for (x, share_x) in column {
-                    let [r, g, b, a] = [0, 1, 2, 3].map(|channel| f32::from(line[4 * x + channel]));
-                    let share = share_x * share_y;
-                    let weight = share * a;
-                    sum[0] += weight * r;
-                    sum[1] += weight * g;
-                    sum[2] += weight * b;
-                    sum[3] += weight;
-                    sum[4] += share;
-                }
+    let new_line = || vec![0.0_f32; stride];
+    averaged.par_chunks_mut(width as usize).zip(&rows).for_each_init(new_line, |line, (output, row)| {
+        // Down first, in whole lines, then across: most of the work is one loop over bytes.
+        line.fill(0.0);
+        for (y, share) in row {
+            let source = &bytes[y * stride..(y + 1) * stride];
+            if photograph.has_alpha {
+                add_weighted(line, source, *share);
+            } else {
+                line.iter_mut().zip(source).for_each(|(sum, byte)| *sum += share * f32::from(*byte));
             }
         }
-        for (pixel, [r, g, b, alpha, share]) in output.iter_mut().zip(sums) {
-            let level = |value: f32| (value + 0.5) as u8;
-            if alpha > 0.0 {
-                *pixel = [level(r / alpha), level(g / alpha), level(b / alpha), level(alpha / share)];
+        for (pixel, column) in output.iter_mut().zip(&columns) {
+            let mut sums = [0.0_f32; 4];
+            for (x, share) in column {
+                sums.iter_mut().zip(&line[4 * x..]).for_each(|(sum, value)| *sum += share * value);
             }
+            let level = |value: f32| (value + 0.5) as u8;
+            let [r, g, b, alpha] = sums;
+            *pixel = match photograph.has_alpha {
+                false => [level(r), level(g), level(b), u8::MAX],
+                true if alpha > 0.0 => [level(r / alpha), level(g / alpha), level(b / alpha), level(alpha)],
+                true => [0; 4],
+            };
         }
     });
     let at = |x: u32, y: u32| averaged[(y * width + x) as usize];
@@ -46,6 +48,17 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
         GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
     });
     Photograph { pixels, has_alpha: photograph.has_alpha, seen }
+}
+
+/// Adds a line of pixels, their colours multiplied by alpha (of 255).
+fn add_weighted(line: &mut [f32], source: &[u8], share: f32) {
+    for (sum, pixel) in line.as_chunks_mut::<4>().0.iter_mut().zip(source.as_chunks::<4>().0) {
+        let alpha = share * f32::from(pixel[3]);
+        for channel in 0..3 {
+            sum[channel] += alpha * f32::from(pixel[channel]);
+        }
+        sum[3] += alpha;
+    }
 }
 
 /// `[row][column]` of `size` = `[width, height]` from an image of `own_size`. Enlarging repeats the nearest pixels.
