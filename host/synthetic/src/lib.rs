@@ -8,6 +8,8 @@
 //! prism       signed distance of a side view with a width    Prism
 //! shape       signed distances of primitives                 Shape
 //! placement   where a primitive stands in the world          Placement
+//! noise       random numbers that belong to places           smooth, layered
+//! material    patterns of wood, brick, cloth, print          Material
 //! texture     colour as a function of the point              Texture, Finish
 //! light       lamps                                          Light
 //! object      primitives, placed and painted                 Part, Object
@@ -20,6 +22,13 @@
 //! cameras     where scenes to learn from are seen from       random_views, spiral_views
 //! kinds       whole distributions: cars, chairs, toys        Kind
 //! collection  many scenes to learn from, on disk             make
+//! lamp         lamps with a size                             Lamp
+//! scenery      an object all around, lamps, a sky            Scenery
+//! illumination soft shadows and light from around            illuminate
+//! photograph   a camera's picture of it, and its depth       photograph, depth
+//! rig          how a person goes around with a camera        Rig
+//! room         a table with things on it in a room           room
+//! shoot        scenes by place, rig, seed and size           generate
 //! ```
 //!
 //! Everything is computed in `f32` from additions, multiplications, divisions and square roots in one stated order,
@@ -30,15 +39,24 @@
 pub mod cameras;
 pub mod collection;
 pub mod folder;
+pub mod illumination;
 pub mod kinds;
+pub mod lamp;
 pub mod light;
+pub mod material;
+pub mod noise;
 pub mod object;
 pub mod orbit;
+pub mod photograph;
 pub mod placement;
 pub mod prism;
 pub mod render;
+pub mod rig;
+pub mod room;
+pub mod scenery;
 pub mod shade;
 pub mod shape;
+pub mod shoot;
 pub mod texture;
 pub mod toy;
 pub mod trace;
@@ -51,7 +69,10 @@ pub use orbit::Orbit;
 pub use placement::Placement;
 pub use prism::Prism;
 pub use render::{render, render_with};
+pub use rig::Rig;
+pub use scenery::Scenery;
 pub use shape::Shape;
+pub use shoot::{Place, Shoot, generate};
 pub use texture::{Finish, Patch, Texture};
 pub use trace::{Hit, trace};
 

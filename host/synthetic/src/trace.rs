@@ -38,23 +38,41 @@ pub struct Hit {
 
 /// The nearest point of `object` on `ray`, if there is one. A ray that starts inside a part hits it at once.
 pub fn trace(object: &Object, ray: &Ray) -> Option<Hit> {
-    ball_interval(ray.origin_world, ray.direction_world, object.bounding_radius())?;
-    let mut nearest: Option<(f32, usize)> = None;
-    for (index, (part, radius)) in object.bounded_parts().enumerate() {
-        let limit = nearest.map_or(f32::MAX, |(distance, _)| distance);
-        if let Some(distance) = march(part, radius, ray, limit) {
-            nearest = Some((distance, index));
-        }
-    }
-    let (distance, index) = nearest?;
+    let (distance, index) = first(object, ray, f32::MAX)?;
     let part = &object.parts()[index];
     let point_local = part.placement.to_local(ray.at(distance));
     Some(Hit { distance, part: index, point_local, normal_local: normal(part, point_local) })
 }
 
-/// Whether anything of `object` lies on `ray`.
-pub fn is_blocked(object: &Object, ray: &Ray) -> bool {
-    object.bounded_parts().any(|(part, radius)| march(part, radius, ray, f32::MAX).is_some())
+/// Distance to the nearest point of `object` on `ray`, if it is less than `limit`, and the index of its part.
+pub fn first(object: &Object, ray: &Ray, limit: f32) -> Option<(f32, usize)> {
+    ball_interval(ray.origin_world, ray.direction_world, object.bounding_radius())?;
+    let mut nearest: Option<(f32, usize)> = None;
+    for cluster in object.clusters() {
+        let limit = nearest.map_or(limit, |(distance, _)| distance);
+        if !cluster.may_be_on(ray.origin_world, ray.direction_world, limit) {
+            continue;
+        }
+        for index in cluster.range() {
+            let limit = nearest.map_or(limit, |(distance, _)| distance);
+            let (part, radius) = object.bounded_part(index);
+            if let Some(distance) = march(part, radius, ray, limit) {
+                nearest = Some((distance, index));
+            }
+        }
+    }
+    nearest
+}
+
+/// Whether anything of `object` lies on `ray` nearer than `limit`.
+pub fn is_blocked(object: &Object, ray: &Ray, limit: f32) -> bool {
+    let (origin, direction) = (ray.origin_world, ray.direction_world);
+    object.clusters().iter().filter(|cluster| cluster.may_be_on(origin, direction, limit)).any(|cluster| {
+        cluster.range().any(|index| {
+            let (part, radius) = object.bounded_part(index);
+            march(part, radius, ray, limit).is_some()
+        })
+    })
 }
 
 /// Distance along the ray to a part's surface, if it is less than `limit`.

@@ -1,0 +1,116 @@
+//! Scenes with backgrounds, named by a few words: a place, a rig, a seed and a size.
+
+use crate::noise::words;
+use crate::photograph::{depth, photograph};
+use crate::rig::Rig;
+use crate::room;
+use crate::scenery::{Scenery, SceneryError};
+use image::RgbImage;
+use std::fmt;
+use std::str::FromStr;
+use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
+use viewfuse_core::pose::PoseError;
+
+/// What is around the cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A table with things on it in a furnished room.
+    Room,
+}
+
+/// The name is none of a place.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a place: room")]
+pub struct UnknownPlace(String);
+
+/// Why there are no photographs.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum ShootError {
+    /// The size of the pictures is unusable.
+    #[error("pictures of {} x {} pixels: {source}", size[0], size[1])]
+    Size {
+        /// What was asked for.
+        size: [u32; 2],
+        /// Why.
+        source: PinholeError,
+    },
+    /// A camera is unusable.
+    #[error("a camera is unusable: {0}")]
+    Camera(#[from] PoseError),
+    /// The scenery is unusable.
+    #[error(transparent)]
+    Scenery(#[from] SceneryError),
+}
+
+/// Focal length as a part of the pictures' longer side.
+const FOCAL: f32 = 0.92;
+
+/// A scenery and the cameras in it. Pictures and depths are made when asked for, each alike whatever was asked before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shoot {
+    scenery: Scenery,
+    cameras: Vec<Camera>,
+    seed: u32,
+}
+
+/// A scene: `count` cameras on a rig in a place, drawn for a seed, with pictures of `[width, height]` pixels.
+///
+/// # Errors
+/// [`ShootError`]; none for a size that a camera can have.
+pub fn generate(place: Place, rig: Rig, seed: u64, size: [u32; 2], count: u32) -> Result<Shoot, ShootError> {
+    let [width, height] = size;
+    let focal = FOCAL * width.max(height) as f32;
+    let principal = [0.5 * width as f32, 0.5 * height as f32];
+    let pinhole =
+        Pinhole::new([focal; 2], principal, width, height).map_err(|source| ShootError::Size { size, source })?;
+    let (scenery, walk) = match place {
+        Place::Room => (room::room(seed, 0)?, room::WALK),
+    };
+    let cameras = rig.cameras(&walk, pinhole, count, seed)?;
+    Ok(Shoot { scenery, cameras, seed: seed as u32 })
+}
+
+impl Shoot {
+    /// What is photographed.
+    pub fn scenery(&self) -> &Scenery {
+        &self.scenery
+    }
+
+    /// The cameras, in the order of the views.
+    pub fn cameras(&self) -> &[Camera] {
+        &self.cameras
+    }
+
+    /// The photograph of a view; `None` if there is no such view. Noise in the shadows differs from view to view.
+    pub fn photograph(&self, view: usize, rays_per_side: u32) -> Option<RgbImage> {
+        let camera = self.cameras.get(view)?;
+        let [seed, ..] = words(self.seed, [view as i32, 0, 0]);
+        Some(photograph(&self.scenery, camera, rays_per_side, 1.0, seed))
+    }
+
+    /// The exact depth of a view's pixels, as [`depth`] has it; `None` if there is no such view.
+    pub fn depth(&self, view: usize) -> Option<Vec<f32>> {
+        self.cameras.get(view).map(|camera| depth(&self.scenery, camera))
+    }
+}
+
+impl Place {
+    /// All places.
+    pub const ALL: [Place; 1] = [Place::Room];
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Place::Room => "room",
+        })
+    }
+}
+
+impl FromStr for Place {
+    type Err = UnknownPlace;
+
+    fn from_str(name: &str) -> Result<Place, UnknownPlace> {
+        Place::ALL.into_iter().find(|place| place.to_string() == name).ok_or_else(|| UnknownPlace(name.to_owned()))
+    }
+}
