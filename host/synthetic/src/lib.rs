@@ -12,7 +12,9 @@
 //! material    patterns of wood, brick, cloth, print          Material
 //! texture     colour as a function of the point              Texture, Finish
 //! light       lamps                                          Light
-//! object      primitives, placed and painted                 Part, Object
+//! part        a primitive, placed and painted                Part
+//! bounds      boxes around parts: which ones a ray may meet  Bounds
+//! object      parts together                                 Object
 //! trace       first point of an object on a ray              trace, is_blocked
 //! shade       light on that point                            shade
 //! render      a camera's picture of an object                render
@@ -36,6 +38,7 @@
 //! for any number of threads.
 #![forbid(unsafe_code)]
 
+pub mod bounds;
 pub mod cameras;
 pub mod collection;
 pub mod folder;
@@ -47,6 +50,7 @@ pub mod material;
 pub mod noise;
 pub mod object;
 pub mod orbit;
+pub mod part;
 pub mod photograph;
 pub mod placement;
 pub mod prism;
@@ -64,8 +68,9 @@ pub mod trace;
 pub use folder::{WriteError, write_scene};
 pub use kinds::Kind;
 pub use light::Light;
-pub use object::{Object, ObjectError, Part};
+pub use object::{Object, ObjectError};
 pub use orbit::Orbit;
+pub use part::Part;
 pub use placement::Placement;
 pub use prism::Prism;
 pub use render::{render, render_with};

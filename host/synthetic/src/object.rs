@@ -1,27 +1,14 @@
 //! Objects: primitives, placed and painted. Their union is the minimum of their distances.
 
+use crate::bounds::Bounds;
 use crate::light::Light;
-use crate::placement::Placement;
-use crate::shape::Shape;
-use crate::texture::Finish;
-use core::ops::Range;
+use crate::part::Part;
 use viewfuse_core::Vec3;
-use viewfuse_core::math::{abs, max, min};
+use viewfuse_core::math::{max, min};
 
 /// Farthest that a part may reach from the world's origin: coordinates there are exact to about the distance at which a
 /// ray counts as arrived.
 pub const LARGEST_DISTANCE: f32 = 100.0;
-
-/// One primitive of an object.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
-    /// Its form.
-    pub shape: Shape,
-    /// Where it stands.
-    pub placement: Placement,
-    /// What it looks like.
-    pub finish: Finish,
-}
 
 /// Why parts are not an object. Parts count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -56,69 +43,13 @@ pub enum ObjectError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     parts: Vec<Part>,
-    /// Neighbours in the list of parts, in the same order.
-    clusters: Vec<Cluster>,
+    /// Around all parts, for rays to pass them by.
+    bounds: Bounds,
     /// Of each part, around its own origin.
     bounding_radii: Vec<f32>,
     /// Of all together, around the world's origin.
     bounding_radius: f32,
     light: Light,
-}
-
-/// Parts of a cluster.
-const CLUSTER_SIZE: usize = 8;
-
-/// How much larger a cluster's box is taken, in world units: more than a part's own.
-const CLUSTER_MARGIN: f32 = 2.0e-3;
-
-/// Parts that follow each other, and a box with world axes that holds them. Who lists what is near each other together
-/// makes a ray pass by most of the parts eight at a time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Cluster {
-    first: usize,
-    end: usize,
-    low: Vec3,
-    high: Vec3,
-}
-
-impl Cluster {
-    fn new(first: usize, parts: &[Part]) -> Cluster {
-        let (mut low, mut high) = (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN));
-        for part in parts {
-            let half = part.shape.half_box();
-            let reach = |axis: Vec3| {
-                let local = part.placement.rotate_to_local(axis);
-                Vec3::new(abs(local.x), abs(local.y), abs(local.z)).dot(half) + CLUSTER_MARGIN
-            };
-            let reach = Vec3::new(reach(Vec3::X), reach(Vec3::Y), reach(Vec3::Z));
-            low = low.min(part.placement.origin_world() - reach);
-            high = high.max(part.placement.origin_world() + reach);
-        }
-        Cluster { first, end: first + parts.len(), low, high }
-    }
-
-    /// Indices of the parts.
-    pub(crate) fn range(&self) -> Range<usize> {
-        self.first..self.end
-    }
-
-    /// Whether a part of it may lie on the ray nearer than `limit`.
-    pub(crate) fn may_be_on(&self, origin: Vec3, direction: Vec3, limit: f32) -> bool {
-        let (mut enter, mut leave) = (0.0, limit);
-        for axis in 0..3 {
-            let (start, step) = (origin[axis], direction[axis]);
-            if step == 0.0 {
-                if start < self.low[axis] || start > self.high[axis] {
-                    return false;
-                }
-                continue;
-            }
-            let (a, b) = ((self.low[axis] - start) / step, (self.high[axis] - start) / step);
-            enter = max(enter, min(a, b));
-            leave = min(leave, max(a, b));
-        }
-        enter <= leave
-    }
 }
 
 /// Distance from the world's origin to the farthest corner of the box around a part: less than that of the ball for
@@ -159,9 +90,8 @@ impl Object {
             bounding_radius = max(bounding_radius, min(reach, farthest_corner(part)));
             bounding_radii.push(part.shape.bounding_radius());
         }
-        let cluster = |(index, parts)| Cluster::new(index * CLUSTER_SIZE, parts);
-        let clusters = parts.chunks(CLUSTER_SIZE).enumerate().map(cluster).collect();
-        Ok(Object { parts, clusters, bounding_radii, bounding_radius, light: Light::default() })
+        let bounds = Bounds::new(&parts);
+        Ok(Object { parts, bounds, bounding_radii, bounding_radius, light: Light::default() })
     }
 
     /// The same object under other lamps.
@@ -182,9 +112,9 @@ impl Object {
         &self.parts
     }
 
-    /// The parts in clusters.
-    pub(crate) fn clusters(&self) -> &[Cluster] {
-        &self.clusters
+    /// Boxes around the parts.
+    pub(crate) fn bounds(&self) -> &Bounds {
+        &self.bounds
     }
 
     /// A part with the radius of a ball around its own origin that holds it.

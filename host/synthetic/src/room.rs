@@ -39,7 +39,7 @@ pub const TABLE: [f32; 2] = [1.6, 1.15];
 const ROOM: u32 = 100;
 
 /// Where a person with a camera walks in the room.
-pub const WALK: Walk = Walk { subject: Vec3::new(0.0, 0.25, 0.38), distance: 3.55, heights: [1.0, 1.75] };
+pub const WALK: Walk = Walk { subject: Vec3::new(0.0, 0.12, 0.34), distance: 3.1, heights: [0.95, 1.6] };
 
 /// The room with this seed and index.
 ///
@@ -55,7 +55,7 @@ pub fn room(seed: u64, index: u32) -> Result<Scenery, SceneryError> {
     let first_glowing = build.parts.len();
     shell::outside(&mut draws, &mut build, window);
     let lamps = lamps(&mut draws);
-    let dim = draws.between(0.3, 0.4);
+    let dim = draws.between(0.36, 0.46);
     let around = [Vec3::new(1.0, 0.9, 0.78) * (0.7 * dim), Vec3::new(0.92, 0.96, 1.0) * dim];
     Ok(Scenery::new(build.parts, lamps, around)?.glowing_from(first_glowing))
 }

@@ -2,7 +2,8 @@
 
 use crate::lamp::Lamp;
 use crate::noise::{blend, layered};
-use crate::object::{Object, ObjectError, Part};
+use crate::object::{Object, ObjectError};
+use crate::part::Part;
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{max, sqrt};
 

@@ -1,6 +1,6 @@
 //! Putting parts together, in world coordinates.
 
-use crate::object::Part;
+use crate::part::Part;
 use crate::placement::Placement;
 use crate::prism::{Prism, Width};
 use crate::shape::Shape;

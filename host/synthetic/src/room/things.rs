@@ -10,7 +10,7 @@ use crate::material::{Letters, Material, Plane, Setting, Stone};
 use crate::object::{Object, ObjectError};
 use crate::placement::Placement;
 use crate::shape::Shape;
-use crate::texture::rgb;
+use crate::texture::{Finish, Texture, rgb};
 use crate::trace::first;
 use core::f32::consts::FRAC_PI_2;
 use viewfuse_core::Vec3;
@@ -165,9 +165,20 @@ fn object(draws: &mut Draws, build: &mut Build, [x, y]: [f32; 2], kind: Kind) ->
     };
     let group = Placement::at(x, y, -lowest).turned_about_z(turn);
     for part in object.parts() {
-        build.add(part.shape, part.placement.within(&group), part.finish);
+        build.add(part.shape, part.placement.within(&group), hand_painted(draws, part.finish));
     }
     Ok(())
+}
+
+/// A finish of one colour as painted by hand, with patches of thicker and thinner paint; others as they are.
+fn hand_painted(draws: &mut Draws, finish: Finish) -> Finish {
+    let seed = pattern_seed(draws);
+    let Texture::Plain { colour } = finish.texture else {
+        return finish;
+    };
+    let colours = [colour * 0.7 + Vec3::splat(0.02), colour * 0.92 + Vec3::splat(0.07)];
+    let paint = Stone { colours, vein: colour * 0.5, veined: 0.35, cell: Vec3::splat(0.11), seed };
+    of(Material::Stone(paint), finish.gloss)
 }
 
 /// Height of the lowest point of an object, by rays from below on a grid.
