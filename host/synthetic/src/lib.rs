@@ -31,6 +31,7 @@
 //! rig          how a person goes around with a camera        Rig
 //! room         a table with things on it in a room           room
 //! shoot        scenes by place, rig, seed and size           generate
+//! transforms   photographs and poses on disk, NeRF layout    write_shoot
 //! ```
 //!
 //! Everything is computed in `f32` from additions, multiplications, divisions and square roots in one stated order,
@@ -64,6 +65,7 @@ pub mod shoot;
 pub mod texture;
 pub mod toy;
 pub mod trace;
+pub mod transforms;
 
 pub use folder::{WriteError, write_scene};
 pub use kinds::Kind;
@@ -80,6 +82,7 @@ pub use shape::Shape;
 pub use shoot::{Place, Shoot, generate};
 pub use texture::{Finish, Patch, Texture};
 pub use trace::{Hit, trace};
+pub use transforms::write_shoot;
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

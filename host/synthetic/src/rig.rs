@@ -15,7 +15,7 @@ use viewfuse_core::random::uniform_from;
 /// A way to take photographs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rig {
-    /// On an arc in front of the subject, about 11 degrees from one view to the next, at most 110 degrees in all.
+    /// On an arc in front of the subject, about 12 degrees from one view to the next, at most 120 degrees in all.
     Arc,
     /// Side by side in rows, all looking about the same way: a wall of cameras.
     Forward,
@@ -42,10 +42,10 @@ pub struct Walk {
 }
 
 /// Angle from one view of an arc to the next, in radians.
-const ARC_STEP: f32 = 0.192;
+const ARC_STEP: f32 = 0.205;
 
 /// Largest angle of an arc, in radians.
-const LARGEST_ARC: f32 = 1.93;
+const LARGEST_ARC: f32 = 2.1;
 
 /// Random numbers of a rig: those of a view do not depend on how many views there are.
 struct Hand {
@@ -86,7 +86,7 @@ impl Rig {
         let (azimuth, distance, up, unsteady) = match self {
             Rig::Arc => {
                 let span = min(ARC_STEP * steps, LARGEST_ARC);
-                let azimuth = span * (along - 0.5) + 0.012 * hand.shake();
+                let azimuth = span * (along - 0.5) + 0.008 * hand.shake();
                 (azimuth, d * (1.0 + 0.04 * hand.shake()), height(0.5 + 0.5 * hand.shake()), 0.03)
             }
             Rig::Forward => {

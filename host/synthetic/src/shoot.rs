@@ -45,6 +45,15 @@ pub enum ShootError {
 /// Focal length as a part of the pictures' longer side.
 const FOCAL: f32 = 0.92;
 
+/// Seed of the sample: a room with many colours and textures.
+const SAMPLE_SEED: u64 = 17;
+
+/// Pictures of the sample are so large.
+const SAMPLE_SIZE: [u32; 2] = [320, 240];
+
+/// Views of the sample.
+const SAMPLE_VIEW_COUNT: u32 = 11;
+
 /// A scenery and the cameras in it. Pictures and depths are made when asked for, each alike whatever was asked before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shoot {
@@ -68,6 +77,14 @@ pub fn generate(place: Place, rig: Rig, seed: u64, size: [u32; 2], count: u32) -
     };
     let cameras = rig.cameras(&walk, pinhole, count, seed)?;
     Ok(Shoot { scenery, cameras, seed: seed as u32 })
+}
+
+/// The repository's sample of a room, as `tests/data/room` has it: 11 views of 320 x 240 pixels on an arc.
+///
+/// # Errors
+/// None with the constants of this file.
+pub fn sample() -> Result<Shoot, ShootError> {
+    generate(Place::Room, Rig::Arc, SAMPLE_SEED, SAMPLE_SIZE, SAMPLE_VIEW_COUNT)
 }
 
 impl Shoot {

@@ -48,12 +48,20 @@ impl Painting {
         fractions(seed, [0, 0, 60])[0] < LANDSCAPES
     }
 
+    /// Whether it is a landscape by day, with a blue sky.
+    pub fn is_day(seed: u32) -> bool {
+        Painting::is_landscape(seed) && Painting::palette(seed) % 2 == 0
+    }
+
+    fn palette(seed: u32) -> usize {
+        (fractions(seed, [0, 0, 60])[1] * 4.0) as usize & 3
+    }
+
     /// The colour at a point.
     pub(super) fn colour(&self, p: Vec3) -> Vec3 {
         let [right, up, _] = self.plane.coordinates(p);
         let (x, y) = (right / self.half[1], up / self.half[1]);
-        let [_, choice, ..] = fractions(self.seed, [0, 0, 60]);
-        let palette = (choice * 4.0) as usize & 3;
+        let palette = Painting::palette(self.seed);
         let colour =
             if Painting::is_landscape(self.seed) { self.landscape(x, y, palette) } else { self.abstracted(x, y) };
         // Strokes of the brush.

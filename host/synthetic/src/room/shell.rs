@@ -135,11 +135,11 @@ fn rug(draws: &mut Draws, build: &mut Build) {
 pub(super) fn outside(draws: &mut Draws, build: &mut Build, Window { x, .. }: Window) {
     let seed = pattern_seed(draws);
     let middle = 0.5 * (x[0] + x[1]);
-    let view = Painting { half: [9.0, 3.2], plane: Plane::Front, seed: landscape_from(seed) };
-    build.block([middle - 1.0, 13.0, 1.6], [9.0, 0.1, 5.0], 0.0, of(Material::Painting(view), 0.0));
+    let view = Painting { half: [9.0, 3.2], plane: Plane::Front, seed: day_from(seed) };
+    build.block([middle - 1.0, 13.0, 2.4], [9.0, 0.1, 5.0], 0.0, of(Material::Painting(view), 0.0));
     for _ in 0..6 {
         let size = draws.between(0.5, 1.1);
-        let at = [middle + draws.between(-3.0, 2.5), draws.between(7.0, 10.0), FLOOR + draws.between(0.6, 2.4)];
+        let at = [middle + draws.between(-3.0, 2.5), draws.between(7.0, 10.0), FLOOR + draws.between(0.4, 1.9)];
         let green = draws.one_of([rgb(96, 140, 62), rgb(130, 160, 78), rgb(70, 120, 70), rgb(150, 150, 70)]);
         let leaves = Stone {
             colours: [green * 0.5, green],
@@ -152,7 +152,7 @@ pub(super) fn outside(draws: &mut Draws, build: &mut Build, Window { x, .. }: Wi
     }
 }
 
-/// The next seed from here on whose painting is a landscape.
-fn landscape_from(seed: u32) -> u32 {
-    (seed..seed.saturating_add(64)).find(|&seed| Painting::is_landscape(seed)).unwrap_or(seed)
+/// The next seed from here on whose painting is a landscape by day.
+fn day_from(seed: u32) -> u32 {
+    (seed..seed.saturating_add(64)).find(|&seed| Painting::is_day(seed)).unwrap_or(seed)
 }
