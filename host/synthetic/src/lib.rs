@@ -30,6 +30,7 @@
 //! photograph   a camera's picture of it, and its depth       photograph, depth
 //! rig          how a person goes around with a camera        Rig
 //! room         a table with things on it in a room           room
+//! garden       the same table outdoors                        garden
 //! shoot        scenes by place, rig, seed and size           generate
 //! transforms   photographs and poses on disk, NeRF layout    write_shoot
 //! ```
@@ -43,6 +44,7 @@ pub mod bounds;
 pub mod cameras;
 pub mod collection;
 pub mod folder;
+pub mod garden;
 pub mod illumination;
 pub mod kinds;
 pub mod lamp;

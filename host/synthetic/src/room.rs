@@ -4,11 +4,11 @@
 //! room is closed: floor, ceiling and four walls. Everything is drawn for a seed: materials, colours, what stands on the
 //! table and where, what hangs on the walls.
 
-mod furniture;
+pub(crate) mod furniture;
 mod hangings;
-mod palette;
+pub(crate) mod palette;
 mod shell;
-mod things;
+pub(crate) mod things;
 mod vessels;
 
 use crate::kinds::build::Build;
@@ -80,16 +80,16 @@ fn lamps(draws: &mut Draws) -> Vec<Lamp> {
 }
 
 /// A material with a gloss, the pattern's origin at the part's.
-fn of(material: Material, gloss: f32) -> Finish {
+pub(crate) fn of(material: Material, gloss: f32) -> Finish {
     shifted(material, gloss, Vec3::ZERO)
 }
 
 /// A material whose pattern is moved: parts of one wall share one pattern.
-fn shifted(material: Material, gloss: f32, shift: Vec3) -> Finish {
+pub(crate) fn shifted(material: Material, gloss: f32, shift: Vec3) -> Finish {
     Finish { texture: Texture::Material { material, shift }, gloss }
 }
 
 /// A seed for a material.
-fn pattern_seed(draws: &mut Draws) -> u32 {
+pub(crate) fn pattern_seed(draws: &mut Draws) -> u32 {
     draws.below(1 << 22)
 }

@@ -1,5 +1,6 @@
 //! Scenes with backgrounds, named by a few words: a place, a rig, a seed and a size.
 
+use crate::garden;
 use crate::noise::words;
 use crate::photograph::{depth, photograph};
 use crate::rig::Rig;
@@ -16,11 +17,13 @@ use viewfuse_core::pose::PoseError;
 pub enum Place {
     /// A table with things on it in a furnished room.
     Room,
+    /// The table outdoors: a house, trees, hills and a sky.
+    Garden,
 }
 
 /// The name is none of a place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a place: room")]
+#[error("'{0}' is not a place: room or garden")]
 pub struct UnknownPlace(String);
 
 /// Why there are no photographs.
@@ -74,6 +77,7 @@ pub fn generate(place: Place, rig: Rig, seed: u64, size: [u32; 2], count: u32) -
         Pinhole::new([focal; 2], principal, width, height).map_err(|source| ShootError::Size { size, source })?;
     let (scenery, walk) = match place {
         Place::Room => (room::room(seed, 0)?, room::WALK),
+        Place::Garden => (garden::garden(seed, 0)?, room::WALK),
     };
     let cameras = rig.cameras(&walk, pinhole, count, seed)?;
     Ok(Shoot { scenery, cameras, seed: seed as u32 })
@@ -113,13 +117,14 @@ impl Shoot {
 
 impl Place {
     /// All places.
-    pub const ALL: [Place; 1] = [Place::Room];
+    pub const ALL: [Place; 2] = [Place::Room, Place::Garden];
 }
 
 impl fmt::Display for Place {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Place::Room => "room",
+            Place::Garden => "garden",
         })
     }
 }

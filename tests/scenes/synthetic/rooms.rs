@@ -152,6 +152,27 @@ fn every_rig_stays_in_the_room_and_sees_it() {
 }
 
 #[test]
+fn a_garden_has_all_depths_and_a_sky() {
+    for seed in 0..4 {
+        let garden = generate(Place::Garden, Rig::Arc, seed, [64, 48], 5).expect("a garden");
+        let depths: Vec<f32> = (0..5).flat_map(|view| garden.depth(view).expect("a view")).collect();
+        let sky = depths.iter().filter(|depth| depth.is_infinite()).count();
+        assert!(sky * 2 < depths.len(), "seed {seed}: {sky} of {} pixels are sky", depths.len());
+        for range in [0.5..4.0, 4.0..8.0, 8.0..20.0, 20.0..100.0_f32] {
+            let count = depths.iter().filter(|depth| range.contains(*depth)).count();
+            assert!(count > 20, "seed {seed}: {count} pixels at {range:?}");
+        }
+        for camera in garden.cameras() {
+            let free = garden.scenery().object().distance(camera.pose.centre_world(), 1.0);
+            assert!(free > 0.15, "seed {seed}: {free} from the nearest part");
+        }
+    }
+    for place in Place::ALL {
+        assert_eq!(place.to_string().parse::<Place>(), Ok(place));
+    }
+}
+
+#[test]
 fn photographs_belong_to_the_seed_and_not_to_the_threads() {
     let room = small(Rig::Handheld, 1, 2);
     let with_threads = |count| {

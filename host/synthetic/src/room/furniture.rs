@@ -26,7 +26,7 @@ pub(super) fn furniture(draws: &mut Draws, build: &mut Build) {
 }
 
 /// The top lies below `z = 0`; a cloth lies on it, thinner than a finger.
-fn table(draws: &mut Draws, build: &mut Build) {
+pub(crate) fn table(draws: &mut Draws, build: &mut Build) {
     let [half_x, half_y] = TABLE;
     let plank = draws.between(0.3, 0.42);
     let wood = palette::wood(draws, Plane::Top, false, plank, 5.0);

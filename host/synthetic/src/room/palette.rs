@@ -63,12 +63,12 @@ const PAINTS: [Vec3; 14] = [
 ];
 
 /// Any paint for small things.
-pub(super) fn paint(draws: &mut Draws) -> Vec3 {
+pub(crate) fn paint(draws: &mut Draws) -> Vec3 {
     draws.one_of(PAINTS)
 }
 
 /// A paint that stands out from another one.
-pub(super) fn other_paint(draws: &mut Draws, than: Vec3) -> Vec3 {
+pub(crate) fn other_paint(draws: &mut Draws, than: Vec3) -> Vec3 {
     let mut colour = paint(draws);
     for _ in 0..6 {
         if (colour - than).length() > 0.5 {
@@ -80,17 +80,17 @@ pub(super) fn other_paint(draws: &mut Draws, than: Vec3) -> Vec3 {
 }
 
 /// Four colours of a textile.
-pub(super) fn textile(draws: &mut Draws) -> [Vec3; 4] {
+pub(crate) fn textile(draws: &mut Draws) -> [Vec3; 4] {
     draws.one_of(TEXTILES)
 }
 
 /// Wood in planks of this width and length.
-pub(super) fn wood(draws: &mut Draws, plane: Plane, turned: bool, plank: f32, length: f32) -> Material {
+pub(crate) fn wood(draws: &mut Draws, plane: Plane, turned: bool, plank: f32, length: f32) -> Material {
     Material::Wood(Wood { colours: draws.one_of(WOODS), plane, turned, plank, length, seed: pattern_seed(draws) })
 }
 
 /// The same wood in another plane, for furniture of one wood; other materials stay.
-pub(super) fn same_wood(material: Material, plane: Plane, turned: bool) -> Material {
+pub(crate) fn same_wood(material: Material, plane: Plane, turned: bool) -> Material {
     match material {
         Material::Wood(wood) => Material::Wood(Wood { plane, turned, seed: wood.seed.wrapping_add(1), ..wood }),
         other => other,
@@ -98,7 +98,7 @@ pub(super) fn same_wood(material: Material, plane: Plane, turned: bool) -> Mater
 }
 
 /// What walls are covered with: mostly wallpaper, also bricks, boards and plaster.
-pub(super) fn wall(draws: &mut Draws, plane: Plane) -> Material {
+pub(crate) fn wall(draws: &mut Draws, plane: Plane) -> Material {
     match draws.below(8) {
         0..4 => {
             let [ground, first, second, third] = draws.one_of(PAPERS);
@@ -122,7 +122,7 @@ pub(super) fn wall(draws: &mut Draws, plane: Plane) -> Material {
 }
 
 /// Bricks.
-pub(super) fn brick(draws: &mut Draws, plane: Plane) -> Material {
+pub(crate) fn brick(draws: &mut Draws, plane: Plane) -> Material {
     let [light, dark, mortar] = draws.one_of(BRICKS);
     let size = [draws.between(0.56, 0.72), draws.between(0.2, 0.26)];
     let seed = pattern_seed(draws);
@@ -130,7 +130,7 @@ pub(super) fn brick(draws: &mut Draws, plane: Plane) -> Material {
 }
 
 /// What floors are made of: planks, tiles or flags.
-pub(super) fn floor(draws: &mut Draws) -> Material {
+pub(crate) fn floor(draws: &mut Draws) -> Material {
     if draws.chance(0.65) {
         let turned = draws.chance(0.5);
         let plank = draws.between(0.32, 0.5);
@@ -152,7 +152,7 @@ pub(super) fn floor(draws: &mut Draws) -> Material {
 }
 
 /// Checked or striped cloth.
-pub(super) fn cloth(draws: &mut Draws, plane: Plane, repeat: f32, thread: f32) -> Material {
+pub(crate) fn cloth(draws: &mut Draws, plane: Plane, repeat: f32, thread: f32) -> Material {
     let [a, b, c, d] = textile(draws);
     let colours = if draws.chance(0.5) { [d, a, b] } else { [a, c, d] };
     let striped = draws.chance(0.4);

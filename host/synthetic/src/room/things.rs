@@ -43,7 +43,7 @@ enum Thing {
 ///
 /// # Errors
 /// [`ObjectError`] of the kinds of objects; none for the kinds as they are.
-pub(super) fn things(draws: &mut Draws, build: &mut Build) -> Result<(), ObjectError> {
+pub(crate) fn things(draws: &mut Draws, build: &mut Build) -> Result<(), ObjectError> {
     let mut tall = [Thing::Vase, Thing::Blocks, Thing::Books, Thing::Chair];
     let mut low = [Thing::Car, Thing::Ball, Thing::Mug, Thing::Fruit];
     shuffle(draws, &mut tall);
