@@ -12,8 +12,7 @@
 //! material    patterns of wood, brick, cloth, print          Material
 //! texture     colour as a function of the point              Texture, Finish
 //! light       lamps                                          Light
-//! part        a primitive, placed and painted                Part
-//! bounds      boxes around parts: which ones a ray may meet  Bounds
+//! part        a primitive, placed and painted; boxes around  Part, Bounds
 //! object      parts together                                 Object
 //! trace       first point of an object on a ray              trace, is_blocked
 //! shade       light on that point                            shade
@@ -40,7 +39,6 @@
 //! for any number of threads.
 #![forbid(unsafe_code)]
 
-pub mod bounds;
 pub mod cameras;
 pub mod collection;
 pub mod folder;

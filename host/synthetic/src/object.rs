@@ -1,8 +1,7 @@
 //! Objects: primitives, placed and painted. Their union is the minimum of their distances.
 
-use crate::bounds::Bounds;
 use crate::light::Light;
-use crate::part::Part;
+use crate::part::{Bounds, Part};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{max, min};
 

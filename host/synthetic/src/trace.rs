@@ -4,9 +4,8 @@
 //! coordinates and only inside its bounding ball. That takes fewer steps than tracing the minimum of the distances:
 //! a ray that passes close to one part on its way to another is not slowed down.
 
-use crate::bounds::Probe;
 use crate::object::Object;
-use crate::part::Part;
+use crate::part::{Part, Probe};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Ray;
 use viewfuse_core::math::{abs, max, min, sqrt};

@@ -50,7 +50,7 @@ impl Painting {
 
     /// Whether it is a landscape by day, with a blue sky.
     pub fn is_day(seed: u32) -> bool {
-        Painting::is_landscape(seed) && Painting::palette(seed) % 2 == 0
+        Painting::is_landscape(seed) && Painting::palette(seed).is_multiple_of(2)
     }
 
     fn palette(seed: u32) -> usize {
