@@ -1,7 +1,7 @@
 //! Parts: primitives, placed and painted; and boxes around them, which say what a ray may meet.
 //!
-//! Every part has a box with world axes, and so has every run of [`CLUSTER_SIZE`] parts in the list: where neighbours in the
-//! list are neighbours in the world, a ray passes by most parts eight at a time. The boxes are a little larger than the
+//! Every part has a box with world axes, and so has every run of eight parts in the list: where neighbours in the
+//! list are neighbours in the world, a ray passes by eight at a time. The boxes are a little larger than the
 //! parts, so that which parts are met never depends on rounding here.
 
 use crate::placement::Placement;

@@ -1,7 +1,7 @@
 //! Scenes with backgrounds, named by a few words: a place, a rig, a seed and a size.
 
 use crate::garden;
-use crate::noise::words;
+use crate::noise::{fractions, words};
 use crate::photograph::{depth, photograph};
 use crate::rig::Rig;
 use crate::room;
@@ -10,6 +10,7 @@ use image::RgbImage;
 use std::fmt;
 use std::str::FromStr;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
+use viewfuse_core::math::clamp;
 use viewfuse_core::pose::PoseError;
 
 /// What is around the cameras.
@@ -62,6 +63,8 @@ const SAMPLE_VIEW_COUNT: u32 = 11;
 pub struct Shoot {
     scenery: Scenery,
     cameras: Vec<Camera>,
+    /// A factor on the light of each view.
+    exposures: Vec<f32>,
     seed: u32,
 }
 
@@ -80,7 +83,8 @@ pub fn generate(place: Place, rig: Rig, seed: u64, size: [u32; 2], count: u32) -
         Place::Garden => (garden::garden(seed, 0)?, room::WALK),
     };
     let cameras = rig.cameras(&walk, pinhole, count, seed)?;
-    Ok(Shoot { scenery, cameras, seed: seed as u32 })
+    let exposures = vec![1.0; cameras.len()];
+    Ok(Shoot { scenery, cameras, exposures, seed: seed as u32 })
 }
 
 /// The repository's sample of a room, as `tests/data/room` has it: 11 views of 320 x 240 pixels on an arc.
@@ -102,11 +106,26 @@ impl Shoot {
         &self.cameras
     }
 
+    /// The factor on the light of each view: 1 unless [`Shoot::with_exposures`] said otherwise.
+    pub fn exposures(&self) -> &[f32] {
+        &self.exposures
+    }
+
+    /// The same with a camera that sets its own exposure: each view gets a factor between `1 - spread` and `1 + spread` on its
+    /// light, drawn for the seed. A spread outside of 0 to 0.9 is taken as the nearer of the two.
+    #[must_use]
+    pub fn with_exposures(self, spread: f32) -> Shoot {
+        let spread = clamp(spread, 0.0, 0.9);
+        let exposure = |view: usize| 1.0 + spread * (2.0 * fractions(self.seed, [view as i32, 1, 0])[0] - 1.0);
+        Shoot { exposures: (0..self.cameras.len()).map(exposure).collect(), ..self }
+    }
+
     /// The photograph of a view; `None` if there is no such view. Noise in the shadows differs from view to view.
     pub fn photograph(&self, view: usize, rays_per_side: u32) -> Option<RgbImage> {
         let camera = self.cameras.get(view)?;
         let [seed, ..] = words(self.seed, [view as i32, 0, 0]);
-        Some(photograph(&self.scenery, camera, rays_per_side, 1.0, seed))
+        let exposure = *self.exposures.get(view)?;
+        Some(photograph(&self.scenery, camera, rays_per_side, exposure, seed))
     }
 
     /// The exact depth of a view's pixels, as [`depth`] has it; `None` if there is no such view.

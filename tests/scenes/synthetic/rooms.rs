@@ -187,6 +187,30 @@ fn photographs_belong_to_the_seed_and_not_to_the_threads() {
 }
 
 #[test]
+fn exposures_are_factors_on_the_light() {
+    let plain = small(Rig::Arc, 4, 5);
+    assert_eq!(plain.exposures(), [1.0; 5]);
+    let shoot = plain.clone().with_exposures(0.4);
+    assert!(shoot.exposures().iter().all(|exposure| (0.6..=1.4).contains(exposure)), "{:?}", shoot.exposures());
+    let mean = |shoot: &Shoot, view: usize| {
+        let picture = shoot.photograph(view, 1).expect("a view");
+        // Dark values: bright ones are pressed together. Display values are square roots.
+        let (mut sum, mut count) = (0.0, 0);
+        for (pixel, dark) in picture.pixels().zip(plain.photograph(view, 1).expect("a view").pixels()) {
+            if (40..110).contains(&dark[1]) {
+                sum += (f32::from(pixel[1]) / f32::from(dark[1])).powi(2);
+                count += 1;
+            }
+        }
+        sum / count as f32
+    };
+    for view in 0..5 {
+        let (factor, expected) = (mean(&shoot, view), shoot.exposures()[view]);
+        assert!((factor - expected).abs() < 0.03, "view {view}: {factor} instead of {expected}");
+    }
+}
+
+#[test]
 fn a_written_room_opens_as_it_was() {
     let directory = tempfile::tempdir().expect("a folder");
     let folder = directory.path().join("scene");
