@@ -111,8 +111,8 @@ impl Published {
         let here = scenes.iter().filter(|name| benchmark.has_scene(name)).count();
         let metric = if benchmark.is_masked() { "PSNR masked" } else { "PSNR" };
         let of = format!(
-            "{}, {sources} sources, {width}x{height}, {metric}: means over the benchmark's {} scenes ({}), of which {here} \
-             of the {} here",
+            "{}, {sources} sources, {width}x{height}, {metric}: means over the benchmark's {} scenes ({}), {here} of the {} \
+             here among them",
             benchmark.title(),
             benchmark.scenes().len(),
             benchmark.scenes().join(", "),
@@ -137,7 +137,7 @@ mod tests {
         assert!(same.figures.len() == 14 && same.withheld.is_none(), "{same:?}");
         assert!(same.figures.is_sorted_by(|a, b| a.psnr <= b.psnr));
         assert!(same.of.starts_with("LLFF, 3 sources, 504x378, PSNR: means over the benchmark's 8 scenes (fern, "));
-        assert!(same.of.ends_with("of which 1 of the 2 here"), "{}", same.of);
+        assert!(same.of.ends_with(", 1 of the 2 here among them"), "{}", same.of);
         assert_eq!(published("llff:6", [504, 378], false).map(|own| own.figures.len()), Some(4));
         let small = published("llff:3", [252, 189], false).expect("withheld");
         assert_eq!(
