@@ -19,8 +19,8 @@ pub mod rig;
 mod scene;
 
 pub use scene::{
-    IntrinsicsFault, LARGEST_SIDE, Photograph, Place, READERS, Scene, SceneError, SceneFrame, ScenePoint, Split, View,
-    looked_for, reader,
+    IntrinsicsFault, LARGEST_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame, ScenePoint,
+    Split, View, looked_for, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -13,14 +13,21 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::lens::Lens;
 
+mod bytes;
+mod camera_models;
 mod check;
+mod colmap;
 mod error;
 mod fault;
 mod files;
 mod images;
 mod json;
+mod llff;
 mod masks;
 mod middlebury;
+mod missing;
+mod neus;
+mod numpy;
 pub mod reader;
 mod split;
 mod srn;
@@ -29,12 +36,13 @@ mod undistort;
 
 use check::Checked;
 pub use error::SceneError;
-pub use fault::{IntrinsicsFault, Place};
+pub use fault::{IntrinsicsFault, NumpyFault, Place};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
 /// The readers of all layouts, in the order in which they are asked: a path is taken for the first that fits.
-pub const READERS: [&dyn Reader; 3] = [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn];
+pub const READERS: [&dyn Reader; 6] =
+    [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn, &neus::Neus, &llff::Llff, &colmap::Colmap];
 
 /// What readers look for, for help texts and messages.
 pub fn looked_for(readers: &[&dyn Reader]) -> String {
@@ -160,6 +168,7 @@ impl Scene {
             let Some(found) = reader.recognise(path)? else { continue };
             let mut checked = check::scene(&found, reader.form(), reader.read(&found)?)?;
             distinguish(&mut checked.views);
+            checked.warnings.extend(masks::find(path, &mut checked.views));
             let mut names = HashSet::new();
             for view in &checked.views {
                 if !names.insert(view.name.as_str()) {

@@ -5,10 +5,11 @@
 use std::path::PathBuf;
 
 use thiserror::Error;
+use viewfuse_core::lens::LensError;
 use viewfuse_core::pose::PoseError;
 
 use super::LARGEST_SIDE;
-use super::fault::{IntrinsicsFault, Place};
+use super::fault::{IntrinsicsFault, NumpyFault, Place};
 
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
@@ -62,6 +63,16 @@ pub enum SceneError {
         place: Place,
         /// The photograph that was looked for (where the name has no extension: with any of those that we read).
         image: PathBuf,
+    },
+    /// A mask that is named and missing.
+    #[error("{path}{place}: there is no mask {mask}")]
+    NoMask {
+        /// The file that names it.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// The mask that was looked for.
+        mask: PathBuf,
     },
     /// A photograph whose pose is missing.
     #[error("{path}: this photograph has no pose: there is no {pose}")]
@@ -141,9 +152,9 @@ pub enum SceneError {
         /// What is wrong with them.
         fault: IntrinsicsFault,
     },
-    /// The photograph was taken through a lens that is not a pinhole.
+    /// The photograph was taken through a lens that is not supported.
     #[error(
-        "{path}: {key} is {value}: lens distortion is not supported; undistort the photographs first, for example \
+        "{path}: {key} is {value}: this lens is not supported; undistort the photographs first, for example \
          with COLMAP's image_undistorter, and use the cameras that it writes"
     )]
     Distorted {
@@ -217,6 +228,124 @@ pub enum SceneError {
         declared_width: u32,
         /// Height that the cameras are for.
         declared_height: u32,
+    },
+    /// A binary file ends too early.
+    #[error("{path}: ends after {length} bytes, inside {of}")]
+    Truncated {
+        /// The file.
+        path: PathBuf,
+        /// Its length in bytes.
+        length: usize,
+        /// What is cut off.
+        of: &'static str,
+    },
+    /// A binary file goes on behind its end.
+    #[error("{path}{place}: {left} bytes are left over")]
+    LeftOver {
+        /// The file.
+        path: PathBuf,
+        /// Where they begin.
+        place: Place,
+        /// How many.
+        left: usize,
+    },
+    /// A binary file announces more than it holds.
+    #[error("{path}{place}: announces {count} {of}; the file has room for {most}")]
+    NoRoom {
+        /// The file.
+        path: PathBuf,
+        /// Where the count stands.
+        place: Place,
+        /// What is counted.
+        of: &'static str,
+        /// How many it says there are.
+        count: u64,
+        /// How many there can be.
+        most: usize,
+    },
+    /// A text in a binary file is none.
+    #[error("{path}{place}: {of} is not UTF-8 text")]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// Where it begins.
+        place: Place,
+        /// What it should be.
+        of: &'static str,
+    },
+    /// A number that must be whole and not negative is not.
+    #[error("{path}{place}: {word:?} is not a whole number")]
+    NotWhole {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// The word.
+        word: String,
+    },
+    /// A camera model that is not read.
+    #[error("{path}{place}: camera model {model} is not supported; the models are {supported}")]
+    CameraModel {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// Its name or number.
+        model: String,
+        /// The names of those that are.
+        supported: String,
+    },
+    /// Two entries of a list have one number.
+    #[error("{path}{place}: there are two {of} with the number {id}")]
+    DuplicateId {
+        /// The file.
+        path: PathBuf,
+        /// Where the second one stands.
+        place: Place,
+        /// What they are.
+        of: &'static str,
+        /// The number.
+        id: u64,
+    },
+    /// A reference to an entry that is not there.
+    #[error("{path}{place}: there is no {of} with the number {id}")]
+    NoSuchId {
+        /// The file.
+        path: PathBuf,
+        /// Where the reference stands.
+        place: Place,
+        /// What is referred to.
+        of: &'static str,
+        /// The number.
+        id: u64,
+    },
+    /// The numbers are not a lens.
+    #[error("{path}{place}: {reason}")]
+    Lens {
+        /// The file.
+        path: PathBuf,
+        /// Where in it.
+        place: Place,
+        /// What core's check says.
+        reason: LensError,
+    },
+    /// Not an array as NumPy writes them.
+    #[error("{path}{entry}: not a readable NumPy array: {fault}")]
+    Numpy {
+        /// The file.
+        path: PathBuf,
+        /// `: name` of an array in an archive; empty for a file of one array.
+        entry: String,
+        /// What is wrong.
+        fault: NumpyFault,
+    },
+    /// Not a zip archive.
+    #[error("{path}: not a readable zip archive: {cause}")]
+    Zip {
+        /// The file.
+        path: PathBuf,
+        /// What the reader says.
+        cause: zip::result::ZipError,
     },
     /// A photograph that must be turned to be upright, and cameras that do not say whether they are of it or of the stored one.
     #[error(

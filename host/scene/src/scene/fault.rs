@@ -1,4 +1,4 @@
-//! Parts of [`super::SceneError`]: the place in a file, and what makes intrinsics unusable.
+//! Parts of [`super::SceneError`]: the place in a file, and what makes intrinsics or an array unusable.
 
 use std::fmt;
 
@@ -12,6 +12,8 @@ pub enum Place {
     File,
     /// A line, counted from 1.
     Line(usize),
+    /// A byte of a binary file, counted from 0.
+    Byte(usize),
     /// A key of a JSON file, such as `frames[3].fl_x`; arrays count from 0.
     Key(String),
 }
@@ -22,6 +24,7 @@ impl fmt::Display for Place {
         match self {
             Place::File => Ok(()),
             Place::Line(line) => write!(f, ":{line}"),
+            Place::Byte(at) => write!(f, ": byte {at}"),
             Place::Key(key) => write!(f, ": {key}"),
         }
     }
@@ -66,6 +69,9 @@ pub enum IntrinsicsFault {
         /// Element (0, 1) of the matrix.
         skew: f64,
     },
+    /// A projection of 3 x 4 numbers that is singular.
+    #[error("the projection is singular: it has no centre")]
+    Projection,
     /// The matrix is not upper triangular with a last row of `0 0 1`.
     #[error("K does not have the form fx 0 cx / 0 fy cy / 0 0 1")]
     Form,
@@ -80,4 +86,38 @@ impl IntrinsicsFault {
             PinholeError::Size => IntrinsicsFault::Size { width: size[0].into(), height: size[1].into() },
         }
     }
+}
+
+/// Why bytes are not an array of NumPy's.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum NumpyFault {
+    /// They do not begin as such a file does.
+    #[error("it does not begin with \\x93NUMPY")]
+    Magic,
+    /// A version that did not exist when this was written.
+    #[error("its format has version {0}; 1 to 3 are read")]
+    Version(u8),
+    /// The header or the numbers are cut off.
+    #[error("it ends too early for what its header says")]
+    Truncated,
+    /// A key of the header is missing or wrong.
+    #[error("its header is damaged at {0}")]
+    Header(&'static str),
+    /// Not floating point numbers.
+    #[error("it holds elements of type {0:?}; <f4 and <f8 are read")]
+    Kind(String),
+    /// NaN or an infinity.
+    #[error("element {index} is {value}")]
+    NotFinite {
+        /// Its index in the order of the file, from 0.
+        index: usize,
+        /// The number.
+        value: f64,
+    },
+    /// An array of an archive that is too large for cameras.
+    #[error("it is larger than 16 MiB")]
+    TooLarge,
+    /// Two arrays of one name.
+    #[error("the archive holds it twice")]
+    Twice,
 }

@@ -9,7 +9,11 @@ use super::error::SceneError;
 use super::fault::Place;
 
 /// Extensions of photographs, compared without regard to case.
-pub(super) const IMAGE_EXTENSIONS: [&str; 3] = ["png", "jpg", "jpeg"];
+pub(super) const IMAGE_EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "JPG", "JPEG", "PNG"];
+
+/// Folders that photographs stand in, in the order in which they are looked for: the largest first.
+pub(super) const IMAGE_FOLDERS: [&str; 8] =
+    ["images", "images_1", "images_2", "images_4", "images_8", "input", "image", "rgb"];
 
 /// Longest part of a wrong word that an error repeats: a binary file's first "word" may be the whole file.
 const LONGEST_EXCERPT: usize = 40;
@@ -53,6 +57,33 @@ pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf
     }
     paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
     Ok(paths)
+}
+
+/// `images` and, by rising N, `images_N`, as far as they are there: photographs at full size and N times smaller.
+pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
+    let failed = |cause| unreadable(root, cause);
+    let mut folders: Vec<(u64, PathBuf)> = Vec::new();
+    // Of a relative path that is a lone file name the folder is the current one.
+    let here = if root.as_os_str().is_empty() { Path::new(".") } else { root };
+    for entry in std::fs::read_dir(here).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let factor = match name.strip_prefix("images") {
+            Some("") => Some(1),
+            Some(rest) => rest.strip_prefix('_').and_then(|factor| factor.parse().ok()),
+            None => None,
+        };
+        if let Some(factor) = factor.filter(|_| path.is_dir()) {
+            folders.push((factor, path));
+        }
+    }
+    folders.sort();
+    Ok(folders.into_iter().map(|(_, path)| path).collect())
+}
+
+/// The number that a name ends in.
+pub(super) fn trailing_number(name: &str) -> Option<u64> {
+    name[name.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
 }
 
 /// Whether the file's name ends in one of these extensions, in either case.

@@ -3,15 +3,62 @@
 //! A mask is 0 where the photograph does not count and greatest where it does: white objects before black in NeuS's data,
 //! black what is to be ignored in COLMAP's and nerfstudio's. Values between are fractions of a pixel. It has the photograph's size,
 //! or another of the same shape.
+//!
+//! A layout may name masks itself. Otherwise they are looked for in a folder `mask` or `masks` in the scene, beside the
+//! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
+//! (nerfstudio), or one of another extension.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use image::imageops::{FilterType, resize};
 
 use super::Photograph;
+use super::View;
 use super::check::same_shape;
 use super::error::SceneError;
+use super::files::IMAGE_EXTENSIONS;
 use super::images;
+
+/// Folders of masks.
+const FOLDERS: [&str; 2] = ["mask", "masks"];
+
+/// Gives views without a mask the one that stands in a folder beside; `root` is the scene's folder or a file in it. The
+/// warning counts photographs without a mask where others have one.
+pub(super) fn find(root: &Path, views: &mut [View]) -> Option<String> {
+    let root = if root.is_dir() { root } else { root.parent()? };
+    // Two photographs of one name in two folders may not share a mask.
+    let mut taken: std::collections::HashSet<PathBuf> = views.iter().filter_map(|view| view.mask.clone()).collect();
+    for view in views.iter_mut().filter(|view| view.mask.is_none()) {
+        let mask = view.image.as_deref().and_then(|image| beside(root, image));
+        view.mask = mask.filter(|mask| taken.insert(mask.clone()));
+    }
+    let photographs = || views.iter().filter(|view| view.image.is_some());
+    let without = photographs().filter(|view| view.mask.is_none()).count();
+    let all = photographs().count();
+    let some = without > 0 && without < all;
+    some.then(|| format!("{}: {without} of {all} photographs have no mask", root.display()))
+}
+
+/// The mask of a photograph, if there is one.
+fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
+    for folder in image.ancestors().skip(1).take_while(|folder| folder.starts_with(root)) {
+        let inside = image.strip_prefix(folder).ok()?;
+        // `images/left/1.jpg` is `left/1.jpg` in `masks`; `1.jpg` beside `masks` is `1.jpg`.
+        let without_first: PathBuf = inside.components().skip(1).collect();
+        let names = [without_first.as_path(), inside];
+        for name in names.into_iter().filter(|name| !name.as_os_str().is_empty()) {
+            for masks in FOLDERS.map(|masks| folder.join(masks)).into_iter().filter(|masks| masks.is_dir()) {
+                let appended = |extension: &&str| PathBuf::from(format!("{}.{extension}", masks.join(name).display()));
+                let replaced = |extension: &&str| masks.join(name).with_extension(extension);
+                let mut candidates = IMAGE_EXTENSIONS.iter().map(appended).chain(IMAGE_EXTENSIONS.iter().map(replaced));
+                if let Some(mask) = candidates.find(|mask| mask.is_file()) {
+                    return Some(mask);
+                }
+            }
+        }
+    }
+    None
+}
 
 /// Multiplies the photograph's alpha channel by the mask.
 ///

@@ -1,0 +1,274 @@
+//! COLMAP's sparse models, binary and text: `cameras`, `images` and, if there, `points3D`.
+//!
+//! A model is looked for in `sparse/0`, `sparse`, `dense/0/sparse`, `dense/sparse`, `colmap/sparse/0` and in the folder itself,
+//! which may stand beside the photographs or hold them. Photographs are looked for from the model's folder upwards, in `images`,
+//! `images_2`, `images_4`, `images_8`, `input`, `image`, `rgb` and in the folder itself; the first folder that has any of them
+//! is taken. They may be smaller than the model says, by one scale: intrinsics scale with them. Photographs that are missing are
+//! left out, with one warning that counts them. Views are in natural order of the names.
+//!
+//! Image coordinates are as ours, with pixel centres at halves. Poses are world-to-camera in OpenCV axes.
+
+mod binary;
+mod text;
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::DQuat;
+
+use super::camera_models::{CameraModel, Parameters, camera_model_names};
+use super::check;
+use super::error::SceneError;
+use super::fault::Place;
+use super::files;
+use super::missing::Missing;
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
+
+/// Where models are, in the order in which they are looked for.
+const MODEL_FOLDERS: [&str; 6] = ["sparse/0", "sparse", "dense/0/sparse", "dense/sparse", "colmap/sparse/0", ""];
+/// How far above the model photographs are looked for.
+const HIGHEST: usize = 4;
+/// Norms of quaternions that rounding in a text file explains.
+const UNIT_NORMS: std::ops::RangeInclusive<f64> = 0.99..=1.01;
+
+/// COLMAP: `sparse/0/cameras.bin` or `.txt`, `images/`.
+pub(super) struct Colmap;
+
+/// A camera of a model.
+#[derive(Clone, Debug)]
+struct ModelCamera {
+    size: [u32; 2],
+    parameters: Parameters,
+    place: Place,
+}
+
+/// An image of a model.
+#[derive(Clone, Debug)]
+struct ModelImage {
+    id: u32,
+    /// `w x y z` of the rotation from world to camera.
+    rotation: [f64; 4],
+    translation: [f64; 3],
+    camera: u32,
+    /// Relative to the folder of photographs.
+    name: String,
+    place: Place,
+}
+
+/// A point of a model; its views are numbers of images.
+#[derive(Clone, Debug)]
+struct ModelPoint {
+    position: [f64; 3],
+    colour: [u8; 3],
+    error: f64,
+    images: Vec<u32>,
+}
+
+/// The two forms of a model's files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Binary,
+    Text,
+}
+
+impl Form {
+    fn file(self, folder: &Path, stem: &str) -> PathBuf {
+        folder.join(match self {
+            Form::Binary => format!("{stem}.bin"),
+            Form::Text => format!("{stem}.txt"),
+        })
+    }
+
+    /// The form of the model in a folder, the binary one where both are there.
+    fn of(folder: &Path) -> Option<Form> {
+        let is_there = |form: &Form| ["cameras", "images"].iter().all(|stem| form.file(folder, stem).is_file());
+        [Form::Binary, Form::Text].into_iter().find(is_there)
+    }
+}
+
+impl Reader for Colmap {
+    fn name(&self) -> &'static str {
+        "colmap"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with sparse/0/cameras.bin and images.bin, or .txt (COLMAP)"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        Ok(MODEL_FOLDERS.iter().map(|name| path.join(name)).find(|folder| Form::of(folder).is_some()))
+    }
+
+    fn read(&self, folder: &Path) -> Result<RawScene, SceneError> {
+        let Some(form) = Form::of(folder) else {
+            return Err(SceneError::Missing { path: Form::Binary.file(folder, "cameras") });
+        };
+        let [cameras_path, images_path, points_path] =
+            ["cameras", "images", "points3D"].map(|stem| form.file(folder, stem));
+        let (cameras, images) = match form {
+            Form::Binary => (binary::cameras(&cameras_path)?, binary::images(&images_path)?),
+            Form::Text => (text::cameras(&cameras_path)?, text::images(&images_path)?),
+        };
+        let points = match form {
+            _ if !points_path.is_file() => Vec::new(),
+            Form::Binary => binary::points(&points_path)?,
+            Form::Text => text::points(&points_path)?,
+        };
+        assemble(folder, [&cameras_path, &images_path], &by_id(&cameras_path, cameras)?, images, points)
+    }
+}
+
+/// Cameras by their numbers, which must differ.
+fn by_id(path: &Path, cameras: Vec<(u32, ModelCamera)>) -> Result<HashMap<u32, ModelCamera>, SceneError> {
+    let mut all = HashMap::new();
+    for (id, camera) in cameras {
+        let place = camera.place.clone();
+        if all.insert(id, camera).is_some() {
+            let path = path.to_path_buf();
+            return Err(SceneError::DuplicateId { path, place, of: "cameras", id: id.into() });
+        }
+    }
+    Ok(all)
+}
+
+fn assemble(
+    folder: &Path,
+    [cameras_path, images_path]: [&Path; 2],
+    cameras: &HashMap<u32, ModelCamera>,
+    mut images: Vec<ModelImage>,
+    points: Vec<ModelPoint>,
+) -> Result<RawScene, SceneError> {
+    if images.is_empty() {
+        return Err(SceneError::NoViews { path: images_path.to_path_buf(), looked_for: "images of a COLMAP model" });
+    }
+    images.sort_by(|a, b| files::natural_order(&a.name, &b.name));
+    let photographs = photograph_folder(folder, &images);
+    let mut missing = Missing::default();
+    let mut views: Vec<RawView> = Vec::new();
+    let mut view_of: HashMap<u32, u32> = HashMap::new();
+    for image in &images {
+        let Some(camera) = cameras.get(&image.camera) else {
+            let (path, place) = (images_path.to_path_buf(), image.place.clone());
+            return Err(SceneError::NoSuchId { path, place, of: "camera", id: image.camera.into() });
+        };
+        let Some(photograph) = present(&photographs, &image.name) else {
+            missing.missed(image.place.clone(), photographs.join(&image.name));
+            continue;
+        };
+        missing.found();
+        let intrinsics = RawIntrinsics {
+            focal: camera.parameters.focal,
+            principal: camera.parameters.principal,
+            size: Some(camera.size),
+            lens: camera.parameters.lens,
+            path: cameras_path.to_path_buf(),
+            place: camera.place.clone(),
+            size_place: camera.place.clone(),
+        };
+        let pose = RawPose {
+            matrix: camera_from_world(image),
+            form: PoseForm::OpenCvFromWorld,
+            path: images_path.to_path_buf(),
+            place: image.place.clone(),
+        };
+        if view_of.insert(image.id, views.len() as u32).is_some() {
+            let (path, place) = (images_path.to_path_buf(), image.place.clone());
+            return Err(SceneError::DuplicateId { path, place, of: "images", id: image.id.into() });
+        }
+        let name = files::stem(&photograph);
+        views.push(RawView::new(name, Some(ImageFile::open(&photograph)?), pose, Some(intrinsics)));
+    }
+    let point = |point: ModelPoint| RawPoint {
+        position: point.position,
+        error: point.error,
+        colour: point.colour,
+        views: point.images.iter().filter_map(|image| view_of.get(image).copied()).collect(),
+    };
+    let points = points.into_iter().map(point).collect();
+    Ok(RawScene { views, points, warnings: missing.warning(images_path)?.into_iter().collect() })
+}
+
+/// The folder that has the photographs: the first, from the model's upwards, that has any of them.
+fn photograph_folder(model: &Path, images: &[ModelImage]) -> PathBuf {
+    let above = |levels: usize| model.ancestors().nth(levels).map(Path::to_path_buf);
+    for level in (0..=HIGHEST).filter_map(above) {
+        for folder in files::IMAGE_FOLDERS.iter().map(|name| level.join(name)).chain([level.clone()]) {
+            if folder.is_dir() && images.iter().any(|image| present(&folder, &image.name).is_some()) {
+                return folder;
+            }
+        }
+    }
+    // Where people look first, for the message.
+    let root = model.ancestors().find(|folder| folder.join("images").is_dir());
+    root.unwrap_or(model).join("images")
+}
+
+/// The photograph of a name, whose extension may have changed when it was made smaller.
+fn present(folder: &Path, name: &str) -> Option<PathBuf> {
+    let path: PathBuf = folder.join(name).components().collect();
+    if path.is_file() {
+        return Some(path);
+    }
+    files::IMAGE_EXTENSIONS.iter().map(|extension| path.with_extension(extension)).find(|path| path.is_file())
+}
+
+/// `[R | t]` of an image. A quaternion that is not of length 1, but for rounding, gives a matrix that is not rigid.
+fn camera_from_world(image: &ModelImage) -> [f64; 16] {
+    let [w, x, y, z] = image.rotation;
+    let [a, b, c] = image.translation;
+    let given = DQuat::from_xyzw(x, y, z, w);
+    let norm = given.length();
+    let unit = if UNIT_NORMS.contains(&norm) { given.normalize() } else { given };
+    let (w, x, y, z) = (unit.w, unit.x, unit.y, unit.z);
+    [
+        w * w + x * x - y * y - z * z,
+        2.0 * (x * y - w * z),
+        2.0 * (x * z + w * y),
+        a,
+        2.0 * (x * y + w * z),
+        w * w - x * x + y * y - z * z,
+        2.0 * (y * z - w * x),
+        b,
+        2.0 * (x * z - w * y),
+        2.0 * (y * z + w * x),
+        w * w - x * x - y * y + z * z,
+        c,
+        0.0,
+        0.0,
+        0.0,
+        1.0,
+    ]
+}
+
+/// A camera from its model's name or number, its size and its parameters.
+fn camera(
+    path: &Path,
+    place: Place,
+    model: Result<CameraModel, String>,
+    size: [f64; 2],
+    parameters: &[f64],
+) -> Result<ModelCamera, SceneError> {
+    let model = known(path, &place, model)?;
+    let expected = model.parameter_count();
+    if parameters.len() != expected {
+        let (path, found) = (path.to_path_buf(), parameters.len());
+        return Err(SceneError::WrongCount { path, place, of: "parameters of the camera model", expected, found });
+    }
+    let size = check::size(path, place.clone(), size[0], size[1])?;
+    let parameters = model.interpret(parameters).map_err(|reason| SceneError::Lens {
+        path: path.to_path_buf(),
+        place: place.clone(),
+        reason,
+    })?;
+    Ok(ModelCamera { size, parameters, place })
+}
+
+/// The model, if it is one that is read.
+fn known(path: &Path, place: &Place, model: Result<CameraModel, String>) -> Result<CameraModel, SceneError> {
+    model.map_err(|model| SceneError::CameraModel {
+        path: path.to_path_buf(),
+        place: place.clone(),
+        model,
+        supported: camera_model_names(),
+    })
+}

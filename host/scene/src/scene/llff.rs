@@ -1,0 +1,105 @@
+//! The layout of Local Light Field Fusion (Mildenhall et al. 2019): `poses_bounds.npy` beside the photographs.
+//!
+//! A row for each photograph, in the order of the photographs' names: 15 numbers are a 3x5 matrix, row-major, whose first
+//! three columns are the camera's axes in the world (down, right, backwards), whose fourth is its centre and whose fifth holds
+//! height, width and focal length of the full photograph in pixels; two numbers are the nearest and the furthest depth of
+//! what the photograph shows. The principal point is the centre of the photograph.
+//!
+//! Photographs are those of `images`, or without it of `images_2`, `images_4`, `images_8` and so on: of the folders with as
+//! many photographs as there are rows, the one with the largest photographs. Intrinsics scale with them.
+
+use std::path::{Path, PathBuf};
+
+use super::check;
+use super::error::SceneError;
+use super::fault::Place;
+use super::files::{self, IMAGE_EXTENSIONS};
+use super::numpy;
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
+
+/// Name of the file.
+const FILE_NAME: &str = "poses_bounds.npy";
+
+/// Numbers in a row.
+const ROW: usize = 17;
+
+/// LLFF: `poses_bounds.npy` beside `images`, `images_4`, `images_8`.
+pub(super) struct Llff;
+
+impl Reader for Llff {
+    fn name(&self) -> &'static str {
+        "llff"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with poses_bounds.npy and images/ or images_N/ (LLFF)"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        let is_named = path.file_name().is_some_and(|name| name == FILE_NAME);
+        let file = if is_named { path.to_path_buf() } else { path.join(FILE_NAME) };
+        Ok(file.is_file().then_some(file))
+    }
+
+    fn read(&self, file: &Path) -> Result<RawScene, SceneError> {
+        let array = numpy::read_npy(file)?;
+        let rows: Vec<&[f64]> = match array.shape[..] {
+            [_, ROW] => array.values.chunks_exact(ROW).collect(),
+            _ => {
+                let (path, place) = (file.to_path_buf(), Place::File);
+                let found = array.shape.get(1).copied().unwrap_or(array.values.len());
+                return Err(SceneError::WrongCount { path, place, of: "numbers in a row", expected: ROW, found });
+            }
+        };
+        let images = photographs(file, rows.len())?;
+        let views = rows.iter().enumerate().zip(images).map(|((row, numbers), image)| view(file, row, numbers, &image));
+        Ok(RawScene::from(views.collect::<Result<Vec<_>, _>>()?))
+    }
+}
+
+/// The photographs in the order of their names (by character, as the authors' code sorts them).
+fn photographs(file: &Path, row_count: usize) -> Result<Vec<PathBuf>, SceneError> {
+    let root = file.with_file_name("");
+    let mut wrong = None;
+    for folder in files::image_folders(&root)? {
+        let mut images = files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
+        images.sort();
+        match images.len() {
+            0 => {}
+            count if count == row_count => return Ok(images),
+            found => _ = wrong.get_or_insert((folder, found)),
+        }
+    }
+    Err(match wrong {
+        Some((path, found)) => {
+            let of = "photographs (rows of poses_bounds.npy)";
+            SceneError::WrongCount { path, place: Place::File, of, expected: row_count, found }
+        }
+        None => SceneError::NoViews { path: root, looked_for: "images/, images_2/, images_4/, images_8/" },
+    })
+}
+
+fn view(file: &Path, row: usize, numbers: &[f64], image: &Path) -> Result<RawView, SceneError> {
+    let (path, place) = (file.to_path_buf(), Place::Key(format!("row {row}")));
+    let at = |line: usize, column: usize| numbers[5 * line + column];
+    let mut matrix = [0.0; 16];
+    for line in 0..3 {
+        let [down, right, backwards, centre] = [0, 1, 2, 3].map(|column| at(line, column));
+        matrix[4 * line..4 * line + 4].copy_from_slice(&[right, down, -backwards, centre]);
+    }
+    matrix[15] = 1.0;
+    let size = check::size(file, place.clone(), at(1, 4), at(0, 4))?;
+    let intrinsics = RawIntrinsics {
+        focal: [at(2, 4); 2],
+        principal: size.map(|side| f64::from(side) / 2.0),
+        size: Some(size),
+        lens: None,
+        path: path.clone(),
+        place: place.clone(),
+        size_place: place.clone(),
+    };
+    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
+    let mut view = RawView::new(files::stem(image), Some(ImageFile::open(image)?), pose, Some(intrinsics));
+    view.near_far = Some([numbers[15], numbers[16]]);
+    Ok(view)
+}

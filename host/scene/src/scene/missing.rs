@@ -1,0 +1,47 @@
+//! Photographs that a list names and that are not there: left out and counted, with one warning for all of them.
+
+use std::path::{Path, PathBuf};
+
+use super::error::SceneError;
+use super::fault::Place;
+
+/// The photographs of a list that are missing.
+#[derive(Debug, Default)]
+pub(super) struct Missing {
+    listed: usize,
+    count: usize,
+    first: Option<(Place, PathBuf)>,
+}
+
+impl Missing {
+    /// Counts a photograph of the list that is there.
+    pub(super) fn found(&mut self) {
+        self.listed += 1;
+    }
+
+    /// Counts a photograph of the list that is not there; `place` is where the list names it.
+    pub(super) fn missed(&mut self, place: Place, image: PathBuf) {
+        self.listed += 1;
+        self.count += 1;
+        self.first.get_or_insert((place, image));
+    }
+
+    /// The warning, if any is missing; `list` is the file that names them.
+    ///
+    /// # Errors
+    /// [`SceneError::PoseWithoutImage`] if all are missing.
+    pub(super) fn warning(self, list: &Path) -> Result<Option<String>, SceneError> {
+        let Missing { listed, count, first } = self;
+        match first {
+            Some((place, image)) if count == listed => {
+                Err(SceneError::PoseWithoutImage { path: list.to_path_buf(), place, image })
+            }
+            Some((_, image)) => Ok(Some(format!(
+                "{}: {count} of {listed} photographs are not there and left out (the first is {})",
+                list.display(),
+                image.display()
+            ))),
+            None => Ok(None),
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The layout of NeuS and IDR (DTU, BlendedMVS): `cameras_sphere.npz` (or another `cameras*.npz`), `image/`, `mask/`.
+//!
+//! For each photograph the archive has `world_mat_N`, a 4x4 matrix whose first three rows project world points to pixels, and
+//! mostly `scale_mat_N`, which places the unit sphere around the object in that world. The scene's world is the unit sphere's: the
+//! projection is `P = world_mat_N scale_mat_N`, taken apart in f64 into `K [R | t]` by an RQ decomposition. Near and far
+//! depth are those of the sphere where the archive has one and the camera stands outside of it.
+//!
+//! A photograph belongs to the matrix with the number that its name ends in, if all have one; otherwise to that of its
+//! position. `mask/` holds masks of the same numbers. Pixel `(0, 0)` is the centre of the top left pixel there; here that is
+//! `(0.5, 0.5)`.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use glam::{DMat3, DVec3};
+
+use super::error::SceneError;
+use super::fault::{IntrinsicsFault, Place};
+use super::files::{self, IMAGE_EXTENSIONS};
+use super::missing::Missing;
+use super::numpy::{self, Array};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
+
+/// Names of the archive, in the order in which they are looked for; then any other `cameras*.npz`.
+const FILE_NAMES: [&str; 3] = ["cameras_sphere.npz", "cameras.npz", "cameras_large.npz"];
+/// Folders of photographs.
+const IMAGE_FOLDERS: [&str; 3] = ["image", "images", "rgb"];
+/// Folders of masks.
+const MASK_FOLDERS: [&str; 2] = ["mask", "masks"];
+/// What the projections are called, before their number.
+const WORLD: &str = "world_mat_";
+/// What the spheres are called.
+const SCALE: &str = "scale_mat_";
+/// Largest skew that rounding of 32-bit matrices may leave, in pixels.
+const LARGEST_SKEW: f64 = 0.05;
+
+/// NeuS and IDR: `cameras*.npz`, `image/`, `mask/`.
+pub(super) struct Neus;
+
+impl Reader for Neus {
+    fn name(&self) -> &'static str {
+        "neus"
+    }
+
+    fn form(&self) -> &'static str {
+        "a folder with cameras_sphere.npz (or another cameras*.npz) and image/ (NeuS, DTU)"
+    }
+
+    fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
+        let is_archive = |path: &Path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            name.starts_with("cameras") && name.ends_with(".npz")
+        };
+        if !path.is_dir() {
+            return Ok(is_archive(path).then(|| path.to_path_buf()));
+        }
+        if let Some(file) = FILE_NAMES.iter().map(|name| path.join(name)).find(|file| file.is_file()) {
+            return Ok(Some(file));
+        }
+        Ok(files::list(path, is_archive)?.into_iter().next())
+    }
+
+    fn read(&self, file: &Path) -> Result<RawScene, SceneError> {
+        let matrices = numpy::read_npz(file, |name| numbered(name, WORLD).or(numbered(name, SCALE)).is_some())?;
+        let mut worlds: BTreeMap<u64, &Array> = BTreeMap::new();
+        for (name, array) in &matrices {
+            if let Some(number) = numbered(name, WORLD) {
+                worlds.insert(number, array);
+            }
+        }
+        let root = file.with_file_name("");
+        let folder = IMAGE_FOLDERS.iter().map(|name| root.join(name)).find(|folder| folder.is_dir());
+        let folder = folder.unwrap_or_else(|| root.join(IMAGE_FOLDERS[0]));
+        let images = files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
+        if images.is_empty() || worlds.is_empty() {
+            let path = if worlds.is_empty() { file.to_path_buf() } else { folder };
+            return Err(SceneError::NoViews { path, looked_for: "photographs in image/, world_mat_0 in the archive" });
+        }
+        let numbers = numbers_of(file, &images, &worlds)?;
+        let masks = masks(&root)?;
+        let mut missing = Missing::default();
+        for number in worlds.keys() {
+            match numbers.contains(number) {
+                true => missing.found(),
+                false => {
+                    missing.missed(Place::Key(format!("{WORLD}{number}")), folder.join(format!("{number:06}.png")))
+                }
+            }
+        }
+        let mut views = Vec::new();
+        for (image, number) in images.iter().zip(&numbers) {
+            let mut view = view(file, *number, &matrices, image)?;
+            view.mask = masks.get(&files::trailing_number(&files::stem(image)).unwrap_or(*number)).cloned();
+            views.push(view);
+        }
+        Ok(RawScene { views, warnings: missing.warning(file)?.into_iter().collect(), ..RawScene::default() })
+    }
+}
+
+/// The number behind a prefix.
+fn numbered(name: &str, prefix: &str) -> Option<u64> {
+    name.strip_prefix(prefix)?.parse().ok()
+}
+
+/// Which matrix each photograph belongs to.
+fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -> Result<Vec<u64>, SceneError> {
+    let by_name: Option<Vec<u64>> = images.iter().map(|image| files::trailing_number(&files::stem(image))).collect();
+    if let Some(numbers) = by_name.filter(|numbers| numbers.iter().all(|number| worlds.contains_key(number))) {
+        return Ok(numbers);
+    }
+    if images.len() == worlds.len() {
+        return Ok(worlds.keys().copied().collect());
+    }
+    let (path, place, of) = (file.to_path_buf(), Place::File, "matrices world_mat_N (one a photograph)");
+    Err(SceneError::WrongCount { path, place, of, expected: images.len(), found: worlds.len() })
+}
+
+/// Masks by the number that their names end in.
+fn masks(root: &Path) -> Result<BTreeMap<u64, PathBuf>, SceneError> {
+    let Some(folder) = MASK_FOLDERS.iter().map(|name| root.join(name)).find(|folder| folder.is_dir()) else {
+        return Ok(BTreeMap::new());
+    };
+    let masks = files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
+    Ok(masks.into_iter().filter_map(|mask| Some((files::trailing_number(&files::stem(&mask))?, mask))).collect())
+}
+
+/// A 4x4 matrix (of a 3x4 one the last row is `0 0 0 1`).
+fn matrix(file: &Path, name: &str, matrices: &BTreeMap<String, Array>) -> Result<Option<[[f64; 4]; 4]>, SceneError> {
+    let Some(array) = matrices.get(name) else { return Ok(None) };
+    let rows = match array.shape[..] {
+        [4, 4] => 4,
+        [3, 4] => 3,
+        _ => {
+            let (path, place, found) = (file.to_path_buf(), Place::Key(name.to_string()), array.values.len());
+            return Err(SceneError::WrongCount { path, place, of: "numbers (4 x 4)", expected: 16, found });
+        }
+    };
+    let mut matrix = [[0.0, 0.0, 0.0, 1.0]; 4];
+    for (row, numbers) in matrix.iter_mut().zip(array.values.chunks_exact(4)).take(rows) {
+        row.copy_from_slice(numbers);
+    }
+    Ok(Some(matrix))
+}
+
+fn view(file: &Path, number: u64, matrices: &BTreeMap<String, Array>, image: &Path) -> Result<RawView, SceneError> {
+    let (path, place) = (file.to_path_buf(), Place::Key(format!("{WORLD}{number}")));
+    let world = matrix(file, &format!("{WORLD}{number}"), matrices)?.unwrap_or_default();
+    let scale = matrix(file, &format!("{SCALE}{number}"), matrices)?;
+    let projection = match scale {
+        Some(scale) => product(&world, &scale),
+        None => world,
+    };
+    let fault = |fault| SceneError::Intrinsics { path: path.clone(), place: place.clone(), fault };
+    let Parts { k, camera_from_world, centre } =
+        take_apart(&projection).ok_or_else(|| fault(IntrinsicsFault::Projection))?;
+    let skew = k.y_axis.x;
+    if skew.abs() > LARGEST_SKEW {
+        return Err(fault(IntrinsicsFault::Skew { skew }));
+    }
+    let r = camera_from_world.transpose();
+    let column = |row: usize| [r.col(0)[row], r.col(1)[row], r.col(2)[row], centre[row]];
+    let ([a, b, c, d], [e, f, g, h], [i, j, l, m]) = (column(0), column(1), column(2));
+    let matrix = [a, b, c, d, e, f, g, h, i, j, l, m, 0.0, 0.0, 0.0, 1.0];
+    let intrinsics = RawIntrinsics {
+        focal: [k.x_axis.x, k.y_axis.y],
+        principal: [k.z_axis.x + 0.5, k.z_axis.y + 0.5],
+        size: None,
+        lens: None,
+        path: path.clone(),
+        place: place.clone(),
+        size_place: place.clone(),
+    };
+    let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path: path.clone(), place: place.clone() };
+    let mut view = RawView::new(files::stem(image), Some(ImageFile::open(image)?), pose, Some(intrinsics));
+    let depth = -centre.dot(r.z_axis);
+    view.near_far = (scale.is_some() && depth > 1.0).then_some([depth - 1.0, depth + 1.0]);
+    Ok(view)
+}
+
+fn product(a: &[[f64; 4]; 4], b: &[[f64; 4]; 4]) -> [[f64; 4]; 4] {
+    let entry = |row: usize, column: usize| (0..4).map(|k| a[row][k] * b[k][column]).sum();
+    std::array::from_fn(|row| std::array::from_fn(|column| entry(row, column)))
+}
+
+/// A projection `K R (X - centre)`; `K` upper triangular with a positive diagonal and a last entry of 1, `R` a rotation.
+struct Parts {
+    k: DMat3,
+    camera_from_world: DMat3,
+    centre: DVec3,
+}
+
+/// `None` for a projection that is singular or not finite.
+fn take_apart(projection: &[[f64; 4]; 4]) -> Option<Parts> {
+    let row = |row: usize| DVec3::new(projection[row][0], projection[row][1], projection[row][2]);
+    let largest = (0..3).map(|r| row(r).length()).fold(0.0, f64::max);
+    // A projection means the same at any scale; of the two signs, the one that makes R a rotation.
+    let handed = row(0).cross(row(1)).dot(row(2));
+    let scale = 1.0 / (largest * handed.signum());
+    if !(scale.is_finite() && handed != 0.0) {
+        return None;
+    }
+    let [first, second, third] = [0, 1, 2].map(|r| row(r) * scale);
+    let last = DVec3::new(projection[0][3], projection[1][3], projection[2][3]) * scale;
+    // RQ by Gram and Schmidt from the last row up: twice, so that R is orthonormal to the last bits.
+    let z = third.normalize();
+    let y = orthogonal(second, &[z])?;
+    let x = orthogonal(first, &[z, y])?;
+    let (k22, k11, k00) = (third.dot(z), second.dot(y), first.dot(x));
+    let (k12, k02, k01) = (second.dot(z), first.dot(z), first.dot(y));
+    let k =
+        DMat3::from_cols(DVec3::new(k00, 0.0, 0.0), DVec3::new(k01, k11, 0.0), DVec3::new(k02, k12, k22)) * (1.0 / k22);
+    let camera_from_world = DMat3::from_cols(x, y, z).transpose();
+    let centre = -(DMat3::from_cols(first, second, third).transpose().inverse() * last);
+    (k.is_finite() && camera_from_world.is_finite() && centre.is_finite()).then_some(Parts {
+        k,
+        camera_from_world,
+        centre,
+    })
+}
+
+/// The unit vector along what of `vector` is orthogonal to unit vectors.
+fn orthogonal(vector: DVec3, to: &[DVec3]) -> Option<DVec3> {
+    let mut rest = vector;
+    for _ in 0..2 {
+        for other in to {
+            rest -= *other * rest.dot(*other);
+        }
+    }
+    rest.try_normalize()
+}

@@ -1,0 +1,240 @@
+//! One entry of `frames`: its photograph, its mask, its intrinsics and its lens.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use viewfuse_core::lens::{Lens, Projection};
+
+use super::super::camera_models::camera_model_names;
+use super::super::check;
+use super::super::error::SceneError;
+use super::super::fault::{IntrinsicsFault, Place};
+use super::super::files::{self, IMAGE_EXTENSIONS};
+use super::super::json::Object;
+use super::super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
+use super::super::split::Split;
+
+/// The coefficients that are read, in the order of [`Lens::new`].
+const COEFFICIENTS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+
+/// Coefficients that must be 0: of thin prisms.
+const REFUSED_COEFFICIENTS: [&str; 4] = ["s1", "s2", "s3", "s4"];
+
+/// Flags of projections that are no lens of ours, whatever the coefficients.
+const REFUSED_FLAGS: [&str; 2] = ["equirectangular", "latlong"];
+
+/// Values of `camera_model`: the perspective ones, with whatever coefficients there are.
+const PERSPECTIVE_MODELS: [&str; 7] =
+    ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "FULL_OPENCV", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
+
+/// The fisheye ones.
+const FISHEYE_MODELS: [&str; 4] = ["OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "FISHEYE"];
+
+/// Lists of photographs at the top of nerfstudio's files.
+const LISTS: [(&str, Split); 3] =
+    [("train_filenames", Split::Train), ("val_filenames", Split::Validation), ("test_filenames", Split::Test)];
+
+/// What a frame is.
+pub(super) enum Listed {
+    /// A view with its photograph.
+    View(Box<RawView>),
+    /// A photograph that is not there, and where it is named.
+    Missing(Place, PathBuf),
+}
+
+/// The parts of the scene that the lists at the top of a file put photographs in.
+pub(super) fn lists(top: &Object) -> Result<HashMap<String, Split>, SceneError> {
+    let mut parts = HashMap::new();
+    for (key, split) in LISTS {
+        if top.get(key).is_some() {
+            let names = top.array(key)?.iter().filter_map(Value::as_str);
+            parts.extend(names.map(|name| (name.to_owned(), split)));
+        }
+    }
+    Ok(parts)
+}
+
+/// One entry of `frames`.
+pub(super) struct Frame<'a> {
+    pub(super) path: &'a Path,
+    /// `frames[3]`.
+    pub(super) key: String,
+    /// Where its intrinsics are looked up: in the frame, then at the top of the file.
+    pub(super) scopes: [Object<'a>; 2],
+}
+
+impl<'a> Frame<'a> {
+    pub(super) fn view(&self, lists: &HashMap<String, Split>) -> Result<Listed, SceneError> {
+        let [frame, _] = &self.scopes;
+        let pose = RawPose {
+            matrix: frame.matrix("transform_matrix")?,
+            form: PoseForm::WorldFromOpenGl,
+            path: self.path.to_path_buf(),
+            place: Place::Key(frame.full("transform_matrix")),
+        };
+        let file_path = frame.text("file_path")?;
+        let given = self.beside(file_path);
+        let Some(image) = photograph(&given) else {
+            return Ok(Listed::Missing(Place::Key(frame.full("file_path")), given));
+        };
+        let image = ImageFile::open(&image)?;
+        let intrinsics = Some(self.intrinsics(image.size())?);
+        let mut view = RawView::new(files::stem(image.path()), Some(image), pose, intrinsics);
+        view.mask = self.mask()?;
+        view.split = lists.get(file_path).copied();
+        Ok(Listed::View(Box::new(view)))
+    }
+
+    /// Whether it names a depth image.
+    pub(super) fn has_depth(&self) -> bool {
+        self.scopes[0].get("depth_file_path").is_some()
+    }
+
+    /// The mask that the frame names.
+    fn mask(&self) -> Result<Option<PathBuf>, SceneError> {
+        let [frame, _] = &self.scopes;
+        if frame.get("mask_path").is_none() {
+            return Ok(None);
+        }
+        let mask = self.beside(frame.text("mask_path")?);
+        if mask.is_file() {
+            return Ok(Some(mask));
+        }
+        let (path, place) = (self.path.to_path_buf(), Place::Key(frame.full("mask_path")));
+        Err(SceneError::NoMask { path, place, mask })
+    }
+
+    /// A path relative to the JSON file. Components without `.`, so that `./train/r_0` is named as people name it.
+    fn beside(&self, path: &str) -> PathBuf {
+        self.path.with_file_name("").join(path).components().collect()
+    }
+
+    fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
+        let place = || Place::Key(self.key.clone());
+        let stated = match (self.number("w")?, self.number("h")?) {
+            (None, None) => None,
+            (Some((width, _)), Some((height, _))) => Some(check::size(self.path, place(), width, height)?),
+            (Some(_), None) => return Err(self.missing("h")),
+            (None, Some(_)) => return Err(self.missing("w")),
+        };
+        let size = stated.unwrap_or(image_size);
+        let focal_x =
+            self.focal("fl_x", "camera_angle_x", size[0])?.ok_or_else(|| self.missing("fl_x (or camera_angle_x)"))?;
+        let focal_y = self.focal("fl_y", "camera_angle_y", size[1])?.unwrap_or(focal_x);
+        let centre = size.map(|side| f64::from(side) / 2.0);
+        let principal = [
+            self.number("cx")?.map_or(centre[0], |(value, _)| value),
+            self.number("cy")?.map_or(centre[1], |(value, _)| value),
+        ];
+        let (path, place, size_place) = (self.path.to_path_buf(), place(), place());
+        Ok(RawIntrinsics {
+            focal: [focal_x, focal_y],
+            principal,
+            size: stated,
+            lens: self.lens()?,
+            path,
+            place,
+            size_place,
+        })
+    }
+
+    /// A focal length: what the frame says in either form, otherwise what the top of the file says.
+    fn focal(&self, length_key: &str, angle_key: &str, side: u32) -> Result<Option<f64>, SceneError> {
+        for scope in &self.scopes {
+            if let Some(focal) = scope.number(length_key)? {
+                return Ok(Some(focal));
+            }
+            if let Some(angle) = scope.number(angle_key)? {
+                if !(angle > 0.0 && angle < std::f64::consts::PI) {
+                    let (path, place) = (self.path.to_path_buf(), Place::Key(scope.full(angle_key)));
+                    let fault = IntrinsicsFault::Angle { angle };
+                    return Err(SceneError::Intrinsics { path, place, fault });
+                }
+                return Ok(Some(f64::from(side) / 2.0 / (angle / 2.0).tan()));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The lens that the frame or the file states.
+    fn lens(&self) -> Result<Option<Lens>, SceneError> {
+        let refuse =
+            |key: String, value: String| Err(SceneError::Distorted { path: self.path.to_path_buf(), key, value });
+        let mut projection = match self.get("is_fisheye") {
+            Some((Value::Bool(true), _)) => Projection::Fisheye,
+            None | Some((Value::Bool(false), _)) => Projection::Perspective,
+            Some((value, key)) => return refuse(key, files::excerpt(&value.to_string())),
+        };
+        if let Some((value, key)) = self.get("camera_model") {
+            let model = value.as_str().unwrap_or_default();
+            let is_one_of = |models: &[&str]| models.iter().any(|known| model.eq_ignore_ascii_case(known));
+            if is_one_of(&FISHEYE_MODELS) {
+                projection = Projection::Fisheye;
+            } else if !is_one_of(&PERSPECTIVE_MODELS) {
+                return Err(SceneError::CameraModel {
+                    path: self.path.to_path_buf(),
+                    place: Place::Key(key),
+                    model: files::excerpt(&value.to_string()),
+                    supported: camera_model_names(),
+                });
+            }
+        }
+        for flag in REFUSED_FLAGS {
+            if let Some((value, key)) = self.get(flag)
+                && value != &Value::Bool(false)
+            {
+                return refuse(key, files::excerpt(&value.to_string()));
+            }
+        }
+        for coefficient in REFUSED_COEFFICIENTS {
+            if let Some((value, key)) = self.number(coefficient)?
+                && value != 0.0
+            {
+                return refuse(key, value.to_string());
+            }
+        }
+        let mut coefficients = [0.0; 8];
+        for (coefficient, key) in coefficients.iter_mut().zip(COEFFICIENTS) {
+            *coefficient = self.number(key)?.map_or(0.0, |(value, _)| value);
+        }
+        let lens = Lens::new(projection, coefficients).map_err(|reason| SceneError::Lens {
+            path: self.path.to_path_buf(),
+            place: Place::Key(self.key.clone()),
+            reason,
+        })?;
+        Ok((!lens.is_pinhole()).then_some(lens))
+    }
+
+    /// A value and the full name of its key, from the frame or the top of the file.
+    fn get(&self, key: &str) -> Option<(&'a Value, String)> {
+        self.scopes.iter().find_map(|scope| scope.get(key).map(|value| (value, scope.full(key))))
+    }
+
+    /// A number and the full name of its key, from the frame or the top of the file.
+    fn number(&self, key: &str) -> Result<Option<(f64, String)>, SceneError> {
+        for scope in &self.scopes {
+            if let Some(value) = scope.number(key)? {
+                return Ok(Some((value, scope.full(key))));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The error for a key that is neither in the frame nor at the top.
+    fn missing(&self, key: &str) -> SceneError {
+        let key = format!("{key}, in {} and at the top level,", self.key);
+        SceneError::MissingKey { path: self.path.to_path_buf(), key }
+    }
+}
+
+/// The photograph of a path, with the extension that the Blender flavour leaves out.
+fn photograph(given: &Path) -> Option<PathBuf> {
+    let with_extension = |extension: &&str| {
+        let mut name = given.to_path_buf().into_os_string();
+        name.push(format!(".{extension}"));
+        PathBuf::from(name)
+    };
+    let mut candidates = std::iter::once(given.to_path_buf()).chain(IMAGE_EXTENSIONS.iter().map(with_extension));
+    candidates.find(|candidate| candidate.is_file())
+}
