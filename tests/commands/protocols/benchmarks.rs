@@ -253,7 +253,7 @@ fn masks_serve_the_metric() {
         fs::create_dir(folder.path().join(name)).expect("a folder");
         like_dtu(&folder.path().join(name), with_masks);
     }
-    let run = |scene: &str, protocol: &str| json(folder.path(), &format!("{scene} --protocol {protocol} --size 32x24"));
+    let run = |scene: &str, protocol: &str| json(folder.path(), &format!("{scene} --protocol {protocol} --size 32x32"));
     let names = |whole: &Value| -> Vec<String> {
         let metrics = whole["tables"][0]["metrics"].as_array().expect("metrics").clone();
         metrics.iter().map(|metric| metric["label"].as_str().expect("a label").to_owned()).collect()

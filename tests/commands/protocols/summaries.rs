@@ -125,7 +125,7 @@ fn views_of_one_scene_take_the_place_of_scenes() {
 
 fn nothing_leads_within_the_interval() {
     // The other scheme is clearly best.
-    let clear = tables(&[views(&[[10.0, 20.0, 22.0], [12.0, 30.0, 33.0], [14.0, 10.0, 14.0]])], false);
+    let clear = tables(&[views(&[[10.0, 20.0, 22.0], [18.0, 30.0, 33.0], [4.0, 10.0, 14.0]])], false);
     assert_eq!(leading(&clear[0]), ["other"]);
     // Both schemes are above the copy; which of them is better, three views do not tell.
     let close = tables(&[views(&[[10.0, 20.0, 21.0], [10.5, 30.0, 29.0], [11.0, 25.0, 25.5]])], false);
