@@ -367,5 +367,3 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(Rendered { colours, depths: device.download(&depths)?, width, height })
     }
 }
-    std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d)
-}
