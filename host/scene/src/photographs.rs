@@ -79,8 +79,10 @@ pub struct SourceImages {
     pub background: [f32; 3],
     /// Whether alpha is an object's silhouette. Otherwise photographs are whole, and alpha 0 marks what they do not show.
     pub has_silhouettes: bool,
-    /// Points of surfaces in world coordinates, where the scene's files know some.
+    /// Points of surfaces in world coordinates that two or more of the sources saw, where the scene's files know some.
     pub points: Vec<Vec3>,
+    /// Nearest and farthest depth of what the sources show, where the scene's files say so.
+    pub near_far: Option<[f32; 2]>,
     /// What is doubtful about the background, if anything.
     pub warning: Option<String>,
 }
@@ -107,6 +109,9 @@ const DECODING_BYTES: u64 = 16;
 
 /// Photographs of less than twice this side are kept at their own size, however small they are needed.
 const LEAST_KEPT_SIDE: u32 = 640;
+
+/// Points of a larger reprojection error, in pixels, do not count.
+const MOST_POINT_ERROR: f32 = 2.0;
 
 /// Photographs of a scene, decoded once where memory allows.
 pub struct Album<'a> {
@@ -244,6 +249,7 @@ impl<'a> Album<'a> {
                 backdrop.noise_level()
             ));
         }
+        let (points, near_far) = self.space(views);
         let all = |borders: &[Option<matte::Border>]| {
             let images = views.par_iter().zip(borders).map(|(&view, border)| {
                 progress.check()?;
@@ -267,16 +273,30 @@ impl<'a> Album<'a> {
                         self.cut_out(view, longest_side, None, &backdrop, false)
                     })
                     .collect::<Result<Vec<_>, PhotographsError>>()?;
-                Ok(SourceImages { images, background, has_silhouettes: false, points: Vec::new(), warning })
+                Ok(SourceImages { images, background, has_silhouettes: false, points, near_far, warning })
             }
             images => Ok(SourceImages {
                 images: images?,
                 background,
                 has_silhouettes: !whole_pictures,
-                points: Vec::new(),
+                points,
+                near_far,
                 warning,
             }),
         }
+    }
+
+    /// Points that at least two of these views saw, and the bounds of depth that all of them state.
+    fn space(&self, views: &[usize]) -> (Vec<Vec3>, Option<[f32; 2]>) {
+        let saw = |point: &&crate::ScenePoint| {
+            let is_source = |view: &&u32| views.contains(&(**view as usize));
+            let is_exact = point.error.is_none_or(|error| error <= MOST_POINT_ERROR);
+            is_exact && point.views.iter().filter(is_source).take(2).count() == 2
+        };
+        let points = self.scene.points.iter().filter(saw).map(|point| point.position_world).collect();
+        let bounds: Option<Vec<[f32; 2]>> = views.iter().map(|&view| self.scene.views[view].near_far).collect();
+        let near_far = bounds.and_then(|all| all.into_iter().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]));
+        (points, near_far)
     }
 
     /// A source at working size; `must_show` says that it must show both an object and, unless its alpha channel says so, a
@@ -289,8 +309,11 @@ impl<'a> Album<'a> {
         backdrop: &matte::Backdrop,
         must_show: bool,
     ) -> Result<SourceImage, PhotographsError> {
-        let View { name, camera, image, .. } = &self.scene.views[view];
-        let photograph = self.photograph(view)?;
+        let View { name, camera, image, mask, .. } = &self.scene.views[view];
+        let mut photograph = self.photograph(view)?;
+        if mask.is_some() && !must_show {
+            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        }
         // Enlarging a source would add pixels but no detail.
         let (width, height) = reduced_size(camera, longest_side);
         let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
@@ -315,16 +338,27 @@ impl<'a> Album<'a> {
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
 
-    /// The truth at a view, resampled to a size and laid over a background, rounded to 8 bits.
+    /// The truth at a view, resampled to a size, rounded to 8 bits: what is cut out of it is laid over a background, if there is
+    /// one; otherwise the whole photograph.
     ///
     /// # Errors
     /// [`SceneError`] if it cannot be read.
-    pub fn truth(&self, view: usize, size: [u32; 2], background: [f32; 3]) -> Result<RgbImage, SceneError> {
-        let photograph = self.photograph(view)?;
+    pub fn truth(&self, view: usize, size: [u32; 2], background: Option<[f32; 3]>) -> Result<RgbImage, SceneError> {
+        let mut photograph = self.photograph(view)?;
+        if background.is_none() && self.scene.views[view].mask.is_some() {
+            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        }
+        let background = background.unwrap_or_default();
         let own_size = photograph.pixels.dimensions();
         let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
         Ok(to_rgb8(&texels, size))
     }
+}
+
+/// The whole photograph, whatever its mask says.
+fn without_alpha(mut photograph: Photograph) -> Photograph {
+    photograph.pixels.pixels_mut().for_each(|pixel| pixel[3] = 255);
+    Photograph { has_alpha: false, ..photograph }
 }
 
 /// Longest side of a camera's image in pixels.
