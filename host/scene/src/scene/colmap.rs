@@ -86,9 +86,16 @@ impl Form {
     }
 }
 
-/// A model's images by name (in the order of characters) with their world-to-camera matrices, and its points, whose views are
-/// indices into these; `None` where the folder has no model. For layouts that were made from one.
-pub(super) fn beside(root: &Path) -> Result<Option<(Vec<[f64; 16]>, Vec<RawPoint>)>, SceneError> {
+/// What a layout that was made from a model takes from it.
+pub(super) struct Origin {
+    /// World-to-camera matrices of its images, which are in the order of their names by character.
+    pub(super) cameras_from_world: Vec<[f64; 16]>,
+    /// Its points; their views are indices into these images.
+    pub(super) points: Vec<RawPoint>,
+}
+
+/// The model with points that stands in a scene's folder, if there is one.
+pub(super) fn beside(root: &Path) -> Result<Option<Origin>, SceneError> {
     let Some(folder) = MODEL_FOLDERS.iter().map(|name| root.join(name)).find(|folder| Form::of(folder).is_some())
     else {
         return Ok(None);
@@ -104,7 +111,8 @@ pub(super) fn beside(root: &Path) -> Result<Option<(Vec<[f64; 16]>, Vec<RawPoint
     };
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let view_of = images.iter().enumerate().map(|(view, image)| (image.id, view as u32)).collect();
-    Ok(Some((images.iter().map(camera_from_world).collect(), raw_points(points, &view_of))))
+    let cameras_from_world = images.iter().map(camera_from_world).collect();
+    Ok(Some(Origin { cameras_from_world, points: raw_points(points, &view_of) }))
 }
 
 /// Points with their views as [`RawScene`] counts them; images without a view are left out.

@@ -13,7 +13,7 @@
 use std::path::{Path, PathBuf};
 
 use super::check;
-use super::colmap;
+use super::colmap::{self, Origin};
 use super::error::SceneError;
 use super::fault::Place;
 use super::files::{self, IMAGE_EXTENSIONS};
@@ -71,7 +71,7 @@ impl Reader for Llff {
 /// The points of the COLMAP model that the poses were made from, where it stands beside them.
 fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
     let root = file.with_file_name("");
-    let Some((images, points)) = colmap::beside(&root).map_err(|error| error.to_string())? else {
+    let Some(Origin { cameras_from_world, points }) = colmap::beside(&root).map_err(|error| error.to_string())? else {
         return Ok(Vec::new());
     };
     // Each centre, from `[R | t]` and from the row: -R^T t.
@@ -82,7 +82,7 @@ fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
         // A NaN differs, too.
         !((0..3).all(|axis| offset(axis).abs() <= SAME_CENTRE * size))
     };
-    if images.len() != views.len() || images.iter().zip(views).any(differs) {
+    if cameras_from_world.len() != views.len() || cameras_from_world.iter().zip(views).any(differs) {
         return Err(format!("{}: its rows are not the images of the COLMAP model beside it", file.display()));
     }
     Ok(points)
