@@ -75,7 +75,7 @@ fn evaluates_schemes_against_the_nearest_copy() {
     let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
     assert_eq!(lines.next(), Some(vec!["scene", "scheme", "target", "sources", "psnr_db", "ssim", "seconds"]));
     let rows: Vec<Vec<&str>> = lines.collect();
-    assert_eq!(rows.len(), 2 * 3 * 2, "{csv}");
+    assert_eq!(rows.len(), 2 * 5 * 2, "{csv}");
     let score = |scene: &str, scheme: &str, target: &str| -> [f64; 2] {
         let own: Vec<_> = rows.iter().filter(|row| row[..3] == [scene, scheme, target]).collect();
         assert_eq!(own.len(), 1, "{scene}, {scheme}, {target} in\n{csv}");

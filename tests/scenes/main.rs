@@ -6,6 +6,7 @@ mod damaged;
 mod datasets;
 mod errors;
 mod formats;
+mod large;
 mod layouts;
 mod lenses;
 mod made;

@@ -17,7 +17,7 @@ fn photographs_that_are_not_kept_are_read_when_they_are_needed() {
     let none = Album::open(&scene, [], &Silent).expect("no photograph");
     let sources = |album: &Album| album.sources(&views, 48, BackgroundChoice::Auto, &Silent).expect("sources");
     assert_eq!(sources(&kept), sources(&none));
-    let truth = |album: &Album| album.truth(7, [40, 40], [0.25; 3]).expect("a truth");
+    let truth = |album: &Album| album.truth(7, [40, 40], Some([0.25; 3])).expect("a truth");
     assert_eq!(truth(&kept), truth(&none));
     assert_ne!(sources(&kept), kept.sources(&views, 47, BackgroundChoice::Auto, &Silent).expect("sources"));
 }

@@ -6,6 +6,7 @@ mod collections;
 mod folders;
 mod kinds;
 mod prisms;
+mod rooms;
 
 use folders::assert_poses;
 use std::fs;

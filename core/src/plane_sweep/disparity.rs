@@ -6,6 +6,8 @@ use crate::math::{clamp, exp, max, min};
 
 /// Temperature of the softmax over planes.
 pub const TEMPERATURE: f32 = 0.008;
+/// Planes to each side of the best one that mean the same disparity.
+pub const NEAR_PLANES: usize = 3;
 /// A cost at which a match is as likely wrong as right.
 pub const DOUBTFUL_COST: f32 = 0.12;
 /// Width of the step from sure to doubtful.
@@ -13,7 +15,7 @@ pub const DOUBT_WIDTH: f32 = 0.02;
 
 /// Disparity and confidence in `[0, 1]` of a pixel, from `costs[row][column][group]`. The disparity is that of the plane of
 /// least cost, moved to the vertex of the parabola through it and its neighbours; the confidence is the share of the softmax
-/// within one plane of it, times a logistic step on the least cost.
+/// within [`NEAR_PLANES`] of it, times a logistic step on the least cost.
 #[inline]
 pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [f32; 2] {
     let groups = frustum.group_count as usize;
@@ -34,7 +36,7 @@ pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [
     while plane < plane_count {
         let share = exp((least - cost(plane)) * (1.0 / TEMPERATURE));
         all += share;
-        if plane + 1 >= best && plane <= best + 1 {
+        if plane + NEAR_PLANES >= best && plane <= best + NEAR_PLANES {
             near += share;
         }
         plane += 1;

@@ -1,18 +1,20 @@
 //! How good is each weighting scheme: views are left out of the sources, rendered, and compared with their photographs.
 
+use crate::baseline::plane::plane_depth;
+use crate::baseline::{BLENDED, Baseline, Shot};
+use crate::metrics::masked::MaskedTruth;
 use crate::metrics::{MetricError, Scorer};
 use image::RgbImage;
+use std::collections::HashMap;
 use std::time::{Duration, Instant};
+use viewfuse_core::camera::Camera;
 use viewfuse_field::Renderer;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
-use viewfuse_scene::photographs::{Album, SourceImages};
+use viewfuse_scene::photographs::{Album, PhotographsError, SourceImages};
 use viewfuse_weighting::Weighting;
-
-/// Name of the row that copies the nearest source instead of rendering.
-pub const NEAREST_COPY: &str = "nearest copy";
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
@@ -45,7 +47,7 @@ pub const SSIM: &str = "ssim";
 /// The score of one scheme at one target.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Score {
-    /// The scheme, or [`NEAREST_COPY`].
+    /// The scheme, or the name of a [`Baseline`].
     pub scheme: String,
     /// The target view.
     pub target: String,
@@ -64,6 +66,25 @@ impl Score {
     }
 }
 
+/// What is evaluated.
+#[derive(Clone, Copy)]
+pub struct Subject<'a> {
+    /// The scene as fields see it.
+    pub scene: &'a Scene,
+    /// Its photographs.
+    pub album: &'a Album<'a>,
+    /// The scene with the masks that targets are scored by as well ([`crate::metrics::masked`]); `None` without masked
+    /// metrics. Its views are those of `scene`.
+    pub masked: Option<&'a Scene>,
+}
+
+/// A scene whose photographs have no masks beside them: they are seen whole.
+pub fn without_masks(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    scene.views.iter_mut().for_each(|view| view.mask = None);
+    scene
+}
+
 /// What renders and scores.
 pub struct Evaluator<'a> {
     /// The schemes.
@@ -79,24 +100,20 @@ pub struct Evaluator<'a> {
 }
 
 impl Evaluator<'_> {
-    /// Scores every scheme on targets that share their sources, after copying the nearest source. `seen` gets each rendered
-    /// frame with its scheme, its values and the sources at working size.
+    /// Scores the baselines and then every scheme on targets that share their sources. `seen` gets each rendered frame with
+    /// its scheme, its values and the sources at working size.
     ///
     /// # Errors
     /// [`EvaluateError`].
     pub fn score(
         &self,
-        scene: &Scene,
-        album: &Album<'_>,
+        subject: Subject<'_>,
         sources: &[usize],
         targets: &[usize],
         mut seen: impl FnMut(&Weighting, &Frame, &[(String, f64)], &SourceImages),
     ) -> Result<Vec<Score>, EvaluateError> {
-        let Evaluator { weightings, renderer, options, scorer, progress } = *self;
-        let values = |prediction: &RgbImage, truth: &RgbImage| -> Result<Vec<(String, f64)>, MetricError> {
-            let scored = scorer.score(prediction, truth)?;
-            Ok(scored.into_iter().map(|scored| (scored.name.to_owned(), scored.value)).collect())
-        };
+        let Evaluator { weightings, renderer, options, progress, .. } = *self;
+        let Subject { scene, album, masked } = subject;
         let score = |scheme: &str, target: usize, values: Vec<(String, f64)>, time: Duration| Score {
             scheme: scheme.to_owned(),
             target: scene.views[target].name.clone(),
@@ -105,13 +122,28 @@ impl Evaluator<'_> {
             time,
         };
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
-        let mut scores = Vec::new();
+        let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
         for &target in targets {
-            let nearest = nearest_source(scene, sources, target);
-            let size = stage.picture_size(target)?;
-            let (prediction, truth) = (stage.truth_at(nearest, size)?, stage.truth_at(target, size)?);
-            scores.push(score(NEAREST_COPY, target, values(&prediction, &truth)?, Duration::ZERO));
+            progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
+            let (shot, mask) = (shot_of(scene, &stage, target)?, self.mask(masked, &stage, target)?);
+            let nearest = nearest_sources(scene, sources, target, BLENDED);
+            for &source in &nearest {
+                if !shots.contains_key(&source) {
+                    shots.insert(source, shot_of(scene, &stage, source)?);
+                }
+            }
+            let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
+            let depth = depth_of(scene, target);
+            for baseline in Baseline::ALL {
+                let start = Instant::now();
+                let picture = baseline.picture(&nearest, &shot.camera, depth);
+                let time = start.elapsed();
+                let values = self.values(&picture, &shot.picture, mask.as_ref())?;
+                scores.push(score(baseline.name(), target, values, time));
+            }
+            masks.insert(target, mask);
         }
+        drop(shots);
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for weighting in weightings {
@@ -123,7 +155,8 @@ impl Evaluator<'_> {
                 if let Some(truth) = &frame.truth {
                     let time = encode_share + frame.time.saturating_sub(frame.encode);
                     shared += frame.encode;
-                    let values = values(&frame.picture, &truth.picture)?;
+                    let mask = masks.get(&target).and_then(Option::as_ref);
+                    let values = self.values(&frame.picture, &truth.picture, mask)?;
                     seen(weighting, &frame, &values, &stage.images);
                     scores.push(score(&weighting.to_string(), target, values, time));
                 }
@@ -132,6 +165,34 @@ impl Evaluator<'_> {
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
         Ok(scores)
+    }
+
+    /// Every metric of a picture, the masked ones last.
+    fn values(
+        &self,
+        prediction: &RgbImage,
+        truth: &RgbImage,
+        mask: Option<&MaskedTruth>,
+    ) -> Result<Vec<(String, f64)>, MetricError> {
+        let scored = self.scorer.score(prediction, truth)?;
+        let mut values: Vec<(String, f64)> =
+            scored.into_iter().map(|scored| (scored.name.to_owned(), scored.value)).collect();
+        values.extend(mask.into_iter().flat_map(|mask| mask.score(prediction)));
+        Ok(values)
+    }
+
+    /// The truth of a target with its mask, if masked metrics are wanted and it has one.
+    fn mask(
+        &self,
+        masked: Option<&Scene>,
+        stage: &Stage<'_>,
+        target: usize,
+    ) -> Result<Option<MaskedTruth>, EvaluateError> {
+        let Some(scene) = masked else { return Ok(None) };
+        let (album, size) =
+            (Album::open(scene, [target], self.progress).map_err(RenderError::from)?, stage.picture_size(target)?);
+        let over = |level: f32| album.truth(target, size, Some([level; 3])).map_err(RenderError::from);
+        Ok(MaskedTruth::of(over(1.0)?, &over(0.0)?))
     }
 
     /// Scores every scheme on a scene. Without `--sources`, each target is rendered from all other views (leave one out)
@@ -145,7 +206,8 @@ impl Evaluator<'_> {
         let album = Album::open(scene, used, self.progress).map_err(RenderError::from)?;
         let mut scores = Vec::new();
         for (sources, targets) in &groups {
-            scores.extend(self.score(scene, &album, sources, targets, |_, _, _, _| {})?);
+            let subject = Subject { scene, album: &album, masked: None };
+            scores.extend(self.score(subject, sources, targets, |_, _, _, _| {})?);
         }
         Ok(scores)
     }
@@ -183,60 +245,28 @@ fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> 
         .collect()
 }
 
-/// The source whose centre is nearest to the target's.
-fn nearest_source(scene: &Scene, sources: &[usize], target: usize) -> usize {
+/// The sources whose centres are nearest to the target's, at most `count`, the nearest first; of equally near ones the
+/// first.
+fn nearest_sources(scene: &Scene, sources: &[usize], target: usize, count: usize) -> Vec<usize> {
     let distance = |view: usize| scene.views[view].camera.pose.distance(&scene.views[target].camera.pose);
-    sources.iter().copied().min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(target)
+    let mut nearest = sources.to_vec();
+    nearest.sort_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+    nearest.truncate(count);
+    nearest
 }
 
-/// Mean scores of a scheme over targets.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Mean {
-    /// The scheme.
-    pub scheme: String,
-    /// Mean PSNR in decibels.
-    pub psnr: f64,
-    /// Mean SSIM over the targets that have one.
-    pub ssim: Option<f64>,
-    /// Means of the other metrics over the targets that have them, by name.
-    pub further: Vec<(String, f64)>,
-    /// Mean time.
-    pub seconds: f64,
-    /// Over how many targets.
-    pub target_count: usize,
+/// A view's photograph at working size over the run's background, with the camera of these pixels.
+fn shot_of(scene: &Scene, stage: &Stage<'_>, view: usize) -> Result<Shot, EvaluateError> {
+    let [width, height] = stage.picture_size(view)?;
+    let camera = scene.views[view].camera;
+    let resized = camera.pinhole.resized(width, height);
+    let pinhole = resized.map_err(|error| RenderError::Size { width, height, error })?;
+    Ok(Shot { camera: Camera { pinhole, ..camera }, picture: stage.truth_at(view, [width, height])? })
 }
 
-/// Means over targets of every scheme, in the order in which the schemes appear.
-pub fn means(scores: &[Score]) -> Vec<Mean> {
-    let mut schemes: Vec<&str> = Vec::new();
-    for score in scores {
-        if !schemes.contains(&score.scheme.as_str()) {
-            schemes.push(&score.scheme);
-        }
-    }
-    schemes
-        .into_iter()
-        .map(|scheme| {
-            let own: Vec<&Score> = scores.iter().filter(|score| score.scheme == scheme).collect();
-            let count = own.len() as f64;
-            let mean_of = |name: &str| {
-                let values: Vec<f64> = own.iter().filter_map(|score| score.value(name)).collect();
-                (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-            };
-            let mut names: Vec<&str> = Vec::new();
-            for (name, _) in own.iter().flat_map(|score| &score.values) {
-                if ![PSNR, SSIM].contains(&name.as_str()) && !names.contains(&name.as_str()) {
-                    names.push(name);
-                }
-            }
-            Mean {
-                scheme: scheme.to_owned(),
-                psnr: mean_of(PSNR).unwrap_or(f64::NAN),
-                ssim: mean_of(SSIM),
-                further: names.into_iter().filter_map(|name| Some((name.to_owned(), mean_of(name)?))).collect(),
-                seconds: own.iter().map(|score| score.time.as_secs_f64()).sum::<f64>() / count,
-                target_count: own.len(),
-            }
-        })
-        .collect()
+/// The depth of the plane that a target's baselines are warped by.
+fn depth_of(scene: &Scene, target: usize) -> f64 {
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    let points = scene.points.iter().map(|point| point.position_world);
+    plane_depth(&cameras[target], points, scene.views[target].near_far, &cameras)
 }

@@ -175,7 +175,7 @@ fn object_of(
     if views.len() < 2 {
         return Err("fewer than two photographs: the object cannot be found".to_owned());
     }
-    let album = Album::open(scene, views.iter().copied(), progress).map_err(|error| error.to_string())?;
+    let album = Album::open_at(scene, views.iter().copied(), LOOK_SIDE, progress).map_err(|error| error.to_string())?;
     let images = album.sources(&views, LOOK_SIDE, background, progress).map_err(|error| error.to_string())?;
     warnings.extend(images.warning.clone());
     find_object(&images).ok_or_else(|| {

@@ -5,6 +5,7 @@
 //! ```text
 //! inspect      what a scene holds and what looks wrong with it
 //! metrics      how good is a picture
+//! baseline     pictures that need no field: copies and warps of the nearest sources
 //! evaluator    each weighting scheme on views that are left out      Evaluator
 //! protocol     which views are sources, which are targets
 //! pareto       error against run time
@@ -15,6 +16,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod baseline;
 mod evaluator;
 pub mod gallery;
 pub mod inspect;

@@ -8,6 +8,7 @@
 //! features         a set of pictures as Inception's numbers
 //! frechet, kernel  distance of two sets: FID, KID
 //! convention       what published tables mean by their scores
+//! masked           PSNR and SSIM of the object alone
 //! interval         means over scenes, and how sure they are
 //! ```
 //!
@@ -25,6 +26,7 @@ pub mod interval;
 #[cfg(feature = "fid")]
 pub mod kernel;
 pub mod lpips;
+pub mod masked;
 pub mod similarity;
 pub mod trunk;
 

@@ -1,27 +1,34 @@
 //! Evaluation protocols: which views of a scene are sources and which are targets, so that tables can be compared.
 //!
 //! ```text
-//! random   sources and targets drawn from all photographs (the paper's first table)
-//! close    five sources, exactly one of them near the target (its second table)
-//! count    2, 8, 16, 32 sources, each set within the next, the same targets (its figures)
-//! fixed    the view lists that were published, or a person's own
+//! random               sources and targets drawn from all photographs (the paper's first table)
+//! close                five sources, exactly one of them near the target (its second table)
+//! count                2, 8, 16, 32 sources, each set within the next, the same targets (its figures)
+//! fixed                the view lists that were published, or a person's own
+//! nearest              each target from the views nearest to it
+//! llff, dtu, blender   the benchmarks of few-shot papers
 //! ```
 //!
 //! What is drawn hangs on the seed, the scene's name and the number of the trial, and on nothing else: not on which
 //! machine takes which job, nor on the order of the scenes. `random` and `count` of one seed draw the same targets.
 
+mod benchmark;
 mod draw;
+mod drawn;
+mod listed;
 mod name;
+mod published;
 
+pub use benchmark::Benchmark;
 pub use name::ProtocolError;
+pub use published::{Figure, Published};
 
 use draw::Draw;
+use drawn::{close, counted};
+use listed::{fixed, nearest};
 use viewfuse_core::Vec3;
-use viewfuse_core::camera::Camera;
 use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::{SelectionError, view_list};
-use viewfuse_scene::rig::Rig;
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_scene::photographs::reduced_size;
 
 /// Sources of `random` unless a person says otherwise.
 pub const RANDOM_SOURCES: usize = 3;
@@ -33,7 +40,8 @@ pub const CLOSE_DEGREES: f32 = 10.0;
 pub const COUNTS: [usize; 4] = [2, 8, 16, 32];
 
 /// How sources and targets are chosen. As text: `NAME` or `NAME:KEY=VALUE[,KEY=VALUE]`, of `fixed` `fixed:LIST` or
-/// `fixed:SOURCES:TARGETS`.
+/// `fixed:SOURCES:TARGETS`, of `nearest` `nearest:K` or `nearest:K:TARGETS`, of a benchmark `NAME:K`, of one with masks also
+/// `NAME:K,masks=given`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Protocol {
     /// So many sources; they and the targets are drawn from all photographs.
@@ -54,12 +62,29 @@ pub enum Protocol {
         /// The numbers, ascending.
         sources: Vec<usize>,
     },
-    /// The same views of every scene, as lists that [`view_list`] reads. A source is never a target.
+    /// The same views of every scene, as lists that [`view_list`](viewfuse_scene::few_shot::view_list) reads. A source is never a target.
     Fixed {
         /// Which views are sources.
         sources: String,
         /// Which are targets.
         targets: String,
+    },
+    /// Each target has its own sources: the other views whose cameras are nearest to its own.
+    Nearest {
+        /// How many sources.
+        sources: usize,
+        /// Which views are targets, as a list of the same kind; otherwise each view with a photograph.
+        targets: Option<String>,
+    },
+    /// The views, the size and the metric of a benchmark.
+    Benchmark {
+        /// Which.
+        benchmark: Benchmark,
+        /// How many sources.
+        sources: usize,
+        /// Whether fields are given the masks that stand beside the photographs. Papers' methods are not: there, the
+        /// truth's mask serves the metric only.
+        masks_given: bool,
     },
 }
 
@@ -68,9 +93,9 @@ pub enum Protocol {
 pub struct Draws {
     /// Seed of all draws.
     pub seed: u64,
-    /// How many times sources and targets are drawn for every scene; `fixed` draws nothing and has one trial.
+    /// How many times sources and targets are drawn for every scene. Protocols that draw nothing have one trial.
     pub trial_count: u32,
-    /// Targets of a trial; `fixed` takes those that its list says.
+    /// Targets of a trial. Protocols that draw nothing say their targets themselves.
     pub target_count: usize,
 }
 
@@ -108,7 +133,10 @@ impl Protocol {
     /// a scene.
     pub fn plan(&self, scenes: &[Scene], draws: Draws, least_sources: usize) -> Result<Plan, ProtocolError> {
         let fewest = match self {
-            Protocol::Random { sources } | Protocol::Close { sources, .. } => *sources,
+            Protocol::Random { sources }
+            | Protocol::Close { sources, .. }
+            | Protocol::Nearest { sources, .. }
+            | Protocol::Benchmark { sources, .. } => *sources,
             Protocol::Count { sources } => sources.first().copied().unwrap_or(0),
             Protocol::Fixed { .. } => least_sources,
         };
@@ -117,7 +145,7 @@ impl Protocol {
         }
         let mut plan = Plan::default();
         for (index, scene) in scenes.iter().enumerate() {
-            let trials = if matches!(self, Protocol::Fixed { .. }) { 1 } else { draws.trial_count };
+            let trials = if self.draws() { draws.trial_count } else { 1 };
             for trial in 0..trials {
                 let draw = Draw::of(draws.seed, &scene.name(), trial);
                 let mut add = |sources: Vec<usize>, targets: Vec<usize>| {
@@ -134,6 +162,14 @@ impl Protocol {
                         add(sources, targets);
                         Vec::new()
                     }
+                    Protocol::Nearest { sources, targets } => near(scene, *sources, targets.as_deref(), &mut add)?,
+                    Protocol::Benchmark { benchmark, sources, .. } => match benchmark.choose(scene, *sources) {
+                        Ok((sources, targets)) => {
+                            add(sources, targets);
+                            Vec::new()
+                        }
+                        Err(lack) => vec![format!("{} {lack}", scene.name())],
+                    },
                 };
                 // What a scene has not is the same in every trial.
                 plan.notes.extend(notes.into_iter().filter(|_| trial == 0));
@@ -144,96 +180,68 @@ impl Protocol {
             false => Ok(plan),
         }
     }
-}
 
-/// The first views of the order are the targets, those behind them the sources: a smaller set is the beginning of a larger.
-fn counted(
-    scene: &Scene,
-    draw: &Draw,
-    counts: &[usize],
-    target_count: usize,
-    add: &mut impl FnMut(Vec<usize>, Vec<usize>),
-) -> Vec<String> {
-    let order = draw.order(photographed(scene));
-    let mut notes = Vec::new();
-    for &count in counts {
-        if order.len() < target_count + count {
-            let (has, wanted) = (order.len(), target_count + count);
-            notes.push(format!("{}: {has} photographs, {wanted} are needed for {count} sources", scene.name()));
-            continue;
-        }
-        let (targets, rest) = order.split_at(target_count);
-        add(ascending(&rest[..count]), targets.to_vec());
+    /// Whether sources or targets are drawn: the seed and the number of trials matter.
+    pub fn draws(&self) -> bool {
+        matches!(self, Protocol::Random { .. } | Protocol::Close { .. } | Protocol::Count { .. })
     }
-    notes
+
+    /// Whether each number of sources has a table of its own.
+    pub fn has_table_a_count(&self) -> bool {
+        matches!(self, Protocol::Count { .. })
+    }
+
+    /// Whether targets are scored by their masks as well.
+    pub fn is_masked(&self) -> bool {
+        matches!(self, Protocol::Benchmark { benchmark, .. } if benchmark.is_masked())
+    }
+
+    /// Whether masks that stand beside photographs are kept from the field.
+    pub fn hides_masks(&self) -> bool {
+        matches!(self, Protocol::Benchmark { benchmark, masks_given: false, .. } if benchmark.is_masked())
+    }
+
+    /// The size of a scene's pictures that the protocol asks for: that of its first view, with the longest side of the
+    /// benchmark and of `longest`, what the field can at most; never larger than the photograph. `None` for protocols that
+    /// leave the size open.
+    pub fn picture_size(&self, scene: &Scene, longest: u32) -> Option<[u32; 2]> {
+        let Protocol::Benchmark { benchmark, .. } = self else { return None };
+        let side = benchmark.published_size().into_iter().max()?.min(longest);
+        scene.views.first().map(|view| reduced_size(&view.camera, side).into())
+    }
+
+    /// What is scored, in words for records.
+    pub fn metric_words(&self) -> &'static str {
+        match (self.is_masked(), self.hides_masks()) {
+            (false, _) => "full: prediction and photograph over the run's background",
+            (true, true) => {
+                "full: prediction and whole photograph; masked: both over white by the truth's mask; fields are given no masks"
+            }
+            (true, false) => {
+                "full: prediction and photograph over the run's background; masked: both over white by the truth's mask; \
+                 fields are given the sources' masks"
+            }
+        }
+    }
 }
 
 /// Each target is a job: its sources are its own.
-fn close(
+fn near(
     scene: &Scene,
-    draw: &Draw,
     source_count: usize,
-    degrees: f32,
-    target_count: usize,
+    targets: Option<&str>,
     add: &mut impl FnMut(Vec<usize>, Vec<usize>),
-) -> Vec<String> {
-    let views: Vec<usize> = photographed(scene).collect();
-    let cameras: Vec<Camera> = views.iter().map(|&view| scene.views[view].camera).collect();
-    let focus = Rig::of(&cameras).focus;
-    let from_focus = |view: usize| scene.views[view].camera.pose.centre_world() - focus;
-    let is_near = |a: usize, b: usize| angle(from_focus(a), from_focus(b)).to_degrees() < f64::from(degrees);
-    let neighbours = |target: usize| -> (Vec<usize>, Vec<usize>) {
-        views.iter().copied().filter(|&view| view != target).partition(|&view| is_near(view, target))
-    };
-    let fits = |target: &usize| {
-        let (near, far) = neighbours(*target);
-        !near.is_empty() && far.len() + 1 >= source_count
-    };
-    let (fitting, others): (Vec<usize>, Vec<usize>) = views.iter().copied().partition(fits);
-    for target in draw.order(fitting.iter().copied()).into_iter().take(target_count) {
-        let (near, far) = neighbours(target);
-        let own = draw.of_view(target);
-        let (near, far) = (own.order(near), own.order(far));
-        let sources: Vec<usize> = near.into_iter().take(1).chain(far.into_iter().take(source_count - 1)).collect();
-        add(ascending(&sources), vec![target]);
+) -> Result<Vec<String>, ProtocolError> {
+    let count = photographed(scene).count();
+    if count <= source_count {
+        return Ok(vec![format!(
+            "{}: {count} photographs, {} are needed for {source_count} sources",
+            scene.name(),
+            source_count + 1
+        )]);
     }
-    let scene_name = scene.name();
-    let mut notes = Vec::new();
-    if !others.is_empty() {
-        let (count, all, far) = (others.len(), views.len(), source_count - 1);
-        notes.push(format!(
-            "{scene_name}: {count} of {all} views are no targets: they lack a view within {degrees} degrees, or {far} beyond"
-        ));
-    }
-    if !fitting.is_empty() && fitting.len() < target_count {
-        notes.push(format!("{scene_name}: {} targets instead of {target_count}", fitting.len()));
-    }
-    notes
-}
-
-fn fixed(
-    scene: &Scene,
-    sources: &str,
-    targets: &str,
-    least_sources: usize,
-) -> Result<(Vec<usize>, Vec<usize>), SelectionError> {
-    let scene_name = || scene.path.display().to_string();
-    let (sources, mut targets) = (view_list(scene, sources)?, view_list(scene, targets)?);
-    targets.retain(|target| !sources.contains(target));
-    if let Some(&view) = sources.iter().chain(&targets).find(|&&view| scene.views[view].image.is_none()) {
-        return Err(SelectionError::NoPhotograph { scene: scene_name(), name: scene.views[view].name.clone() });
-    }
-    let count = sources.len();
-    if count < least_sources {
-        return Err(SelectionError::TooFewSources { scene: scene_name(), count, least: least_sources });
-    }
-    if count > MOST_SOURCES {
-        return Err(SelectionError::TooManySources { scene: scene_name(), count });
-    }
-    if targets.is_empty() {
-        return Err(SelectionError::NoTargets { scene: scene_name() });
-    }
-    Ok((sources, targets))
+    nearest(scene, source_count, targets)?.into_iter().for_each(|(sources, target)| add(sources, vec![target]));
+    Ok(Vec::new())
 }
 
 fn photographed(scene: &Scene) -> impl Iterator<Item = usize> {

@@ -309,7 +309,8 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`RenderError::Scene`] if it cannot be read.
     pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError> {
-        Ok(self.album.truth(view, size, self.images.background)?)
+        let background = self.images.has_silhouettes.then_some(self.images.background);
+        Ok(self.album.truth(view, size, background)?)
     }
 
     /// Width and height of the picture that is rendered at a view's camera.

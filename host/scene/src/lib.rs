@@ -21,8 +21,8 @@ mod scene;
 pub mod write;
 
 pub use scene::{
-    IntrinsicsFault, LARGEST_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame, ScenePoint,
-    Split, View, looked_for, reader,
+    FileFault, IntrinsicsFault, LARGEST_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
+    ScenePoint, Split, View, looked_for, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -79,8 +79,10 @@ pub struct SourceImages {
     pub background: [f32; 3],
     /// Whether alpha is an object's silhouette. Otherwise photographs are whole, and alpha 0 marks what they do not show.
     pub has_silhouettes: bool,
-    /// Points of surfaces in world coordinates, where the scene's files know some.
+    /// Points of surfaces in world coordinates that two or more of the sources saw, where the scene's files know some.
     pub points: Vec<Vec3>,
+    /// Nearest and farthest depth of what the sources show, where the scene's files say so.
+    pub near_far: Option<[f32; 2]>,
     /// What is doubtful about the background, if anything.
     pub warning: Option<String>,
 }
@@ -99,14 +101,31 @@ impl SourceImages {
 /// Most bytes of decoded photographs that are kept. Where a run needs more, each is decoded again whenever it is needed.
 const MOST_KEPT_BYTES: u64 = 512 << 20;
 
+/// Most bytes of photographs that are being decoded at a time, but for a single one that needs more.
+const MOST_DECODING_BYTES: u64 = 512 << 20;
+
+/// What decoding takes for a pixel: as decoded, as RGBA, undistorted.
+const DECODING_BYTES: u64 = 16;
+
+/// Photographs of less than twice this side are kept at their own size, however small they are needed.
+const LEAST_KEPT_SIDE: u32 = 640;
+
+/// Points of a larger reprojection error, in pixels, do not count.
+const MOST_POINT_ERROR: f32 = 2.0;
+
 /// Photographs of a scene, decoded once where memory allows.
 pub struct Album<'a> {
     scene: &'a Scene,
     kept: Vec<Option<Photograph>>,
+    /// The longest side that is worth keeping.
+    side: Option<u32>,
 }
 
 impl<'a> Album<'a> {
-    /// Reads the photographs of these views, all cores at once.
+    /// Reads the photographs of these views at their own size, all cores at once.
+    ///
+    /// At most 512 MiB of them are kept; where they need more, each is read again whenever it is needed. Beside them, at most
+    /// 512 MiB are in use while photographs are decoded, or what a single one needs.
     ///
     /// # Errors
     /// [`PhotographsError`] of the first view that cannot be read, or if the work is stopped.
@@ -115,33 +134,85 @@ impl<'a> Album<'a> {
         views: impl IntoIterator<Item = usize>,
         progress: &dyn Progress,
     ) -> Result<Album<'a>, PhotographsError> {
+        Album { scene, kept: vec![None; scene.views.len()], side: None }.filled(views, progress)
+    }
+
+    /// As [`Album::open`], for sources and truths of at most `longest_side` pixels on a side: larger photographs are reduced as
+    /// soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times that side, keep
+    /// their own size, and give the same numbers to the bit.
+    ///
+    /// # Errors
+    /// As [`Album::open`].
+    pub fn open_at(
+        scene: &'a Scene,
+        views: impl IntoIterator<Item = usize>,
+        longest_side: u32,
+        progress: &dyn Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
+        let side = Some(longest_side.saturating_mul(2).max(LEAST_KEPT_SIDE));
+        Album { scene, kept: vec![None; scene.views.len()], side }.filled(views, progress)
+    }
+
+    fn filled(
+        mut self,
+        views: impl IntoIterator<Item = usize>,
+        progress: &dyn Progress,
+    ) -> Result<Album<'a>, PhotographsError> {
         let mut wanted: Vec<usize> = views.into_iter().collect();
         wanted.sort_unstable();
         wanted.dedup();
-        let mut kept = vec![None; scene.views.len()];
-        let bytes = |view: &usize| {
-            let pinhole = &scene.views[*view].camera.pinhole;
-            4 * u64::from(pinhole.width()) * u64::from(pinhole.height())
-        };
-        if wanted.iter().map(bytes).sum::<u64>() <= MOST_KEPT_BYTES {
-            progress.expect(wanted.len());
-            let read = |view: usize| {
+        let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
+        if wanted.iter().map(|&view| 4 * pixels(self.kept_size(view))).sum::<u64>() > MOST_KEPT_BYTES {
+            return Ok(self);
+        }
+        progress.expect(wanted.len());
+        let mut rest = &wanted[..];
+        while !rest.is_empty() {
+            // As many as fit, and at least one.
+            let mut bytes = 0;
+            let fits = |&&view: &&usize| {
+                let pinhole = &self.scene.views[view].camera.pinhole;
+                bytes += DECODING_BYTES * pixels((pinhole.width(), pinhole.height()));
+                bytes <= MOST_DECODING_BYTES
+            };
+            let count = rest.iter().take_while(fits).count().max(1);
+            let (now, later) = rest.split_at(count);
+            let read = |&view: &usize| {
                 progress.check()?;
-                let photograph = scene.photograph(view)?;
+                let photograph = self.read(view)?;
                 progress.step();
                 Ok((view, photograph))
             };
-            let photographs: Vec<_> = wanted.into_par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
+            let photographs: Vec<_> = now.par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
             for (view, photograph) in photographs {
-                kept[view] = Some(photograph);
+                self.kept[view] = Some(photograph);
             }
+            rest = later;
         }
-        Ok(Album { scene, kept })
+        Ok(self)
+    }
+
+    /// The size at which a photograph is kept.
+    fn kept_size(&self, view: usize) -> (u32, u32) {
+        let camera = &self.scene.views[view].camera;
+        match self.side {
+            Some(side) if longest_side(camera) / 2 >= side => reduced_size(camera, side),
+            _ => (camera.pinhole.width(), camera.pinhole.height()),
+        }
+    }
+
+    fn read(&self, view: usize) -> Result<Photograph, SceneError> {
+        let size = self.kept_size(view);
+        self.scene.photograph_after(view, |stored| match stored.pixels.dimensions() == size {
+            true => stored,
+            false => resample::reduced(&stored, size),
+        })
     }
 
     fn photograph(&self, view: usize) -> Result<Cow<'_, Photograph>, SceneError> {
         match self.kept.get(view) {
             Some(Some(photograph)) => Ok(Cow::Borrowed(photograph)),
+            _ if view < self.scene.views.len() => Ok(Cow::Owned(self.read(view)?)),
             _ => Ok(Cow::Owned(self.scene.photograph(view)?)),
         }
     }
@@ -178,6 +249,7 @@ impl<'a> Album<'a> {
                 backdrop.noise_level()
             ));
         }
+        let (points, near_far) = self.space(views);
         let all = |borders: &[Option<matte::Border>]| {
             let images = views.par_iter().zip(borders).map(|(&view, border)| {
                 progress.check()?;
@@ -201,16 +273,30 @@ impl<'a> Album<'a> {
                         self.cut_out(view, longest_side, None, &backdrop, false)
                     })
                     .collect::<Result<Vec<_>, PhotographsError>>()?;
-                Ok(SourceImages { images, background, has_silhouettes: false, points: Vec::new(), warning })
+                Ok(SourceImages { images, background, has_silhouettes: false, points, near_far, warning })
             }
             images => Ok(SourceImages {
                 images: images?,
                 background,
                 has_silhouettes: !whole_pictures,
-                points: Vec::new(),
+                points,
+                near_far,
                 warning,
             }),
         }
+    }
+
+    /// Points that at least two of these views saw, and the bounds of depth that all of them state.
+    fn space(&self, views: &[usize]) -> (Vec<Vec3>, Option<[f32; 2]>) {
+        let saw = |point: &&crate::ScenePoint| {
+            let is_source = |view: &&u32| views.contains(&(**view as usize));
+            let is_exact = point.error.is_none_or(|error| error <= MOST_POINT_ERROR);
+            is_exact && point.views.iter().filter(is_source).take(2).count() == 2
+        };
+        let points = self.scene.points.iter().filter(saw).map(|point| point.position_world).collect();
+        let bounds: Option<Vec<[f32; 2]>> = views.iter().map(|&view| self.scene.views[view].near_far).collect();
+        let near_far = bounds.and_then(|all| all.into_iter().reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]));
+        (points, near_far)
     }
 
     /// A source at working size; `must_show` says that it must show both an object and, unless its alpha channel says so, a
@@ -223,8 +309,11 @@ impl<'a> Album<'a> {
         backdrop: &matte::Backdrop,
         must_show: bool,
     ) -> Result<SourceImage, PhotographsError> {
-        let View { name, camera, image, .. } = &self.scene.views[view];
-        let photograph = self.photograph(view)?;
+        let View { name, camera, image, mask, .. } = &self.scene.views[view];
+        let mut photograph = self.photograph(view)?;
+        if mask.is_some() && !must_show {
+            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        }
         // Enlarging a source would add pixels but no detail.
         let (width, height) = reduced_size(camera, longest_side);
         let pinhole = camera.pinhole.resized(width, height).map_err(|error| PhotographsError::Size {
@@ -233,7 +322,12 @@ impl<'a> Album<'a> {
             height,
             error,
         })?;
-        let premultiplied = matte::premultiplied(&photograph, border, backdrop);
+        let mut premultiplied = matte::premultiplied(&photograph, border, backdrop);
+        if let Some(seen) = photograph.seen.as_ref().filter(|_| border.is_none() && !must_show) {
+            for (texel, _) in premultiplied.iter_mut().zip(seen.pixels()).filter(|(_, seen)| seen[0] == 0) {
+                *texel = [0.0; 4];
+            }
+        }
         let opaque = premultiplied.iter().filter(|texel| texel[3] > 0.5).count();
         if must_show && (opaque == 0 || (opaque == premultiplied.len() && !photograph.has_alpha)) {
             let path = image.as_ref().map_or_else(|| name.clone(), |path| path.display().to_string());
@@ -244,16 +338,27 @@ impl<'a> Album<'a> {
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
 
-    /// The truth at a view, resampled to a size and laid over a background, rounded to 8 bits.
+    /// The truth at a view, resampled to a size, rounded to 8 bits: what is cut out of it is laid over a background, if there is
+    /// one; otherwise the whole photograph.
     ///
     /// # Errors
     /// [`SceneError`] if it cannot be read.
-    pub fn truth(&self, view: usize, size: [u32; 2], background: [f32; 3]) -> Result<RgbImage, SceneError> {
-        let photograph = self.photograph(view)?;
+    pub fn truth(&self, view: usize, size: [u32; 2], background: Option<[f32; 3]>) -> Result<RgbImage, SceneError> {
+        let mut photograph = self.photograph(view)?;
+        if background.is_none() && self.scene.views[view].mask.is_some() {
+            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        }
+        let background = background.unwrap_or_default();
         let own_size = photograph.pixels.dimensions();
         let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
         Ok(to_rgb8(&texels, size))
     }
+}
+
+/// The whole photograph, whatever its mask says.
+fn without_alpha(mut photograph: Photograph) -> Photograph {
+    photograph.pixels.pixels_mut().for_each(|pixel| pixel[3] = 255);
+    Photograph { has_alpha: false, ..photograph }
 }
 
 /// Longest side of a camera's image in pixels.

@@ -37,7 +37,7 @@ mod undistort;
 
 use check::Checked;
 pub use error::SceneError;
-pub use fault::{IntrinsicsFault, NumpyFault, Place};
+pub use fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
@@ -198,11 +198,21 @@ impl Scene {
     /// [`SceneError`] if there is no such view, if it has no photograph, if a file cannot be decoded, or if its size
     /// is no longer what it was when the scene was opened.
     pub fn photograph(&self, view: usize) -> Result<Photograph, SceneError> {
+        self.photograph_after(view, |stored| stored)
+    }
+
+    /// As [`Scene::photograph`], with the stored photograph (upright, with its mask) made smaller before it is undistorted.
+    pub(crate) fn photograph_after(
+        &self,
+        view: usize,
+        reduce: impl FnOnce(Photograph) -> Photograph,
+    ) -> Result<Photograph, SceneError> {
         let mut photograph = self.stored_photograph(view)?;
-        let View { camera, lens, mask, .. } = &self.views[view];
+        let View { camera, lens, mask, .. } = self.view(view)?;
         if let Some(mask) = mask {
             masks::apply(mask, &mut photograph)?;
         }
+        let photograph = reduce(photograph);
         Ok(match lens {
             Some(lens) => undistort::undistorted(&photograph, lens, &camera.pinhole),
             None => photograph,

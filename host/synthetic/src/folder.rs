@@ -67,6 +67,14 @@ pub enum WriteError {
         /// Why it was refused.
         source: io::Error,
     },
+    /// The photograph could not be stored.
+    #[error("{path}: cannot be stored as a JPEG", path = .path.display())]
+    Jpeg {
+        /// What was being written.
+        path: PathBuf,
+        /// What the encoder said.
+        source: image::ImageError,
+    },
     /// The picture could not be stored.
     #[error("{path}: cannot be stored as a PNG", path = .path.display())]
     Png {
@@ -91,6 +99,30 @@ pub fn write_scene(
     progress: &dyn Progress,
 ) -> Result<(), WriteError> {
     let pinhole = shared_pinhole(folder, cameras)?;
+    create_whole(folder, |unfinished| {
+        for path in [unfinished.join("pose"), unfinished.join("rgb")] {
+            fs::create_dir(&path).map_err(io_error(&path))?;
+        }
+        write_text(&unfinished.join("intrinsics.txt"), &intrinsics_text(&pinhole))?;
+        for (index, camera) in cameras.iter().enumerate() {
+            progress.check()?;
+            write_text(&unfinished.join(format!("pose/{index:06}.txt")), &pose_text(camera))?;
+            let picture = render_with(object, camera, rays_per_side);
+            write_picture(&unfinished.join(format!("rgb/{index:06}.png")), &picture)?;
+        }
+        Ok(())
+    })
+}
+
+/// Creates a folder that must not exist, filled by `fill` under another name beside it and then renamed; its parent is
+/// created where it is missing.
+///
+/// # Errors
+/// What `fill` says, or [`WriteError`] if something stands there or the file system refuses.
+pub(crate) fn create_whole(
+    folder: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), WriteError>,
+) -> Result<(), WriteError> {
     let name = folder.file_name().ok_or_else(|| WriteError::NoName { path: folder.to_owned() })?;
     // `symlink_metadata`: a dangling link is something that stands there, too.
     if folder.symlink_metadata().is_ok() {
@@ -104,16 +136,8 @@ pub fn write_scene(
     let temporary = tempfile::Builder::new().prefix(".unfinished-").tempdir_in(parent).map_err(io_error(parent))?;
     // A temporary folder is closed to others; the scene, a folder inside it, has the ordinary permissions.
     let unfinished = temporary.path().join(name);
-    for path in [&unfinished, &unfinished.join("pose"), &unfinished.join("rgb")] {
-        fs::create_dir(path).map_err(io_error(path))?;
-    }
-    write_text(&unfinished.join("intrinsics.txt"), &intrinsics_text(&pinhole))?;
-    for (index, camera) in cameras.iter().enumerate() {
-        progress.check()?;
-        write_text(&unfinished.join(format!("pose/{index:06}.txt")), &pose_text(camera))?;
-        let picture = render_with(object, camera, rays_per_side);
-        write_picture(&unfinished.join(format!("rgb/{index:06}.png")), &picture)?;
-    }
+    fs::create_dir(&unfinished).map_err(io_error(&unfinished))?;
+    fill(&unfinished)?;
     fs::rename(&unfinished, folder).map_err(io_error(folder))
 }
 
@@ -149,7 +173,7 @@ fn decimal(number: f32) -> String {
     if digits.contains('.') { digits } else { digits + "." }
 }
 
-fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
     fs::write(path, text).map_err(io_error(path))
 }
 
@@ -161,6 +185,6 @@ fn write_picture(path: &Path, picture: &image::RgbaImage) -> Result<(), WriteErr
     fs::write(path, bytes).map_err(io_error(path))
 }
 
-fn io_error(path: &Path) -> impl FnOnce(io::Error) -> WriteError {
+pub(crate) fn io_error(path: &Path) -> impl FnOnce(io::Error) -> WriteError {
     move |source| WriteError::Io { path: path.to_owned(), source }
 }

@@ -6,12 +6,12 @@
 //! diagonal of the box around them is about 1 (0.8 to 1), its middle about the origin. Nothing reaches farther
 //! than [`LARGEST_RADIUS`], so that no camera of [`crate::cameras`] cuts anything off.
 
-mod build;
+pub(crate) mod build;
 mod cars;
 mod chairs;
-mod draws;
+pub(crate) mod draws;
 mod livery;
-mod paint;
+pub(crate) mod paint;
 mod toys;
 
 use crate::object::{Object, ObjectError};

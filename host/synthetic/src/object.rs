@@ -1,26 +1,13 @@
 //! Objects: primitives, placed and painted. Their union is the minimum of their distances.
 
 use crate::light::Light;
-use crate::placement::Placement;
-use crate::shape::Shape;
-use crate::texture::Finish;
+use crate::part::{Bounds, Part};
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{max, min};
 
 /// Farthest that a part may reach from the world's origin: coordinates there are exact to about the distance at which a
 /// ray counts as arrived.
 pub const LARGEST_DISTANCE: f32 = 100.0;
-
-/// One primitive of an object.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
-    /// Its form.
-    pub shape: Shape,
-    /// Where it stands.
-    pub placement: Placement,
-    /// What it looks like.
-    pub finish: Finish,
-}
 
 /// Why parts are not an object. Parts count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -55,6 +42,8 @@ pub enum ObjectError {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Object {
     parts: Vec<Part>,
+    /// Around all parts, for rays to pass them by.
+    bounds: Bounds,
     /// Of each part, around its own origin.
     bounding_radii: Vec<f32>,
     /// Of all together, around the world's origin.
@@ -100,7 +89,8 @@ impl Object {
             bounding_radius = max(bounding_radius, min(reach, farthest_corner(part)));
             bounding_radii.push(part.shape.bounding_radius());
         }
-        Ok(Object { parts, bounding_radii, bounding_radius, light: Light::default() })
+        let bounds = Bounds::new(&parts);
+        Ok(Object { parts, bounds, bounding_radii, bounding_radius, light: Light::default() })
     }
 
     /// The same object under other lamps.
@@ -119,6 +109,16 @@ impl Object {
     /// The parts, in the order given.
     pub fn parts(&self) -> &[Part] {
         &self.parts
+    }
+
+    /// Boxes around the parts.
+    pub(crate) fn bounds(&self) -> &Bounds {
+        &self.bounds
+    }
+
+    /// A part with the radius of a ball around its own origin that holds it.
+    pub(crate) fn bounded_part(&self, index: usize) -> (&Part, f32) {
+        (&self.parts[index], self.bounding_radii[index])
     }
 
     /// The parts, each with the radius of a ball around its own origin that holds it.

@@ -38,6 +38,16 @@ impl Placement {
         Placement { x_world, y_world, ..self }
     }
 
+    /// The placement of a thing that is placed so in a group, when the group is placed by `group`.
+    pub fn within(&self, group: &Placement) -> Placement {
+        Placement {
+            x_world: group.rotate_to_world(self.x_world),
+            y_world: group.rotate_to_world(self.y_world),
+            z_world: group.rotate_to_world(self.z_world),
+            origin_world: group.rotate_to_world(self.origin_world) + group.origin_world,
+        }
+    }
+
     /// The local origin in world coordinates.
     pub fn origin_world(&self) -> Vec3 {
         self.origin_world

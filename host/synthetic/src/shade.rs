@@ -37,8 +37,8 @@ pub fn shade(object: &Object, ray: &Ray, hit: &Hit) -> Vec3 {
     let above = 0.5 + 0.5 * normal.z;
     let around = object.light().around[0] * (1.0 - above) + object.light().around[1] * above;
     let towards_key = max(normal.dot(key), 0.0);
-    let in_shadow =
-        towards_key > 0.0 && is_blocked(object, &Ray { origin_world: point + normal * LIFT, direction_world: key });
+    let in_shadow = towards_key > 0.0
+        && is_blocked(object, &Ray { origin_world: point + normal * LIFT, direction_world: key }, f32::MAX);
     let key_light = if in_shadow { 0.0 } else { object.light().key_light * towards_key };
     let fill_light = object.light().fill_light * max(normal.dot(fill), 0.0);
 

@@ -4,6 +4,7 @@
 //! them. So they need no unwrapping, have no seams and mean the same for every shape. Colours are display values
 //! (what an 8-bit image stores, divided by 255), red, green, blue.
 
+use crate::material::Material;
 use viewfuse_core::Vec3;
 use viewfuse_core::math::{angle_from_components, floor_to_i32, sqrt};
 use viewfuse_core::random::threefry_2x32;
@@ -92,6 +93,13 @@ pub enum Texture {
         /// Which of the random patterns.
         seed: u32,
     },
+    /// What things in rooms and outdoors are made of.
+    Material {
+        /// Its pattern.
+        material: Material,
+        /// Added to the point: where in the pattern the local origin lies.
+        shift: Vec3,
+    },
 }
 
 /// What a surface looks like.
@@ -122,6 +130,7 @@ impl Finish {
                 ground.is_finite() && patches.iter().all(finite)
             }
             Texture::Mottle { colours, cell, .. } => both(colours) && size(cell.x) && size(cell.y) && size(cell.z),
+            Texture::Material { ref material, shift } => material.is_sound() && shift.is_finite(),
         };
         texture && (0.0..=f32::MAX).contains(&self.gloss)
     }
@@ -165,6 +174,7 @@ impl Texture {
                 let amount = value_noise(p / cell, seed);
                 colours[0] * (1.0 - amount) + colours[1] * amount
             }
+            Texture::Material { ref material, shift } => material.colour(p + shift),
         }
     }
 }

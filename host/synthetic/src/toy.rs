@@ -6,8 +6,9 @@
 
 mod load;
 
-use crate::object::{Object, ObjectError, Part};
+use crate::object::{Object, ObjectError};
 use crate::orbit::Orbit;
+use crate::part::Part;
 use crate::placement::Placement;
 use crate::shape::Shape;
 use crate::texture::{Finish, Texture, rgb};

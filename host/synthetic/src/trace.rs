@@ -4,7 +4,8 @@
 //! coordinates and only inside its bounding ball. That takes fewer steps than tracing the minimum of the distances:
 //! a ray that passes close to one part on its way to another is not slowed down.
 
-use crate::object::{Object, Part};
+use crate::object::Object;
+use crate::part::{Part, Probe};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Ray;
 use viewfuse_core::math::{abs, max, min, sqrt};
@@ -23,6 +24,10 @@ const NORMAL_STEP: f32 = 4.0e-4;
 /// How much larger a part's box is taken, in world units: a ray that passes it by is far from arriving.
 const BOX_MARGIN: f32 = 1.0e-3;
 
+/// Parts whose ball is larger than this, in world units, are walls and the like: a ray begins at their box. With smaller
+/// ones that would save no more than a step.
+const LARGE: f32 = 1.0;
+
 /// Where a ray meets an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
@@ -38,23 +43,41 @@ pub struct Hit {
 
 /// The nearest point of `object` on `ray`, if there is one. A ray that starts inside a part hits it at once.
 pub fn trace(object: &Object, ray: &Ray) -> Option<Hit> {
-    ball_interval(ray.origin_world, ray.direction_world, object.bounding_radius())?;
-    let mut nearest: Option<(f32, usize)> = None;
-    for (index, (part, radius)) in object.bounded_parts().enumerate() {
-        let limit = nearest.map_or(f32::MAX, |(distance, _)| distance);
-        if let Some(distance) = march(part, radius, ray, limit) {
-            nearest = Some((distance, index));
-        }
-    }
-    let (distance, index) = nearest?;
+    let (distance, index) = first(object, ray, f32::MAX)?;
     let part = &object.parts()[index];
     let point_local = part.placement.to_local(ray.at(distance));
     Some(Hit { distance, part: index, point_local, normal_local: normal(part, point_local) })
 }
 
-/// Whether anything of `object` lies on `ray`.
-pub fn is_blocked(object: &Object, ray: &Ray) -> bool {
-    object.bounded_parts().any(|(part, radius)| march(part, radius, ray, f32::MAX).is_some())
+/// Distance to the nearest point of `object` on `ray`, if it is less than `limit`, and the index of its part.
+pub fn first(object: &Object, ray: &Ray, limit: f32) -> Option<(f32, usize)> {
+    ball_interval(ray.origin_world, ray.direction_world, object.bounding_radius())?;
+    let (bounds, probe) = (object.bounds(), Probe::new(ray.origin_world, ray.direction_world));
+    let mut nearest: Option<(f32, usize)> = None;
+    for cluster in 0..bounds.cluster_count() {
+        let before = nearest.map_or(limit, |(distance, _)| distance);
+        for index in bounds.parts_of(cluster, &probe, before) {
+            let before = nearest.map_or(limit, |(distance, _)| distance);
+            if !bounds.may_meet(index, &probe, before) {
+                continue;
+            }
+            let (part, radius) = object.bounded_part(index);
+            if let Some(distance) = march(part, radius, ray, before) {
+                nearest = Some((distance, index));
+            }
+        }
+    }
+    nearest
+}
+
+/// Whether anything of `object` lies on `ray` nearer than `limit`.
+pub fn is_blocked(object: &Object, ray: &Ray, limit: f32) -> bool {
+    let (bounds, probe) = (object.bounds(), Probe::new(ray.origin_world, ray.direction_world));
+    let blocks = |index: usize| {
+        let (part, radius) = object.bounded_part(index);
+        bounds.may_meet(index, &probe, limit) && march(part, radius, ray, limit).is_some()
+    };
+    (0..bounds.cluster_count()).any(|cluster| bounds.parts_of(cluster, &probe, limit).any(blocks))
 }
 
 /// Distance along the ray to a part's surface, if it is less than `limit`.
@@ -65,10 +88,12 @@ fn march(part: &Part, bounding_radius: f32, ray: &Ray, limit: f32) -> Option<f32
     let leave = min(leave, limit);
     let origin = part.placement.rotate_to_local(offset);
     let direction = part.placement.rotate_to_local(ray.direction_world);
-    if !meets_box(origin, direction, part.shape.half_box()) {
+    let (box_enter, box_leave) = box_interval(origin, direction, part.shape.half_box())?;
+    if box_leave < 0.0 || box_enter > leave {
         return None;
     }
-    let mut t = enter;
+    let mut t = if bounding_radius > LARGE { max(enter, box_enter) } else { enter };
+    let leave = min(leave, box_leave);
     for _ in 0..LARGEST_STEP_COUNT {
         if t >= leave {
             return None;
@@ -96,15 +121,15 @@ fn ball_interval(origin: Vec3, direction: Vec3, radius: f32) -> Option<(f32, f32
     if middle + half > 0.0 { Some((max(middle - half, 0.0), middle + half)) } else { None }
 }
 
-/// Whether a line passes through a box around the coordinates' origin, taken a little larger than told. Long and flat
-/// parts fill little of their balls.
-fn meets_box(origin: Vec3, direction: Vec3, half_box: Vec3) -> bool {
+/// The stretch of a line inside a box around the coordinates' origin, taken a little larger than told. Long and flat parts
+/// fill little of their balls.
+fn box_interval(origin: Vec3, direction: Vec3, half_box: Vec3) -> Option<(f32, f32)> {
     let (mut enter, mut leave) = (f32::MIN, f32::MAX);
     for axis in 0..3 {
         let (start, step, half) = (origin[axis], direction[axis], half_box[axis] + BOX_MARGIN);
         if step == 0.0 {
             if abs(start) > half {
-                return false;
+                return None;
             }
             continue;
         }
@@ -112,7 +137,7 @@ fn meets_box(origin: Vec3, direction: Vec3, half_box: Vec3) -> bool {
         enter = max(enter, min(a, b));
         leave = min(leave, max(a, b));
     }
-    enter <= leave
+    if enter <= leave { Some((enter, leave)) } else { None }
 }
 
 /// Gradient of the distance from four values at the corners of a tetrahedron, scaled to unit length.

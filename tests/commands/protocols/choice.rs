@@ -51,18 +51,31 @@ fn protocols_as_text() {
         ("fixed:5,8,14:3,10,18", "fixed:chairs"),
         ("fixed:pixelnerf-2", "fixed:pixelnerf-2"),
         ("fixed:0..3:all/2", "fixed:0..3:all/2"),
+        ("nearest:4", "nearest:4"),
+        ("nearest:4:2,5", "nearest:4:2,5"),
+        ("llff:3", "llff:3"),
+        ("dtu:9", "dtu:9"),
+        ("dtu:3,masks=given", "dtu:3,masks=given"),
+        ("blender:8", "blender:8"),
     ] {
         assert_eq!(protocol(text).to_string(), whole);
         assert_eq!(protocol(whole), protocol(text));
     }
     for (text, part) in [
-        ("nearest", "unknown protocol 'nearest'; there are: random[:sources=N]"),
+        ("farthest", "unknown protocol 'farthest'; there are: random[:sources=N]"),
+        ("nearest", "protocol 'nearest': sources must be a whole number from 1 to 256, not ''"),
+        ("nearest:3:", "unknown protocol"),
+        ("llff:0", "protocol 'llff': sources must be a whole number from 1 to 256, not '0'"),
+        ("llff:3,masks=given", "unknown protocol"),
+        ("dtu:10", "protocol 'dtu': sources must be a whole number from 1 to 9, not '10'"),
+        ("dtu:3,masks=no", "unknown protocol"),
+        ("blender:4", "protocol 'blender': sources must be 8, not '4'"),
         ("random:degrees=3", "unknown protocol"),
         ("random:sources", "unknown protocol"),
         ("fixed:boats", "unknown protocol 'fixed:boats'"),
         ("fixed:1:", "unknown protocol"),
         ("random:sources=0", "sources must be a whole number from 1 to 256, not '0'"),
-        ("count:sources=2+x", "not '2+x'"),
+        ("count:sources=2+x", "not 'x'"),
         ("close:degrees=0", "degrees must be above 0 and at most 180"),
     ] {
         let error = text.parse::<Protocol>().expect_err(text).to_string();

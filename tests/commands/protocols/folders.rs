@@ -51,7 +51,8 @@ fn scores(folder: &Path) -> Vec<String> {
 /// Rows of printed tables without their last column, the time; and the title.
 fn printed(text: &str) -> Vec<String> {
     let is_row = |line: &&str| {
-        line.contains("random:") || [" mean", " l1", " error", " nearest"].iter().any(|name| line.starts_with(name))
+        line.contains("random:")
+            || [" mean", " l1", " error", " nearest", " warped"].iter().any(|name| line.starts_with(name))
     };
     let without_time = |line: &str| line.trim_end().rsplit_once(' ').map_or("", |(row, _)| row).trim_end().to_owned();
     text.lines().filter(is_row).map(without_time).collect()
@@ -62,7 +63,7 @@ fn shards_together_are_the_whole() {
     let folder = scene.path();
     let whole = done(BINARY, folder, &format!("{RUN} -o whole"));
     assert!(whole.contains("6 jobs done; 6 of 6 are in whole"), "{whole}");
-    assert_eq!(printed(&whole).len(), 1 + 4, "{whole}");
+    assert_eq!(printed(&whole).len(), 1 + 6, "{whole}");
     // Out of order, and the second of three last.
     for (shard, part) in [("2/3", "missing: 0, 1, 3, 4"), ("0/3", "missing: 1, 4;"), ("1/3", "6 of 6 are in parts")] {
         let text = done(BINARY, folder, &format!("{RUN} -o parts --shard {shard}"));
@@ -75,8 +76,8 @@ fn shards_together_are_the_whole() {
     }
     assert_eq!(finished(&folder.join("parts")), finished(&folder.join("whole")));
     assert_eq!(scores(&folder.join("parts")), scores(&folder.join("whole")));
-    // Six jobs with two targets, a copy and three schemes each.
-    assert_eq!(scores(&folder.join("whole")).len(), 1 + 6 * 2 * 4);
+    // Six jobs with two targets, three baselines and three schemes each.
+    assert_eq!(scores(&folder.join("whole")).len(), 1 + 6 * 2 * 6);
     assert_eq!(scores(&folder.join("whole"))[0], "job,scene,trial,scheme,target,sources,psnr_db,ssim");
     let journals = names_in(&folder.join("parts"));
     assert_eq!(journals.iter().filter(|name| name.contains("-of-3.jsonl")).count(), 3, "{journals:?}");
@@ -275,8 +276,8 @@ fn arguments_that_do_not_fit() {
     let scene = toy();
     let folder = scene.path();
     let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, folder, arguments, parts);
-    wrong("evaluate toy --protocol random", &["required"]);
-    wrong("evaluate toy --protocol nearest -o out", &["nearest", "random[:sources=N]"]);
+    wrong("evaluate toy --protocol random --shard 0/2", &["required"]);
+    wrong("evaluate toy --protocol farthest -o out", &["farthest", "random[:sources=N]"]);
     wrong("evaluate toy --protocol random --targets 3 -o out", &["--protocol", "--targets"]);
     wrong("evaluate toy --shard 0/2 -o out", &["required"]);
     wrong("evaluate toy --protocol random --shard 2/2 -o out", &["2/2", "counted from 0"]);

@@ -1,15 +1,23 @@
 //! Tables over scenes, against sums by hand.
 
 use std::time::Duration;
+use viewfuse::evaluate::baseline::Baseline;
+use viewfuse::evaluate::metrics::masked::PSNR_MASKED;
 use viewfuse::evaluate::run_folder::Finished;
-use viewfuse::evaluate::summary::{Table, tables};
-use viewfuse::evaluate::{NEAREST_COPY, PSNR, SSIM, Score};
+use viewfuse::evaluate::summary::{Standing, Table, Unit, tables};
+use viewfuse::evaluate::{PSNR, SSIM, Score};
 
 viewfuse_tests::trials![
     scenes_count_the_same_and_differences_are_paired,
     a_table_for_each_number_of_sources,
     equal_pictures_are_best,
+    views_of_one_scene_take_the_place_of_scenes,
+    nothing_leads_within_the_interval,
+    words_say_what_is_below_a_baseline,
+    masked_metrics_come_first,
 ];
+
+const NEAREST_COPY: &str = Baseline::NearestCopy.name();
 
 /// A job of a scene: PSNR and SSIM of the copy, the mean and another scheme.
 fn job(number: usize, scene: usize, source_count: usize, values: [[f64; 2]; 3]) -> Finished {
@@ -78,4 +86,93 @@ fn equal_pictures_are_best() {
     // Infinity goes through a journal and back.
     let text = serde_json::to_string(&jobs[0]).expect("JSON");
     assert_eq!(serde_json::from_str::<Finished>(&text).expect("a job"), jobs[0]);
+}
+
+/// A job of one scene with several targets: PSNR of the copy, the mean and another scheme.
+fn views(values: &[[f64; 3]]) -> Finished {
+    let mut whole = job(0, 0, 3, [[0.0; 2]; 3]);
+    whole.scores.clear();
+    for (target, values) in values.iter().enumerate() {
+        let of_target = job(0, 0, 3, values.map(|psnr| [psnr, 0.5])).scores;
+        whole.scores.extend(of_target.into_iter().map(|score| Score { target: target.to_string(), ..score }));
+    }
+    whole
+}
+
+fn leading(table: &Table) -> Vec<&str> {
+    let leads = |row: &&viewfuse::evaluate::summary::Row| row.cells[0].as_ref().is_some_and(|cell| cell.leads);
+    table.rows.iter().filter(leads).map(|row| row.scheme.as_str()).collect()
+}
+
+fn views_of_one_scene_take_the_place_of_scenes() {
+    let jobs = [views(&[[10.0, 20.0, 22.0], [12.0, 30.0, 33.0], [14.0, 10.0, 14.0]])];
+    let table = &tables(&jobs, false)[0];
+    assert_eq!((table.unit, table.scene_count, table.target_count), (Unit::Views, 1, 3));
+    let cell = table.rows[2].cells[0].as_ref().expect("a cell");
+    // Views 22, 33 and 14; differences 2, 3 and 4 with a standard deviation of 1.
+    assert_eq!((cell.value.mean, cell.value.count), (23.0, 3));
+    let versus = cell.versus_reference.expect("a difference");
+    assert!((versus.half_width.expect("an interval") - 4.302_653 / 3.0_f64.sqrt()).abs() < 1.0e-5, "{versus:?}");
+    assert!(table.interval_words().contains("over 3 views of one scene; they say nothing about other scenes"));
+    // A second scene, and scenes are counted.
+    let two = [jobs[0].clone(), job(1, 1, 3, [[10.0, 0.5]; 3])];
+    let table = &tables(&two, false)[0];
+    assert_eq!((table.unit, table.rows[2].cells[0].as_ref().map(|cell| cell.value.count)), (Unit::Scenes, Some(2)));
+    // Two jobs of one scene with a target of the same name are two pictures.
+    let again = [jobs[0].clone(), Finished { job: 1, trial: 1, ..jobs[0].clone() }];
+    assert_eq!(tables(&again, false)[0].rows[0].cells[0].as_ref().map(|cell| cell.value.count), Some(6));
+}
+
+fn nothing_leads_within_the_interval() {
+    // The other scheme is clearly best.
+    let clear = tables(&[views(&[[10.0, 20.0, 22.0], [18.0, 30.0, 33.0], [4.0, 10.0, 14.0]])], false);
+    assert_eq!(leading(&clear[0]), ["other"]);
+    // Both schemes are above the copy; which of them is better, three views do not tell.
+    let close = tables(&[views(&[[10.0, 20.0, 21.0], [10.5, 30.0, 29.0], [11.0, 25.0, 25.5]])], false);
+    assert_eq!(leading(&close[0]), ["mean", "other"]);
+    // Nor do they tell anything here, nor does a single view.
+    let noise = tables(&[views(&[[10.0, 20.0, 15.0], [20.0, 10.0, 15.0]])], false);
+    assert!(leading(&noise[0]).is_empty(), "{:?}", noise[0]);
+    let single = tables(&[views(&[[10.0, 20.0, 30.0]])], false);
+    assert!(leading(&single[0]).is_empty() && single[0].interval_words().contains("no intervals"));
+}
+
+fn words_say_what_is_below_a_baseline() {
+    let table = &tables(&[views(&[[20.0, 15.0, 20.5], [21.0, 16.5, 20.0], [22.0, 17.0, 23.0]])], false)[0];
+    let standing: Vec<Standing> = table.comparisons.iter().map(|own| own.standing).collect();
+    assert_eq!(standing, [Standing::Below, Standing::NotBelow]);
+    let words = table.verdicts();
+    assert_eq!(words.len(), 2, "{words:?}");
+    assert!(words[0].starts_with("mean: below the nearest copy (-4.83 ± 0.72 dB)"), "{words:?}");
+    assert!(
+        words[1].starts_with("other: no difference from the nearest copy beyond the interval (+0.17 "),
+        "{words:?}"
+    );
+    let worse = &tables(&[views(&[[20.0, 19.5, 30.0], [20.0, 20.3, 31.0], [20.0, 19.9, 32.0]])], false)[0];
+    assert!(worse.verdicts()[0].starts_with("mean: below the nearest copy, within the interval (-0.10 "));
+    assert_eq!(worse.verdicts().len(), 1);
+    let good = &tables(&[views(&[[20.0, 29.5, 30.0], [20.0, 30.3, 31.0]])], false)[0];
+    assert_eq!(good.verdicts(), ["every scheme is above every baseline in PSNR beyond the interval"]);
+    let single = &tables(&[views(&[[20.0, 19.5, 30.0]])], false)[0];
+    assert_eq!(
+        single.verdicts(),
+        [
+            "mean: below the nearest copy (-0.50 dB, no interval)",
+            "other: above the nearest copy (+10.00 dB, no interval)"
+        ]
+    );
+}
+
+fn masked_metrics_come_first() {
+    let mut job = views(&[[20.0, 10.0, 30.0], [20.0, 11.0, 30.5]]);
+    for score in &mut job.scores {
+        let masked = if score.scheme == "mean" { 25.0 } else { 22.0 };
+        score.values.push((PSNR_MASKED.to_owned(), masked));
+    }
+    let table = &tables(&[job], false)[0];
+    let headings: Vec<String> = table.metrics.iter().map(|metric| metric.heading()).collect();
+    assert_eq!(headings, ["PSNR full dB", "SSIM full", "PSNR masked dB"]);
+    assert_eq!(table.headline, 2);
+    // By the masked metric the mean is above the copy, although the full one says otherwise.
+    assert_eq!(table.comparisons[0].standing, Standing::Above);
 }

@@ -77,8 +77,14 @@ fn pictures_of_hardly_any_pixels() {
     for side in [1, 2, 3] {
         let cameras = orbit(side).spiral(6, [-0.5, 0.8]).expect("cameras");
         let images = cameras.iter().map(|camera| source(*camera, &render(&ball(), camera))).collect();
-        let sources =
-            SourceImages { images, background: [1.0; 3], has_silhouettes: true, points: Vec::new(), warning: None };
+        let sources = SourceImages {
+            images,
+            background: [1.0; 3],
+            has_silhouettes: true,
+            points: Vec::new(),
+            near_far: None,
+            warning: None,
+        };
         for target_side in [1, 5] {
             match Run::default().picture(&sources, &target(target_side)) {
                 Ok(picture) => assert_sound(&picture),

@@ -4,8 +4,10 @@ use image::{Rgba, RgbaImage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse::device::cpu::Cpu;
+use viewfuse::evaluate::baseline::Baseline;
 use viewfuse::evaluate::metrics::{Metrics, MetricsOn};
-use viewfuse::evaluate::{Evaluator, Mean, NEAREST_COPY, PSNR, SSIM, means};
+use viewfuse::evaluate::summary::{Observation, Table, table};
+use viewfuse::evaluate::{Evaluator, PSNR, SSIM};
 use viewfuse::field::On;
 use viewfuse::field::render::{Frame, RenderOptions, Stage};
 use viewfuse::field::training_free::TrainingFree;
@@ -28,7 +30,7 @@ fn scheme(name: &str) -> Weighting {
     Weighting::open(name).expect("a scheme")
 }
 
-fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {
+fn scores(folder: &Path, schemes: &[&str]) -> Table {
     let scene = Scene::open(folder).expect("the sample");
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
     let weightings: Vec<Weighting> = schemes.iter().map(|name| scheme(name)).collect();
@@ -50,11 +52,12 @@ fn scores(folder: &Path, schemes: &[&str]) -> Vec<Mean> {
             score.value(SSIM).unwrap_or(0.0)
         );
     }
-    means(&scores)
+    table(&scores.iter().map(|score| Observation { scene: 0, job: 0, score }).collect::<Vec<_>>())
 }
 
-fn psnr_of(means: &[Mean], scheme: &str) -> f64 {
-    means.iter().find(|mean| mean.scheme == scheme).unwrap_or_else(|| panic!("no row {scheme}")).psnr
+fn psnr_of(table: &Table, scheme: &str) -> f64 {
+    let row = table.rows.iter().find(|row| row.scheme == scheme).unwrap_or_else(|| panic!("no row {scheme}"));
+    row.cells[0].as_ref().expect("a ratio").value.mean
 }
 
 /// The sample with every photograph laid over white, without an alpha channel.
@@ -84,7 +87,7 @@ fn flattened_sample() -> Folder {
 #[test]
 fn error_weighting_beats_copying_and_the_mean_with_and_without_alpha() {
     let with_alpha = scores(&sample_folder(), &["error:alpha=1", "mean"]);
-    let copy = psnr_of(&with_alpha, NEAREST_COPY);
+    let copy = psnr_of(&with_alpha, Baseline::NearestCopy.name());
     let (error, mean) = (psnr_of(&with_alpha, "error:alpha=1"), psnr_of(&with_alpha, "mean"));
     println!("sample: nearest copy {copy:.2} dB, mean {mean:.2} dB, error:alpha=1 {error:.2} dB");
     assert!(error >= copy + 8.0, "{error} dB is not 8 dB above the nearest copy's {copy}");

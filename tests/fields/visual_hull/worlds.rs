@@ -79,7 +79,14 @@ pub(crate) fn source(camera: Camera, pixels: &RgbaImage) -> SourceImage {
 /// An object seen by cameras, on white.
 pub(crate) fn views(object: &Object, cameras: &[Camera]) -> SourceImages {
     let images = cameras.iter().map(|camera| source(*camera, &render(object, camera))).collect();
-    SourceImages { images, background: [1.0; 3], has_silhouettes: true, points: Vec::new(), warning: None }
+    SourceImages {
+        images,
+        background: [1.0; 3],
+        has_silhouettes: true,
+        points: Vec::new(),
+        near_far: None,
+        warning: None,
+    }
 }
 
 /// A ball around the origin with a pattern all over it.

@@ -101,7 +101,14 @@ impl File<'_> {
             Ok(SourceImage { camera: Camera { pose, pinhole }, texels })
         };
         let images = poses.iter().enumerate().map(image).collect::<Result<_, VerifyError>>()?;
-        Ok(SourceImages { images, background: [1.0; 3], has_silhouettes: true, points: Vec::new(), warning: None })
+        Ok(SourceImages {
+            images,
+            background: [1.0; 3],
+            has_silhouettes: true,
+            points: Vec::new(),
+            near_far: None,
+            warning: None,
+        })
     }
 
     /// A camera-to-world matrix, row by row.

@@ -1,10 +1,14 @@
 //! `viewfuse evaluate`.
 //!
 //! ```text
-//! protocol   with --protocol: jobs, a folder that can be continued, shards
-//! tables     means on the terminal, every score as CSV
+//! protocol   with --protocol: a folder that can be gone on with, shards, the tables
+//! jobs       what a protocol is made of, one after the other
+//! tables     means on the terminal
+//! files      every score as CSV, tables as JSON
 //! ```
 
+mod files;
+mod jobs;
 mod protocol;
 mod tables;
 
@@ -15,13 +19,16 @@ use super::terminal::Terminal;
 use super::weighting::{many_help, open_all, or_every_scheme};
 use super::{on_threads, say};
 use clap::Args;
+use files::{csv_of, json_of};
 use protocol::ProtocolOptions;
+use serde_json::json;
 use std::collections::{BTreeMap, HashSet};
 use std::path::PathBuf;
 use std::process::ExitCode;
-use tables::{csv_of, print_means};
+use tables::{counted, print_table};
 use viewfuse_device::choice::Chosen;
-use viewfuse_evaluate::{Evaluator, Score, means};
+use viewfuse_evaluate::summary::{Observation, Table, table};
+use viewfuse_evaluate::{Evaluator, Score};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_scene::Scene;
 use viewfuse_scene::dataset::{Dataset, DatasetError, Split};
@@ -31,18 +38,22 @@ use viewfuse_weighting::WeightingSpec;
 #[command(after_help = "Examples:\n  \
     viewfuse evaluate dino/ --targets 1,4,7,10,13,16 --size 160x120\n      each of six views from all others, every scheme\n  \
     viewfuse evaluate cars/*/ --sources all/3 --weights mean --weights error:alpha=1 -o cars.csv\n      the other views from every third, two schemes\n  \
+    viewfuse evaluate fern/ --protocol llff:3\n      as few-shot papers do on LLFF, with their figures beside\n  \
+    viewfuse evaluate scene/ --protocol nearest:4 --targets 2,5 --json\n      two views, each from the four nearest others\n  \
     viewfuse evaluate cars/*/ --protocol random --trials 3 -o runs/random\n      the paper's first table, with pictures for a report\n  \
     viewfuse evaluate cars/*/ --protocol count --shard 2/8 -o runs/count\n      the third of eight parts; the folder is shared, or copied together afterwards\n\n\
-    With --protocol, the same command continues a folder after an interruption, and prints the tables once every job of \
-    all shards is done. Intervals are of 95 % over the scenes; differences from mean are taken scene by scene.")]
+    With --protocol and --output, the same command again goes on with a folder after a kill, and prints the tables once \
+    every job is there, whichever shards did them. Intervals are of 95 % over the scenes, or over the views of one scene; \
+    differences of rows are taken scene by scene, or view by view. The first rows need no field: a copy of the nearest \
+    source, that copy warped by the homography of a plane at the scene's depth, and the mean of the four nearest so warped.")]
 pub(crate) struct Arguments {
     /// One or more scenes; with --split data sets
     #[arg(required = true)]
     scenes: Vec<PathBuf>,
-    /// Use the scenes of a data set for train, val or test
+    /// Take the scenes of a data set: those for train, val or test
     #[arg(long, value_name = "SPLIT")]
     split: Option<Split>,
-    /// Views to render and compare, as for --sources [default: all views, each held out in turn; with --sources all others]
+    /// Views to render and compare, as for --sources [default: all views, each left out in turn; with --sources all others]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
     #[command(flatten)]
@@ -57,18 +68,21 @@ pub(crate) struct Arguments {
     model: ModelOptions,
     #[command(flatten)]
     metrics: MetricOptions,
-    /// Seed of every random draw: of protocols, and of networks
+    /// Seed of every random number: of a protocol's draws, and of networks
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     device: DeviceOptions,
-    /// Write every score to this CSV file; with --protocol the folder of the evaluation
+    /// Print the tables as JSON
+    #[arg(long)]
+    json: bool,
+    /// Write every single score to this CSV file; with --protocol the folder of the evaluation
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// The paths of the scenes.
+    /// Where the scenes are.
     fn paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let Some(split) = self.split else { return Ok(self.scenes.clone()) };
         let sets: Vec<Dataset> = self.scenes.iter().map(|path| Dataset::open(path, split)).collect::<Result<_, _>>()?;
@@ -76,7 +90,7 @@ impl Arguments {
     }
 }
 
-/// `values` are all options and their values as on the command line.
+/// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
     let mut specs = or_every_scheme(&arguments.weights)?;
@@ -86,19 +100,26 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         specs.retain(|spec| seen.insert(spec.to_string()));
     }
     let weightings = open_all(&specs)?;
-    if let (Some(protocol), Some(folder)) = (&arguments.protocol.protocol, &arguments.output) {
-        return protocol::run(arguments, protocol, folder, &weightings, values);
+    if let Some(protocol) = &arguments.protocol.protocol {
+        return protocol::run(arguments, protocol, &weightings, values);
     }
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
     let options = arguments.picture.to_render_options(arguments.model.exact, &field.about())?;
     let Chosen { device, reason } = arguments.device.open()?;
-    let mut all: Vec<Score> = Vec::new();
-    let mut scene_of: Vec<String> = Vec::new();
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
+    let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {
+        let title = format!("{name}: {}", counted(results.target_count, "target"));
+        match arguments.json {
+            true => json_tables.push(json_of(&title, results)?),
+            false => print_table(&title, results)?,
+        }
+        Ok(())
+    };
     for (path, scene) in paths.iter().zip(&scenes) {
         let progress = Terminal::new("evaluating");
         let score = || -> anyhow::Result<Vec<Score>> {
@@ -114,18 +135,37 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         };
         let scores = on_threads(arguments.picture.threads, score)??;
         drop(progress);
-        print_means(&path.display().to_string(), &means(&scores))?;
-        scene_of.extend(scores.iter().map(|_| path.display().to_string()));
-        all.extend(scores);
+        tell(&path.display().to_string(), &table(&observed(&[&scores])))?;
+        all.push(scores);
     }
-    if paths.len() > 1 {
-        print_means(&format!("all {} scenes", paths.len()), &means(&all))?;
+    if all.len() > 1 {
+        tell(&format!("all {} scenes", all.len()), &table(&observed(&all.iter().collect::<Vec<_>>())))?;
     }
-    say(format_args!("device: {}, {reason}", device.name()))?;
+    if arguments.json {
+        let whole = json!({
+            "viewfuse": env!("CARGO_PKG_VERSION"), "device": device.name(), "options": values, "tables": json_tables,
+        });
+        say(format_args!("{whole:#}"))?;
+    } else {
+        say(format_args!("device: {}, {reason}", device.name()))?;
+    }
     if let Some(path) = &arguments.output {
-        let lines: Vec<_> = scene_of.into_iter().map(|scene| vec![scene]).zip(&all).collect();
-        write_whole(path, &csv_of(&["scene"], &lines)?)?;
-        say(format_args!("{}", path.display()))?;
+        let lines = paths
+            .iter()
+            .zip(&all)
+            .flat_map(|(scene, scores)| scores.iter().map(move |score| (vec![scene.display().to_string()], score)));
+        write_whole(path, &csv_of(&["scene"], &lines.collect::<Vec<_>>())?)?;
+        if !arguments.json {
+            say(format_args!("{}", path.display()))?;
+        }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Scores of one scene after the other.
+fn observed<'a>(scenes: &[&'a Vec<Score>]) -> Vec<Observation<'a>> {
+    let of_scene = |(scene, scores): (usize, &&'a Vec<Score>)| {
+        scores.iter().map(move |score| Observation { scene, job: 0, score }).collect::<Vec<_>>()
+    };
+    scenes.iter().enumerate().flat_map(of_scene).collect()
 }

@@ -8,6 +8,7 @@
 //! Two schemes are compared by what they differ by on each scene ([`Interval::of_differences`]): most of what scenes differ
 //! by, they differ by for both.
 
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::{Display, Formatter};
@@ -16,7 +17,7 @@ use std::fmt::{Display, Formatter};
 const CONFIDENCE: f64 = 0.95;
 
 /// A mean and how far it can be off.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
     /// Mean over scenes.
     pub mean: f64,

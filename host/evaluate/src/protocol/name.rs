@@ -1,13 +1,14 @@
 //! Protocols as text, and the view lists that were published.
 
-use super::{CLOSE_DEGREES, CLOSE_SOURCES, COUNTS, Protocol, RANDOM_SOURCES};
+use super::{Benchmark, CLOSE_DEGREES, CLOSE_SOURCES, COUNTS, Protocol, RANDOM_SOURCES};
 use std::fmt;
 use std::str::FromStr;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_weighting::sources::MOST_SOURCES;
 
 const GRAMMAR: &str = "random[:sources=N], close[:sources=N,degrees=D], count[:sources=N+N+...], \
-     fixed[:cars|chairs|pixelnerf-1|pixelnerf-2], fixed:SOURCES:TARGETS";
+     fixed[:cars|chairs|pixelnerf-1|pixelnerf-2], fixed:SOURCES:TARGETS, nearest:K[:TARGETS], llff:K (3, 6, 9), \
+     dtu:K[,masks=given] (3, 6, 9), blender:8";
 
 /// Lists of views by name, sources and targets. `cars` and `chairs` are those of the paper's published evaluation scripts
 /// for SRN's test scenes; `pixelnerf-1` and `pixelnerf-2` are those of pixelNeRF's (one and two sources, all other views).
@@ -79,6 +80,11 @@ impl fmt::Display for Protocol {
                     None => write!(f, "fixed:{sources}:{targets}"),
                 }
             }
+            Protocol::Nearest { sources, targets: None } => write!(f, "nearest:{sources}"),
+            Protocol::Nearest { sources, targets: Some(targets) } => write!(f, "nearest:{sources}:{targets}"),
+            Protocol::Benchmark { benchmark, sources, masks_given } => {
+                write!(f, "{benchmark}:{sources}{}", if *masks_given { ",masks=given" } else { "" })
+            }
         }
     }
 }
@@ -98,6 +104,24 @@ impl FromStr for Protocol {
             };
             return Ok(Protocol::Fixed { sources: sources.to_owned(), targets: targets.to_owned() });
         }
+        if name == "nearest" {
+            let (count, targets) = rest.split_once(':').map_or((rest, None), |(count, list)| (count, Some(list)));
+            if targets.is_some_and(str::is_empty) {
+                return Err(unknown());
+            }
+            let sources = source_count(name, count, [1, MOST_SOURCES])?;
+            return Ok(Protocol::Nearest { sources, targets: targets.map(str::to_owned) });
+        }
+        if let Some(benchmark) = Benchmark::ALL.into_iter().find(|benchmark| benchmark.name() == name) {
+            let (count, masks) = rest.split_once(',').map_or((rest, None), |(count, masks)| (count, Some(masks)));
+            let masks_given = match masks {
+                None => false,
+                Some("masks=given") if benchmark.is_masked() => true,
+                Some(_) => return Err(unknown()),
+            };
+            let sources = source_count(name, count, benchmark.source_range())?;
+            return Ok(Protocol::Benchmark { benchmark, sources, masks_given });
+        }
         let mut protocol = match name {
             "random" => Protocol::Random { sources: RANDOM_SOURCES },
             "close" => Protocol::Close { sources: CLOSE_SOURCES, degrees: CLOSE_DEGREES },
@@ -106,25 +130,16 @@ impl FromStr for Protocol {
         };
         for pair in rest.split(',').filter(|pair| !pair.is_empty()) {
             let (key, value) = pair.split_once('=').ok_or_else(unknown)?;
-            let bad = |key, wanted: &str| ProtocolError::BadValue {
-                protocol: name.to_owned(),
-                key,
-                wanted: wanted.to_owned(),
-                value: value.to_owned(),
-            };
-            let count = |text: &str, least: usize| {
-                let count = text.parse().ok().filter(|count| (least..=MOST_SOURCES).contains(count));
-                count.ok_or_else(|| bad("sources", &format!("a whole number from {least} to {MOST_SOURCES}")))
-            };
+            let count = |text: &str| source_count(name, text, [1, MOST_SOURCES]);
             match (&mut protocol, key) {
-                (Protocol::Random { sources }, "sources") => *sources = count(value, 1)?,
-                (Protocol::Close { sources, .. }, "sources") => *sources = count(value, 1)?,
+                (Protocol::Random { sources }, "sources") => *sources = count(value)?,
+                (Protocol::Close { sources, .. }, "sources") => *sources = count(value)?,
                 (Protocol::Close { degrees, .. }, "degrees") => {
                     let given = value.parse().ok().filter(|degrees| *degrees > 0.0 && *degrees <= 180.0);
-                    *degrees = given.ok_or_else(|| bad("degrees", "above 0 and at most 180"))?;
+                    *degrees = given.ok_or_else(|| bad(name, "degrees", "above 0 and at most 180", value))?;
                 }
                 (Protocol::Count { sources }, "sources") => {
-                    *sources = value.split('+').map(|text| count(text, 1)).collect::<Result<_, _>>()?;
+                    *sources = value.split('+').map(count).collect::<Result<_, _>>()?;
                     sources.sort_unstable();
                     sources.dedup();
                 }
@@ -133,4 +148,16 @@ impl FromStr for Protocol {
         }
         Ok(protocol)
     }
+}
+
+fn bad(protocol: &str, key: &'static str, wanted: &str, value: &str) -> ProtocolError {
+    let (protocol, wanted, value) = (protocol.to_owned(), wanted.to_owned(), value.to_owned());
+    ProtocolError::BadValue { protocol, key, wanted, value }
+}
+
+/// A number of sources between these, both included.
+fn source_count(protocol: &str, text: &str, [least, most]: [usize; 2]) -> Result<usize, ProtocolError> {
+    let count = text.parse().ok().filter(|count| (least..=most).contains(count));
+    let wanted = || if least == most { least.to_string() } else { format!("a whole number from {least} to {most}") };
+    count.ok_or_else(|| bad(protocol, "sources", &wanted(), text))
 }

@@ -2,7 +2,7 @@
 
 use super::{ReportError, counted, figure, pictures, table};
 use crate::gallery::{Shown, shown};
-use crate::protocol::Protocol;
+use crate::protocol::{Benchmark, Protocol};
 use crate::run_folder::{RunFolder, Settings, missing};
 use crate::summary::{REFERENCE, Row, Table, tables};
 use maud::{Markup, PreEscaped, html};
@@ -29,7 +29,7 @@ impl Evaluation {
         let folder = RunFolder::open(path)?;
         let finished = folder.finished()?;
         let settings = folder.settings().clone();
-        let by_count = matches!(settings.protocol.parse(), Ok(Protocol::Count { .. }));
+        let by_count = settings.protocol.parse().is_ok_and(|protocol: Protocol| protocol.has_table_a_count());
         Ok(Evaluation {
             folder: path.to_path_buf(),
             devices: finished.values().map(|job| job.device.clone()).collect(),
@@ -47,6 +47,10 @@ impl Evaluation {
             Ok(Protocol::Close { .. }) => "One source close to the target",
             Ok(Protocol::Count { .. }) => "Number of sources",
             Ok(Protocol::Fixed { .. }) => "Fixed views",
+            Ok(Protocol::Nearest { .. }) => "Nearest sources",
+            Ok(Protocol::Benchmark { benchmark: Benchmark::Llff, .. }) => "As on LLFF",
+            Ok(Protocol::Benchmark { benchmark: Benchmark::Dtu, .. }) => "As on DTU",
+            Ok(Protocol::Benchmark { benchmark: Benchmark::Blender, .. }) => "As on NeRF-synthetic",
             Err(_) => "Evaluation",
         }
     }
@@ -112,21 +116,34 @@ impl Evaluation {
     }
 }
 
-/// The best schemes of a table in a sentence.
+/// What leads a table in a sentence, as far as intervals tell, and what the baselines say of the schemes.
 fn lead(table: &Table) -> Option<Markup> {
-    let metric = table.metrics.first()?;
-    let first = |row: &&Row| row.cells[0].as_ref().is_some_and(|cell| cell.place == 1);
-    let best: Vec<&Row> = table.rows.iter().filter(first).collect();
-    let cell = best.first()?.cells[0].as_ref()?;
-    let names: Vec<&str> = best.iter().map(|row| row.scheme.as_str()).collect();
-    let gain = cell.versus_reference.as_ref().filter(|_| best.len() == 1);
+    let metric = table.metrics.get(table.headline)?;
+    let cell = |row: &Row| row.cells[table.headline].clone();
+    let leading: Vec<&Row> = table.rows.iter().filter(|row| cell(row).is_some_and(|cell| cell.leads)).collect();
+    let best = table.rows.iter().find(|row| cell(row).is_some_and(|cell| cell.place == 1))?;
+    let value = cell(best)?.value;
+    let gain = cell(best)?.versus_reference.filter(|_| leading.len() == 1);
     let sources: Vec<String> = table.source_counts.iter().map(usize::to_string).collect();
+    let names: Vec<&str> = leading.iter().map(|row| row.scheme.as_str()).collect();
     Some(html! {
         p.lead {
-            "Best from " (sources.join(", ")) " sources: " strong { (names.join(", ")) } ", "
-            (metric.label) " " (metric.text(cell.value.mean)) " " (metric.unit)
-            @if let Some(gain) = gain { ", " (metric.interval_text(gain, true)) " over " (REFERENCE) } "."
+            "From " (sources.join(", ")) " sources: "
+            @match names.as_slice() {
+                [] => { "no difference beyond the intervals; " (metric.label) " at most " (metric.text(value.mean)) " " (metric.unit) },
+                [name] => {
+                    "best is " strong { (name) } ", " (metric.label) " " (metric.text(value.mean)) " " (metric.unit)
+                    @if let Some(gain) = gain { ", " (metric.interval_text(&gain, true)) " over " (REFERENCE) }
+                },
+                names => {
+                    "best are " strong { (names.join(", ")) } ", without a difference beyond the intervals; "
+                    (metric.label) " " (metric.text(value.mean)) " " (metric.unit)
+                },
+            }
+            "."
         }
+        ul.notes { @for verdict in table.verdicts() { li { (verdict) } } }
+        p.legend { (table.interval_words()) "." }
     })
 }
 

@@ -1,7 +1,7 @@
 //! A metric over the number of sources, a line for each scheme, with intervals.
 
 use super::ReportError;
-use crate::NEAREST_COPY;
+use crate::baseline::Baseline;
 use crate::metrics::interval::Interval;
 use crate::pareto::plot::COLOURS;
 use crate::summary::{REFERENCE, Table};
@@ -20,6 +20,11 @@ const MARKER: i32 = 4;
 /// How far intervals of the first and the last scheme stand apart at one number of sources, in doublings.
 const SPREAD: f64 = 0.3;
 
+/// The baselines differ in the shape of their points.
+fn baseline_shape(name: &str) -> usize {
+    Baseline::ALL.iter().position(|baseline| baseline.name() == name).unwrap_or(0)
+}
+
 /// How a scheme's points look.
 #[derive(Clone, Copy)]
 struct Style {
@@ -28,11 +33,11 @@ struct Style {
 }
 
 impl Style {
-    /// The reference and copies are black and grey, the others, counted from 0, go through colours and then shapes.
+    /// The reference is black, baselines are grey, the others, counted from 0, go through colours and then shapes.
     fn of(scheme: &str, other: usize) -> Style {
         match scheme {
             REFERENCE => Style { colour: BLACK, shape: 0 },
-            NEAREST_COPY => Style { colour: COPY, shape: 0 },
+            baseline if Baseline::is_named(baseline) => Style { colour: COPY, shape: baseline_shape(baseline) },
             _ => Style { colour: COLOURS[other % COLOURS.len()], shape: other / COLOURS.len() % 3 },
         }
     }
@@ -95,7 +100,7 @@ fn styles(tables: &[Table]) -> Vec<(&str, Style)> {
     let mut others = 0;
     let style = |scheme| {
         let style = Style::of(scheme, others);
-        others += usize::from(![REFERENCE, NEAREST_COPY].contains(&scheme));
+        others += usize::from(scheme != REFERENCE && !Baseline::is_named(scheme));
         (scheme, style)
     };
     schemes.map(style).collect()
@@ -112,7 +117,7 @@ fn lines(tables: &[Table], column: usize, differences: bool) -> Vec<Line> {
         style,
         points: tables.iter().filter_map(|table| point(table, scheme)).collect(),
     };
-    let shown = styles(tables).into_iter().filter(|(scheme, _)| !(differences && *scheme == NEAREST_COPY));
+    let shown = styles(tables).into_iter().filter(|(scheme, _)| !(differences && Baseline::is_named(scheme)));
     shown.map(line).filter(|line| !line.points.is_empty()).collect()
 }
 

@@ -1,7 +1,6 @@
 //! Tables of results and of records.
 
 use super::counted;
-use crate::NEAREST_COPY;
 use crate::metrics::interval::Interval;
 use crate::summary::{Cell, Metric, REFERENCE, Table};
 use maud::{Markup, html};
@@ -29,7 +28,7 @@ pub(super) fn results(table: &Table) -> Markup {
                 }
                 tbody {
                     @for row in &table.rows {
-                        tr class=(if row.scheme == NEAREST_COPY { "copy" } else { "" }) {
+                        tr class=(if row.is_baseline { "copy" } else { "" }) {
                             th scope="row" { (row.scheme) }
                             @for (cell, metric) in row.cells.iter().zip(&table.metrics) {
                                 (value(cell.as_ref(), metric))
@@ -79,8 +78,8 @@ fn half_width(interval: &Interval, metric: &Metric) -> Markup {
 pub(super) fn legend() -> Markup {
     html! {
         p.legend {
-            "The best value of a column is " b { "bold" } ", the next " u { "underlined" } ". Means are over scenes, with 95 % "
-            "intervals (Student). Differences from " code { (REFERENCE) } " are taken scene by scene; "
+            "The best value of a column is " b { "bold" } ", the next " u { "underlined" } ". Means are over scenes, or over the views of "
+            "one, with 95 % intervals (Student). Differences from " code { (REFERENCE) } " are taken scene by scene, or view by view; "
             span.gain { "coloured" } " where the interval leaves out zero."
         }
     }

@@ -19,6 +19,9 @@ pub struct Settings {
     pub schemes: Vec<String>,
     /// What makes the pictures.
     pub field: String,
+    /// What the metrics compare, in words.
+    #[serde(default)]
+    pub metric: String,
     /// Every option of the command and its value, defaults included.
     pub options: BTreeMap<String, String>,
     /// SHA-256 of the files of parameters: checkpoints, learned attention.
@@ -38,13 +41,19 @@ pub struct SceneSettings {
     pub name: String,
     /// How many views it has.
     pub views: usize,
+    /// Of how many the photograph has a mask beside it.
+    #[serde(default)]
+    pub masks: usize,
+    /// Width and height of the pictures at its first view.
+    #[serde(default)]
+    pub size: [u32; 2],
     /// SHA-256 of the names, poses and sizes of its views, the first eight bytes.
     pub cameras: String,
 }
 
 impl SceneSettings {
-    /// Those of a scene.
-    pub fn of(scene: &Scene) -> SceneSettings {
+    /// Those of a scene whose pictures have this size.
+    pub fn of(scene: &Scene, size: [u32; 2]) -> SceneSettings {
         let mut digest = Sha256::new();
         for view in &scene.views {
             digest.update(view.name.as_bytes());
@@ -56,7 +65,8 @@ impl SceneSettings {
                 .for_each(|side| digest.update(side.to_le_bytes()));
         }
         let cameras = hexadecimal(&digest.finalize()[..8]);
-        SceneSettings { name: scene.name(), views: scene.views.len(), cameras }
+        let masks = scene.views.iter().filter(|view| view.mask.is_some()).count();
+        SceneSettings { name: scene.name(), views: scene.views.len(), masks, size, cameras }
     }
 }
 

@@ -2,6 +2,8 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_scene::photographs::SourceImages;
+use viewfuse_scene::rig::Rig;
 
 /// The nearest and the farthest percentile of the points that counts.
 const PERCENTILES: [f64; 2] = [0.01, 0.99];
@@ -10,33 +12,63 @@ const MARGINS: [f32; 2] = [0.85, 1.3];
 /// Fewest points from which bounds are told.
 const FEWEST_POINTS: usize = 32;
 
-/// Points of the scene's surfaces.
-#[derive(Clone, Debug, Default)]
+/// What is known of the depths in a scene.
+#[derive(Clone, Debug)]
 pub(super) struct Space {
+    /// Points of surfaces.
     points: Vec<Vec3>,
+    /// Least and greatest disparity where a camera sees too few points; `None` if nothing is known.
+    bounds: Option<[f32; 2]>,
 }
 
 impl Space {
-    pub(super) fn new(points: Vec<Vec3>) -> Space {
-        Space { points }
-    }
-
-    pub(super) fn count(&self) -> usize {
-        self.points.len()
-    }
-
-    /// Least and greatest disparity in a camera's frustum, from the points that it sees; `None` if it sees too few.
-    pub(super) fn disparities(&self, camera: &CameraBlock) -> Option<[f32; 2]> {
-        let seen = self.points.iter().map(|point| camera.project(*point)).filter(|seen| seen.in_image);
-        let mut depths: Vec<f32> = seen.map(|seen| seen.depth).collect();
-        if depths.len() < FEWEST_POINTS {
-            return None;
+    /// What the scene's files know: bounds first, since they also say what is meant, then points.
+    pub(super) fn of(sources: &SourceImages) -> Space {
+        if let Some([near, far]) = sources.near_far {
+            return Space { points: Vec::new(), bounds: Some([1.0 / far, 1.0 / near]) };
         }
-        depths.sort_by(f32::total_cmp);
-        let at = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
-        let [near, far] = [MARGINS[0] * at(PERCENTILES[0]), MARGINS[1] * at(PERCENTILES[1])];
-        Some([1.0 / far, 1.0 / near])
+        let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+        let points = sources.points.clone();
+        if points.len() < FEWEST_POINTS { Space { points, bounds: None } } else { Space::of_points(points, &cameras) }
     }
+
+    /// From points on surfaces. Where they are too few for a camera, the bounds are those of all the cameras that see enough;
+    /// where none does, the volume that the cameras have in common.
+    pub(super) fn of_points(points: Vec<Vec3>, cameras: &[Camera]) -> Space {
+        let seen = cameras.iter().filter_map(|camera| in_frustum(&points, &camera.block(0)));
+        let bounds = seen.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_else(|| common_volume(cameras));
+        Space { points, bounds: Some(bounds) }
+    }
+
+    /// Whether anything is known.
+    pub(super) fn is_known(&self) -> bool {
+        self.bounds.is_some()
+    }
+
+    /// Least and greatest disparity in a camera's frustum.
+    pub(super) fn disparities(&self, camera: &CameraBlock) -> [f32; 2] {
+        in_frustum(&self.points, camera).or(self.bounds).unwrap_or([0.0, 1.0])
+    }
+}
+
+/// Least and greatest disparity of the points that a camera sees; `None` if it sees too few.
+fn in_frustum(points: &[Vec3], camera: &CameraBlock) -> Option<[f32; 2]> {
+    let seen = points.iter().map(|point| camera.project(*point)).filter(|seen| seen.in_image);
+    let mut depths: Vec<f32> = seen.map(|seen| seen.depth).collect();
+    if depths.len() < FEWEST_POINTS {
+        return None;
+    }
+    depths.sort_by(f32::total_cmp);
+    let at = |share: f64| depths[((depths.len() - 1) as f64 * share).round() as usize];
+    let [near, far] = [MARGINS[0] * at(PERCENTILES[0]), MARGINS[1] * at(PERCENTILES[1])];
+    Some([1.0 / far, 1.0 / near])
+}
+
+/// The disparities of the ball that all cameras see, around the point that they look at.
+fn common_volume(cameras: &[Camera]) -> [f32; 2] {
+    let rig = Rig::of(cameras);
+    let near = (rig.distance - rig.subject_radius).max(0.1 * rig.distance);
+    [1.0 / (rig.distance + rig.subject_radius), 1.0 / near]
 }
 
 /// The greatest disparity worth a look before anything is known: that at the distance of neighbouring cameras, in the median.

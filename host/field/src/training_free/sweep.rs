@@ -30,18 +30,23 @@ const RANGE_CONFIDENCE: f32 = 0.6;
 const PAIRS_PER_VIEW: usize = 3;
 
 /// Settings of the sweep.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
     /// Planes of a frustum: a multiple of 16, at most 128.
     pub plane_count: u32,
     /// Longest side at which views are compared, in pixels. Colours are blended at the size of the pictures.
     pub match_side: u32,
+    /// Cost of the nearest plane beside the farthest one: among equal matches the farther one wins.
+    pub near_cost: f32,
+    /// Cost of contradicting the sources' own disparities.
+    pub dissent_share: f32,
+    /// Temperature of the softmax over planes.
+    pub temperature: f32,
 }
 
 impl Default for Sweep {
     fn default() -> Sweep {
-        let e = |n: &str, d: u32| std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d);
-        Sweep { plane_count: e("VF_PLANES", 64), match_side: e("VF_SIDE", 256) }
+        Sweep { plane_count: 64, match_side: 256, near_cost: 0.01, dissent_share: 0.0625, temperature: TEMPERATURE }
     }
 }
 
@@ -115,9 +120,9 @@ impl Sweep {
             disparities: device.zeros(map_len)?,
             steps: vec![0.0; sources.images.len()],
             relevance: Vec::new(),
-            space: Space::new(sources.points.clone()),
+            space: Space::of(sources),
         };
-        if sources.points.is_empty() {
+        if !views.space.is_known() {
             views.space = views.find_range(&reduced(RANGE_SIDE)?, progress)?;
         }
         Ok(views)
@@ -152,7 +157,7 @@ impl<D: Device> Views<'_, D> {
         }
         let maps = device.download(&maps)?;
         let points = consistent_points(&small.cameras, &maps, range.step);
-        Ok(Space::new(points))
+        Ok(Space::of_points(points, &cameras))
     }
 
     /// The views with a weight as they take part, those of the greatest weights first.
@@ -184,7 +189,7 @@ impl<D: Device> Views<'_, D> {
             view_count: swept.len().min(MOST_MATCHED) as u32,
             pair_count: pairs(swept).len() as u32,
             has_silhouettes: u32::from(self.has_silhouettes),
-            dissent_share: ef("VF_VOTE", 0.0625),
+            dissent_share: self.settings.dissent_share,
             first_row: 0,
             row_count: camera.height,
         }
@@ -227,7 +232,7 @@ impl<D: Device> Views<'_, D> {
             )?;
             device.census_cost(&band, halo, kept, &pair_buffer, &grey, &evidence, &mut costs)?;
         }
-        let window = WindowBlock::new(&whole, ef("VF_NEAR", 0.005));
+        let window = WindowBlock::new(&whole, self.settings.near_cost);
         let mut sums = device.zeros::<Planes>(6 * volume)?;
         device.row_sums(&window, &costs, &mut sums)?;
         drop(costs);
@@ -242,25 +247,9 @@ impl<D: Device> Views<'_, D> {
         Ok(means)
     }
 
-    /// Planes for a camera: what the points say, or the bounds of the whole.
+    /// Planes for a camera.
     fn range(&self, camera: &CameraBlock) -> Range {
-        let all = || {
-            let cameras = self.matched.cameras.iter();
-            cameras.filter_map(|camera| self.space.disparities(camera)).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
-        };
-        let bounds = self.space.disparities(camera).or_else(all).unwrap_or([0.0, 1.0]);
-        let bounds = std::env::var("VF_NF").ok().map_or(bounds, |v| {
-            let v: Vec<f32> = v.split(',').map(|v| v.parse().unwrap()).collect();
-            [1.0 / v[1], 1.0 / v[0]]
-        });
-        if std::env::var("T").is_ok() {
-            eprintln!(
-                "bounds {bounds:?} depths {:?} points {}",
-                [1.0 / bounds[1], 1.0 / bounds[0]],
-                self.space.count()
-            );
-        }
-        Range::new(bounds, self.settings.plane_count)
+        Range::new(self.space.disparities(camera), self.settings.plane_count)
     }
 }
 
@@ -340,10 +329,9 @@ impl<D: Device> Prepared for Views<'_, D> {
         let camera = Camera { pinhole, ..*target }.block(0);
         let weights: Vec<(usize, f32)> = views.iter().copied().zip(request.view_weights()).collect();
         let range = self.range(&camera);
-        let use_maps = std::env::var("VF_NOMAP").is_err();
-        let matched = self.swept(&self.matched, &self.matched, &weights, use_maps);
+        let matched = self.swept(&self.matched, &self.matched, &weights, true);
         let costs = self.costs(camera, range, &self.matched, &matched, progress)?;
-        let blended = self.swept(&self.pictures, &self.matched, &weights, use_maps);
+        let blended = self.swept(&self.pictures, &self.matched, &weights, true);
         let block = BlendBlock {
             target: target.block(0),
             far_disparity: range.far_disparity,
@@ -352,7 +340,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             volume_height: camera.height,
             group_count: range.group_count,
             view_count: blended.len() as u32,
-            sharpness: 1.0 / TEMPERATURE,
+            sharpness: 1.0 / self.settings.temperature,
             has_silhouettes: u32::from(self.has_silhouettes),
         };
         let count = (width * height) as usize;
@@ -378,8 +366,4 @@ impl<D: Device> Prepared for Views<'_, D> {
         }
         Ok(Rendered { colours, depths: device.download(&depths)?, width, height })
     }
-}
-
-fn ef(n: &str, d: f32) -> f32 {
-    std::env::var(n).ok().and_then(|v| v.parse().ok()).unwrap_or(d)
 }

@@ -1,6 +1,65 @@
 //! Resampling by area: every output pixel is the mean of what it covers, so a silhouette becomes a fractional alpha.
 
+use crate::Photograph;
+use image::{GrayImage, Luma, Rgba, RgbaImage};
 use rayon::prelude::*;
+
+/// A photograph at a smaller size, its colours weighted by their alpha. What of it is not wholly seen counts as not seen.
+pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> Photograph {
+    let (own_width, own_height) = photograph.pixels.dimensions();
+    let (columns, rows) = (spans(own_width, width), spans(own_height, height));
+    let stride = 4 * own_width as usize;
+    let bytes = photograph.pixels.as_raw();
+    let mut averaged = vec![[0_u8; 4]; width as usize * height as usize];
+    let new_line = || vec![0.0_f32; stride];
+    averaged.par_chunks_mut(width as usize).zip(&rows).for_each_init(new_line, |line, (output, row)| {
+        // Down first, in whole lines, then across: most of the work is one loop over bytes.
+        line.fill(0.0);
+        for (y, share) in row {
+            let source = &bytes[y * stride..(y + 1) * stride];
+            if photograph.has_alpha {
+                add_weighted(line, source, *share);
+            } else {
+                line.iter_mut().zip(source).for_each(|(sum, byte)| *sum += share * f32::from(*byte));
+            }
+        }
+        for (pixel, column) in output.iter_mut().zip(&columns) {
+            let mut sums = [0.0_f32; 4];
+            for (x, share) in column {
+                sums.iter_mut().zip(&line[4 * x..]).for_each(|(sum, value)| *sum += share * value);
+            }
+            let level = |value: f32| (value + 0.5) as u8;
+            let [r, g, b, alpha] = sums;
+            *pixel = match photograph.has_alpha {
+                false => [level(r), level(g), level(b), u8::MAX],
+                true if alpha > 0.0 => [level(r / alpha), level(g / alpha), level(b / alpha), level(alpha)],
+                true => [0; 4],
+            };
+        }
+    });
+    let at = |x: u32, y: u32| averaged[(y * width + x) as usize];
+    let pixels = RgbaImage::from_fn(width, height, |x, y| Rgba(at(x, y)));
+    let seen = photograph.seen.as_ref().map(|seen| {
+        let is_seen = |x: u32, y: u32| {
+            let mut covered =
+                rows[y as usize].iter().flat_map(|(y, _)| columns[x as usize].iter().map(move |(x, _)| (*x, *y)));
+            covered.all(|(x, y)| seen.get_pixel(x as u32, y as u32)[0] > 0)
+        };
+        GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
+    });
+    Photograph { pixels, has_alpha: photograph.has_alpha, seen }
+}
+
+/// Adds a line of pixels, their colours multiplied by alpha (of 255).
+fn add_weighted(line: &mut [f32], source: &[u8], share: f32) {
+    for (sum, pixel) in line.as_chunks_mut::<4>().0.iter_mut().zip(source.as_chunks::<4>().0) {
+        let alpha = share * f32::from(pixel[3]);
+        for channel in 0..3 {
+            sum[channel] += alpha * f32::from(pixel[channel]);
+        }
+        sum[3] += alpha;
+    }
+}
 
 /// `[row][column]` of `size` = `[width, height]` from an image of `own_size`. Enlarging repeats the nearest pixels.
 pub(super) fn area_average(texels: &[[f32; 4]], own_size: [u32; 2], size: [u32; 2]) -> Vec<[f32; 4]> {

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::{FileFault, Place};
 use super::files::unreadable;
 
 /// A binary file's contents.
@@ -30,6 +30,14 @@ impl<'a> Bytes<'a> {
         Place::Byte(self.at)
     }
 
+    fn damaged(&self, place: Place, fault: FileFault) -> SceneError {
+        SceneError::Damaged { path: self.path(), place, fault }
+    }
+
+    fn truncated(&self, of: &'static str) -> SceneError {
+        self.damaged(Place::File, FileFault::Truncated { length: self.bytes.len(), of })
+    }
+
     pub(super) fn path(&self) -> PathBuf {
         self.path.to_path_buf()
     }
@@ -37,7 +45,7 @@ impl<'a> Bytes<'a> {
     /// So many bytes; `of` says what they are part of.
     pub(super) fn take(&mut self, count: usize, of: &'static str) -> Result<&'a [u8], SceneError> {
         let taken = self.at.checked_add(count).and_then(|end| self.bytes.get(self.at..end));
-        let taken = taken.ok_or_else(|| SceneError::Truncated { path: self.path(), length: self.bytes.len(), of })?;
+        let taken = taken.ok_or_else(|| self.truncated(of))?;
         self.at += count;
         Ok(taken)
     }
@@ -86,7 +94,7 @@ impl<'a> Bytes<'a> {
         let most = (self.bytes.len() - self.at) / least_bytes.max(1);
         match usize::try_from(count) {
             Ok(count) if count <= most => Ok(count),
-            _ => Err(SceneError::NoRoom { path: self.path(), place, of, count, most }),
+            _ => Err(self.damaged(place, FileFault::NoRoom { of, count, most })),
         }
     }
 
@@ -95,10 +103,10 @@ impl<'a> Bytes<'a> {
         let place = self.place();
         let rest = &self.bytes[self.at..];
         let Some(length) = rest.iter().position(|byte| *byte == 0) else {
-            return Err(SceneError::Truncated { path: self.path(), length: self.bytes.len(), of });
+            return Err(self.truncated(of));
         };
         let text = std::str::from_utf8(&rest[..length])
-            .map_err(|_| SceneError::NotText { path: self.path(), place, of })?
+            .map_err(|_| self.damaged(place, FileFault::NotText { of }))?
             .to_string();
         self.at += length + 1;
         Ok(text)
@@ -108,7 +116,7 @@ impl<'a> Bytes<'a> {
     pub(super) fn end(&self) -> Result<(), SceneError> {
         match self.bytes.len() - self.at {
             0 => Ok(()),
-            left => Err(SceneError::LeftOver { path: self.path(), place: self.place(), left }),
+            left => Err(self.damaged(self.place(), FileFault::LeftOver { left })),
         }
     }
 }

@@ -19,7 +19,7 @@ use glam::DQuat;
 use super::camera_models::{CameraModel, Parameters, camera_model_names};
 use super::check;
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::{FileFault, Place};
 use super::files;
 use super::missing::Missing;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
@@ -125,7 +125,11 @@ fn by_id(path: &Path, cameras: Vec<(u32, ModelCamera)>) -> Result<HashMap<u32, M
         let place = camera.place.clone();
         if all.insert(id, camera).is_some() {
             let path = path.to_path_buf();
-            return Err(SceneError::DuplicateId { path, place, of: "cameras", id: id.into() });
+            return Err(SceneError::Damaged {
+                path,
+                place,
+                fault: FileFault::DuplicateId { of: "cameras", id: id.into() },
+            });
         }
     }
     Ok(all)
@@ -149,7 +153,11 @@ fn assemble(
     for image in &images {
         let Some(camera) = cameras.get(&image.camera) else {
             let (path, place) = (images_path.to_path_buf(), image.place.clone());
-            return Err(SceneError::NoSuchId { path, place, of: "camera", id: image.camera.into() });
+            return Err(SceneError::Damaged {
+                path,
+                place,
+                fault: FileFault::NoSuchId { of: "camera", id: image.camera.into() },
+            });
         };
         let Some(photograph) = present(&photographs, &image.name) else {
             missing.missed(image.place.clone(), photographs.join(&image.name));
@@ -173,7 +181,11 @@ fn assemble(
         };
         if view_of.insert(image.id, views.len() as u32).is_some() {
             let (path, place) = (images_path.to_path_buf(), image.place.clone());
-            return Err(SceneError::DuplicateId { path, place, of: "images", id: image.id.into() });
+            return Err(SceneError::Damaged {
+                path,
+                place,
+                fault: FileFault::DuplicateId { of: "images", id: image.id.into() },
+            });
         }
         let name = files::stem(&photograph);
         views.push(RawView::new(name, Some(ImageFile::open(&photograph)?), pose, Some(intrinsics)));

@@ -9,7 +9,7 @@ use viewfuse_core::lens::LensError;
 use viewfuse_core::pose::PoseError;
 
 use super::LARGEST_SIDE;
-use super::fault::{IntrinsicsFault, NumpyFault, Place};
+use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
 
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
@@ -229,59 +229,15 @@ pub enum SceneError {
         /// Height that the cameras are for.
         declared_height: u32,
     },
-    /// A binary file ends too early.
-    #[error("{path}: ends after {length} bytes, inside {of}")]
-    Truncated {
-        /// The file.
-        path: PathBuf,
-        /// Its length in bytes.
-        length: usize,
-        /// What is cut off.
-        of: &'static str,
-    },
-    /// A binary file goes on behind its end.
-    #[error("{path}{place}: {left} bytes are left over")]
-    LeftOver {
-        /// The file.
-        path: PathBuf,
-        /// Where they begin.
-        place: Place,
-        /// How many.
-        left: usize,
-    },
-    /// A binary file announces more than it holds.
-    #[error("{path}{place}: announces {count} {of}; the file has room for {most}")]
-    NoRoom {
-        /// The file.
-        path: PathBuf,
-        /// Where the count stands.
-        place: Place,
-        /// What is counted.
-        of: &'static str,
-        /// How many it says there are.
-        count: u64,
-        /// How many there can be.
-        most: usize,
-    },
-    /// A text in a binary file is none.
-    #[error("{path}{place}: {of} is not UTF-8 text")]
-    NotText {
-        /// The file.
-        path: PathBuf,
-        /// Where it begins.
-        place: Place,
-        /// What it should be.
-        of: &'static str,
-    },
-    /// A number that must be whole and not negative is not.
-    #[error("{path}{place}: {word:?} is not a whole number")]
-    NotWhole {
+    /// A file is damaged, or refers to what it does not hold.
+    #[error("{path}{place}: {fault}")]
+    Damaged {
         /// The file.
         path: PathBuf,
         /// Where in it.
         place: Place,
-        /// The word.
-        word: String,
+        /// What is wrong.
+        fault: FileFault,
     },
     /// A camera model that is not read.
     #[error("{path}{place}: camera model {model} is not supported; the models are {supported}")]
@@ -294,30 +250,6 @@ pub enum SceneError {
         model: String,
         /// The names of those that are.
         supported: String,
-    },
-    /// Two entries of a list have one number.
-    #[error("{path}{place}: there are two {of} with the number {id}")]
-    DuplicateId {
-        /// The file.
-        path: PathBuf,
-        /// Where the second one stands.
-        place: Place,
-        /// What they are.
-        of: &'static str,
-        /// The number.
-        id: u64,
-    },
-    /// A reference to an entry that is not there.
-    #[error("{path}{place}: there is no {of} with the number {id}")]
-    NoSuchId {
-        /// The file.
-        path: PathBuf,
-        /// Where the reference stands.
-        place: Place,
-        /// What is referred to.
-        of: &'static str,
-        /// The number.
-        id: u64,
     },
     /// The numbers are not a lens.
     #[error("{path}{place}: {reason}")]

@@ -1,4 +1,4 @@
-//! Parts of [`super::SceneError`]: the place in a file, and what makes intrinsics or an array unusable.
+//! Parts of [`super::SceneError`]: the place in a file, and what makes intrinsics, a file or an array unusable.
 
 use std::fmt;
 
@@ -86,6 +86,63 @@ impl IntrinsicsFault {
             PinholeError::Size => IntrinsicsFault::Size { width: size[0].into(), height: size[1].into() },
         }
     }
+}
+
+/// What is wrong with a file that is damaged.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum FileFault {
+    /// It ends too early.
+    #[error("ends after {length} bytes, inside {of}")]
+    Truncated {
+        /// Its length in bytes.
+        length: usize,
+        /// What is cut off.
+        of: &'static str,
+    },
+    /// It goes on behind its end.
+    #[error("{left} bytes are left over")]
+    LeftOver {
+        /// How many bytes.
+        left: usize,
+    },
+    /// It announces more than it holds.
+    #[error("announces {count} {of}; the file has room for {most}")]
+    NoRoom {
+        /// What is counted.
+        of: &'static str,
+        /// How many it says there are.
+        count: u64,
+        /// How many there can be.
+        most: usize,
+    },
+    /// A text in a binary file is none.
+    #[error("{of} is not UTF-8 text")]
+    NotText {
+        /// What it should be.
+        of: &'static str,
+    },
+    /// A number that must be whole and not negative is not.
+    #[error("{word:?} is not a whole number")]
+    NotWhole {
+        /// The word.
+        word: String,
+    },
+    /// Two entries have one number.
+    #[error("there are two {of} with the number {id}")]
+    DuplicateId {
+        /// What they are.
+        of: &'static str,
+        /// The number.
+        id: u64,
+    },
+    /// An entry is referred to that is not there.
+    #[error("there is no {of} with the number {id}")]
+    NoSuchId {
+        /// What is referred to.
+        of: &'static str,
+        /// The number.
+        id: u64,
+    },
 }
 
 /// Why bytes are not an array of NumPy's.

@@ -1,6 +1,6 @@
 //! Putting parts together, in world coordinates.
 
-use crate::object::Part;
+use crate::part::Part;
 use crate::placement::Placement;
 use crate::prism::{Prism, Width};
 use crate::shape::Shape;
@@ -10,28 +10,28 @@ use viewfuse_core::math::{angle_from_components, max, min, sqrt};
 
 /// The parts so far.
 #[derive(Default)]
-pub(super) struct Build {
-    pub(super) parts: Vec<Part>,
+pub(crate) struct Build {
+    pub(crate) parts: Vec<Part>,
 }
 
 impl Build {
-    pub(super) fn add(&mut self, shape: Shape, placement: Placement, finish: Finish) {
+    pub(crate) fn add(&mut self, shape: Shape, placement: Placement, finish: Finish) {
         self.parts.push(Part { shape, placement, finish });
     }
 
     /// A block around a point; its edges are as round as its size allows.
-    pub(super) fn block(&mut self, centre: [f32; 3], half_size: [f32; 3], rounding: f32, finish: Finish) {
+    pub(crate) fn block(&mut self, centre: [f32; 3], half_size: [f32; 3], rounding: f32, finish: Finish) {
         let half_size = Vec3::from_array(half_size);
         let rounding = min(rounding, min(min(half_size.x, half_size.y), half_size.z));
         self.add(Shape::Block { half_size, rounding }, place(centre), finish);
     }
 
-    pub(super) fn ellipsoid(&mut self, centre: [f32; 3], radii: [f32; 3], finish: Finish) {
+    pub(crate) fn ellipsoid(&mut self, centre: [f32; 3], radii: [f32; 3], finish: Finish) {
         self.add(Shape::Ellipsoid { radii: Vec3::from_array(radii) }, place(centre), finish);
     }
 
     /// A rod with round ends between two points.
-    pub(super) fn rod(&mut self, from: Vec3, to: Vec3, radius: f32, finish: Finish) {
+    pub(crate) fn rod(&mut self, from: Vec3, to: Vec3, radius: f32, finish: Finish) {
         let along = to - from;
         let middle = (from + to) * 0.5;
         // The local z axis is turned first about world z, then down.
@@ -44,13 +44,13 @@ impl Build {
     }
 
     /// A prism whose outline and width are given in world coordinates; its own coordinates are the world's.
-    pub(super) fn prism(&mut self, corners: &[[f32; 2]], width: Width, finish: Finish) {
+    pub(crate) fn prism(&mut self, corners: &[[f32; 2]], width: Width, finish: Finish) {
         self.add(Shape::Prism(Prism::new(corners, width)), Placement::at(0.0, 0.0, 0.0), finish);
     }
 
     /// As [`Build::prism`], with the local origin in the middle of the outline: for small ones, whose boxes are then
     /// small. It does not narrow towards the ends.
-    pub(super) fn small_prism(&mut self, corners: &[[f32; 2]], width: Width, finish: Finish) {
+    pub(crate) fn small_prism(&mut self, corners: &[[f32; 2]], width: Width, finish: Finish) {
         let bounds = |axis: usize| {
             let ends = corners
                 .iter()
@@ -65,7 +65,7 @@ impl Build {
 }
 
 /// Unturned, at a point.
-pub(super) fn place(centre: [f32; 3]) -> Placement {
+pub(crate) fn place(centre: [f32; 3]) -> Placement {
     Placement::at(centre[0], centre[1], centre[2])
 }
 

@@ -9,17 +9,17 @@ use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, clamp, sin_cos};
 
 /// One colour with this gloss.
-pub(super) fn plain(colour: Vec3, gloss: f32) -> Finish {
+pub(crate) fn plain(colour: Vec3, gloss: f32) -> Finish {
     Finish { texture: Texture::Plain { colour }, gloss }
 }
 
 /// Grey of this brightness.
-pub(super) fn grey(brightness: f32) -> Vec3 {
+pub(crate) fn grey(brightness: f32) -> Vec3 {
     Vec3::splat(brightness)
 }
 
 /// A display colour from a hue in turns, a saturation and the largest channel.
-pub(super) fn hue(turns: f32, saturation: f32, value: f32) -> Vec3 {
+pub(crate) fn hue(turns: f32, saturation: f32, value: f32) -> Vec3 {
     // Each channel is a trapezium over the circle of hues, its middle at 0, 1/3 and 2/3.
     let channel = |shift: f32| {
         let place = 6.0 * (turns + shift);
@@ -32,7 +32,7 @@ pub(super) fn hue(turns: f32, saturation: f32, value: f32) -> Vec3 {
 
 /// Any paint: white and silver, black, vivid, dull. Vivid ones are red, blue and yellow more often than others, as paints
 /// are.
-pub(super) fn paint(draws: &mut Draws) -> Vec3 {
+pub(crate) fn paint(draws: &mut Draws) -> Vec3 {
     let turns = match draws.below(8) {
         0 | 1 => draws.between(0.96, 1.05),
         2 | 3 => draws.between(0.53, 0.68),
@@ -52,7 +52,7 @@ pub(super) fn paint(draws: &mut Draws) -> Vec3 {
 }
 
 /// A paint that stands out from another: drawn again a few times while it is near.
-pub(super) fn contrast(draws: &mut Draws, to: Vec3) -> Vec3 {
+pub(crate) fn contrast(draws: &mut Draws, to: Vec3) -> Vec3 {
     let mut colour = paint(draws);
     for _ in 0..4 {
         if (colour - to).length() > 0.45 {
@@ -64,13 +64,13 @@ pub(super) fn contrast(draws: &mut Draws, to: Vec3) -> Vec3 {
 }
 
 /// From matt to varnish.
-pub(super) fn gloss(draws: &mut Draws) -> f32 {
+pub(crate) fn gloss(draws: &mut Draws) -> f32 {
     let shine = draws.unit();
     0.3 * shine * shine
 }
 
 /// A pattern over a whole part: mostly one colour. `size` is the size of what repeats, in world units.
-pub(super) fn pattern(draws: &mut Draws, colour: Vec3, size: f32) -> Texture {
+pub(crate) fn pattern(draws: &mut Draws, colour: Vec3, size: f32) -> Texture {
     let colours = [colour, contrast(draws, colour)];
     let seed = draws.below(1 << 20);
     match draws.below(12) {
@@ -92,7 +92,7 @@ pub(super) fn pattern(draws: &mut Draws, colour: Vec3, size: f32) -> Texture {
 }
 
 /// A bright or a dull day, with the key lamp on any side and high.
-pub(super) fn light(draws: &mut Draws) -> Light {
+pub(crate) fn light(draws: &mut Draws) -> Light {
     let (sine, cosine) = sin_cos(TAU * draws.unit());
     let spread = draws.between(0.2, 1.1);
     let soft = draws.unit();

@@ -1,7 +1,7 @@
 //! What the toy lorry carries: a ball, a crate, a ring with a small ball in it, a log and a skittle.
 
 use super::{BLUE, GREEN, ORANGE, PINK, PURPLE, RED, WHITE, WOOD, YELLOW, ball, block, part};
-use crate::object::Part;
+use crate::part::Part;
 use crate::placement::Placement;
 use crate::shape::Shape;
 use crate::texture::{Finish, Texture, rgb};

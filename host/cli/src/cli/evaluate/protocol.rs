@@ -2,54 +2,53 @@
 
 use super::super::terminal::Terminal;
 use super::Arguments;
-use super::tables::{csv_of, print_table};
-use crate::cli::metrics_options::MetricOptions;
-use crate::cli::{on_threads, say};
+use super::files::{csv_of, json_of};
+use super::jobs::{Jobs, names};
+use super::tables::{counted, print_published, print_table};
+use crate::cli::{on_threads, say, wrong};
 use anyhow::Context;
 use clap::Args;
+use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
-use viewfuse_device::choice::{AnyDevice, Chosen};
-use viewfuse_evaluate::Evaluator;
-use viewfuse_evaluate::gallery::Gallery;
-use viewfuse_evaluate::protocol::{Draws, Job, Plan, Protocol};
-use viewfuse_evaluate::run_folder::{
-    Finished, FolderError, RunFolder, SETTINGS, SceneSettings, Settings, Shard, missing,
-};
-use viewfuse_evaluate::summary::tables;
-use viewfuse_field::AnyField;
-use viewfuse_field::render::RenderOptions;
+use viewfuse_device::choice::Chosen;
+use viewfuse_evaluate::metrics::masked::PSNR_MASKED;
+use viewfuse_evaluate::protocol::{Draws, Job, Plan, Protocol, Published};
+use viewfuse_evaluate::run_folder::{Finished, SETTINGS, SceneSettings, Settings, Shard, missing};
+use viewfuse_evaluate::summary::{Table, tables};
+use viewfuse_field::render::{RenderError, RenderOptions, working_side};
 use viewfuse_job::digest::sha256_of;
 use viewfuse_job::files::{check_writable, write_whole};
-use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
-use viewfuse_scene::photographs::Album;
+use viewfuse_scene::photographs::reduced_size;
 use viewfuse_weighting::Weighting;
 
 const PROTOCOLS: &str = "Options of protocols";
-/// Options that change no number, or that the settings have in another form.
-const NO_SETTINGS: [&str; 7] = ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol"];
-/// The most missing jobs and notes in a message.
+/// Options that change no number, or that the settings hold in another form.
+const NO_SETTINGS: [&str; 9] =
+    ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol", "targets", "json"];
+/// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
 #[derive(Args)]
 pub(crate) struct ProtocolOptions {
-    /// Choose sources and targets by a protocol: random[:sources=N] (3), close[:sources=N,degrees=D] (5 sources,
-    /// exactly one within 10 degrees of the target), count[:sources=N+N+...] (2+8+16+32),
-    /// fixed[:cars|chairs|pixelnerf-1|pixelnerf-2] (published lists) or fixed:SOURCES:TARGETS
-    #[arg(long, value_name = "PROTOCOL", requires = "output", conflicts_with_all = ["targets", "sources", "views"], help_heading = PROTOCOLS)]
+    /// Choose sources and targets by a protocol: random[:sources=N] (3), close[:sources=N,degrees=D] (5 sources, exactly one
+    /// within 10 degrees of the target), count[:sources=N+N+...] (2+8+16+32), fixed[:cars|chairs|pixelnerf-1|pixelnerf-2]
+    /// (published lists) or fixed:SOURCES:TARGETS, nearest:K (each view, or each of --targets, from the K nearest others), or
+    /// a benchmark's views, size and metric: llff:3|6|9, dtu:3|6|9[,masks=given], blender:8
+    #[arg(long, value_name = "PROTOCOL", conflicts_with_all = ["sources", "views"], help_heading = PROTOCOLS)]
     pub(super) protocol: Option<Protocol>,
-    /// Number of trials: draws of sources and targets for every scene
+    /// Draw sources and targets this many times for every scene
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = PROTOCOLS)]
     trials: u32,
     /// Targets of a trial
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(1..=10_000), help_heading = PROTOCOLS)]
     targets_per_trial: u16,
-    /// Run only part INDEX of COUNT, counted from 0: every COUNT-th job
-    #[arg(long, value_name = "INDEX/COUNT", requires = "protocol", help_heading = PROTOCOLS)]
+    /// Do only part INDEX of COUNT, counted from 0: every COUNT-th job
+    #[arg(long, value_name = "INDEX/COUNT", requires_all = ["protocol", "output"], help_heading = PROTOCOLS)]
     shard: Option<Shard>,
-    /// Keep the pictures of the first N jobs for the report
+    /// Keep the pictures of this many jobs, the first ones, for the report
     #[arg(long, value_name = "N", default_value_t = 4, help_heading = PROTOCOLS)]
     pictures: usize,
 }
@@ -57,20 +56,32 @@ pub(crate) struct ProtocolOptions {
 pub(super) fn run(
     arguments: &Arguments,
     protocol: &Protocol,
-    folder: &Path,
     weightings: &[Weighting],
     mut options: BTreeMap<String, String>,
 ) -> anyhow::Result<ExitCode> {
-    check_writable(&folder.join(SETTINGS))?;
+    let protocol = &with_targets(protocol, arguments.targets.as_deref())?;
+    let folder = arguments.output.as_deref();
+    folder.map_or(Ok(()), |folder| check_writable(&folder.join(SETTINGS)))?;
     let field = arguments.model.open(arguments.seed, None)?;
-    let render_options = arguments.picture.to_render_options(arguments.model.exact, &field.about())?;
+    let about = field.about();
+    let render_options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
     let scenes: Vec<Scene> = arguments.paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
     let draws = Draws {
         seed: arguments.seed,
         trial_count: arguments.protocol.trials,
         target_count: arguments.protocol.targets_per_trial.into(),
     };
-    let plan = protocol.plan(&scenes, draws, field.about().least_sources)?;
+    let plan = protocol.plan(&scenes, draws, about.least_sources)?;
+    let of_scene = |scene: &Scene| {
+        let size = render_options.size.or_else(|| protocol.picture_size(scene, about.longest_side));
+        RenderOptions { size, ..render_options.clone() }
+    };
+    let scene_options: Vec<RenderOptions> = scenes.iter().map(of_scene).collect();
+    let sizes: Vec<[u32; 2]> = scenes
+        .iter()
+        .zip(&scene_options)
+        .map(|(scene, options)| size_of(scene, options, about.longest_side))
+        .collect::<Result<_, _>>()?;
     NO_SETTINGS.iter().for_each(|option| {
         options.remove(*option);
     });
@@ -84,12 +95,13 @@ pub(super) fn run(
         viewfuse: env!("CARGO_PKG_VERSION").to_owned(),
         protocol: protocol.to_string(),
         schemes: weightings.iter().map(Weighting::to_string).collect(),
-        field: field.about().name.to_owned(),
+        field: about.name.to_owned(),
+        metric: protocol.metric_words().to_owned(),
         options,
         files,
         job_count: plan.jobs.len(),
         notes: plan.notes.clone(),
-        scenes: scenes.iter().map(SceneSettings::of).collect(),
+        scenes: scenes.iter().zip(&sizes).map(|(scene, size)| SceneSettings::of(scene, *size)).collect(),
     };
     let Chosen { device, reason } = arguments.device.open()?;
     let shard = arguments.protocol.shard.unwrap_or(Shard::ALL);
@@ -98,120 +110,152 @@ pub(super) fn run(
     let work = Jobs {
         path: folder,
         settings: &settings,
+        protocol,
         scenes: &scenes,
         plan: &plan,
         shard,
         picture_count: arguments.protocol.pictures,
         weightings,
-        options: &render_options,
+        options: &scene_options,
         metrics: &arguments.metrics,
         progress: &progress,
     };
-    let (folder, done) = on_threads(arguments.picture.threads, || work.run(&device, &field))??;
+    let (finished, done) = on_threads(arguments.picture.threads, || work.run(&device, &field))??;
     drop(progress);
-    plan.notes.iter().take(NAMED).try_for_each(|note| say(format_args!("note: {note}")))?;
-    if plan.notes.len() > NAMED {
-        say(format_args!("and {} more notes, all in {SETTINGS}", plan.notes.len() - NAMED))?;
-    }
-    let finished = folder.finished()?;
     let missing = missing(plan.jobs.len(), &finished);
-    if missing.is_empty() {
-        let by_count = matches!(protocol, Protocol::Count { .. });
-        for table in tables(finished.values(), by_count) {
-            print_table(&protocol.to_string(), &table)?;
-        }
-        let first = |job: &Finished| vec![job.job.to_string(), job.scene_name.clone(), job.trial.to_string()];
-        let lines = finished.values().flat_map(|job| job.scores.iter().map(move |score| (first(job), score)));
-        let csv = csv_of(&["job", "scene", "trial"], &lines.collect::<Vec<_>>())?;
-        write_whole(&folder.path().join("scores.csv"), &csv)?;
+    let results = match missing.is_empty() {
+        true => tables(finished.values(), protocol.has_table_a_count()),
+        false => Vec::new(),
+    };
+    if let (Some(folder), true) = (folder, missing.is_empty()) {
+        write_scores(folder, &finished)?;
     }
-    let (there, all) = (finished.len(), plan.jobs.len());
-    let part = if shard == Shard::ALL { String::new() } else { format!("shard {shard}: ") };
-    say(format_args!("{part}{done} jobs done; {there} of {all} are in {}", folder.path().display()))?;
+    let outcome = Outcome { protocol, scenes: &scenes, sizes: &sizes, plan: &plan, results: &results };
+    if arguments.json {
+        let json = json!({
+            "settings": settings,
+            "device": device.name(),
+            "jobs": plan.jobs.iter().map(|job| outcome.job(job)).collect::<Vec<_>>(),
+            "tables": outcome.json_tables()?,
+            "published": outcome.published(),
+            "missing": missing,
+        });
+        say(format_args!("{json:#}"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    outcome.print()?;
+    if let Some(folder) = folder {
+        let (there, all) = (finished.len(), plan.jobs.len());
+        let part = if shard == Shard::ALL { String::new() } else { format!("shard {shard}: ") };
+        say(format_args!("{part}{done} jobs done; {there} of {all} are in {}", folder.display()))?;
+    }
     if !missing.is_empty() {
         let named: Vec<String> = missing.iter().take(NAMED).map(usize::to_string).collect();
         let more = missing.len().saturating_sub(NAMED);
         let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        say(format_args!("missing: {}{more}; the tables are printed after the last of them", named.join(", ")))?;
+        say(format_args!("missing: {}{more}; the tables come with the last of them", named.join(", ")))?;
     }
     say(format_args!("device: {}, {reason}", device.name()))?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// The jobs of a shard that are not finished.
-struct Jobs<'a> {
-    path: &'a Path,
-    settings: &'a Settings,
+/// The protocol with the targets that were given beside it.
+fn with_targets(protocol: &Protocol, targets: Option<&str>) -> anyhow::Result<Protocol> {
+    match (protocol, targets) {
+        (protocol, None) => Ok(protocol.clone()),
+        (Protocol::Nearest { sources, targets: None }, Some(targets)) => {
+            Ok(Protocol::Nearest { sources: *sources, targets: Some(targets.to_owned()) })
+        }
+        _ => Err(wrong(format_args!(
+            "--targets cannot be used with --protocol {protocol}, which chooses its targets; with nearest:K it can"
+        ))),
+    }
+}
+
+/// Width and height of the pictures at a scene's first view.
+fn size_of(scene: &Scene, options: &RenderOptions, longest: u32) -> Result<[u32; 2], RenderError> {
+    let side = working_side(scene, options, longest)?;
+    let own = || scene.views.first().map_or([0, 0], |view| reduced_size(&view.camera, side).into());
+    Ok(options.size.unwrap_or_else(own))
+}
+
+/// Every score as CSV in the folder.
+fn write_scores(folder: &Path, finished: &BTreeMap<usize, Finished>) -> anyhow::Result<()> {
+    let first = |job: &Finished| vec![job.job.to_string(), job.scene_name.clone(), job.trial.to_string()];
+    let lines = finished.values().flat_map(|job| job.scores.iter().map(move |score| (first(job), score)));
+    let csv = csv_of(&["job", "scene", "trial"], &lines.collect::<Vec<_>>())?;
+    Ok(write_whole(&folder.join("scores.csv"), &csv)?)
+}
+
+/// What there is to tell.
+struct Outcome<'a> {
+    protocol: &'a Protocol,
     scenes: &'a [Scene],
+    sizes: &'a [[u32; 2]],
     plan: &'a Plan,
-    shard: Shard,
-    picture_count: usize,
-    weightings: &'a [Weighting],
-    options: &'a RenderOptions,
-    metrics: &'a MetricOptions,
-    progress: &'a dyn Progress,
+    /// Empty until every job is there.
+    results: &'a [Table],
 }
 
-impl Jobs<'_> {
-    /// Returns the folder, and how many were done.
-    fn run(&self, device: &AnyDevice, field: &AnyField) -> anyhow::Result<(RunFolder, usize)> {
-        let Jobs { path, settings, scenes, plan, shard, weightings, options, metrics, progress, .. } = *self;
-        let (renderer, scorer) = (field.on(device), metrics.on(device)?);
-        // Only after all arguments are checked: a folder keeps its settings.
-        let folder = RunFolder::begin(path, settings.clone())?;
-        let mut journal = folder.journal(shard)?;
-        let finished = folder.finished()?;
-        for (number, done) in &finished {
-            self.check(*number, done)?;
-        }
-        let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
-        let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
-        let mut count = 0;
-        for (number, job) in plan.jobs.iter().enumerate() {
-            if !shard.does(number) || finished.contains_key(&number) {
-                continue;
-            }
-            progress.check()?;
-            let scene = &scenes[job.scene];
-            let sources = names(scene, &job.sources);
-            let album = Album::open(scene, job.sources.iter().chain(&job.targets).copied(), progress)?;
-            let mut gallery = Gallery::default();
-            let first = job.targets.first().map_or("", |&target| &scene.views[target].name);
-            let scores =
-                evaluator.score(scene, &album, &job.sources, &job.targets, |weighting, frame, values, images| {
-                    if number < self.picture_count && frame.target.name == first {
-                        gallery.add(weighting, frame, values, images);
-                    }
-                })?;
-            // Before the line that says that the job is done: it is not done again.
-            gallery.write(folder.path(), number, &scene.name(), first, &sources)?;
-            let (trial, device) = (job.trial, device.name());
-            journal.add(&Finished {
-                job: number,
-                scene: job.scene,
-                scene_name: scene.name(),
-                trial,
-                device,
-                sources,
-                scores,
-            })?;
-            count += 1;
-        }
-        Ok((folder, count))
+impl Outcome<'_> {
+    fn title(&self, results: &Table) -> String {
+        let sources: Vec<String> = results.source_counts.iter().map(usize::to_string).collect();
+        let (scenes, pictures) = (counted(results.scene_count, "scene"), counted(results.target_count, "picture"));
+        format!("{}, sources: {}; {scenes}, {pictures} of each scheme", self.protocol, sources.join(", "))
     }
-}
 
-impl Jobs<'_> {
-    /// A finished job must be the one that would be done now.
-    fn check(&self, number: usize, done: &Finished) -> Result<(), FolderError> {
-        let same = |job: &Job| done.scene == job.scene && done.sources == names(&self.scenes[job.scene], &job.sources);
-        match self.plan.jobs.get(number) {
-            Some(job) if same(job) => Ok(()),
-            _ => Err(FolderError::OtherJob { path: self.path.to_path_buf(), job: number }),
+    /// What others published, of the scenes that have jobs.
+    fn published(&self) -> Option<Published> {
+        let taken = |scene: &usize| self.plan.jobs.iter().any(|job| job.scene == *scene);
+        let taken: Vec<usize> = (0..self.scenes.len()).filter(taken).collect();
+        let scenes: Vec<String> = taken.iter().map(|&scene| self.scenes[scene].name()).collect();
+        let sizes: Vec<[u32; 2]> = taken.iter().map(|&scene| self.sizes[scene]).collect();
+        let has_masked = self.results.iter().flat_map(|table| &table.metrics).any(|metric| metric.name == PSNR_MASKED);
+        Published::of(self.protocol, &scenes, &sizes, has_masked).filter(|_| !self.results.is_empty())
+    }
+
+    fn job(&self, job: &Job) -> serde_json::Value {
+        let scene = &self.scenes[job.scene];
+        json!({
+            "scene": scene.name(),
+            "trial": job.trial,
+            "sources": names(scene, &job.sources),
+            "targets": names(scene, &job.targets),
+        })
+    }
+
+    fn json_tables(&self) -> anyhow::Result<Vec<serde_json::Value>> {
+        self.results.iter().map(|table| json_of(&self.title(table), table)).collect()
+    }
+
+    fn print(&self) -> anyhow::Result<()> {
+        let notes = &self.plan.notes;
+        notes.iter().take(NAMED).try_for_each(|note| say(format_args!("note: {note}")))?;
+        if notes.len() > NAMED {
+            say(format_args!("and {} more notes", notes.len() - NAMED))?;
+        }
+        if !self.protocol.draws() && !self.results.is_empty() {
+            self.print_views()?;
+        }
+        for table in self.results {
+            print_table(&self.title(table), table)?;
+        }
+        match self.published() {
+            Some(published) => Ok(print_published(&published)?),
+            None => Ok(()),
         }
     }
-}
 
-fn names(scene: &Scene, views: &[usize]) -> Vec<String> {
-    views.iter().map(|&view| scene.views[view].name.clone()).collect()
+    /// Which views were taken, and the metric, where that is no matter of chance.
+    fn print_views(&self) -> anyhow::Result<()> {
+        for job in self.plan.jobs.iter().take(NAMED) {
+            let (scene, [width, height]) = (&self.scenes[job.scene], self.sizes[job.scene]);
+            let [sources, targets] = [&job.sources, &job.targets].map(|views| names(scene, views).join(", "));
+            say(format_args!("{}, {width}x{height}: targets {targets} from {sources}", scene.name()))?;
+        }
+        if self.plan.jobs.len() > NAMED {
+            say(format_args!("and {} more", self.plan.jobs.len() - NAMED))?;
+        }
+        Ok(say(format_args!("metric: {}\n", self.protocol.metric_words()))?)
+    }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::camera_models::CameraModel;
 use super::super::error::SceneError;
-use super::super::fault::Place;
+use super::super::fault::{FileFault, Place};
 use super::super::files::{self, number, read_text};
 use super::{ModelCamera, ModelImage, ModelPoint, camera};
 
@@ -16,10 +16,10 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// A whole number that is not negative.
 fn whole(path: &Path, line: usize, word: &str) -> Result<u32, SceneError> {
-    word.parse().map_err(|_| SceneError::NotWhole {
+    word.parse().map_err(|_| SceneError::Damaged {
         path: path.to_path_buf(),
         place: Place::Line(line),
-        word: files::excerpt(word),
+        fault: FileFault::NotWhole { word: files::excerpt(word) },
     })
 }
 

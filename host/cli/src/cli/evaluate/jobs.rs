@@ -1,0 +1,115 @@
+//! The jobs of a protocol, one after the other, with or without a folder that keeps them.
+
+use crate::cli::metrics_options::MetricOptions;
+use std::collections::BTreeMap;
+use std::path::Path;
+use viewfuse_device::choice::AnyDevice;
+use viewfuse_evaluate::gallery::Gallery;
+use viewfuse_evaluate::protocol::{Job, Plan, Protocol};
+use viewfuse_evaluate::run_folder::{Finished, FolderError, RunFolder, Settings, Shard};
+use viewfuse_evaluate::{Evaluator, Subject, without_masks};
+use viewfuse_field::AnyField;
+use viewfuse_field::render::RenderOptions;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::Scene;
+use viewfuse_scene::photographs::Album;
+use viewfuse_weighting::Weighting;
+
+/// The jobs of a shard that are not finished.
+pub(super) struct Jobs<'a> {
+    /// Where finished jobs are kept, if anywhere.
+    pub(super) path: Option<&'a Path>,
+    pub(super) settings: &'a Settings,
+    pub(super) protocol: &'a Protocol,
+    /// As they were opened, with masks.
+    pub(super) scenes: &'a [Scene],
+    pub(super) plan: &'a Plan,
+    pub(super) shard: Shard,
+    pub(super) picture_count: usize,
+    pub(super) weightings: &'a [Weighting],
+    /// One a scene.
+    pub(super) options: &'a [RenderOptions],
+    pub(super) metrics: &'a MetricOptions,
+    pub(super) progress: &'a dyn Progress,
+}
+
+impl Jobs<'_> {
+    /// Returns all finished jobs by number, those of other shards included, and how many were done here.
+    pub(super) fn run(
+        &self,
+        device: &AnyDevice,
+        field: &AnyField,
+    ) -> anyhow::Result<(BTreeMap<usize, Finished>, usize)> {
+        let Jobs { scenes, plan, shard, weightings, metrics, progress, .. } = *self;
+        let (renderer, scorer) = (field.on(device), metrics.on(device)?);
+        // Only now, that nothing which a person gave can be wrong: a folder keeps its settings.
+        let folder = self.path.map(|path| RunFolder::begin(path, self.settings.clone())).transpose()?;
+        let mut journal = folder.as_ref().map(|folder| folder.journal(shard)).transpose()?;
+        let mut finished = folder.as_ref().map_or_else(|| Ok(BTreeMap::new()), RunFolder::finished)?;
+        for (number, done) in &finished {
+            self.check(*number, done)?;
+        }
+        // What fields may see of the scenes.
+        let shown: Vec<Scene> = match self.protocol.hides_masks() {
+            true => scenes.iter().map(without_masks).collect(),
+            false => scenes.to_vec(),
+        };
+        let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
+        let mut count = 0;
+        for (number, job) in plan.jobs.iter().enumerate() {
+            if !shard.does(number) || finished.contains_key(&number) {
+                continue;
+            }
+            progress.check()?;
+            let (scene, options) = (&shown[job.scene], &self.options[job.scene]);
+            let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
+            let sources = names(scene, &job.sources);
+            let album = Album::open(scene, job.sources.iter().chain(&job.targets).copied(), progress)?;
+            let masked = self.protocol.is_masked().then(|| &scenes[job.scene]);
+            let mut gallery = Gallery::default();
+            let first = job.targets.first().map_or("", |&target| &scene.views[target].name);
+            let scores = evaluator.score(
+                Subject { scene, album: &album, masked },
+                &job.sources,
+                &job.targets,
+                |weighting, frame, values, images| {
+                    if folder.is_some() && number < self.picture_count && frame.target.name == first {
+                        gallery.add(weighting, frame, values, images);
+                    }
+                },
+            )?;
+            let done = Finished {
+                job: number,
+                scene: job.scene,
+                scene_name: scene.name(),
+                trial: job.trial,
+                device: device.name(),
+                sources,
+                scores,
+            };
+            if let (Some(folder), Some(journal)) = (&folder, &mut journal) {
+                // Before the line that says that the job is done: it is not done again.
+                gallery.write(folder.path(), number, &done.scene_name, first, &done.sources)?;
+                journal.add(&done)?;
+            }
+            finished.insert(number, done);
+            count += 1;
+        }
+        // Other shards may have added some.
+        Ok((folder.map_or(Ok(finished), |folder| folder.finished())?, count))
+    }
+
+    /// A finished job must be the one that would be done now.
+    fn check(&self, number: usize, done: &Finished) -> Result<(), FolderError> {
+        let same = |job: &Job| done.scene == job.scene && done.sources == names(&self.scenes[job.scene], &job.sources);
+        match (self.plan.jobs.get(number), self.path) {
+            (Some(job), _) if same(job) => Ok(()),
+            (_, path) => Err(FolderError::OtherJob { path: path.unwrap_or(Path::new("")).to_path_buf(), job: number }),
+        }
+    }
+}
+
+/// The names of views.
+pub(super) fn names(scene: &Scene, views: &[usize]) -> Vec<String> {
+    views.iter().map(|&view| scene.views[view].name.clone()).collect()
+}

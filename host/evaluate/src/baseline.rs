@@ -1,0 +1,122 @@
+//! Pictures that need no field: what every field must be above.
+//!
+//! ```text
+//! plane   how far the scene is, as one number for each target
+//! warp    a source as the target would see it if the scene were a plane at that depth
+//! ```
+//!
+//! | row | picture |
+//! |---|---|
+//! | `nearest copy` | the source whose camera is nearest, as it is |
+//! | `warped copy` | the same source, warped by the homography of the plane |
+//! | `warped blend` | the mean of the four nearest sources, each so warped |
+//!
+//! The plane is perpendicular to the target's principal axis. All arithmetic is in `f64` on the host; values are 8-bit
+//! levels, looked up bilinearly and rounded once at the end.
+
+pub mod plane;
+mod warp;
+
+pub use warp::Look;
+
+use image::imageops::{self, FilterType};
+use image::{Rgb, RgbImage};
+use std::fmt;
+use viewfuse_core::camera::Camera;
+use warp::Homography;
+
+/// A source photograph with the camera of exactly these pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shot {
+    /// Its camera; width and height are the picture's.
+    pub camera: Camera,
+    /// Its pixels.
+    pub picture: RgbImage,
+}
+
+/// A picture made of sources without a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Baseline {
+    /// The nearest source as it is, resampled to the target's size.
+    NearestCopy,
+    /// The nearest source warped by the homography of a plane.
+    WarpedCopy,
+    /// The mean of the [`BLENDED`] nearest sources so warped.
+    WarpedBlend,
+}
+
+/// Sources that [`Baseline::WarpedBlend`] takes.
+pub const BLENDED: usize = 4;
+
+impl Baseline {
+    /// All of them, in the order of their rows.
+    pub const ALL: [Baseline; 3] = [Baseline::NearestCopy, Baseline::WarpedCopy, Baseline::WarpedBlend];
+
+    /// The name of its row.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Baseline::NearestCopy => "nearest copy",
+            Baseline::WarpedCopy => "warped copy",
+            Baseline::WarpedBlend => "warped blend",
+        }
+    }
+
+    /// Whether a row of this name is a baseline and no scheme.
+    pub fn is_named(row: &str) -> bool {
+        Baseline::ALL.iter().any(|baseline| baseline.name() == row)
+    }
+
+    /// How many sources it takes at most, the nearest first.
+    pub const fn source_count(self) -> usize {
+        match self {
+            Baseline::NearestCopy | Baseline::WarpedCopy => 1,
+            Baseline::WarpedBlend => BLENDED,
+        }
+    }
+
+    /// The picture at a target, of the target's size. `nearest` are sources, the nearest to the target first; `depth` is
+    /// that of the plane along the target's principal axis in world units, infinite for the homography of a pure
+    /// rotation. Of no source the picture is black.
+    ///
+    /// Where the plane's point lies outside a source, the copy takes the source's nearest pixel. The blend is the mean of
+    /// those sources that show the point, and where none does, the nearest source's nearest pixel.
+    pub fn picture(self, nearest: &[&Shot], target: &Camera, depth: f64) -> RgbImage {
+        let (width, height) = (target.pinhole.width(), target.pinhole.height());
+        let Some((first, _)) = nearest.split_first() else { return RgbImage::new(width, height) };
+        if self == Baseline::NearestCopy {
+            return match first.picture.dimensions() == (width, height) {
+                true => first.picture.clone(),
+                false => imageops::resize(&first.picture, width, height, FilterType::Triangle),
+            };
+        }
+        let taken = &nearest[..nearest.len().min(self.source_count())];
+        let warps: Vec<(&Shot, Homography)> =
+            taken.iter().map(|shot| (*shot, Homography::of_plane(target, &shot.camera, depth))).collect();
+        RgbImage::from_fn(width, height, |column, row| {
+            let looks = warps.iter().map(|(shot, warp)| warp.look(&shot.picture, column, row));
+            Rgb(mean_of_seen(looks).map(|level| (level + 0.5) as u8))
+        })
+    }
+}
+
+impl fmt::Display for Baseline {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// The mean of those looks that are inside their picture; if none is, the first look. Of no look 0.
+fn mean_of_seen(looks: impl Iterator<Item = Look>) -> [f64; 3] {
+    let (mut sum, mut count, mut first) = ([0.0; 3], 0_u32, None);
+    for look in looks {
+        if look.inside {
+            count += 1;
+            sum.iter_mut().zip(look.levels).for_each(|(sum, level)| *sum += level);
+        }
+        first.get_or_insert(look.levels);
+    }
+    match count {
+        0 => first.unwrap_or_default(),
+        _ => sum.map(|sum| sum / f64::from(count)),
+    }
+}

@@ -1,0 +1,96 @@
+//! PSNR and SSIM of the object alone, as few-shot papers report for DTU: prediction and truth are both laid over white by
+//! the mask of the *truth*, and compared over the whole picture.
+//!
+//! The prediction is not cut out by what it knows of the object itself: what it paints inside the mask counts, what it
+//! paints outside does not. Both pictures have 8 bits, whatever convention the other metrics follow.
+
+use image::RgbImage;
+use viewfuse_core::metrics::{psnr, ssim};
+
+/// Name of the masked peak signal to noise ratio in decibels.
+pub const PSNR_MASKED: &str = "psnr-masked";
+/// Name of the masked structural similarity.
+pub const SSIM_MASKED: &str = "ssim-masked";
+
+/// A truth of which the mask is known.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaskedTruth {
+    over_white: RgbImage,
+    /// How much of each pixel is the object, row-major.
+    shares: Vec<f32>,
+}
+
+impl MaskedTruth {
+    /// Of the same photograph laid over white and over black, of equal size; `None` where these are equal: it has no mask.
+    pub fn of(over_white: RgbImage, over_black: &RgbImage) -> Option<MaskedTruth> {
+        if over_white == *over_black || over_white.dimensions() != over_black.dimensions() {
+            return None;
+        }
+        let share = |(white, black): (&image::Rgb<u8>, &image::Rgb<u8>)| {
+            let behind: i32 = (0..3).map(|channel| i32::from(white[channel]) - i32::from(black[channel])).sum();
+            (1.0 - behind as f32 / (3.0 * 255.0)).clamp(0.0, 1.0)
+        };
+        let shares = over_white.pixels().zip(over_black.pixels()).map(share).collect();
+        Some(MaskedTruth { over_white, shares })
+    }
+
+    /// A picture laid over white by this truth's mask. It must have the truth's size.
+    pub fn over_white(&self, picture: &RgbImage) -> RgbImage {
+        let mut laid = picture.clone();
+        for (pixel, share) in laid.pixels_mut().zip(&self.shares) {
+            let over = |level: u8| (f32::from(level) * share + 255.0 * (1.0 - share) + 0.5) as u8;
+            pixel.0 = pixel.0.map(over);
+        }
+        laid
+    }
+
+    /// [`PSNR_MASKED`], and [`SSIM_MASKED`] if the picture is at least 7x7; nothing if the sizes differ.
+    pub fn score(&self, prediction: &RgbImage) -> Vec<(String, f64)> {
+        let (width, height) = self.over_white.dimensions();
+        if prediction.dimensions() != (width, height) {
+            return Vec::new();
+        }
+        let laid = self.over_white(prediction);
+        let mut values = vec![(PSNR_MASKED.to_owned(), psnr(&laid, &self.over_white))];
+        let similarity = ssim(&laid, &self.over_white, width as usize, height as usize, 3);
+        values.extend(similarity.map(|value| (SSIM_MASKED.to_owned(), value)));
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::Rgb;
+
+    /// The left half is an object of level 100, the right half background.
+    fn halves() -> MaskedTruth {
+        let over = |behind: u8| RgbImage::from_fn(16, 8, |x, _| Rgb(if x < 8 { [100; 3] } else { [behind; 3] }));
+        MaskedTruth::of(over(255), &over(0)).expect("a mask")
+    }
+
+    #[test]
+    fn only_the_object_counts() {
+        let truth = halves();
+        let prediction = RgbImage::from_fn(16, 8, |x, _| Rgb(if x < 8 { [110; 3] } else { [7; 3] }));
+        let values = truth.score(&prediction);
+        // An error of 10 levels on half of the pixels.
+        let expected = 10.0 * (255.0_f64.powi(2) / 50.0).log10();
+        assert_eq!(values[0].0, PSNR_MASKED);
+        assert!((values[0].1 - expected).abs() < 1.0e-9, "{values:?}");
+        assert!(values[1].0 == SSIM_MASKED && values[1].1 < 1.0, "{values:?}");
+        let exact = RgbImage::from_pixel(16, 8, Rgb([100; 3]));
+        assert_eq!(truth.score(&exact)[0].1, f64::INFINITY);
+        assert!(truth.score(&RgbImage::new(3, 3)).is_empty());
+    }
+
+    #[test]
+    fn fractions_and_photographs_without_a_mask() {
+        // A quarter object of level 200: 50 over black, 241 over white.
+        let (white, black) = (RgbImage::from_pixel(2, 2, Rgb([241; 3])), RgbImage::from_pixel(2, 2, Rgb([50; 3])));
+        let truth = MaskedTruth::of(white.clone(), &black).expect("a mask");
+        let level = truth.over_white(&RgbImage::from_pixel(2, 2, Rgb([200; 3]))).get_pixel(0, 0)[0];
+        assert!(level.abs_diff(241) <= 1, "{level}");
+        assert_eq!(MaskedTruth::of(white.clone(), &white), None);
+    }
+}
