@@ -99,7 +99,8 @@ impl Swept {
             let (width, height) = (view.map_width.div_ceil(2), view.map_height.div_ceil(2));
             let first = disparities.len() as u32;
             for pixel in 0..width * height {
-                let place = (pixel / width * 2).min(view.map_height - 1) * view.map_width + pixel % width;
+                let (row, column) = (pixel / width * 2, pixel % width * 2);
+                let place = row * view.map_width + column;
                 disparities.push(self.disparities[(view.first_disparity + place) as usize]);
             }
             (view.first_disparity, view.map_width, view.map_height) = (first, width, height);
