@@ -8,7 +8,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::lookup::bilinear_from;
 use viewfuse_core::plane_sweep::blend::{BlendBlock, Blended, blend};
 use viewfuse_core::plane_sweep::census::census_cost;
-use viewfuse_core::plane_sweep::disparity::pick_disparity;
+use viewfuse_core::plane_sweep::disparity::{NEAR_PLANES, pick_disparity};
 use viewfuse_core::plane_sweep::evidence::{UNSEEN, ViewPair, evidence};
 use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_core::plane_sweep::path::CostBlock;
@@ -365,7 +365,7 @@ fn equal_costs_are_far_and_unsure() {
     let costs = vec![[0.05; PLANES]; (WIDTH * HEIGHT) as usize];
     let [disparity, confidence] = pick_disparity(&swept.frustum, &costs, 77);
     assert_eq!(disparity, 0.0);
-    assert!((confidence - 2.0 / PLANES as f32).abs() < 0.01, "confidence {confidence}");
+    assert!((confidence - (1 + NEAR_PLANES) as f32 / PLANES as f32).abs() < 0.02, "confidence {confidence}");
 }
 
 /// A view that does not see a pixel takes no part in its comparison.

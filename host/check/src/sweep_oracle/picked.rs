@@ -3,7 +3,7 @@
 use super::disparity;
 use crate::bounded::Bounded;
 use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::disparity::{DOUBT_WIDTH, DOUBTFUL_COST, TEMPERATURE};
+use viewfuse_core::plane_sweep::disparity::{DOUBT_WIDTH, DOUBTFUL_COST, NEAR_PLANES, TEMPERATURE};
 use viewfuse_core::plane_sweep::frustum::FrustumBlock;
 
 /// The logistic step from 1 at small costs to 0 at large ones.
@@ -23,7 +23,7 @@ pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [
     let shares: Vec<Bounded> =
         costs.iter().map(|cost| ((least - Bounded::from(*cost)) / Bounded::from(TEMPERATURE)).exp()).collect();
     let sum = |shares: &[Bounded]| shares.iter().fold(Bounded::ZERO, |sum, share| sum + *share);
-    let near = sum(&shares[best.saturating_sub(1)..(best + 2).min(shares.len())]);
+    let near = sum(&shares[best.saturating_sub(NEAR_PLANES)..(best + NEAR_PLANES + 1).min(shares.len())]);
     let confidence = near / sum(&shares) * logistic(least, DOUBTFUL_COST, DOUBT_WIDTH);
     let plane = disparity(frustum.far_disparity, frustum.disparity_step, best);
     let offset = match (best.checked_sub(1).map(|before| costs[before]), costs.get(best + 1)) {
