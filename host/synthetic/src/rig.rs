@@ -42,7 +42,7 @@ pub struct Walk {
 }
 
 /// Angle from one view of an arc to the next, in radians.
-const ARC_STEP: f32 = 0.205;
+const ARC_STEP: f32 = 0.11;
 
 /// Largest angle of an arc, in radians.
 const LARGEST_ARC: f32 = 2.1;

@@ -47,7 +47,7 @@ pub struct Sweep {
 
 impl Default for Sweep {
     fn default() -> Sweep {
-        Sweep { plane_count: 64, match_side: 256, near_cost: 0.01, dissent_share: 0.0625, temperature: TEMPERATURE }
+        Sweep { plane_count: 64, match_side: 256, near_cost: 0.005, dissent_share: 0.0625, temperature: TEMPERATURE }
     }
 }
 
