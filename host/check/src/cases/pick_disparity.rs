@@ -8,6 +8,7 @@ use crate::swept::{Swept, costs};
 use crate::world::Numbers;
 use viewfuse_core::plane_sweep::Planes;
 use viewfuse_core::plane_sweep::frustum::FrustumBlock;
+use viewfuse_core::plane_sweep::path::CostBlock;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
@@ -51,7 +52,7 @@ impl Case for PickDisparity {
         // The map begins behind that of a smaller view.
         inputs.frustum.camera.first_texel = 5;
         let (width, height) = (frustum.camera.width, frustum.camera.height);
-        let volume = viewfuse_core::plane_sweep::path::CostBlock { width, height, ..swept.volume() };
+        let volume = CostBlock { width, height, ..swept.volume() };
         inputs.costs = costs(&mut Numbers::new(seed), &volume);
         inputs
     }
