@@ -34,7 +34,7 @@ impl Case for PickDisparity {
     const KERNEL: Kernel = Kernel::PickDisparity;
     const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = true;
-    const LIMITS: Limits = Limits { tolerance: 2.0e-4, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 5.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "a difference of costs in units of the temperature, under an exponential; the quotient of two \
         sums of these; the vertex of a parabola in steps of a plane; undecided where all three costs are nearly equal";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[
