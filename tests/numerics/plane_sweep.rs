@@ -73,7 +73,7 @@ fn swept_costs(swept: &Swept) -> (Vec<Planes>, Vec<Planes>) {
     let (mut grey, mut found, mut weighted) = (zeros(views.len()), zeros(4), zeros(2));
     let (mut sums, mut means, mut paths, mut joined) = (zeros(6), zeros(1), zeros(4), zeros(1));
     let windows = WindowBlock::new(frustum, 0.02);
-    let run = || {
+    let mut run = || {
         Cpu.compare_views(frustum, views, pairs, texels, disparities, &mut grey, &mut found)?;
         Cpu.census_cost(frustum, 0, frustum.row_count, pairs, &grey, &found, &mut weighted)?;
         Cpu.row_sums(&windows, &weighted, &mut sums)?;
@@ -81,7 +81,6 @@ fn swept_costs(swept: &Swept) -> (Vec<Planes>, Vec<Planes>) {
         Cpu.follow_paths(&volume, &means, &mut paths)?;
         Cpu.join_paths(&volume, &paths, &mut joined)
     };
-    let mut run = run;
     run().expect("a CPU");
     (weighted, joined)
 }

@@ -36,7 +36,7 @@ impl Case for CensusCost {
     const KERNEL: Kernel = Kernel::CensusCost;
     const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = true;
-    const LIMITS: Limits = Limits { tolerance: 1.0e-4, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
     const REASON: &'static str = "differences of grey in units of 0.04, each rounded; sums over twelve neighbours of all pairs; \
         three quotients";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[

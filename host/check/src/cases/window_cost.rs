@@ -103,7 +103,7 @@ impl Case for WindowCost {
     const KERNEL: Kernel = Kernel::WindowCost;
     const SEED_COUNT: u64 = 4;
     const HAS_REAL_PARAMETERS: bool = true;
-    const LIMITS: Limits = Limits { tolerance: 2.0e-5, least: 1.0e-2 };
+    const LIMITS: Limits = Limits { tolerance: 2.0e-6, least: 1.0e-2 };
     const REASON: &'static str = "for each window at most thirteen additions of sums, and a quotient below 0.4";
     const SPOILERS: &'static [Spoiler<Inputs>] = &[
         ("sums", |inputs| inputs.sums.iter_mut().step_by(2).flatten().for_each(|sum| *sum *= 1.01)),
