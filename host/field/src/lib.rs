@@ -39,7 +39,9 @@ pub mod training_free;
 
 pub use any::AnyField;
 pub use error::FieldError;
-pub use field::{About, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, SourceSide};
+pub use field::{
+    About, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable,
+};
 pub use record::{Denoising, LeftOut, Record};
 pub use renderer::{On, Renderer};
 pub use session::Session;
