@@ -299,6 +299,11 @@ impl<'a> Stage<'a> {
         self.session.surfaces()
     }
 
+    /// Longest side of the pictures.
+    pub fn side(&self) -> u32 {
+        self.side
+    }
+
     /// The scene.
     pub fn scene(&self) -> &'a Scene {
         self.scene
@@ -358,7 +363,15 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`RenderError::Size`].
     pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError> {
-        let camera = self.at_working_size(&self.scene.views[view].camera)?;
+        self.size_at(&self.scene.views[view].camera)
+    }
+
+    /// Width and height of the picture that is rendered at a camera.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn size_at(&self, camera: &Camera) -> Result<[u32; 2], RenderError> {
+        let camera = self.at_working_size(camera)?;
         Ok([camera.pinhole.width(), camera.pinhole.height()])
     }
 
