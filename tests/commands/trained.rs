@@ -3,6 +3,7 @@
 use super::done;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use viewfuse::evaluate::baseline::Baseline;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::scenes::Folder;
 

@@ -1,6 +1,5 @@
 //! Fields as a whole, on the CPU: pictures of scenes whose geometry is known, extremes, and what may be left out.
 
-mod baselines;
 mod genvs;
 mod pixelnerf;
 mod sampling;

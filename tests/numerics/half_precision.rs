@@ -116,6 +116,7 @@ fn sources() -> SourceImages {
         background: [1.0; 3],
         has_silhouettes: true,
         points: Vec::new(),
+        near_far: None,
         warning: None,
     }
 }

@@ -12,6 +12,7 @@ mod lens;
 mod math;
 mod metrics;
 mod network;
+mod plane_sweep;
 mod points;
 mod published;
 mod rays;

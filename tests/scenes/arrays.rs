@@ -37,6 +37,27 @@ fn the_largest_whole_folder_of_photographs_is_taken() {
 }
 
 #[test]
+fn llff_with_the_model_that_it_was_made_from() {
+    let folder = llff();
+    folder
+        .write("sparse/0/cameras.bin", cameras_binary(&[pinhole()]))
+        .write("sparse/0/images.bin", images_binary(&IMAGES));
+    folder.write("sparse/0/points3D.bin", points_binary());
+    let scene = open(&folder);
+    assert_eq!((scene.layout, scene.points.len(), scene.warnings.len()), ("llff", 2, 0));
+    // By character, "b 10" stands before "b 2": image 11 is the first row.
+    assert_eq!((scene.points[0].error, &scene.points[0].views[..]), (Some(0.25), &[0, 1][..]));
+    // Another model, or a damaged one, costs the points and a warning.
+    folder.write("sparse/0/images.bin", images_binary(&IMAGES[..1]));
+    let other = open(&folder);
+    assert!(other.points.is_empty() && other.warnings[0].contains("are not the images of the COLMAP model"));
+    folder.write("sparse/0/images.bin", [0; 9]);
+    let damaged = open(&folder);
+    assert!(damaged.points.is_empty() && damaged.warnings[0].contains("images.bin: byte 8: 1 bytes are left over"));
+    assert_eq!(damaged.views, scene.views);
+}
+
+#[test]
 fn arrays_have_several_forms() {
     let rows = [llff_row(), llff_row()].concat();
     let single: Vec<u8> = rows.iter().flat_map(|number| (*number as f32).to_le_bytes()).collect();

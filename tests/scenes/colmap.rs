@@ -92,7 +92,8 @@ fn text_without_the_lines_of_points_is_read() {
 fn every_camera_model_is_read() {
     // Parameters count from 1 after focal lengths and principal point, so that each coefficient shows where it went.
     let perspective = Projection::Perspective;
-    let cases: [(u32, &str, usize, usize, Projection, [f64; 8]); 9] = [
+    type Case = (u32, &'static str, usize, usize, Projection, [f64; 8]);
+    let cases: [Case; 9] = [
         (0, "SIMPLE_PINHOLE", 1, 0, perspective, [0.0; 8]),
         (1, "PINHOLE", 2, 0, perspective, [0.0; 8]),
         (2, "SIMPLE_RADIAL", 1, 1, perspective, [0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]),

@@ -2,6 +2,7 @@
 
 use super::made::{assert_pixel, assert_refused, names, open};
 use serde_json::{Value, json};
+use viewfuse::scene::few_shot::view_list;
 use viewfuse::scene::{Scene, Split};
 use viewfuse_core::lens::Projection;
 use viewfuse_tests::scenes::{self, Folder};
@@ -35,6 +36,8 @@ fn parts_in_files_are_one_scene() {
     let splits: Vec<_> = scene.views.iter().filter_map(|view| view.split).collect();
     assert_eq!(splits, [Split::Train, Split::Validation, Split::Test]);
     assert_pixel(&scene, 2, [13.0, 3.5]);
+    let chosen = |list: &str| view_list(&scene, list).expect("views");
+    assert_eq!((chosen("test"), chosen("train,val/2"), chosen("all")), (vec![2], vec![0, 1], vec![0, 1, 2]));
     // One of the files by its name is that part alone.
     let test = Scene::open(folder.path().join("transforms_test.json")).expect("a part");
     assert_eq!((names(&test), test.views[0].split), (vec!["r_0"], Some(Split::Test)));
@@ -69,6 +72,16 @@ fn missing_photographs_and_depth_images_are_one_warning_each() {
     assert!(depth.contains("2 of 3 frames") && depth.contains("depth_file_path"), "{depth}");
     let none = with_frames(frames.into(), &[]);
     assert_refused(&none, "transforms.json: frames[0].file_path: this pose has no photograph", &["images/1.png"]);
+}
+
+#[test]
+fn photographs_may_be_smaller_and_paths_those_of_another_system() {
+    let mut frames: Vec<Value> = ["images/1.png", "images/2.png"].map(frame).into();
+    frames[1]["file_path"] = json!("images\\2.png");
+    let folder = with_frames(frames.into(), &["images_4/1.png", "images_4/2.png"]);
+    let scene = open(&folder);
+    assert_eq!((names(&scene), scene.warnings.len()), (vec!["1", "2"], 0));
+    assert_eq!(scene.views[1].image, Some(folder.path().join("images_4/2.png")));
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 mod lists;
 mod networks;
+mod plane_sweep;
 mod visual_hull;
 mod volumes;
 

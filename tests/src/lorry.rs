@@ -33,6 +33,7 @@ pub fn photographs(count: u32, side: u32) -> SourceImages {
         background: [1.0; 3],
         has_silhouettes: true,
         points: Vec::new(),
+        near_far: None,
         warning: None,
     }
 }

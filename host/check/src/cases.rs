@@ -1,6 +1,9 @@
 //! The cases, one for each kernel and with its name, and the mapping from a kernel to its case.
 
 pub mod attend;
+pub mod blend_planes;
+pub mod census_cost;
+pub mod compare_views;
 pub mod composite;
 pub mod convolutions;
 pub mod depths;
@@ -18,7 +21,9 @@ pub mod lists;
 pub mod march_rays;
 pub mod match_cost;
 pub mod matrices;
+pub mod paths;
 pub mod pick_depth;
+pub mod pick_disparity;
 pub mod pictures;
 pub mod points;
 pub mod rays;
@@ -27,12 +32,16 @@ pub mod seen;
 pub mod volumes;
 pub mod weigh;
 pub mod window;
+pub mod window_cost;
 
 use super::case::{Case, Visitor};
 use viewfuse_core::for_each_kernel;
 use viewfuse_vulkan::kernel::Kernel;
 
 use attend::*;
+use blend_planes::*;
+use census_cost::*;
+use compare_views::*;
 use composite::*;
 use convolutions::*;
 use depths::*;
@@ -50,7 +59,9 @@ use lists::*;
 use march_rays::*;
 use match_cost::*;
 use matrices::*;
+use paths::*;
 use pick_depth::*;
+use pick_disparity::*;
 use pictures::*;
 use points::*;
 use rays::*;
@@ -59,6 +70,7 @@ use seen::*;
 use volumes::*;
 use weigh::*;
 use window::*;
+use window_cost::*;
 
 macro_rules! visits {
     ($(

@@ -19,7 +19,7 @@ use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 pub const NOWHERE: Bounded = Bounded { value: NO_SURFACE as f64, error: 0.0 };
 
 /// Visibility at `b` widths behind a surface: `(1 - b^2 / 4)^4`, 0 from two widths on.
-fn bell(b: Bounded) -> Bounded {
+pub(crate) fn bell(b: Bounded) -> Bounded {
     (Bounded::ONE - b.squared() / Bounded::from(4.0)).greater(Bounded::ZERO).squared().squared()
 }
 

@@ -13,8 +13,9 @@
 //!   winograd_oracle,
 //!   network_oracle, point_oracle,
 //!   group_norm_oracle,
-//!   matrix_oracle, volume_oracle
-//! poses, sights, world          inputs for a seed
+//!   matrix_oracle, volume_oracle,
+//!   sweep_oracle
+//! poses, sights, world, swept   inputs for a seed
 //! case, cases                   one for each kernel: inputs, dispatch, expected outputs
 //! report, measure               the check of a device's kernels
 //! picture                       a whole picture compared with the CPU's
@@ -42,6 +43,8 @@ pub mod poses;
 pub mod ray_oracle;
 pub mod report;
 pub mod sights;
+pub mod sweep_oracle;
+pub mod swept;
 pub mod verify;
 pub mod volume_oracle;
 pub mod winograd_oracle;

@@ -88,6 +88,61 @@ pub struct Cell {
     pub leads: bool,
 }
 
+/// A column of a table as it is shown, behind the rows' names and before their times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Column {
+    /// A metric, by its index.
+    Value(usize),
+    /// What the headline metric is above that of copying the nearest source.
+    OverCopy,
+    /// What it is above that of [`REFERENCE`].
+    OverReference,
+}
+
+impl Column {
+    /// The metric that the column is of, by its index.
+    pub fn metric(self, table: &Table) -> usize {
+        match self {
+            Column::Value(metric) => metric,
+            Column::OverCopy | Column::OverReference => table.headline,
+        }
+    }
+
+    /// The difference that a cell of the column's metric has in it; `None` for values.
+    pub fn difference(self, cell: Option<&Cell>) -> Option<Interval> {
+        match self {
+            Column::Value(_) => None,
+            Column::OverCopy => cell?.versus_copy,
+            Column::OverReference => cell?.versus_reference,
+        }
+    }
+}
+
+impl Table {
+    /// The columns that are shown: every metric, behind the headline metric its differences from the rows that are there.
+    pub fn columns(&self) -> Vec<Column> {
+        let has = |scheme: &str| self.rows.iter().any(|row| row.scheme == scheme);
+        let mut columns = Vec::new();
+        for metric in 0..self.metrics.len() {
+            columns.push(Column::Value(metric));
+            if metric == self.headline {
+                columns.extend(has(Baseline::NearestCopy.name()).then_some(Column::OverCopy));
+                columns.extend(has(REFERENCE).then_some(Column::OverReference));
+            }
+        }
+        columns
+    }
+
+    /// What stands above a column.
+    pub fn heading(&self, column: Column) -> String {
+        match column {
+            Column::Value(metric) => self.metrics[metric].heading(),
+            Column::OverCopy => "over copy".to_owned(),
+            Column::OverReference => format!("over {REFERENCE}"),
+        }
+    }
+}
+
 /// A score and where it is from.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {

@@ -3,9 +3,11 @@
 //! ```text
 //! hull     sources that show a silhouette: a solid carved by them and by photo-consistency
 //! sweep    any sources: planes through the frusta of sources and target
-//! space    which depths there are, for the planes
+//! space    near and far bounds, for the planes
+//! exposure gains by which the sources become equally light
 //! ```
 
+mod exposure;
 pub mod hull;
 mod space;
 mod sweep;

@@ -1,10 +1,11 @@
 //! The job: which views are sources, which cameras are targets.
 //!
 //! Views are chosen by a list of items separated by commas: a view's name, a range `A..B` of names (both ends
-//! included), `all`, and `/STEP` behind either to take every `STEP`-th.
+//! included), `all`, a part of the scene (`train`, `val`, `test`, where its files know parts), and `/STEP` behind either to
+//! take every `STEP`-th.
 
 use crate::rig::Rig;
-use crate::{Scene, View};
+use crate::{Scene, Split, View};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::PoseError;
 use viewfuse_weighting::sources::MOST_SOURCES;
@@ -224,6 +225,8 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
         };
         if range == "all" {
             chosen.extend((0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).step_by(step));
+        } else if let Some(part) = part_named(scene, range) {
+            chosen.extend(part.into_iter().step_by(step));
         } else if let Some((first, last)) = range.split_once("..") {
             let bad_range = || SelectionError::BadRange { item: item.to_owned() };
             if first.is_empty() || last.is_empty() {
@@ -241,6 +244,14 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
     chosen.sort_unstable();
     chosen.dedup();
     Ok(chosen)
+}
+
+/// The photographs of a part of the scene, if a text names one that it has.
+fn part_named(scene: &Scene, text: &str) -> Option<Vec<usize>> {
+    let part: Split = text.parse().ok()?;
+    let is_in = |view: &View| view.image.is_some() && view.split == Some(part);
+    let views: Vec<usize> = (0..scene.views.len()).filter(|&view| is_in(&scene.views[view])).collect();
+    (!views.is_empty()).then_some(views)
 }
 
 /// `count` of the candidates, each next one as far from those before as possible (farthest-point sampling of the

@@ -24,6 +24,7 @@ pub(super) fn photographs(count: u32, side: u32) -> SourceImages {
         background: [1.0; 3],
         has_silhouettes: true,
         points: Vec::new(),
+        near_far: None,
         warning: None,
     }
 }

@@ -8,7 +8,7 @@ use viewfuse_core::visual_hull::sweep::{SweepBlock, match_cost, mean_column, pic
 use viewfuse_shaders::{ray_marching, sweep};
 
 /// Binary logarithm of the pages' length by which a map of this length takes all four.
-fn page_shift(length: usize) -> u32 {
+pub(super) fn page_shift(length: usize) -> u32 {
     length.div_ceil(4).next_power_of_two().trailing_zeros()
 }
 
@@ -17,12 +17,12 @@ fn page_length(shift: u32) -> usize {
     if shift == 0 { usize::MAX } else { 1 << shift }
 }
 
-fn pages<T>(all: &[T], shift: u32) -> [&[T]; 4] {
+pub(super) fn pages<T>(all: &[T], shift: u32) -> [&[T]; 4] {
     let mut pages = all.chunks(page_length(shift));
     std::array::from_fn(|_| pages.next().unwrap_or_default())
 }
 
-fn pages_mut<T>(all: &mut [T], shift: u32) -> [&mut [T]; 4] {
+pub(super) fn pages_mut<T>(all: &mut [T], shift: u32) -> [&mut [T]; 4] {
     let mut pages = all.chunks_mut(page_length(shift));
     std::array::from_fn(|_| pages.next().unwrap_or_default())
 }

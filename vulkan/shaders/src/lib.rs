@@ -15,6 +15,7 @@ pub mod group_norm;
 pub mod lists;
 pub mod matrices;
 pub mod network;
+pub mod plane_sweep;
 pub mod points;
 pub mod ray_marching;
 pub mod rays;

@@ -2,12 +2,12 @@
 
 use super::counted;
 use crate::metrics::interval::Interval;
-use crate::summary::{Cell, Metric, REFERENCE, Table};
+use crate::summary::{Cell, Column, Metric, REFERENCE, Table};
 use maud::{Markup, html};
 
 /// A table of results as papers print it.
 pub(super) fn results(table: &Table) -> Markup {
-    let has_reference = table.rows.iter().any(|row| row.scheme == REFERENCE);
+    let columns = table.columns();
     let sources: Vec<String> = table.source_counts.iter().map(usize::to_string).collect();
     html! {
         figure.table {
@@ -19,9 +19,15 @@ pub(super) fn results(table: &Table) -> Markup {
                 thead {
                     tr {
                         th scope="col" { "weighting" }
-                        @for metric in &table.metrics {
-                            th scope="col" { (metric.heading()) " " (if metric.larger_is_better { "↑" } else { "↓" }) }
-                            @if has_reference { th.versus scope="col" { "over " (REFERENCE) } }
+                        @for column in &columns {
+                            @if let Column::Value(metric) = column {
+                                th scope="col" {
+                                    (table.heading(*column)) " "
+                                    (if table.metrics[*metric].larger_is_better { "↑" } else { "↓" })
+                                }
+                            } @else {
+                                th.versus scope="col" { (table.heading(*column)) }
+                            }
                         }
                         th scope="col" { "s / view" }
                     }
@@ -30,9 +36,14 @@ pub(super) fn results(table: &Table) -> Markup {
                     @for row in &table.rows {
                         tr class=(if row.is_baseline { "copy" } else { "" }) {
                             th scope="row" { (row.scheme) }
-                            @for (cell, metric) in row.cells.iter().zip(&table.metrics) {
-                                (value(cell.as_ref(), metric))
-                                @if has_reference { (versus(cell.as_ref(), metric)) }
+                            @for column in &columns {
+                                @let metric = column.metric(table);
+                                @let cell = row.cells[metric].as_ref();
+                                @if let Column::Value(_) = column {
+                                    (value(cell, &table.metrics[metric]))
+                                } @else {
+                                    (versus(column.difference(cell), &table.metrics[metric]))
+                                }
                             }
                             td { @if let Some(seconds) = row.seconds { (format!("{seconds:.3}")) } }
                         }
@@ -58,8 +69,8 @@ fn value(cell: Option<&Cell>, metric: &Metric) -> Markup {
     }
 }
 
-fn versus(cell: Option<&Cell>, metric: &Metric) -> Markup {
-    let Some(versus) = cell.and_then(|cell| cell.versus_reference.as_ref()) else { return html! { td.versus {} } };
+fn versus(difference: Option<Interval>, metric: &Metric) -> Markup {
+    let Some(versus) = difference else { return html! { td.versus {} } };
     let better = (versus.mean > 0.0) == metric.larger_is_better;
     let class = match (versus.excludes_zero(), better) {
         (false, _) => "versus",
@@ -67,7 +78,7 @@ fn versus(cell: Option<&Cell>, metric: &Metric) -> Markup {
         (true, false) => "versus loss",
     };
     let decimals = metric.decimals;
-    html! { td class=(class) { (format!("{:+.decimals$}", versus.mean)) (half_width(versus, metric)) } }
+    html! { td class=(class) { (format!("{:+.decimals$}", versus.mean)) (half_width(&versus, metric)) } }
 }
 
 fn half_width(interval: &Interval, metric: &Metric) -> Markup {
@@ -79,7 +90,7 @@ pub(super) fn legend() -> Markup {
     html! {
         p.legend {
             "The best value of a column is " b { "bold" } ", the next " u { "underlined" } ". Means are over scenes, or over the views of "
-            "one, with 95 % intervals (Student). Differences from " code { (REFERENCE) } " are taken scene by scene, or view by view; "
+            "one, with 95 % intervals (Student). Differences from the nearest copy and from " code { (REFERENCE) } " are taken scene by scene, or view by view; "
             span.gain { "coloured" } " where the interval leaves out zero."
         }
     }

@@ -1,6 +1,7 @@
 //! Any sources: planes of equal disparity through the frusta of the sources and of the target; the mathematics is in
 //! [`viewfuse_core::plane_sweep`].
 
+use super::exposure;
 use super::space::{Space, first_guess};
 use crate::{FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use viewfuse_core::Vec3;
@@ -85,6 +86,9 @@ pub(super) struct Views<'a, D: Device> {
     steps: Vec<f32>,
     relevance: Vec<SourceWeights>,
     space: Space,
+    /// The matched sources' texels on the host, and the gains that they tell under the current weighting.
+    texels: Vec<[f32; 4]>,
+    gains: Option<Vec<[f32; 4]>>,
 }
 
 /// The sources at one size.
@@ -150,6 +154,8 @@ impl Sweep {
             disparities: device.zeros(map_len)?,
             steps: vec![0.0; sources.images.len()],
             relevance: Vec::new(),
+            texels: small.iter().flat_map(|image| image.texels.iter().copied()).collect(),
+            gains: None,
             space: Space::of(sources),
         };
         if !views.space.is_known() {
@@ -194,11 +200,18 @@ impl<D: Device> Views<'_, D> {
     fn swept(&self, images: &Images<D>, maps: &Images<D>, weights: &[(usize, f32)], use_maps: bool) -> Vec<SweptView> {
         let mut order: Vec<(usize, f32)> = weights.iter().copied().filter(|(_, weight)| *weight > 0.0).collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        // The picture gets the exposure of the sources that count.
+        let common = self.gains.as_ref().map_or([1.0; 4], |gains| exposure::common(gains, &order));
+        let gain = |view: usize| {
+            self.gains
+                .as_ref()
+                .map_or([1.0; 4], |gains| [0, 1, 2, 3].map(|channel| gains[view][channel] / common[channel]))
+        };
         let view = |(view, weight): (usize, f32)| {
             let map = &maps.cameras[view];
             SweptView {
                 camera: images.cameras[view],
-                gain: [1.0; 4],
+                gain: gain(view),
                 weight,
                 disparity_step: if use_maps { self.steps[view] } else { 0.0 },
                 first_disparity: map.first_texel,
@@ -331,6 +344,7 @@ impl<D: Device> Prepared for Views<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.relevance = relevance.to_vec();
         self.steps.fill(0.0);
+        self.gains = None;
         Ok(())
     }
 
@@ -373,6 +387,10 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
+        if self.gains.is_none() {
+            let maps = self.device.download(&self.disparities)?;
+            self.gains = Some(exposure::gains(&self.matched.cameras, &self.texels, &maps, &self.steps));
+        }
         let device = self.device;
         let &Request { camera: target, views, .. } = request;
         let (width, height) = (target.pinhole.width(), target.pinhole.height());

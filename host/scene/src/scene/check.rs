@@ -60,7 +60,7 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
             split: raw.split,
         });
     }
-    if !views.first().is_some_and(|view| view.image.is_some()) {
+    if views.first().is_none_or(|view| view.image.is_none()) {
         return Err(no_views());
     }
 

@@ -86,6 +86,46 @@ impl Form {
     }
 }
 
+/// What a layout that was made from a model takes from it.
+pub(super) struct Origin {
+    /// World-to-camera matrices of its images, which are in the order of their names by character.
+    pub(super) cameras_from_world: Vec<[f64; 16]>,
+    /// Its points; their views are indices into these images.
+    pub(super) points: Vec<RawPoint>,
+}
+
+/// The model with points that stands in a scene's folder, if there is one.
+pub(super) fn beside(root: &Path) -> Result<Option<Origin>, SceneError> {
+    let Some(folder) = MODEL_FOLDERS.iter().map(|name| root.join(name)).find(|folder| Form::of(folder).is_some())
+    else {
+        return Ok(None);
+    };
+    let Some(form) = Form::of(&folder) else { return Ok(None) };
+    let [images_path, points_path] = ["images", "points3D"].map(|stem| form.file(&folder, stem));
+    if !points_path.is_file() {
+        return Ok(None);
+    }
+    let (mut images, points) = match form {
+        Form::Binary => (binary::images(&images_path)?, binary::points(&points_path)?),
+        Form::Text => (text::images(&images_path)?, text::points(&points_path)?),
+    };
+    images.sort_by(|a, b| a.name.cmp(&b.name));
+    let view_of = images.iter().enumerate().map(|(view, image)| (image.id, view as u32)).collect();
+    let cameras_from_world = images.iter().map(camera_from_world).collect();
+    Ok(Some(Origin { cameras_from_world, points: raw_points(points, &view_of) }))
+}
+
+/// Points with their views as [`RawScene`] counts them; images without a view are left out.
+fn raw_points(points: Vec<ModelPoint>, view_of: &HashMap<u32, u32>) -> Vec<RawPoint> {
+    let raw = |point: ModelPoint| RawPoint {
+        position: point.position,
+        error: point.error,
+        colour: point.colour,
+        views: point.images.iter().filter_map(|image| view_of.get(image).copied()).collect(),
+    };
+    points.into_iter().map(raw).collect()
+}
+
 impl Reader for Colmap {
     fn name(&self) -> &'static str {
         "colmap"
@@ -190,13 +230,7 @@ fn assemble(
         let name = files::stem(&photograph);
         views.push(RawView::new(name, Some(ImageFile::open(&photograph)?), pose, Some(intrinsics)));
     }
-    let point = |point: ModelPoint| RawPoint {
-        position: point.position,
-        error: point.error,
-        colour: point.colour,
-        views: point.images.iter().filter_map(|image| view_of.get(image).copied()).collect(),
-    };
-    let points = points.into_iter().map(point).collect();
+    let points = raw_points(points, &view_of);
     Ok(RawScene { views, points, warnings: missing.warning(images_path)?.into_iter().collect() })
 }
 

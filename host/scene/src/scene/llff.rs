@@ -7,21 +7,27 @@
 //!
 //! Photographs are those of `images`, or without it of `images_2`, `images_4`, `images_8` and so on: of the folders with as
 //! many photographs as there are rows, the one with the largest photographs. Intrinsics scale with them.
+//!
+//! The poses are made from a COLMAP model. Where that stands beside them, its points are the scene's.
 
 use std::path::{Path, PathBuf};
 
 use super::check;
+use super::colmap::{self, Origin};
 use super::error::SceneError;
 use super::fault::Place;
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::numpy;
-use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
+use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
 
 /// Name of the file.
 const FILE_NAME: &str = "poses_bounds.npy";
 
 /// Numbers in a row.
 const ROW: usize = 17;
+
+/// Centres of a row and of its image in a COLMAP model may differ by this share of their coordinates.
+const SAME_CENTRE: f64 = 1.0e-4;
 
 /// LLFF: `poses_bounds.npy` beside `images`, `images_4`, `images_8`.
 pub(super) struct Llff;
@@ -53,8 +59,33 @@ impl Reader for Llff {
         };
         let images = photographs(file, rows.len())?;
         let views = rows.iter().enumerate().zip(images).map(|((row, numbers), image)| view(file, row, numbers, &image));
-        Ok(RawScene::from(views.collect::<Result<Vec<_>, _>>()?))
+        let mut scene = RawScene::from(views.collect::<Result<Vec<_>, _>>()?);
+        match points(file, &scene.views) {
+            Ok(points) => scene.points = points,
+            Err(reason) => scene.warnings.push(format!("{reason}; the scene is read without its points")),
+        }
+        Ok(scene)
     }
+}
+
+/// The points of the COLMAP model that the poses were made from, where it stands beside them.
+fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
+    let root = file.with_file_name("");
+    let Some(Origin { cameras_from_world, points }) = colmap::beside(&root).map_err(|error| error.to_string())? else {
+        return Ok(Vec::new());
+    };
+    // Each centre, from `[R | t]` and from the row: -R^T t.
+    let differs = |(m, view): (&[f64; 16], &RawView)| {
+        let c = &view.pose.matrix;
+        let offset = |axis: usize| -(m[axis] * m[3] + m[4 + axis] * m[7] + m[8 + axis] * m[11]) - c[4 * axis + 3];
+        let size = 1.0 + [3, 7, 11].map(|entry| m[entry].abs()).into_iter().fold(0.0, f64::max);
+        // A NaN differs, too.
+        !((0..3).all(|axis| offset(axis).abs() <= SAME_CENTRE * size))
+    };
+    if cameras_from_world.len() != views.len() || cameras_from_world.iter().zip(views).any(differs) {
+        return Err(format!("{}: its rows are not the images of the COLMAP model beside it", file.display()));
+    }
+    Ok(points)
 }
 
 /// The photographs in the order of their names (by character, as the authors' code sorts them).

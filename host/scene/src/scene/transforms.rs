@@ -9,7 +9,8 @@
 //! The lens is `camera_model` (or `is_fisheye`) with `k1 .. k6 p1 p2` in OpenCV's meaning; other lenses are refused. `mask_path`
 //! names a frame's mask, `train_filenames` and the like the parts of the scene. Without `transforms.json`,
 //! `transforms_train.json`, `transforms_val.json` and `transforms_test.json` are one scene that knows its parts; where there
-//! are several of them, each view has its part's name in front. Frames whose photograph is missing are left out, with one warning.
+//! are several of them, each view has its part's name in front. A photograph of `images` that is missing is looked for in `images_2`,
+//! `images_4` and so on. Frames whose photograph is missing are left out, with one warning.
 //!
 //! `applied_transform`, `applied_scale`, `scale`, `offset` and `aabb_scale` say what was done to the world or what
 //! a particular trainer should do; the poses stand as they are written. `depth_file_path` is ignored, with a warning.

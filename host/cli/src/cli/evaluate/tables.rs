@@ -3,10 +3,8 @@
 use crate::cli::say;
 use crate::cli::table::table;
 use std::io;
-use viewfuse_evaluate::baseline::Baseline;
-use viewfuse_evaluate::metrics::interval::Interval;
 use viewfuse_evaluate::protocol::Published;
-use viewfuse_evaluate::summary::{Metric, REFERENCE, Row, Table};
+use viewfuse_evaluate::summary::{Cell, Column, Row, Table};
 
 /// Verdicts that are printed; of more, how many there are.
 const VERDICTS: usize = 16;
@@ -18,20 +16,13 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 
 /// A table with intervals under a title, and what it says in words. The leading rows of each column are marked.
 pub(super) fn print_table(title: &str, results: &Table) -> io::Result<()> {
-    let has = |scheme: &str| results.rows.iter().any(|row| row.scheme == scheme);
-    let compared = Compared { copy: has(Baseline::NearestCopy.name()), reference: has(REFERENCE) };
-    let mut header = vec!["scheme".to_owned()];
-    for (column, metric) in results.metrics.iter().enumerate() {
-        header.push(metric.heading());
-        if column == results.headline {
-            header.extend(compared.copy.then(|| "over copy".to_owned()));
-            header.extend(compared.reference.then(|| format!("over {REFERENCE}")));
-        }
-    }
-    header.push("s / view".to_owned());
-    let mut rows = table(header);
+    let columns = results.columns();
+    let headings = columns.iter().map(|column| results.heading(*column));
+    let mut rows = table(["scheme".to_owned()].into_iter().chain(headings).chain(["s / view".to_owned()]));
     for row in &results.rows {
-        rows.add_row(line(row, results, &compared));
+        let cells = columns.iter().map(|column| cell(row, results, *column));
+        let seconds = row.seconds.map_or(String::new(), |seconds| format!("{seconds:.3}"));
+        rows.add_row([row.scheme.clone()].into_iter().chain(cells).chain([seconds]));
     }
     say(title)?;
     say(rows)?;
@@ -49,31 +40,15 @@ pub(super) fn print_table(title: &str, results: &Table) -> io::Result<()> {
     say("")
 }
 
-/// Which rows the headline metric is compared with.
-struct Compared {
-    copy: bool,
-    reference: bool,
-}
-
-fn line(row: &Row, results: &Table, compared: &Compared) -> Vec<String> {
-    let mut line = vec![row.scheme.clone()];
-    for (column, (cell, metric)) in row.cells.iter().zip(&results.metrics).enumerate() {
-        let value = cell
-            .as_ref()
-            .map(|cell| format!("{}{}", if cell.leads { "* " } else { "" }, metric.interval_text(&cell.value, false)));
-        line.push(value.unwrap_or_default());
-        if column == results.headline {
-            let versus = |wanted: bool, interval: Option<Interval>| wanted.then(|| text(interval, metric));
-            line.extend(versus(compared.copy, cell.as_ref().and_then(|cell| cell.versus_copy)));
-            line.extend(versus(compared.reference, cell.as_ref().and_then(|cell| cell.versus_reference)));
-        }
+fn cell(row: &Row, results: &Table, column: Column) -> String {
+    let metric = &results.metrics[column.metric(results)];
+    let cell = row.cells[column.metric(results)].as_ref();
+    if let Column::Value(_) = column {
+        let mark = |cell: &Cell| if cell.leads { "* " } else { "" };
+        return cell
+            .map_or(String::new(), |cell| format!("{}{}", mark(cell), metric.interval_text(&cell.value, false)));
     }
-    line.push(row.seconds.map_or(String::new(), |seconds| format!("{seconds:.3}")));
-    line
-}
-
-fn text(interval: Option<Interval>, metric: &Metric) -> String {
-    interval.map_or(String::new(), |interval| metric.interval_text(&interval, true))
+    column.difference(cell).map_or(String::new(), |difference| metric.interval_text(&difference, true))
 }
 
 /// What others published for the same protocol.

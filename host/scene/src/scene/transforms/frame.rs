@@ -75,7 +75,7 @@ impl<'a> Frame<'a> {
         };
         let file_path = frame.text("file_path")?;
         let given = self.beside(file_path);
-        let Some(image) = photograph(&given) else {
+        let Some(image) = photograph(&given).or_else(|| smaller(&given)) else {
             return Ok(Listed::Missing(Place::Key(frame.full("file_path")), given));
         };
         let image = ImageFile::open(&image)?;
@@ -105,9 +105,10 @@ impl<'a> Frame<'a> {
         Err(SceneError::NoMask { path, place, mask })
     }
 
-    /// A path relative to the JSON file. Components without `.`, so that `./train/r_0` is named as people name it.
+    /// A path relative to the JSON file. Components without `.`, so that `./train/r_0` is named as people name it; with `/`
+    /// between them, whatever the system that wrote the file has there.
     fn beside(&self, path: &str) -> PathBuf {
-        self.path.with_file_name("").join(path).components().collect()
+        self.path.with_file_name("").join(path.replace('\\', "/")).components().collect()
     }
 
     fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
@@ -237,4 +238,11 @@ fn photograph(given: &Path) -> Option<PathBuf> {
     };
     let mut candidates = std::iter::once(given.to_path_buf()).chain(IMAGE_EXTENSIONS.iter().map(with_extension));
     candidates.find(|candidate| candidate.is_file())
+}
+
+/// The photograph of a path in `images` that is not there, at a smaller size: from `images_2`, `images_4` and so on.
+fn smaller(given: &Path) -> Option<PathBuf> {
+    let folder = given.ancestors().find(|folder| folder.file_name().is_some_and(|name| name == "images"))?;
+    let (inside, root) = (given.strip_prefix(folder).ok()?, folder.parent()?);
+    files::image_folders(root).ok()?.iter().find_map(|folder| photograph(&folder.join(inside)))
 }

@@ -7,6 +7,15 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::Pose;
 
+viewfuse_tests::trials![
+    a_source_at_the_targets_place_is_the_picture,
+    a_painted_plane_is_exact_at_its_depth,
+    what_no_source_shows_is_the_nearest_pixel,
+    more_sources_than_are_blended_change_nothing,
+    sources_of_another_size_are_resampled,
+    points_come_before_bounds_and_bounds_before_the_focus,
+];
+
 const SIZE: [u32; 2] = [64, 48];
 /// How far the painted plane is from the target.
 const DEPTH: f64 = 4.0;
@@ -60,7 +69,6 @@ fn largest_difference(picture: &RgbImage, truth: &RgbImage, sources: &[Shot]) ->
     (largest, count)
 }
 
-#[test]
 fn a_source_at_the_targets_place_is_the_picture() {
     let shot = painted(target(), 3.0);
     for depth in [0.5, DEPTH, f64::INFINITY] {
@@ -70,7 +78,6 @@ fn a_source_at_the_targets_place_is_the_picture() {
     }
 }
 
-#[test]
 fn a_painted_plane_is_exact_at_its_depth() {
     let sources: Vec<Shot> = around().into_iter().map(|camera| painted(camera, DEPTH)).collect();
     let nearest: Vec<&Shot> = sources.iter().collect();
@@ -84,18 +91,17 @@ fn a_painted_plane_is_exact_at_its_depth() {
         assert!(count > 1500, "only {count} pixels are shown by all");
         // A rounding of the source, one of the result, and the curvature of the paint.
         assert!(largest <= 2, "{baseline}: {largest} levels");
-        for wrong in [0.9 * DEPTH, 1.1 * DEPTH, f64::INFINITY] {
+        for wrong in [0.6 * DEPTH, 2.0 * DEPTH, f64::INFINITY] {
             assert!(error(baseline, wrong).0 > 2, "{baseline} at {wrong} is as good as at {DEPTH}");
         }
     }
-    assert!(error(Baseline::NearestCopy, DEPTH).0 > 20, "the copy is no test");
+    assert!(error(Baseline::NearestCopy, DEPTH).0 > 2, "the copy is exact as well");
     // The order in which sources are given decides which is copied, not what the blend is.
     let reversed: Vec<&Shot> = sources.iter().rev().collect();
     let blends = [&nearest, &reversed].map(|order| Baseline::WarpedBlend.picture(order, &target(), DEPTH));
     assert_eq!(blends[0].get_pixel(32, 24), blends[1].get_pixel(32, 24));
 }
 
-#[test]
 fn what_no_source_shows_is_the_nearest_pixel() {
     // A source far to the right: the left of the target is outside it.
     let side = camera(Vec3::new(1.5, 0.0, 0.0), Vec3::new(1.5, 0.0, 1.0));
@@ -120,7 +126,6 @@ fn what_no_source_shows_is_the_nearest_pixel() {
     assert_eq!(blend, front.picture);
 }
 
-#[test]
 fn more_sources_than_are_blended_change_nothing() {
     let mut sources: Vec<Shot> = around().into_iter().map(|camera| painted(camera, DEPTH)).collect();
     let black = RgbImage::new(SIZE[0], SIZE[1]);
@@ -134,7 +139,6 @@ fn more_sources_than_are_blended_change_nothing() {
     assert_eq!(all.len(), BLENDED + 1);
 }
 
-#[test]
 fn sources_of_another_size_are_resampled() {
     let pinhole = target().pinhole.resized(2 * SIZE[0], 2 * SIZE[1]).expect("a larger camera");
     let large = Shot {
@@ -149,9 +153,9 @@ fn sources_of_another_size_are_resampled() {
     }
 }
 
-#[test]
 fn points_come_before_bounds_and_bounds_before_the_focus() {
-    let cameras = around();
+    let looked_at = Vec3::new(0.1, 0.2, 4.0);
+    let cameras: Vec<Camera> = around().into_iter().map(|own| camera(own.pose.centre_world(), looked_at)).collect();
     let view = target();
     // Half of the points at 2, half at 6: the mean disparity is that of 3. Those outside the picture do not count.
     let seen = |z: f32| Vec3::new(0.0, 0.1, z);
@@ -162,7 +166,7 @@ fn points_come_before_bounds_and_bounds_before_the_focus() {
     near(plane_depth(&view, all(), Some([10.0, 30.0]), &cameras), 3.0);
     near(plane_depth(&view, all().skip(1), Some([10.0, 30.0]), &cameras), 15.0);
     let focus = depth_of_focus(&view, &cameras).expect("they look at one place");
-    assert!((3.5..4.5).contains(&focus), "{focus}");
+    assert!((focus - 4.0).abs() < 1.0e-3, "{focus}");
     near(plane_depth(&view, [], None, &cameras), focus);
     // Parallel axes, and a focus behind the target: nothing is known.
     let parallel = [-1.0, 1.0].map(|x| camera(Vec3::new(x, 0.0, 0.0), Vec3::new(x, 0.0, 1.0)));

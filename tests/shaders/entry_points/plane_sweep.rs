@@ -1,0 +1,179 @@
+//! The plane sweep. Arrays that may lie in pages are on one and on four.
+
+use super::visual_hull::{page_shift, pages, pages_mut};
+use super::{UNTOUCHED, dispatch};
+use viewfuse::check::swept::{Swept, band, costs};
+use viewfuse::check::world::Numbers;
+use viewfuse_core::plane_sweep::blend::blend;
+use viewfuse_core::plane_sweep::disparity::pick_disparity;
+use viewfuse_core::plane_sweep::evidence::evidence;
+use viewfuse_core::plane_sweep::frustum::FrustumBlock;
+use viewfuse_core::plane_sweep::path::{CostBlock, Line, joined_cost};
+use viewfuse_core::plane_sweep::window::{WindowBlock, row_sums, window_cost};
+use viewfuse_core::plane_sweep::{PLANES, Planes, census};
+use viewfuse_shaders::plane_sweep;
+
+/// What elements hold before anything is written.
+const NOTHING: Planes = [UNTOUCHED; PLANES];
+
+/// Some hundred groups of planes, two for each pixel.
+fn swept() -> Swept {
+    let swept = Swept::new(4, 300);
+    assert!(swept.frustum.group_count == 2 && swept.frustum.first_row == 1);
+    swept
+}
+
+/// Pixels and groups, in the order of volumes.
+fn elements(group_count: u32, count: usize) -> impl Iterator<Item = (u32, u32)> {
+    (0..count as u32).map(move |element| (element / group_count, element % group_count))
+}
+
+fn groups(volume: &CostBlock) -> usize {
+    (volume.width * volume.height * volume.group_count) as usize
+}
+
+fn planes(seed: u64, swept: &Swept) -> (CostBlock, Vec<Planes>) {
+    let volume = swept.volume();
+    let costs = costs(&mut Numbers::new(seed), &volume);
+    (volume, costs)
+}
+
+#[test]
+fn compare_views_is_core_s() {
+    let swept = swept();
+    let Swept { frustum, views, pairs, texels, disparities } = &swept;
+    let count = swept.band_len();
+    let (mut grey, mut found) = (vec![NOTHING; views.len() * count], vec![NOTHING; 4 * count]);
+    dispatch(*frustum, count as u32, |id, push| {
+        plane_sweep::compare_views(id, push, views, pairs, texels, disparities, &mut grey, &mut found);
+    });
+    let first = frustum.first_row * frustum.camera.width;
+    for (element, (pixel, group)) in elements(frustum.group_count, count).enumerate() {
+        let expected = evidence(frustum, views, pairs, &texels[..], &disparities[..], first + pixel, group);
+        for (view, planes) in expected.grey[..views.len()].iter().enumerate() {
+            assert_eq!(grey[view * count + element], *planes);
+        }
+        let evidence = [expected.difference, expected.weight, expected.dissent, expected.hull];
+        assert_eq!(found[4 * element..][..4], evidence);
+    }
+    assert!(found.iter().any(|planes| planes.iter().any(|number| *number != found[0][0])));
+}
+
+#[test]
+fn census_cost_is_core_s() {
+    let swept = swept();
+    let (grey, evidence) = band(&mut Numbers::new(2), &swept);
+    let FrustumBlock { camera, group_count, first_row, .. } = swept.frustum;
+    let count = swept.band_len();
+    let above = 2 * (first_row * camera.width * group_count) as usize;
+    let mut costs = vec![NOTHING; above + 2 * count];
+    dispatch(swept.frustum, count as u32, |id, push| {
+        plane_sweep::census_cost(id, push, &swept.pairs, &grey, &evidence, &mut costs);
+    });
+    let cost = |(pixel, group)| census::census_cost(&swept.frustum, &swept.pairs, &grey, &evidence, pixel, group);
+    let expected: Vec<Planes> = elements(group_count, count).flat_map(cost).collect();
+    assert_eq!(costs[above..], expected);
+    assert_eq!(costs[..above], vec![NOTHING; above]);
+}
+
+#[test]
+fn windows_are_core_s() {
+    let swept = swept();
+    let block = WindowBlock { reach: [1, 2, 4], ..WindowBlock::new(&swept.frustum, 0.02) };
+    let (volume, weighted) = planes(3, &swept);
+    let weighted: Vec<Planes> = weighted.iter().flat_map(|cost| [*cost, cost.map(|cost| 2.0 * cost)]).collect();
+    let count = groups(&volume);
+    let mut sums = vec![NOTHING; 6 * count];
+    dispatch(block, count as u32, |id, push| plane_sweep::row_sums(id, push, &weighted, &mut sums));
+    let sum = |(pixel, group)| row_sums(&block, &weighted, pixel, group);
+    let expected: Vec<Planes> = elements(block.group_count, count).flat_map(sum).flatten().collect();
+    assert_eq!(sums, expected);
+
+    let mut means = vec![NOTHING; count];
+    dispatch(block, count as u32, |id, push| plane_sweep::window_cost(id, push, &sums, &mut means));
+    let mean = |(pixel, group)| window_cost(&block, &sums, pixel, group);
+    assert_eq!(means, elements(block.group_count, count).map(mean).collect::<Vec<Planes>>());
+}
+
+#[test]
+fn paths_are_core_s() {
+    let (block, means) = planes(4, &swept());
+    let count = groups(&block);
+    let mut paths = vec![NOTHING; 4 * count];
+    dispatch(block, block.line_count(), |id, push| plane_sweep::follow_paths(id, push, &means, &mut paths));
+    let mut expected = Vec::new();
+    for line in 0..block.line_count() {
+        let (direction, number, step_count) = block.line(line);
+        let mut state = Line::START;
+        for step in 0..step_count {
+            let pixel = block.pixel(direction, number, step);
+            state.advance(&means, (pixel * block.group_count) as usize, block.group_count as usize);
+            expected.extend((0..block.group_count as usize).map(|group| state.costs(group)));
+        }
+    }
+    assert_eq!(paths, expected);
+
+    let mut costs = vec![NOTHING; count];
+    dispatch(block, count as u32, |id, push| plane_sweep::join_paths(id, push, &paths, &mut costs));
+    let joined = |(pixel, group)| joined_cost(&block, &paths, pixel, group);
+    assert_eq!(costs, elements(block.group_count, count).map(joined).collect::<Vec<Planes>>());
+}
+
+#[test]
+fn pick_disparity_is_core_s() {
+    let swept = swept();
+    let (volume, costs) = planes(5, &swept);
+    let mut frustum = swept.frustum;
+    frustum.camera.first_texel = 3;
+    let count = volume.width * volume.height;
+    let mut picked = vec![[UNTOUCHED; 2]; 3 + count as usize];
+    dispatch(frustum, count, |id, push| plane_sweep::pick_disparity(id, push, &costs, &mut picked));
+    let expected: Vec<[f32; 2]> = (0..count).map(|pixel| pick_disparity(&frustum, &costs, pixel)).collect();
+    assert_eq!(picked[3..], expected);
+    assert_eq!(picked[..3], [[UNTOUCHED; 2]; 3]);
+}
+
+#[test]
+fn blend_planes_is_core_s() {
+    let swept = swept();
+    let (volume, costs) = planes(6, &swept);
+    let (Swept { views, texels, disparities, .. }, block) = swept.halved(&volume);
+    let count = block.target.width * block.target.height;
+    let expected: Vec<([f32; 4], f32, f32)> = (0..count)
+        .map(|pixel| {
+            let at = [pixel % block.target.width, pixel / block.target.width].map(|side| side as f32 + 0.5);
+            let seen = blend(&block, &views, &texels[..], &disparities[..], &costs, at);
+            (seen.colour, seen.depth, seen.confidence)
+        })
+        .collect();
+    assert!(expected.iter().any(|(_, _, confidence)| *confidence > 0.0));
+    for shift in [0, page_shift(texels.len())] {
+        let mut colours = vec![[UNTOUCHED; 4]; count as usize];
+        let (mut depths, mut confidences) = (vec![UNTOUCHED; count as usize], vec![UNTOUCHED; count as usize]);
+        dispatch(block, count, |id, push| {
+            let [ta, tb, tc, td] = pages(&texels, shift);
+            let [ca, cb, cc, cd] = pages_mut(&mut colours, shift);
+            plane_sweep::blend_planes(
+                id,
+                push,
+                &views,
+                ta,
+                tb,
+                tc,
+                td,
+                &disparities,
+                &costs,
+                ca,
+                cb,
+                cc,
+                cd,
+                &mut depths,
+                &mut confidences,
+                shift,
+            );
+        });
+        let seen: Vec<([f32; 4], f32, f32)> =
+            colours.into_iter().zip(depths).zip(confidences).map(|((colour, d), c)| (colour, d, c)).collect();
+        assert_eq!(seen, expected);
+    }
+}
