@@ -36,12 +36,7 @@ use viewfuse_weighting::Weighting;
 /// The schemes that are tried, the default first.
 pub fn schemes() -> Vec<Scheme> {
     let of = |formula, choice, parameter| Scheme::new(formula, choice, parameter).ok();
-    let more = [
-        of(Formula::Error, 0, 0.5),
-        of(Formula::Distance, 2, 0.0),
-        of(Formula::Distance, 3, 0.0),
-        of(Formula::Gaussian, 0, 4.0),
-    ];
+    let more = [of(Formula::Error, 0, 0.5), of(Formula::Distance, 2, 0.0), of(Formula::Distance, 3, 0.0)];
     let plain = [Scheme::ERROR, Scheme::MEAN, Scheme::L1, Scheme::of(Formula::Gaussian)];
     plain.into_iter().chain(more.into_iter().flatten()).collect()
 }
@@ -60,6 +55,8 @@ pub struct Candidate {
     pub settings: Vec<Setting>,
     /// Mean score of the sources that were left out, decibels.
     pub psnr: f64,
+    /// The score of each.
+    pub scores: Vec<f64>,
 }
 
 /// A source that was left out, with what was chosen.
@@ -174,8 +171,9 @@ struct Search<'t, 'a> {
 impl Search<'_, '_> {
     fn outcomes(&mut self, weighting: &Weighting, settings: &[Setting]) -> Result<Vec<Outcome>, RenderError> {
         let outcomes = self.trials.outcomes(weighting, settings, self.progress)?;
-        let psnr = outcomes.iter().map(|outcome| outcome.psnr).sum::<f64>() / outcomes.len() as f64;
-        self.candidates.push(Candidate { weighting: weighting.to_string(), settings: settings.to_vec(), psnr });
+        let scores: Vec<f64> = outcomes.iter().map(|outcome| outcome.psnr).collect();
+        let psnr = scores.iter().sum::<f64>() / scores.len().max(1) as f64;
+        self.candidates.push(Candidate { weighting: weighting.to_string(), settings: settings.to_vec(), psnr, scores });
         Ok(outcomes)
     }
 }
