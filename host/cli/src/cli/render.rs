@@ -12,7 +12,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::Setting;
-use viewfuse_field::auto::{self, Candidate, Chosen, Expected};
+use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
                 render(&scene, &job, weighting, renderer, &options, &progress, write)?
             }
             None => {
-                let write = |sources: &SourceImages, frame: Frame, chosen: &Chosen| {
+                let write = |sources: &SourceImages, frame: Frame, chosen: &auto::Chosen| {
                     writer.set_chosen(chosen);
                     anyhow::Ok(writer.write(sources, &frame)?)
                 };
