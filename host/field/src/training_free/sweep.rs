@@ -27,6 +27,8 @@ const RANGE_PLANES: u32 = 128;
 const RANGE_NEIGHBOURS: usize = 4;
 /// Confidence from which on a pixel counts there.
 const RANGE_CONFIDENCE: f32 = 0.6;
+/// Most other sources that a source is compared with, those of the greatest weights: cost is linear in the sources.
+const NEIGHBOURS: usize = 4;
 /// Most pairs that are compared, for each view.
 const PAIRS_PER_VIEW: usize = 3;
 
@@ -355,6 +357,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         let relevance = &self.relevance[view];
         let mut weights: Vec<(usize, f32)> =
             (0..count).filter(|other| *other != view).map(|other| (other, relevance.get(other as u32))).collect();
+        weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        weights.truncate(NEIGHBOURS);
         weights.push((view, 1.0));
         let swept = self.swept(&self.matched, &self.matched, &weights, false);
         let costs = self.costs(camera, range, &self.matched, &swept, progress)?;
