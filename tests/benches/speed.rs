@@ -99,7 +99,7 @@ fn stages(criterion: &mut Criterion) {
     group.finish();
 
     let relevance = vec![Weights::mean(sources.len() as u32); sources.len()];
-    let depths = field.depth_maps(&Cpu, &stage.images, &relevance, &progress).expect("depths");
+    let depths = field.hull.depth_maps(&Cpu, &stage.images, &relevance, &progress).expect("depths");
     let object = find_object(&stage.images).expect("an object");
     let mut texels = Vec::new();
     let mut views = Vec::new();

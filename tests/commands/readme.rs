@@ -130,7 +130,8 @@ fn every_command_runs() {
         }
     }
     assert!(count >= 20, "{count}");
-    let files = ["000048.png", "000048_depth.png", "000048_sheet.png", "run.json", "toy/000021.png", "cameras.png"];
+    let files =
+        ["002.png", "002_depth.png", "002_sheet.png", "run.json", "car/000048.png", "toy/000021.png", "cameras.png"];
     for file in files.into_iter().chain(["scores.csv", "attention.h"]) {
         assert!(out.join(file).exists(), "{file}");
     }

@@ -2,5 +2,6 @@
 
 mod genvs;
 mod pixelnerf;
+mod plane_sweep;
 mod sampling;
 mod visual_hull;

@@ -6,6 +6,7 @@ mod sample;
 mod worlds;
 
 use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::training_free::hull::Hull;
 use viewfuse::scene::photographs::SourceImages;
 use worlds::{Run, assert_shows_an_object, assert_sound, largest_difference, lorry_views, share_within, target};
 
@@ -26,7 +27,10 @@ fn pictures_do_not_depend_on_the_number_of_threads() {
 fn pictures_do_not_depend_on_the_bands() {
     let sources = lorry_views(48);
     let with_values = |most_band_values| {
-        let run = Run { field: TrainingFree { most_band_values, ..TrainingFree::default() }, ..Run::default() };
+        let run = Run {
+            field: TrainingFree { hull: Hull { most_band_values }, ..TrainingFree::default() },
+            ..Run::default()
+        };
         run.picture(&sources, &target(48)).expect("a picture")
     };
     let whole = with_values(16 << 20);

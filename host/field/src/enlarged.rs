@@ -61,15 +61,15 @@ impl Prepared for Views<'_> {
     }
 }
 
-/// A picture of `[width, height]` pixels, each the bilinear mean of the four nearest ones of a smaller picture; depths are
-/// those of the nearest one, since the mean of two depths is not on a surface.
+/// A picture of `[width, height]` pixels, each the bilinear mean of the four nearest ones of a smaller picture; depths and confidences
+/// are those of the nearest one, since the mean of two depths is not on a surface.
 fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
     if [rendered.width, rendered.height] == [width, height] {
         return rendered;
     }
     let (columns, rows) = (places(rendered.width, width), places(rendered.height, height));
     let at = |row: u32, column: u32| (row * rendered.width + column) as usize;
-    let mut picture = Rendered { colours: Vec::new(), depths: Vec::new(), width, height };
+    let mut picture = Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width, height };
     for [top, bottom] in &rows {
         for [left, right] in &columns {
             let mut colour = [0.0; 4];
@@ -83,6 +83,7 @@ fn enlarged(rendered: Rendered, [width, height]: [u32; 2]) -> Rendered {
             let nearest = |[first, second]: [&(u32, f32); 2]| if first.1 >= second.1 { first.0 } else { second.0 };
             let index = at(nearest([top, bottom]), nearest([left, right]));
             picture.depths.extend(rendered.depths.get(index));
+            picture.confidences.extend(rendered.confidences.get(index));
         }
     }
     picture
@@ -108,20 +109,23 @@ mod tests {
     fn a_slope_stays_a_slope() {
         let colours = (0..8).map(|index| [(index % 4) as f32, (index / 4) as f32, 0.5, 1.0]).collect();
         let depths = (0..8).map(|index| index as f32).collect();
-        let picture = enlarged(Rendered { colours, depths, width: 4, height: 2 }, [8, 4]);
+        let picture = enlarged(Rendered { colours, confidences: depths.clone(), depths, width: 4, height: 2 }, [8, 4]);
         let red: Vec<f32> = picture.colours[..8].iter().map(|colour| colour[0]).collect();
         assert_eq!(red, [0.0, 0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.0]);
         let green: Vec<f32> = picture.colours.iter().step_by(8).map(|colour| colour[1]).collect();
         assert_eq!(green, [0.0, 0.25, 0.75, 1.0]);
         assert!(picture.colours.iter().all(|colour| colour[2..] == [0.5, 1.0]));
         assert_eq!(picture.depths[..8], [0.0, 0.0, 1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert_eq!(picture.confidences, picture.depths);
         assert_eq!((picture.width, picture.height, picture.depths.len()), (8, 4, 32));
     }
 
     #[test]
     fn odd_sides_and_no_depths() {
-        let picture =
-            enlarged(Rendered { colours: vec![[0.5; 4]; 6], depths: Vec::new(), width: 3, height: 2 }, [5, 3]);
+        let picture = enlarged(
+            Rendered { colours: vec![[0.5; 4]; 6], depths: Vec::new(), confidences: Vec::new(), width: 3, height: 2 },
+            [5, 3],
+        );
         assert_eq!((picture.colours.len(), picture.depths.len()), (15, 0));
         assert!(picture.colours.iter().flatten().all(|value| (value - 0.5).abs() < 1.0e-6));
     }

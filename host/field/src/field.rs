@@ -3,6 +3,8 @@
 
 use super::error::FieldError;
 use super::record::Record;
+use serde::Serialize;
+use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -52,10 +54,57 @@ pub trait Prepared {
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
 
+    /// The scalars that can be chosen for a scene, for these sources; none by default.
+    fn tunables(&self) -> &'static [Tunable] {
+        &[]
+    }
+
+    /// Sets scalars for the views and targets that follow; those that are not named take their defaults. Encoded views stay
+    /// as they are. Names that are none of [`Prepared::tunables`] are ignored.
+    fn tune(&mut self, _settings: &[Setting]) {}
+
+    /// What follows is only compared with one another: the field may work with less resolution where that changes the
+    /// comparison little.
+    fn simplify(&mut self) {}
+
+    /// What is known of where the surfaces are; nothing by default.
+    fn surfaces(&self) -> Surfaces {
+        Surfaces::default()
+    }
+
     /// The record of its work so far; the session counts encoded views.
     fn record(&self) -> Record {
         Record::default()
     }
+}
+
+/// A scalar of a field that can be chosen for a scene.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tunable {
+    /// Its name.
+    pub name: &'static str,
+    /// Its default.
+    pub default: f32,
+    /// Other values that are worth a trial.
+    pub others: &'static [f32],
+}
+
+/// A value of a [`Tunable`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Setting {
+    /// The scalar's name.
+    pub name: &'static str,
+    /// Its value.
+    pub value: f32,
+}
+
+/// What is known of where the surfaces of a scene are, in the form of [`SourceImages`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surfaces {
+    /// Points on surfaces, in world coordinates.
+    pub points: Vec<Vec3>,
+    /// Nearest and farthest depth in any view.
+    pub near_far: Option<[f32; 2]>,
 }
 
 /// Requirements and properties of a field.
@@ -147,6 +196,8 @@ pub struct Rendered {
     pub colours: Vec<[f32; 4]>,
     /// Depth along the principal axis in world units, 0 where there is no surface; empty for fields without depths.
     pub depths: Vec<f32>,
+    /// How far each pixel can be relied on, in `[0, 1]`; empty for fields that do not tell.
+    pub confidences: Vec<f32>,
     /// Width of the picture.
     pub width: u32,
     /// Height of the picture.

@@ -15,6 +15,7 @@
 //! family            one row a learned field
 //! enlarged          previews: small pictures, enlarged
 //! render            the render loop, from a scene to pictures
+//! auto              the scheme and the field's scalars for a scene, and the score to expect
 //! ```
 //!
 //! A field of your own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`] renders
@@ -22,6 +23,7 @@
 #![forbid(unsafe_code)]
 
 pub mod any;
+pub mod auto;
 pub mod enlarged;
 pub mod error;
 pub mod family;
@@ -39,7 +41,9 @@ pub mod training_free;
 
 pub use any::AnyField;
 pub use error::FieldError;
-pub use field::{About, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, SourceSide};
+pub use field::{
+    About, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable,
+};
 pub use record::{Denoising, LeftOut, Record};
 pub use renderer::{On, Renderer};
 pub use session::Session;

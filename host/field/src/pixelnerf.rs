@@ -213,7 +213,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             tiles.push(renderer.render(&mut workspace, some, seen.as_ref(), &mut evaluated)?);
             progress.step();
         }
-        let mut rendered = Rendered { colours: Vec::new(), depths: Vec::new(), width, height };
+        let mut rendered = Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width, height };
         for tile in tiles {
             rendered.colours.extend(device.download(&tile.colours)?);
             rendered.depths.extend(device.download(&tile.depths)?);

@@ -1,6 +1,6 @@
 //! The render loop, from a scene to pictures.
 
-use crate::{FieldError, Record, Rendered, Renderer, Session};
+use crate::{FieldError, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
 use image::RgbImage;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -98,6 +98,8 @@ pub struct RenderOptions {
     pub leave_out: f32,
     /// Transmittance of early termination.
     pub early_termination: f32,
+    /// Values of the field's scalars ([`Tunable`]); those that are not named take their defaults.
+    pub settings: Vec<Setting>,
 }
 
 /// Default of the largest share of the weight that is left out: it bounds the change of a fusion of all
@@ -115,6 +117,7 @@ impl Default for RenderOptions {
             background: BackgroundChoice::Auto,
             leave_out: DEFAULT_LEAVE_OUT,
             early_termination: DEFAULT_EARLY_TERMINATION,
+            settings: Vec::new(),
         }
     }
 }
@@ -146,6 +149,8 @@ pub struct Frame {
     /// Depth along the principal axis in world units, 0 where there is no surface, row-major; empty for fields without
     /// depths.
     pub depths: Vec<f32>,
+    /// How far each pixel can be relied on, in `[0, 1]`; empty for fields that do not tell.
+    pub confidences: Vec<f32>,
     /// The ground truth at the same size and the scores, if there is a photograph.
     pub truth: Option<Truth>,
     /// Time for this frame alone.
@@ -200,6 +205,8 @@ pub struct Stage<'a> {
     album: &'a Album<'a>,
     options: &'a RenderOptions,
     side: u32,
+    /// The source views, as indices into the scene's views.
+    pub views: Vec<usize>,
     sources: SourcePoses,
     /// The sources at working size.
     pub images: Arc<SourceImages>,
@@ -253,9 +260,11 @@ impl<'a> Stage<'a> {
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options, renderer.about().longest_side)?;
         let mut costs = StageCosts::default();
-        let session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))
+        let mut session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))
             .map_err(|error| RenderError::of(error, scene))?;
-        Ok(Stage { scene, album, options, side, sources: source_poses, images, session, costs })
+        session.tune(&options.settings);
+        let views = sources.to_vec();
+        Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, costs })
     }
 
     /// Begins a weighting for the following frames: encodes the sources if the field does so before the frames, each
@@ -268,6 +277,41 @@ impl<'a> Stage<'a> {
         let session = &mut self.session;
         timed(&mut self.costs.encode, || session.weigh(&relevance, progress))
             .map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// The field's scalars that can be chosen for a scene.
+    pub fn tunables(&self) -> &'static [Tunable] {
+        self.session.tunables()
+    }
+
+    /// Sets the field's scalars for what follows; views that are encoded stay as they are.
+    pub fn tune(&mut self, settings: &[Setting]) {
+        self.session.tune(settings);
+    }
+
+    /// What follows is only compared with one another; see [`Prepared::simplify`](crate::Prepared::simplify).
+    pub fn simplify(&mut self) {
+        self.session.simplify();
+    }
+
+    /// What the field knows of where the surfaces are.
+    pub fn surfaces(&self) -> Surfaces {
+        self.session.surfaces()
+    }
+
+    /// Longest side of the pictures.
+    pub fn side(&self) -> u32 {
+        self.side
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    /// Its photographs.
+    pub fn album(&self) -> &'a Album<'a> {
+        self.album
     }
 
     /// The record of the field's work so far.
@@ -295,13 +339,14 @@ impl<'a> Stage<'a> {
         let early_termination = self.options.early_termination;
         let rendered = self.session.render(&camera, &omission.weights, early_termination, progress).map_err(failed)?;
         let time = start.elapsed();
-        let Rendered { colours, depths, width, height } = rendered;
+        let Rendered { colours, depths, confidences, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);
         let truth = match target.truth {
             Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
             None => None,
         };
-        Ok(Frame { target: target.clone(), weights, omission, colours, picture, depths, truth, time, encode })
+        let target = target.clone();
+        Ok(Frame { target, weights, omission, colours, picture, depths, confidences, truth, time, encode })
     }
 
     /// A view's photograph at a size, over the run's background.
@@ -318,7 +363,15 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`RenderError::Size`].
     pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError> {
-        let camera = self.at_working_size(&self.scene.views[view].camera)?;
+        self.size_at(&self.scene.views[view].camera)
+    }
+
+    /// Width and height of the picture that is rendered at a camera.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn size_at(&self, camera: &Camera) -> Result<[u32; 2], RenderError> {
+        let camera = self.at_working_size(camera)?;
         Ok([camera.pinhole.width(), camera.pinhole.height()])
     }
 

@@ -1,7 +1,7 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{About, Encoding, Prepared, Rendered, Request};
+use super::field::{About, Encoding, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use super::record::{LeftOut, Record};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
@@ -95,6 +95,26 @@ impl<'a> Session<'a> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
         self.prepared.render(&Request { camera, weights, views, early_termination }, progress)
+    }
+
+    /// The field's scalars that can be chosen for a scene.
+    pub fn tunables(&self) -> &'static [Tunable] {
+        self.prepared.tunables()
+    }
+
+    /// Sets the field's scalars for what follows; see [`Prepared::tune`].
+    pub fn tune(&mut self, settings: &[Setting]) {
+        self.prepared.tune(settings);
+    }
+
+    /// See [`Prepared::simplify`].
+    pub fn simplify(&mut self) {
+        self.prepared.simplify();
+    }
+
+    /// See [`Prepared::surfaces`].
+    pub fn surfaces(&self) -> Surfaces {
+        self.prepared.surfaces()
     }
 
     /// The record of the work so far.

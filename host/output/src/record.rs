@@ -3,8 +3,9 @@
 use serde::Serialize;
 use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
+use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
 use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
-use viewfuse_field::{Denoising, LeftOut};
+use viewfuse_field::{Denoising, LeftOut, Setting};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 
@@ -31,6 +32,8 @@ pub struct RunRecord {
     pub denoising: Option<Denoising>,
     /// The weighting scheme.
     pub weighting: String,
+    /// How the scheme and the field's settings were chosen for the scene; null where they were given.
+    pub chosen: Option<ChosenRecord>,
     /// Seed of every random draw. The training-free field makes none.
     pub seed: u64,
     /// Width and height of the pictures.
@@ -57,6 +60,24 @@ pub struct RunRecord {
     pub transfers: TransfersRecord,
     /// One entry a target.
     pub frames: Vec<FrameRecord>,
+}
+
+/// See [`RunRecord::chosen`].
+#[derive(Clone, Debug, Serialize)]
+pub struct ChosenRecord {
+    /// The field's scalars that are not at their defaults.
+    pub settings: Vec<Setting>,
+    /// All schemes and settings that were tried, with the mean score of the sources that were left out.
+    pub candidates: Vec<Candidate>,
+    /// The sources that were left out, each rendered coarsely from the others with what was chosen.
+    pub left_out: Vec<LeftOutSource>,
+}
+
+impl From<Chosen> for ChosenRecord {
+    fn from(chosen: Chosen) -> ChosenRecord {
+        let Chosen { settings, candidates, left_out, .. } = chosen;
+        ChosenRecord { settings, candidates, left_out }
+    }
 }
 
 /// See [`RunRecord::background`].
@@ -149,6 +170,8 @@ pub struct FrameRecord {
     pub left_out_weight: f32,
     /// Peak signal to noise ratio against the ground truth, decibels; null for equal pictures or without a ground truth.
     pub psnr: Option<f64>,
+    /// The score to expect without a ground truth; null where the scheme was given, and with too few sources.
+    pub expected: Option<Expected>,
     /// Structural similarity with the ground truth.
     pub ssim: Option<f64>,
     /// World units of depth in one step of the 16-bit depth map, in which 0 means no surface; null for fields without
@@ -179,6 +202,7 @@ impl FrameRecord {
                 .collect(),
             left_out_weight: frame.omission.omitted_weight,
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
+            expected: None,
             ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
             depth_step: (!frame.depths.is_empty()).then(|| depth_step(&frame.depths)),
             seconds: frame.time.as_secs_f64(),

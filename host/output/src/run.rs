@@ -1,15 +1,16 @@
-//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit) and `NAME_sheet.png` for each target, and
-//! `run.json`.
+//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit), `NAME_confidence.png` (8 bit) and `NAME_sheet.png` for
+//! each target, and `run.json`.
 
 use crate::png::write_png;
 use crate::record::{
-    FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
+    ChosenRecord, FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
 };
 use crate::sheet::{Sheet, SheetSource, depth_picture};
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use viewfuse_field::Renderer;
+use viewfuse_field::auto::Chosen;
 use viewfuse_field::render::{Finished, Frame, RenderOptions};
 use viewfuse_job::files::{WriteError, remove_if_there, write_whole};
 use viewfuse_scene::Scene;
@@ -34,6 +35,7 @@ pub struct RunWriter {
     size: [u32; 2],
     background: [f32; 3],
     warning: Option<String>,
+    chosen: Option<Chosen>,
 }
 
 /// The values of the record that only the caller knows.
@@ -69,6 +71,16 @@ impl RunWriter {
             size: [0, 0],
             background: [0.0; 3],
             warning: None,
+            chosen: None,
+        }
+    }
+
+    /// The frames that follow are of a scheme and settings that were chosen for the scene: they replace the weighting, and each
+    /// frame gets the score to expect.
+    pub fn set_chosen(&mut self, chosen: &Chosen) {
+        if self.chosen.is_none() {
+            self.weighting = chosen.weighting.to_string();
+            self.chosen = Some(chosen.clone());
         }
     }
 
@@ -88,12 +100,17 @@ impl RunWriter {
             // One of an earlier run would belong to another picture.
             None => remove_if_there(&self.file(name, "_depth"))?,
         }
+        match confidence_map(frame) {
+            Some(map) => write_png(&self.file(name, "_confidence"), &DynamicImage::ImageLuma8(map))?,
+            None => remove_if_there(&self.file(name, "_confidence"))?,
+        }
         write_png(&self.file(name, "_sheet"), &DynamicImage::ImageRgb8(self.sheet(sources, frame)))?;
         self.frame_time += frame.time;
         self.size = [frame.picture.width(), frame.picture.height()];
         self.background = sources.background;
         self.warning.clone_from(&sources.warning);
-        self.frames.push(FrameRecord::of(frame, &self.source_names));
+        let expected = self.chosen.as_ref().and_then(|chosen| chosen.expected(frame));
+        self.frames.push(FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names) });
         Ok(())
     }
 
@@ -122,6 +139,7 @@ impl RunWriter {
             left_out: record.left_out,
             denoising: record.denoising,
             weighting: self.weighting,
+            chosen: self.chosen.map(ChosenRecord::from),
             seed,
             size: self.size,
             background: background_record(options, self.background),
@@ -164,6 +182,16 @@ impl RunWriter {
         }
         .draw()
     }
+}
+
+/// A frame's confidences in steps of 1/255; `None` for fields that do not tell.
+pub fn confidence_map(frame: &Frame) -> Option<ImageBuffer<Luma<u8>, Vec<u8>>> {
+    if frame.confidences.is_empty() {
+        return None;
+    }
+    let (width, height) = frame.picture.dimensions();
+    let confidence = |x: u32, y: u32| Luma([(frame.confidences[(y * width + x) as usize] * 255.0).round() as u8]);
+    Some(ImageBuffer::from_fn(width, height, confidence))
 }
 
 /// A frame's depths in steps of [`depth_step`]; `None` for fields without depths.

@@ -15,7 +15,7 @@ use viewfuse_core::random::uniform_from;
 /// A way to take photographs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rig {
-    /// On an arc in front of the subject, about 12 degrees from one view to the next, at most 120 degrees in all.
+    /// On an arc in front of the subject, about 6 degrees from one view to the next, at most 120 degrees in all.
     Arc,
     /// Side by side in rows, all looking about the same way: a wall of cameras.
     Forward,
@@ -42,7 +42,7 @@ pub struct Walk {
 }
 
 /// Angle from one view of an arc to the next, in radians.
-const ARC_STEP: f32 = 0.205;
+const ARC_STEP: f32 = 0.11;
 
 /// Largest angle of an arc, in radians.
 const LARGEST_ARC: f32 = 2.1;

@@ -5,16 +5,19 @@
 //! sources     the most sources of a run                  SourcePoses, SourceWeights
 //! attention   attention's parameters from files          AttentionModel
 //! spec        the text form, parsed without any file     WeightingSpec, scheme_names, grammar
+//! choice      a scheme or the best for the scene         WeightingChoice, choice_grammar
 //! weighting   ready to weigh                             Weighting, Weigh
 //! ```
 
 #![forbid(unsafe_code)]
 
 pub mod attention;
+mod choice;
 pub mod sources;
 mod spec;
 mod weighting;
 
+pub use choice::{WeightingChoice, choice_grammar};
 pub use spec::{WeightingError, WeightingSpec, grammar, scheme_names};
 pub use weighting::{Weigh, Weighting};
 

@@ -59,7 +59,7 @@ impl<D: Device> Prepared for Photographs<'_, D> {
         };
         let colours: Vec<[f32; 4]> = fused.chunks_exact(CHANNELS).map(colour).collect();
         let depths = colours.iter().map(|colour| if colour[3] > 0.0 { self.plane.depth } else { 0.0 }).collect();
-        Ok(Rendered { colours, depths, width, height })
+        Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
     }
 }
 

@@ -44,7 +44,8 @@ impl PictureOptions {
         let early_termination =
             if exact || !field.ends_rays { 0.0 } else { self.early_termination.unwrap_or(DEFAULT_EARLY_TERMINATION) };
         let leave_out = if exact { 0.0 } else { self.leave_out };
-        Ok(RenderOptions { size: self.size, background: self.background, leave_out, early_termination })
+        let (size, background) = (self.size, self.background);
+        Ok(RenderOptions { size, background, leave_out, early_termination, ..RenderOptions::default() })
     }
 }
 

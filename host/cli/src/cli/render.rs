@@ -4,28 +4,30 @@ use super::model::{GENVS, ModelOptions, parse_level};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::parse::parse_count;
 use super::terminal::Terminal;
-use super::weighting::one_help;
+use super::weighting::choice_help;
 use super::{on_threads, say};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use viewfuse_device::choice::Chosen;
+use viewfuse_field::Setting;
+use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
-use viewfuse_output::record::{FrameRecord, RunRecord};
+use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{READERS, Scene, looked_for};
-use viewfuse_weighting::WeightingSpec;
+use viewfuse_weighting::{Weighting, WeightingChoice, WeightingSpec};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
     viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with scores\n  \
     viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n\n\
-    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_sheet.png for each target, and \
-    run.json.")]
+    Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_confidence.png (8 bit; where the field \
+    tells), NAME_sheet.png for each target, and run.json.")]
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
     scene: PathBuf,
@@ -37,8 +39,8 @@ pub(crate) struct Arguments {
     orbit: Option<usize>,
     #[command(flatten)]
     sources: SourceOptions,
-    #[arg(long, value_name = "SCHEME", default_value_t, help = one_help())]
-    weights: WeightingSpec,
+    #[arg(long, value_name = "SCHEME", default_value_t = WeightingChoice::Given(WeightingSpec::default()), help = choice_help())]
+    weights: WeightingChoice,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -63,7 +65,10 @@ fn scene_help() -> String {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
-    let weighting = arguments.weights.open()?;
+    let weighting = match &arguments.weights {
+        WeightingChoice::Auto => None,
+        WeightingChoice::Given(spec) => Some(spec.open()?),
+    };
     let scene = Scene::open(&arguments.scene)?;
     let open_time = start.elapsed();
     let field = arguments.model.open(arguments.seed, arguments.reuse)?;
@@ -74,13 +79,25 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     check_writable(&arguments.output.join(RECORD))?;
     let Chosen { device, reason } = arguments.device.open()?;
     let label = arguments.scene.display().to_string();
-    let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &weighting);
+    let before = weighting.clone().unwrap_or_else(Weighting::default_scheme);
+    let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &before);
     let renderer = field.on(&device);
     let renderer = renderer.as_ref();
     let record = on_threads(arguments.picture.threads, || -> anyhow::Result<RunRecord> {
         let progress = Terminal::new("rendering");
-        let write = |sources: &SourceImages, frame: Frame| anyhow::Ok(writer.write(sources, &frame)?);
-        let finished = render(&scene, &job, &weighting, renderer, &options, &progress, write)?;
+        let finished = match &weighting {
+            Some(weighting) => {
+                let write = |sources: &SourceImages, frame: Frame| anyhow::Ok(writer.write(sources, &frame)?);
+                render(&scene, &job, weighting, renderer, &options, &progress, write)?
+            }
+            None => {
+                let write = |sources: &SourceImages, frame: Frame, chosen: &auto::Chosen| {
+                    writer.set_chosen(chosen);
+                    anyhow::Ok(writer.write(sources, &frame)?)
+                };
+                auto::render(&scene, &job, renderer, &options, &progress, write)?.0
+            }
+        };
         let circumstances = Circumstances {
             program: env!("CARGO_PKG_VERSION"),
             device_reason: reason,
@@ -110,6 +127,9 @@ fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
         record.device,
         record.times.total
     ))?;
+    if let Some(chosen) = &record.chosen {
+        say(format_args!("{}", choice(chosen, &record.weighting)))?;
+    }
     if let Some(largest) = record.kernels.iter().max_by(|a, b| a.share.total_cmp(&b.share)) {
         let seconds: f64 = record.kernels.iter().map(|kernel| kernel.seconds).sum();
         let (name, share) = (largest.kernel, 100.0 * largest.share);
@@ -118,16 +138,38 @@ fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
     say(format_args!("device: {}, {}", record.device, record.device_reason))
 }
 
+/// What was chosen for the scene, and from what.
+fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
+    let ChosenRecord { settings, candidates, left_out } = chosen;
+    if left_out.is_empty() {
+        return format!("chosen: {weighting}, the default: too few sources to leave one out");
+    }
+    let settings: String = settings.iter().map(|Setting { name, value }| format!(", {name} {value}")).collect();
+    let tried = candidates.len();
+    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.settings == chosen.settings;
+    let score = |candidate: &Candidate| format!(" {:.2} dB", candidate.psnr);
+    let (own, first) = (candidates.iter().find(|candidate| of(candidate)), candidates.first());
+    format!(
+        "chosen: {weighting}{settings}: {} sources left out, one at a time:{}, by default{}; {tried} tried",
+        left_out.len(),
+        own.map(score).unwrap_or_default(),
+        first.map(score).unwrap_or_default(),
+    )
+}
+
 fn summary(frame: &FrameRecord, folder: &Path) -> String {
     let score = match (frame.psnr, frame.ssim) {
         (Some(psnr), Some(ssim)) => format!("  PSNR {psnr:.2} dB  SSIM {ssim:.3}"),
         (Some(psnr), None) => format!("  PSNR {psnr:.2} dB"),
         _ => String::new(),
     };
+    let expected = frame.expected.map_or_else(String::new, |Expected { psnr, interval: [low, high] }| {
+        format!("  expected PSNR {psnr:.1} dB (80 %: {low:.1} to {high:.1})")
+    });
     let left_out = match frame.left_out.len() {
         0 => String::new(),
         1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
         count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
     };
-    format!("{}{score}{left_out}", folder.join(format!("{}.png", frame.target)).display())
+    format!("{}{score}{expected}{left_out}", folder.join(format!("{}.png", frame.target)).display())
 }

@@ -1,11 +1,11 @@
 //! `--weights`: its values and help.
 
 use viewfuse_weighting::attention::AttentionError;
-use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec, grammar, scheme_names};
+use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec, choice_grammar, grammar, scheme_names};
 
-/// Help of an option that takes one scheme.
-pub(crate) fn one_help() -> String {
-    format!("Weighting scheme: {}", grammar())
+/// Help of an option that takes one scheme, or none to choose the best.
+pub(crate) fn choice_help() -> String {
+    format!("Weighting scheme: {}", choice_grammar())
 }
 
 /// Help of an option that can be given several times.

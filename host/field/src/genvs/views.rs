@@ -217,5 +217,5 @@ fn cropped(values: &[f32], size: Size, target: &Camera) -> Rendered {
         [red, green, blue, 1.0]
     };
     let colours: Vec<[f32; 4]> = pixels.map(colour).collect();
-    Rendered { depths: Vec::new(), colours, width, height }
+    Rendered { depths: Vec::new(), confidences: Vec::new(), colours, width, height }
 }

@@ -208,7 +208,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             progress.step();
         }
         let (colours, depths) = (device.download(&pixels.colours)?, device.download(&pixels.depths)?);
-        Ok(Rendered { colours, depths, width, height })
+        Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
     }
 }
 

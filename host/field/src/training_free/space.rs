@@ -1,5 +1,6 @@
 //! Which depths there are in a scene: near and far bounds of the planes, for any camera.
 
+use crate::Surfaces;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_scene::photographs::SourceImages;
@@ -43,6 +44,17 @@ impl Space {
     /// Whether anything is known.
     pub(super) fn is_known(&self) -> bool {
         self.bounds.is_some()
+    }
+
+    /// The same for others.
+    pub(super) fn surfaces(&self) -> Surfaces {
+        match self.bounds {
+            // With points, the bounds follow from them.
+            Some([least, greatest]) if self.points.len() < FEWEST_POINTS => {
+                Surfaces { points: Vec::new(), near_far: Some([1.0 / greatest, 1.0 / least]) }
+            }
+            _ => Surfaces { points: self.points.clone(), near_far: None },
+        }
     }
 
     /// Least and greatest disparity in a camera's frustum.

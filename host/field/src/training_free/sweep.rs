@@ -3,7 +3,7 @@
 
 use super::exposure;
 use super::space::{Space, first_guess};
-use crate::{FieldError, Prepared, Rendered, Request};
+use crate::{FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::plane_sweep::blend::BlendBlock;
@@ -30,6 +30,24 @@ const RANGE_CONFIDENCE: f32 = 0.6;
 /// Most pairs that are compared, for each view.
 const PAIRS_PER_VIEW: usize = 3;
 
+/// Most planes of a frustum in pictures that are only compared with one another.
+const TRIAL_PLANES: u32 = 32;
+
+const NEAR_COST: &str = "near cost";
+const DISSENT_SHARE: &str = "dissent share";
+const TEMPERATURE_NAME: &str = "temperature";
+
+/// The scalars that differ most from scene to scene, the most effective ones first.
+const TUNABLES: &[Tunable] = &[
+    Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
+    Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
+    Tunable { name: TEMPERATURE_NAME, default: DEFAULT.temperature, others: &[0.005, 0.013] },
+];
+
+/// The settings that serve most scenes.
+const DEFAULT: Sweep =
+    Sweep { plane_count: 64, match_side: 256, near_cost: 0.01, dissent_share: 0.0625, temperature: TEMPERATURE };
+
 /// Settings of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
@@ -47,13 +65,15 @@ pub struct Sweep {
 
 impl Default for Sweep {
     fn default() -> Sweep {
-        Sweep { plane_count: 64, match_side: 256, near_cost: 0.01, dissent_share: 0.0625, temperature: TEMPERATURE }
+        DEFAULT
     }
 }
 
 /// Photographs on the device at two sizes, and what is known of their disparities.
 pub(super) struct Views<'a, D: Device> {
-    settings: &'a Sweep,
+    settings: Sweep,
+    /// The settings before any scalar was chosen.
+    defaults: Sweep,
     device: &'a D,
     has_silhouettes: bool,
     background: [f32; 3],
@@ -101,6 +121,15 @@ impl Range {
 }
 
 impl Sweep {
+    /// What can be chosen for a scene, by the names in [`TUNABLES`].
+    fn scalars(&mut self) -> [(&'static str, &mut f32); 3] {
+        [
+            (NEAR_COST, &mut self.near_cost),
+            (DISSENT_SHARE, &mut self.dissent_share),
+            (TEMPERATURE_NAME, &mut self.temperature),
+        ]
+    }
+
     pub(super) fn views<'a, D: Device>(
         &'a self,
         device: &'a D,
@@ -115,7 +144,8 @@ impl Sweep {
         let matched = Images::upload(device, &small)?;
         let map_len: usize = small.iter().map(|image| image.texels.len()).sum();
         let mut views = Views {
-            settings: self,
+            settings: *self,
+            defaults: *self,
             device,
             has_silhouettes: sources.has_silhouettes,
             background: sources.background,
@@ -334,6 +364,28 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(())
     }
 
+    fn tunables(&self) -> &'static [Tunable] {
+        TUNABLES
+    }
+
+    fn tune(&mut self, settings: &[Setting]) {
+        let Sweep { plane_count, match_side, .. } = self.settings;
+        self.settings = Sweep { plane_count, match_side, ..self.defaults };
+        for Setting { name, value } in settings {
+            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
+                *scalar = *value;
+            }
+        }
+    }
+
+    fn simplify(&mut self) {
+        self.settings.plane_count = self.settings.plane_count.min(TRIAL_PLANES);
+    }
+
+    fn surfaces(&self) -> Surfaces {
+        self.space.surfaces()
+    }
+
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
         if self.gains.is_none() {
             let maps = self.device.download(&self.disparities)?;
@@ -382,6 +434,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             let behind = 1.0 - colour[3];
             (0..3).for_each(|channel| colour[channel] += behind * self.background[channel]);
         }
-        Ok(Rendered { colours, depths: device.download(&depths)?, width, height })
+        let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
+        Ok(Rendered { colours, depths, confidences, width, height })
     }
 }

@@ -1,0 +1,109 @@
+//! How well `auto` knows itself: its choice beside the best fixed one in hindsight, and the scores that it expects beside the
+//! true ones.
+//!
+//! `cargo run --release -p viewfuse-evaluate --example self_knowledge -- SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...`
+//!
+//! Pictures have a longest side of `SIDE`. With `grid`, all that `auto` tried is rendered at the targets as well, which is what
+//! takes the time. Each line of output is a JSON object: one a job.
+
+use anyhow::{Context, bail};
+use serde_json::json;
+use std::path::Path;
+use viewfuse_device::cpu::Cpu;
+use viewfuse_evaluate::protocol::{Draws, Protocol};
+use viewfuse_evaluate::without_masks;
+use viewfuse_field::On;
+use viewfuse_field::auto::{Chosen, choose};
+use viewfuse_field::render::{RenderOptions, Stage};
+use viewfuse_field::training_free::TrainingFree;
+use viewfuse_job::progress::Silent;
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::target_of;
+use viewfuse_scene::photographs::{Album, BackgroundChoice, scaled_size};
+use viewfuse_weighting::Weighting;
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [side, most_targets, mode, jobs @ ..] = arguments.as_slice() else {
+        bail!("usage: self_knowledge SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...");
+    };
+    let (side, most_targets): (u32, usize) = (side.parse()?, most_targets.parse()?);
+    for job in jobs {
+        let (folder, protocol) = job.split_once('=').context("a job is FOLDER=PROTOCOL")?;
+        if let Err(error) = measure(Path::new(folder), &protocol.parse()?, side, most_targets, mode == "grid") {
+            eprintln!("{job}: {error}");
+        }
+    }
+    Ok(())
+}
+
+fn measure(folder: &Path, protocol: &Protocol, side: u32, most_targets: usize, grid: bool) -> anyhow::Result<()> {
+    let mut scene = Scene::open(folder)?;
+    let mut options = RenderOptions::default();
+    if protocol.hides_masks() {
+        scene = without_masks(&scene);
+        options.background = BackgroundChoice::None;
+    }
+    let size = scaled_size(&scene.views[0].camera, side);
+    options.size = Some(size.into());
+    let scenes = [scene];
+    let plan = protocol.plan(&scenes, Draws { seed: 0, trial_count: 1, target_count: most_targets }, 3)?;
+    let scene = &scenes[0];
+    for job in &plan.jobs {
+        let step = job.targets.len().div_ceil(most_targets).max(1);
+        let targets: Vec<usize> = job.targets.iter().copied().step_by(step).collect();
+        let album = Album::open(scene, job.sources.iter().chain(&targets).copied(), &Silent)?;
+        let field = TrainingFree::default();
+        let renderer = On { device: &Cpu, field: &field };
+        let mut stage = Stage::prepare(scene, &album, &job.sources, &renderer, &options, &Silent)?;
+        let start = std::time::Instant::now();
+        let chosen = choose(&stage, &renderer, &options, &Silent)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let mut true_scores = Vec::new();
+        if grid {
+            for candidate in &chosen.candidates {
+                stage.tune(&candidate.settings);
+                let weighting = Weighting::open(&candidate.weighting)?;
+                stage.weigh(&weighting, &Silent)?;
+                let mut scores = Vec::new();
+                for &target in &targets {
+                    let frame = stage.frame(&weighting, &target_of(scene, target), &Silent)?;
+                    scores.push(frame.truth.map_or(f64::NAN, |truth| truth.psnr));
+                }
+                true_scores.push(scores);
+            }
+        }
+        let start = std::time::Instant::now();
+        let views = rendered(&mut stage, scene, &chosen, &targets)?;
+        let render_seconds = start.elapsed().as_secs_f64();
+        let line = json!({
+            "scene": folder, "protocol": protocol.to_string(), "sources": job.sources.len(),
+            "weighting": chosen.weighting.to_string(), "settings": chosen.settings, "candidates": chosen.candidates,
+            "left_out": chosen.left_out, "detail": chosen.basis.map(|basis| basis.detail), "views": views,
+            "true_scores": true_scores, "seconds": seconds, "render_seconds": render_seconds,
+        });
+        println!("{line}");
+    }
+    Ok(())
+}
+
+/// The targets with what was chosen.
+fn rendered(
+    stage: &mut Stage<'_>,
+    scene: &Scene,
+    chosen: &Chosen,
+    targets: &[usize],
+) -> anyhow::Result<Vec<serde_json::Value>> {
+    stage.tune(&chosen.settings);
+    stage.weigh(&chosen.weighting, &Silent)?;
+    let mut views = Vec::new();
+    for &target in targets {
+        let frame = stage.frame(&chosen.weighting, &target_of(scene, target), &Silent)?;
+        let confidence = frame.confidences.iter().sum::<f32>() / frame.confidences.len().max(1) as f32;
+        views.push(json!({
+            "target": frame.target.name, "gap": chosen.gap(&frame), "confidence": confidence,
+            "expected": chosen.expected(&frame), "psnr": frame.truth.map(|truth| truth.psnr),
+        }));
+    }
+    Ok(views)
+}

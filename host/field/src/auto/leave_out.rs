@@ -1,0 +1,204 @@
+//! Sources rendered from the other sources, coarsely: what can be known of a field's pictures without any truth.
+
+use super::geometry::Measure;
+use crate::Setting;
+use crate::render::{RenderError, RenderOptions, Stage};
+use crate::renderer::Renderer;
+use image::RgbImage;
+use std::sync::Arc;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::PinholeError;
+use viewfuse_core::metrics::psnr;
+use viewfuse_core::pose::Pose;
+use viewfuse_job::progress::{Interrupted, Progress, Quiet};
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::Target;
+use viewfuse_scene::photographs::{SourceImage, SourceImages, scaled_size};
+use viewfuse_weighting::Weighting;
+
+/// Most sources that are left out, one at a time.
+pub const MOST_LEFT_OUT: usize = 6;
+/// Most of the other sources that a source is rendered from, the nearest ones.
+pub const MOST_NEIGHBOURS: usize = 8;
+/// Longest side of these pictures, in pixels.
+pub const SIDE: u32 = 96;
+/// The greatest score, decibels: that of 8-bit pictures that differ in rounding alone.
+const MOST_PSNR: f64 = 51.0;
+
+/// Sources that are left out, each with the others on the device.
+pub(super) struct Trials<'a> {
+    trials: Vec<Trial<'a>>,
+}
+
+/// A source that is left out.
+struct Trial<'a> {
+    /// As an index into the run's sources.
+    source: usize,
+    stage: Stage<'a>,
+    target: Target,
+    truth: RgbImage,
+    gap: f64,
+}
+
+/// How a source came out that was left out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Outcome {
+    /// As an index into the run's sources.
+    pub(super) source: usize,
+    /// Peak signal to noise ratio, decibels.
+    pub(super) psnr: f64,
+    /// Mean confidence of its pixels; `None` if the field does not tell.
+    pub(super) confidence: Option<f64>,
+    /// Its gap to the others.
+    pub(super) gap: f64,
+}
+
+/// The options of pictures of sources that are left out.
+pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOptions {
+    let camera = stage.scene().views.first().map(|view| view.camera);
+    let size = camera.map(|camera| scaled_size(&camera, SIDE.min(stage.side())).into());
+    RenderOptions { size, settings: Vec::new(), ..options.clone() }
+}
+
+impl<'a> Trials<'a> {
+    /// Leaves sources of `stage` out and encodes the others, weighed as `weighting` says, with the settings' defaults. Empty if
+    /// there are too few sources. A source without which the field finds nothing is no trial.
+    pub(super) fn prepare(
+        stage: &Stage<'a>,
+        weighting: &Weighting,
+        renderer: &'a dyn Renderer,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Trials<'a>, RenderError> {
+        let about = renderer.about();
+        let (scene, album) = (stage.scene(), stage.album());
+        let poses: Vec<Pose> = stage.views.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let mut trials = Vec::new();
+        if poses.len() <= about.least_sources {
+            return Ok(Trials { trials });
+        }
+        let cameras: Vec<_> = stage.images.images.iter().map(|image| image.camera).collect();
+        let measure = Measure::of(&cameras);
+        let side = options.size.map_or(SIDE, |[width, height]| width.max(height));
+        let reduced: Vec<SourceImage> = stage
+            .images
+            .images
+            .iter()
+            .map(|image| small(image, about.source_side.of(side), scene))
+            .collect::<Result<_, _>>()?;
+        let surfaces = stage.surfaces();
+        let chosen = spread(&poses, MOST_LEFT_OUT);
+        progress.expect(chosen.len());
+        for source in chosen {
+            progress.check().map_err(stopped)?;
+            let others = nearest(&poses, source, MOST_NEIGHBOURS);
+            let views: Vec<usize> = others.iter().map(|&other| stage.views[other]).collect();
+            let images = Arc::new(SourceImages {
+                images: others.iter().map(|&other| reduced[other].clone()).collect(),
+                background: stage.images.background,
+                has_silhouettes: stage.images.has_silhouettes,
+                points: surfaces.points.clone(),
+                near_far: surfaces.near_far,
+                warning: None,
+            });
+            let quiet = &Quiet(progress);
+            let prepared =
+                Stage::of_images(scene, album, &views, images, renderer, options, quiet).and_then(|mut own| {
+                    own.simplify();
+                    own.weigh(weighting, quiet)?;
+                    Ok(own)
+                });
+            progress.step();
+            let own = match prepared {
+                Err(RenderError::Unsuitable { .. }) => continue,
+                own => own?,
+            };
+            let shown = small(&stage.images.images[source], side, scene)?;
+            let name = scene.views[stage.views[source]].name.clone();
+            let target = Target { name, camera: shown.camera, truth: None };
+            let truth = SourceImages { images: vec![shown], ..own.images.as_ref().clone() }.picture(0);
+            if own.size_at(&target.camera)? != [truth.width(), truth.height()] {
+                continue;
+            }
+            let gap = measure.gap(&poses[source], others.iter().map(|&other| &poses[other]));
+            trials.push(Trial { source, stage: own, target, truth, gap });
+        }
+        Ok(Trials { trials })
+    }
+
+    /// Whether nothing could be left out.
+    pub(super) fn is_empty(&self) -> bool {
+        self.trials.is_empty()
+    }
+
+    /// How many sources are left out.
+    pub(super) fn len(&self) -> usize {
+        self.trials.len()
+    }
+
+    /// Renders each source that is left out with this weighting and these settings.
+    pub(super) fn outcomes(
+        &mut self,
+        weighting: &Weighting,
+        settings: &[Setting],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Outcome>, RenderError> {
+        let mut outcomes = Vec::with_capacity(self.trials.len());
+        for Trial { source, stage, target, truth, gap } in &mut self.trials {
+            progress.check().map_err(stopped)?;
+            stage.tune(settings);
+            let frame = stage.frame(weighting, target, &Quiet(progress))?;
+            outcomes.push(Outcome {
+                source: *source,
+                psnr: psnr(&frame.picture, truth).min(MOST_PSNR),
+                confidence: mean(&frame.confidences),
+                gap: *gap,
+            });
+            progress.step();
+        }
+        Ok(outcomes)
+    }
+}
+
+/// A source with a longest side of at most `side` pixels.
+fn small(image: &SourceImage, side: u32, scene: &Scene) -> Result<SourceImage, RenderError> {
+    let unusable =
+        |error: PinholeError| RenderError::Unsuitable { scene: scene.path.display().to_string(), reason: error.into() };
+    image.reduced(side).map_err(unusable)
+}
+
+/// The mean of confidences; `None` if there are none.
+pub(super) fn mean(confidences: &[f32]) -> Option<f64> {
+    let sum: f64 = confidences.iter().copied().map(f64::from).sum();
+    (!confidences.is_empty()).then(|| sum / confidences.len() as f64)
+}
+
+fn stopped(interrupted: Interrupted) -> RenderError {
+    RenderError::Field(interrupted.into())
+}
+
+/// Up to `count` of the cameras, each next one as far from those before as possible, ascending.
+fn spread(poses: &[Pose], count: usize) -> Vec<usize> {
+    let centres: Vec<Vec3> = poses.iter().map(Pose::centre_world).collect();
+    let mut chosen: Vec<usize> = Vec::new();
+    while chosen.len() < count.min(centres.len()) {
+        let gap = |own: usize| {
+            chosen.iter().map(|&other| centres[own].distance(centres[other])).fold(f32::INFINITY, f32::min)
+        };
+        let rest = (0..centres.len()).filter(|own| !chosen.contains(own));
+        // The first of equal ones.
+        let Some(next) = rest.rev().max_by(|a, b| gap(*a).total_cmp(&gap(*b))) else { break };
+        chosen.push(next);
+    }
+    chosen.sort_unstable();
+    chosen
+}
+
+/// Up to `count` of the other cameras, the nearest ones, ascending.
+fn nearest(poses: &[Pose], own: usize, count: usize) -> Vec<usize> {
+    let mut others: Vec<usize> = (0..poses.len()).filter(|other| *other != own).collect();
+    others.sort_by(|a, b| poses[*a].distance(&poses[own]).total_cmp(&poses[*b].distance(&poses[own])));
+    others.truncate(count);
+    others.sort_unstable();
+    others
+}

@@ -1,0 +1,210 @@
+//! The training-free field on whole photographs, on the CPU: the sample scene with a background, and a painted wall.
+
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::render::{RenderOptions, render_all};
+use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::{On, Rendered, Session};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::Selection;
+use viewfuse::scene::photographs::{SourceImage, SourceImages};
+use viewfuse::weighting::Weighting;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::metrics::psnr;
+use viewfuse_core::pose::Pose;
+use viewfuse_core::weights::Weights;
+use viewfuse_tests::places::repository;
+
+/// Distance of the painted wall.
+const WALL: f32 = 3.0;
+
+/// A camera at `centre` that looks along z.
+fn camera(centre: Vec3, width: u32, height: u32) -> Camera {
+    let pose = Pose::look_at(centre, centre + Vec3::Z, -Vec3::Y).expect("a pose");
+    let focal = 0.9 * width as f32;
+    let principal = [0.5 * width as f32, 0.5 * height as f32];
+    Camera { pose, pinhole: Pinhole::new([focal; 2], principal, width, height).expect("a pinhole") }
+}
+
+/// The wall's paint: smooth, and different everywhere.
+fn paint(x: f32, y: f32) -> [f32; 3] {
+    let wave =
+        |a: f32, b: f32, c: f32| 0.5 + 0.2 * (a * x + c).sin() * (b * y + c).cos() + 0.2 * (7.3 * x * y + a * y).sin();
+    [wave(9.0, 5.0, 0.3), wave(6.0, 11.0, 1.1), wave(13.0, 8.0, 2.0)]
+}
+
+/// What a camera sees of the wall; `gain` is its exposure.
+fn photograph(camera: Camera, gain: f32) -> SourceImage {
+    let (width, height) = (camera.pinhole.width(), camera.pinhole.height());
+    let texel = |at: u32| {
+        let ray = camera.ray((at % width) as f32 + 0.5, (at / width) as f32 + 0.5);
+        let point = ray.at((WALL - ray.origin_world.z) / ray.direction_world.z);
+        let [r, g, b] = paint(point.x, point.y).map(|value| value * gain);
+        [r, g, b, 1.0]
+    };
+    SourceImage { camera, texels: (0..width * height).map(texel).collect() }
+}
+
+fn sources(images: Vec<SourceImage>) -> SourceImages {
+    SourceImages {
+        images,
+        background: [0.0; 3],
+        has_silhouettes: false,
+        points: Vec::new(),
+        near_far: Some([1.5, 8.0]),
+        warning: None,
+    }
+}
+
+fn wall(gains: [f32; 3]) -> SourceImages {
+    let centres = [Vec3::new(-0.3, 0.0, 0.0), Vec3::new(0.3, 0.05, 0.0), Vec3::new(0.05, -0.3, 0.1)];
+    sources(centres.iter().zip(gains).map(|(centre, gain)| photograph(camera(*centre, 72, 54), gain)).collect())
+}
+
+/// A picture with equal weights.
+fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
+    let (field, count) = (TrainingFree::default(), sources.images.len());
+    let renderer = On { device: &Cpu, field: &field };
+    let mut session = Session::open(&renderer, sources, &Silent).expect("a session");
+    let relevance = |own: usize| {
+        let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+        (0..count).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
+        Weights::from_scores(&scores, count as u32)
+    };
+    session.weigh(&(0..count).map(relevance).collect::<Vec<_>>(), &Silent).expect("a weighting");
+    session.render(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
+}
+
+/// Root mean square difference of the colours away from the border.
+fn inner_error(a: &[[f32; 4]], b: &[[f32; 4]], width: usize) -> f32 {
+    let height = a.len() / width;
+    let inner = (8..height - 8).flat_map(|row| (8..width - 8).map(move |column| row * width + column));
+    let (mut sum, mut count) = (0.0, 0.0);
+    for at in inner {
+        sum += (0..3).map(|c| (a[at][c] - b[at][c]).powi(2)).sum::<f32>();
+        count += 3.0;
+    }
+    (sum / count as f32).sqrt()
+}
+
+#[test]
+fn a_painted_wall_is_found_and_shown() {
+    let target = camera(Vec3::new(0.0, 0.0, 0.0), 72, 54);
+    let rendered = picture(&wall([1.0; 3]), &target);
+    let error = inner_error(&rendered.colours, &photograph(target, 1.0).texels, 72);
+    let mut depths = rendered.depths.clone();
+    depths.sort_by(f32::total_cmp);
+    let median = depths[depths.len() / 2];
+    println!("root mean square error {error}, median depth {median}");
+    // A plane is off by at most half a step, 1.3 % of the depth here: less than half a pixel.
+    assert!(error < 0.02, "{error}");
+    assert!((median - WALL).abs() < 0.05 * WALL, "{median}");
+    let copy = inner_error(&wall([1.0; 3]).images[0].texels, &photograph(target, 1.0).texels, 72);
+    assert!(copy > 5.0 * error, "a copy is as good: {copy}");
+}
+
+#[test]
+fn exposures_are_made_equal() {
+    let target = camera(Vec3::new(0.0, 0.0, 0.0), 72, 54);
+    let gains = [0.8, 1.0, 1.25];
+    let rendered = picture(&wall(gains), &target);
+    // Equal weights: the picture has the geometric mean of the exposures, 1.
+    let error = inner_error(&rendered.colours, &photograph(target, 1.0).texels, 72);
+    println!("root mean square error {error}");
+    assert!(error < 0.03, "{error}");
+}
+
+#[test]
+fn pictures_do_not_depend_on_the_number_of_threads() {
+    let (sources, target) = (wall([1.0, 0.9, 1.1]), camera(Vec3::new(0.1, 0.1, 0.0), 72, 54));
+    let with_threads = |count| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().expect("a thread pool");
+        pool.install(|| picture(&sources, &target))
+    };
+    let one = with_threads(1);
+    assert_eq!(one, with_threads(2), "bit for bit");
+    assert_eq!(one, with_threads(3), "bit for bit");
+}
+
+#[test]
+fn the_order_of_the_sources_is_only_rounding() {
+    let (sources, target) = (wall([1.0; 3]), camera(Vec3::new(0.0, 0.0, 0.0), 72, 54));
+    let reversed = SourceImages { images: sources.images.iter().rev().cloned().collect(), ..sources.clone() };
+    let error = inner_error(&picture(&sources, &target).colours, &picture(&reversed, &target).colours, 72);
+    assert!(error < 2.0e-3, "{error}");
+}
+
+#[test]
+fn what_no_source_sees_is_filled_and_marked() {
+    let sources = wall([1.0; 3]);
+    // Far to the side: the left part of the picture is on no photograph.
+    let target = camera(Vec3::new(-2.2, 0.0, 0.0), 72, 54);
+    let rendered = picture(&sources, &target);
+    assert!(rendered.colours.iter().flatten().chain(&rendered.depths).all(|value| value.is_finite()));
+    assert!(rendered.colours.iter().all(|colour| colour[3] == 1.0), "no void");
+    assert!(rendered.colours.iter().all(|colour| colour[..3].iter().any(|value| *value > 0.01)), "no void");
+    let mean = |columns: std::ops::Range<usize>| {
+        let count = (columns.len() * 54) as f32;
+        (0..54)
+            .flat_map(|row| columns.clone().map(move |column| row * 72 + column))
+            .map(|at| rendered.confidences[at])
+            .sum::<f32>()
+            / count
+    };
+    let (unseen, seen) = (mean(0..16), mean(60..72));
+    println!("confidence where nothing is seen {unseen}, where something is {seen}");
+    assert!(unseen < 0.05 && seen > 4.0 * unseen, "{unseen} {seen}");
+}
+
+#[test]
+fn extremes_give_finite_pictures() {
+    let target = camera(Vec3::ZERO, 24, 18);
+    let towards = |centre: Vec3| camera(centre, 24, 18);
+    let flat = |camera: Camera| SourceImage { camera, texels: vec![[0.5, 0.5, 0.5, 1.0]; 24 * 18] };
+    let turned = Camera { pose: Pose::look_at(Vec3::X, Vec3::X - Vec3::Z, -Vec3::Y).expect("a pose"), ..target };
+    let cases = [
+        ("no texture", vec![flat(towards(Vec3::X)), flat(towards(-Vec3::X))]),
+        ("the same camera twice", vec![photograph(towards(Vec3::ZERO), 1.0), photograph(towards(Vec3::ZERO), 1.0)]),
+        ("one looks away", vec![flat(turned), photograph(towards(Vec3::X), 1.0)]),
+        (
+            "a thousand units apart",
+            vec![photograph(towards(Vec3::X * 1.0e3), 1.0), photograph(towards(-Vec3::X * 1.0e3), 1.0)],
+        ),
+        (
+            "nothing is seen",
+            vec![SourceImage { camera: towards(Vec3::X), texels: vec![[0.0; 4]; 24 * 18] }, flat(towards(Vec3::Y))],
+        ),
+    ];
+    for (name, images) in cases {
+        for near_far in [Some([1.5, 8.0]), None] {
+            let sources = SourceImages { near_far, ..sources(images.clone()) };
+            let rendered = picture(&sources, &target);
+            let numbers = rendered.colours.iter().flatten().chain(&rendered.depths).chain(&rendered.confidences);
+            assert!(numbers.clone().all(|value| value.is_finite() && *value >= 0.0), "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_room_is_better_than_a_copy() {
+    let scene = Scene::open(repository().join("tests/data/room")).expect("the sample");
+    let selection = Selection { targets: Some("2,5,8".to_owned()), ..Selection::default() };
+    let job = selection.resolve(&scene, 2).expect("a job");
+    let options = RenderOptions { size: Some([160, 120]), ..RenderOptions::default() };
+    let weighting = Weighting::open("error:alpha=1").expect("a scheme");
+    let renderer = On { device: &Cpu, field: &TrainingFree::default() };
+    let frames = render_all(&scene, &job, &weighting, &renderer, &options).expect("frames");
+    for frame in frames {
+        let truth = frame.truth.expect("a truth");
+        let heaviest =
+            (0..job.sources.len() as u32).max_by(|a, b| frame.weights.get(*a).total_cmp(&frame.weights.get(*b)));
+        let copy = scene.photograph(job.sources[heaviest.expect("a source") as usize]).expect("a photograph").pixels;
+        let copy = image::imageops::resize(&copy, 160, 120, image::imageops::FilterType::Triangle);
+        let copy: Vec<u8> = copy.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        let (ours, copied) =
+            (psnr(frame.picture.as_raw(), truth.picture.as_raw()), psnr(&copy, truth.picture.as_raw()));
+        println!("{}: {ours:.2} dB, a copy {copied:.2} dB", frame.target.name);
+        assert!(ours > copied + 4.0, "{}: {ours} dB, a copy {copied} dB", frame.target.name);
+    }
+}
