@@ -125,8 +125,8 @@ fn a_plane_that_faces_the_cameras_is_found() {
         let (row, column) = (15, 20);
         let shown = swept.texels[(row * WIDTH + column - plane) as usize];
         let pixel = &pixels[(row * WIDTH + column) as usize];
-        for channel in 0..3 {
-            assert!((pixel.colour[channel] - shown[channel]).abs() < 0.02, "{:?}, not {shown:?}", pixel.colour);
+        for (found, shown) in pixel.colour.into_iter().zip(shown) {
+            assert!((found - shown).abs() < 0.02, "{:?} has {found}, not {shown}", pixel.colour);
         }
         assert!((pixel.depth - 32.0 / plane as f32).abs() < 0.1, "depth {}", pixel.depth);
     }
@@ -158,9 +158,9 @@ fn the_order_of_views_does_not_matter() {
             }
             let parts = [[a.difference, b.difference], [a.weight, b.weight], [a.dissent, b.dissent], [a.hull, b.hull]];
             for [a, b] in parts {
-                for plane in 0..PLANES {
-                    assert!((a[plane] - b[plane]).abs() <= 1.0e-6, "{} and {}", a[plane], b[plane]);
-                    compared += usize::from(a[plane] > 0.0);
+                for (a, b) in a.into_iter().zip(b) {
+                    assert!((a - b).abs() <= 1.0e-6, "{a} and {b}");
+                    compared += usize::from(a > 0.0);
                 }
             }
         }
@@ -279,8 +279,8 @@ fn one_plane_of_one_view_is_a_look_up() {
         let (x, y) = (pixel as f32 % WIDTH as f32, (pixel / WIDTH as usize) as f32);
         let (x, y) = (x.floor() + 0.5 - shift[0], y + 0.5 - shift[1]);
         let expected: [f32; 4] = bilinear_from(&swept.texels[..], 0, WIDTH, HEIGHT, x, y);
-        for channel in 0..4 {
-            assert!((seen.colour[channel] - expected[channel]).abs() < 1.0e-4, "{:?}, not {expected:?}", seen.colour);
+        for (found, expected) in seen.colour.into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1.0e-4, "{:?} has {found}, not {expected}", seen.colour);
         }
         assert!((seen.depth - 32.0 / plane as f32).abs() < 1.0e-4, "depth {}", seen.depth);
     }

@@ -207,15 +207,13 @@ pub fn band(numbers: &mut Numbers, swept: &Swept) -> (Vec<Planes>, Vec<Planes>) 
     }
     let mut evidence = Vec::new();
     for _ in 0..count {
-        let mut parts = [[0.0; PLANES]; 4];
-        for plane in 0..PLANES {
+        let mut of_plane = || {
             let weight = if numbers.between(0.0, 1.0) < 0.1 { 0.0 } else { numbers.between(0.05, 1.0) };
-            parts[0][plane] = weight * numbers.between(0.0, 0.25);
-            parts[1][plane] = weight;
-            parts[2][plane] = numbers.between(0.0, 1.0);
-            parts[3][plane] = numbers.between(-0.5, 1.5).clamp(0.0, 1.0);
-        }
-        evidence.extend(parts);
+            let difference = weight * numbers.between(0.0, 0.25);
+            [difference, weight, numbers.between(0.0, 1.0), numbers.between(-0.5, 1.5).clamp(0.0, 1.0)]
+        };
+        let planes: [[f32; 4]; PLANES] = std::array::from_fn(|_| of_plane());
+        evidence.extend((0..4).map(|part| planes.map(|parts| parts[part])));
     }
     (grey, evidence)
 }

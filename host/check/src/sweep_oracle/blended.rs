@@ -116,8 +116,8 @@ pub fn blend(
         let share = (-excess).exp();
         let disparity = disparity(block.far_disparity, block.disparity_step, plane);
         let shown = shown(block, views, texels, disparities, at, disparity)?;
-        for channel in 0..3 {
-            colour[channel] = colour[channel] + share * shown.colour[channel];
+        for (sum, shown) in colour.iter_mut().zip(shown.colour) {
+            *sum = *sum + share * shown;
         }
         hull = hull.greater(shown.hull);
         disparities_sum = disparities_sum + share * disparity;
