@@ -108,7 +108,7 @@ mod tests {
     #[test]
     fn a_slope_stays_a_slope() {
         let colours = (0..8).map(|index| [(index % 4) as f32, (index / 4) as f32, 0.5, 1.0]).collect();
-        let depths = (0..8).map(|index| index as f32).collect();
+        let depths: Vec<f32> = (0..8).map(|index| index as f32).collect();
         let picture = enlarged(Rendered { colours, confidences: depths.clone(), depths, width: 4, height: 2 }, [8, 4]);
         let red: Vec<f32> = picture.colours[..8].iter().map(|colour| colour[0]).collect();
         assert_eq!(red, [0.0, 0.25, 0.75, 1.25, 1.75, 2.25, 2.75, 3.0]);

@@ -67,6 +67,7 @@ fn photographs_without_any_background() {
         background: [0.0; 3],
         has_silhouettes: true,
         points: Vec::new(),
+        near_far: None,
         warning: None,
     };
     assert_sound(&Run::default().picture(&sources, &target(24)).expect("a picture"));
@@ -82,6 +83,7 @@ fn pictures_of_hardly_any_pixels() {
             background: [1.0; 3],
             has_silhouettes: true,
             points: Vec::new(),
+            near_far: None,
             near_far: None,
             warning: None,
         };
