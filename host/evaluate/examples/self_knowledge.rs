@@ -101,7 +101,7 @@ fn rendered(
         let frame = stage.frame(&chosen.weighting, &target_of(scene, target), &Silent)?;
         let confidence = frame.confidences.iter().sum::<f32>() / frame.confidences.len().max(1) as f32;
         views.push(json!({
-            "target": frame.target.name, "gap": chosen.gap(&frame), "confidence": confidence,
+            "target": frame.target.name, "standing": chosen.standing(&frame), "confidence": confidence,
             "expected": chosen.expected(&frame), "psnr": frame.truth.map(|truth| truth.psnr),
         }));
     }
