@@ -4,7 +4,8 @@
 //! `cargo run --release -p viewfuse-evaluate --example self_knowledge -- SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...`
 //!
 //! Pictures have a longest side of `SIDE`. With `grid`, all that `auto` tried is rendered at the targets as well, which is what
-//! takes the time. Each line of output is a JSON object: one a job.
+//! takes the time. Each line of output is a JSON object, one a job: what the constants of `viewfuse_field::auto` are fitted to.
+//! The last lines are the summary.
 
 use anyhow::{Context, bail};
 use serde_json::json;
@@ -28,16 +29,56 @@ fn main() -> anyhow::Result<()> {
         bail!("usage: self_knowledge SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...");
     };
     let (side, most_targets): (u32, usize) = (side.parse()?, most_targets.parse()?);
+    let mut summary = Summary::default();
     for job in jobs {
         let (folder, protocol) = job.split_once('=').context("a job is FOLDER=PROTOCOL")?;
-        if let Err(error) = measure(Path::new(folder), &protocol.parse()?, side, most_targets, mode == "grid") {
+        let protocol = protocol.parse()?;
+        if let Err(error) = measure(Path::new(folder), &protocol, side, most_targets, mode == "grid", &mut summary) {
             eprintln!("{job}: {error}");
         }
     }
+    summary.print();
     Ok(())
 }
 
-fn measure(folder: &Path, protocol: &Protocol, side: u32, most_targets: usize, grid: bool) -> anyhow::Result<()> {
+/// What all jobs say together.
+#[derive(Default)]
+struct Summary {
+    /// Expected and true score of each target, and whether the true one is in the interval.
+    targets: Vec<(f64, f64, bool)>,
+    /// Mean score of a job: as chosen, of the best candidate in hindsight, of the first one.
+    jobs: Vec<[f64; 3]>,
+}
+
+impl Summary {
+    fn print(&self) {
+        let (count, jobs) = (self.targets.len() as f64, self.jobs.len() as f64);
+        let mean = |value: &dyn Fn(&(f64, f64, bool)) -> f64| self.targets.iter().map(value).sum::<f64>() / count;
+        let (expected, truth) = (mean(&|target| target.0), mean(&|target| target.1));
+        let product = mean(&|target| (target.0 - expected) * (target.1 - truth));
+        let spreads = mean(&|target| (target.0 - expected).powi(2)) * mean(&|target| (target.1 - truth).powi(2));
+        let near = mean(&|target| f64::from((target.0 - target.1).abs() < 1.5));
+        let inside = mean(&|target| f64::from(target.2));
+        println!(
+            "{count} targets: correlation {:.2}, within 1.5 dB {near:.2}, within the interval {inside:.2}",
+            product / spreads.sqrt()
+        );
+        if !self.jobs.is_empty() {
+            let [chosen, best, first] =
+                [0, 1, 2].map(|column| self.jobs.iter().map(|job| job[column]).sum::<f64>() / jobs);
+            println!("{jobs} jobs: chosen {chosen:.2} dB, best in hindsight {best:.2}, first scheme {first:.2}");
+        }
+    }
+}
+
+fn measure(
+    folder: &Path,
+    protocol: &Protocol,
+    side: u32,
+    most_targets: usize,
+    grid: bool,
+    summary: &mut Summary,
+) -> anyhow::Result<()> {
     let mut scene = Scene::open(folder)?;
     let mut options = RenderOptions::default();
     if protocol.hides_masks() {
@@ -74,7 +115,14 @@ fn measure(folder: &Path, protocol: &Protocol, side: u32, most_targets: usize, g
             }
         }
         let start = std::time::Instant::now();
-        let views = rendered(&mut stage, scene, &chosen, &targets)?;
+        let views = rendered(&mut stage, scene, &chosen, &targets, summary)?;
+        if grid {
+            let means: Vec<f64> =
+                true_scores.iter().map(|scores| scores.iter().sum::<f64>() / scores.len() as f64).collect();
+            let own: f64 = summary.targets[summary.targets.len() - views.len()..].iter().map(|target| target.1).sum();
+            let best = means.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            summary.jobs.extend(means.first().map(|first| [own / views.len() as f64, best, *first]));
+        }
         let render_seconds = start.elapsed().as_secs_f64();
         let line = json!({
             "scene": folder, "protocol": protocol.to_string(), "sources": job.sources.len(),
@@ -93,6 +141,7 @@ fn rendered(
     scene: &Scene,
     chosen: &Chosen,
     targets: &[usize],
+    summary: &mut Summary,
 ) -> anyhow::Result<Vec<serde_json::Value>> {
     stage.tune(&chosen.settings);
     stage.weigh(&chosen.weighting, &Silent)?;
@@ -100,9 +149,12 @@ fn rendered(
     for &target in targets {
         let frame = stage.frame(&chosen.weighting, &target_of(scene, target), &Silent)?;
         let confidence = frame.confidences.iter().sum::<f32>() / frame.confidences.len().max(1) as f32;
+        let (Some(expected), Some(truth)) = (chosen.expected(&frame), &frame.truth) else { continue };
+        let is_inside = (expected.interval[0]..=expected.interval[1]).contains(&truth.psnr);
+        summary.targets.push((expected.psnr, truth.psnr, is_inside));
         views.push(json!({
-            "target": frame.target.name, "gap": chosen.gap(&frame), "confidence": confidence,
-            "expected": chosen.expected(&frame), "psnr": frame.truth.map(|truth| truth.psnr),
+            "target": frame.target.name, "standing": chosen.standing(&frame), "confidence": confidence,
+            "expected": expected, "psnr": truth.psnr,
         }));
     }
     Ok(views)

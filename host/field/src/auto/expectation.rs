@@ -7,13 +7,18 @@
 //! `P`, `G`, `K`: the means of score, gap and confidence over the sources that were left out (of the gap, the geometric one);
 //! `g`, `k`: the target's own; `D`: the decibels that the coarse pictures do not show, see [`Basis::detail`].
 
+use super::geometry::Standing;
 use super::leave_out::Outcome;
 use serde::Serialize;
 
-/// Fitted constants.
-const CONSTANTS: [f64; TERMS] = [0.0, 1.0, 0.0, 0.0];
-/// Standard deviation of what the fit leaves, decibels.
-const DEVIATION: f64 = 2.0;
+/// `c0` to `c3`. Least squares over 111 targets of 16 scenes ( fern, fox, cup, herz_jesus_p8, dtu_scan65, dino, three
+/// torcs_cars; the rooms, gardens and the lorry of `viewfuse-synthetic`) from 3 to 12 sources, at longest sides of 128 and 320
+/// pixels, each scene with the same weight in all. The example `self_knowledge` of `viewfuse-evaluate` prints what they were
+/// fitted to. Each scene predicted by a fit to the others: correlation 0.88, root mean square error 2.2 dB, 58 % of the targets
+/// within 1.5 dB, 79 % within the interval. They were fitted with `error:alpha=1` as the first scheme.
+const CONSTANTS: [f64; TERMS] = [1.37, 1.96, 15.1, 0.69];
+/// Root mean square error for scenes that the fit has not seen, decibels.
+const DEVIATION: f64 = 2.2;
 /// Deviations that hold 80 % of a normal distribution.
 const DEVIATIONS_OF_80: f64 = 1.2816;
 /// Terms of the sum.
@@ -49,24 +54,24 @@ impl Basis {
         let confidences: Option<Vec<f64>> = outcomes.iter().map(|outcome| outcome.confidence).collect();
         Basis {
             psnr: sum(&|outcome| outcome.psnr),
-            log_gap: sum(&|outcome| outcome.gap.log2()),
+            log_gap: sum(&|outcome| outcome.standing.gap.log2()),
             confidence: confidences.map(|all| all.iter().sum::<f64>() / count),
             detail,
         }
     }
 
     /// The terms that the constants multiply, for a target of this gap and mean confidence.
-    pub fn terms(&self, gap: f64, confidence: Option<f64>) -> [f64; TERMS] {
+    pub fn terms(&self, standing: Standing, confidence: Option<f64>) -> [f64; TERMS] {
         let surer = match (confidence, self.confidence) {
             (Some(own), Some(mean)) => own - mean,
             _ => 0.0,
         };
-        [1.0, self.log_gap - gap.log2(), surer, self.unseen()]
+        [1.0, self.log_gap - standing.gap.log2(), surer, self.unseen()]
     }
 
     /// The score to expect there.
-    pub fn expected(&self, gap: f64, confidence: Option<f64>) -> Expected {
-        let terms = self.terms(gap, confidence);
+    pub fn expected(&self, standing: Standing, confidence: Option<f64>) -> Expected {
+        let terms = self.terms(standing, confidence);
         let sum: f64 = terms.iter().zip(CONSTANTS).map(|(term, constant)| term * constant).sum();
         let (psnr, reach) = (self.psnr + sum, DEVIATIONS_OF_80 * DEVIATION);
         Expected { psnr, interval: [psnr - reach, psnr + reach] }

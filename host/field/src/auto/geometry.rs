@@ -1,11 +1,24 @@
 //! How far a camera is from its sources, in a measure that compares a target with a source that was left out.
 
+use glam::DVec3;
+use serde::Serialize;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_scene::rig::Rig;
 
 /// Squared gap below which sources count as one with the camera.
 const LEAST_SQUARED_GAP: f64 = 1.0e-8;
+
+/// Where a camera stands among its sources. With `g_i^2 = (d_i / D)^2 + a_i^2`, where `d_i` is the distance of the centres, `D` that
+/// to what the cameras look at, and `a_i` the angle between the principal axes in radians:
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Standing {
+    /// `(sum_i 1 / g_i^2)^(-1/2)`: at most the gap to the nearest source, less with every further one.
+    pub gap: f64,
+    /// `|sum_i v_i / g_i^2| / sum_i |v_i| / g_i^2` with `v_i` from the camera to a source: near 0 in the midst of the sources, 1
+    /// where all of them lie in one direction. For the record: the expectation does not use it.
+    pub outside: f64,
+}
 
 /// What distances are measured by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,16 +33,19 @@ impl Measure {
         Measure { distance: f64::from(Rig::of(cameras).distance).max(1.0e-12) }
     }
 
-    /// The gap between a camera and its sources: `(sum_i 1 / g_i^2)^(-1/2)` with `g_i^2 = (d_i / D)^2 + a_i^2`, where `d_i` is
-    /// the distance of the centres, `D` that to what the cameras look at, and `a_i` the angle between the principal axes in
-    /// radians. It is at most that to the nearest source, and becomes smaller with every further one.
-    pub(super) fn gap<'a>(&self, camera: &Pose, sources: impl Iterator<Item = &'a Pose>) -> f64 {
-        let squared = |source: &Pose| {
-            let distance = f64::from(source.distance(camera)) / self.distance;
+    /// Where a camera stands among its sources.
+    pub(super) fn standing<'a>(&self, camera: &Pose, sources: impl Iterator<Item = &'a Pose>) -> Standing {
+        let (mut sum, mut offset, mut length) = (0.0, DVec3::ZERO, 0.0);
+        for source in sources {
+            let towards = (source.centre_world() - camera.centre_world()).as_dvec3() / self.distance;
             let angle = f64::from(source.axis_angle(camera));
-            (distance * distance + angle * angle).max(LEAST_SQUARED_GAP)
-        };
-        let sum: f64 = sources.map(|source| 1.0 / squared(source)).sum();
-        if sum > 0.0 { sum.sqrt().recip() } else { 1.0 }
+            let weight = (towards.length_squared() + angle * angle).max(LEAST_SQUARED_GAP).recip();
+            sum += weight;
+            offset += weight * towards;
+            length += weight * towards.length();
+        }
+        let gap = if sum > 0.0 { sum.sqrt().recip() } else { 1.0 };
+        let outside = if length > 0.0 { offset.length() / length } else { 0.0 };
+        Standing { gap, outside }
     }
 }

@@ -1,6 +1,6 @@
 //! Sources rendered from the other sources, coarsely: what can be known of a field's pictures without any truth.
 
-use super::geometry::Measure;
+use super::geometry::{Measure, Standing};
 use crate::Setting;
 use crate::render::{RenderError, RenderOptions, Stage};
 use crate::renderer::Renderer;
@@ -37,7 +37,7 @@ struct Trial<'a> {
     stage: Stage<'a>,
     target: Target,
     truth: RgbImage,
-    gap: f64,
+    standing: Standing,
 }
 
 /// How a source came out that was left out.
@@ -49,8 +49,8 @@ pub(super) struct Outcome {
     pub(super) psnr: f64,
     /// Mean confidence of its pixels; `None` if the field does not tell.
     pub(super) confidence: Option<f64>,
-    /// Its gap to the others.
-    pub(super) gap: f64,
+    /// Where it stands among the others.
+    pub(super) standing: Standing,
 }
 
 /// The options of pictures of sources that are left out.
@@ -120,8 +120,8 @@ impl<'a> Trials<'a> {
             if own.size_at(&target.camera)? != [truth.width(), truth.height()] {
                 continue;
             }
-            let gap = measure.gap(&poses[source], others.iter().map(|&other| &poses[other]));
-            trials.push(Trial { source, stage: own, target, truth, gap });
+            let standing = measure.standing(&poses[source], others.iter().map(|&other| &poses[other]));
+            trials.push(Trial { source, stage: own, target, truth, standing });
         }
         Ok(Trials { trials })
     }
@@ -144,7 +144,7 @@ impl<'a> Trials<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
         let mut outcomes = Vec::with_capacity(self.trials.len());
-        for Trial { source, stage, target, truth, gap } in &mut self.trials {
+        for Trial { source, stage, target, truth, standing } in &mut self.trials {
             progress.check().map_err(stopped)?;
             stage.tune(settings);
             let frame = stage.frame(weighting, target, &Quiet(progress))?;
@@ -152,7 +152,7 @@ impl<'a> Trials<'a> {
                 source: *source,
                 psnr: psnr(&frame.picture, truth).min(MOST_PSNR),
                 confidence: mean(&frame.confidences),
-                gap: *gap,
+                standing: *standing,
             });
             progress.step();
         }

@@ -1,0 +1,147 @@
+//! The scheme and the settings that are chosen for a scene, and the score that is expected: on generated scenes.
+
+use std::error::Error;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::auto::{self, Chosen, MOST_LEFT_OUT, choose, schemes};
+use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
+use viewfuse::field::render::{Frame, RenderError, RenderOptions, Stage, render};
+use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::{Field, On};
+use viewfuse::job::progress::{Interrupted, Progress, Silent};
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{FewShot, Selection};
+use viewfuse::scene::photographs::Album;
+use viewfuse::synthetic::{Place, Rig, generate, write_shoot};
+
+const SIZE: [u32; 2] = [96, 72];
+
+/// A room from an arc, views 0 to `count` - 1.
+fn room(folder: &Path, count: u32) -> Scene {
+    let shoot = generate(Place::Room, Rig::Arc, 17, SIZE, count).expect("a room");
+    let folder = folder.join("room");
+    write_shoot(&folder, &shoot, 1, &Silent).expect("photographs");
+    Scene::open(&folder).expect("a scene")
+}
+
+/// The middle view from the others.
+fn middle(scene: &Scene) -> FewShot {
+    let targets = Some(scene.views[scene.views.len() / 2].name.clone());
+    Selection { targets, ..Selection::default() }.resolve(scene, 2).expect("a job")
+}
+
+fn options() -> RenderOptions {
+    RenderOptions { size: Some(SIZE), ..RenderOptions::default() }
+}
+
+/// What is chosen for these sources.
+fn chosen(
+    scene: &Scene,
+    sources: &[usize],
+    field: &(impl Field + Sync),
+    progress: &dyn Progress,
+) -> Result<Chosen, RenderError> {
+    let (renderer, options) = (On { device: &Cpu, field }, options());
+    let album = Album::open(scene, sources.iter().copied(), &Silent)?;
+    let stage = Stage::prepare(scene, &album, sources, &renderer, &options, &Silent)?;
+    choose(&stage, &renderer, &options, progress)
+}
+
+/// A run with what is chosen.
+fn automatic(scene: &Scene) -> Result<(Vec<Frame>, Chosen), Box<dyn Error>> {
+    let field = TrainingFree::default();
+    let (renderer, mut frames) = (On { device: &Cpu, field: &field }, Vec::new());
+    let (_, chosen) = auto::render(scene, &middle(scene), &renderer, &options(), &Silent, |_, frame, _| {
+        frames.push(frame);
+        Ok::<(), RenderError>(())
+    })?;
+    Ok((frames, chosen))
+}
+
+#[test]
+fn what_is_chosen_is_what_is_rendered() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 6);
+    let (frames, chosen) = automatic(&scene)?;
+    let field = TrainingFree::default();
+    let renderer = On { device: &Cpu, field: &field };
+    let given = RenderOptions { settings: chosen.settings.clone(), ..options() };
+    let mut same = Vec::new();
+    render(&scene, &middle(&scene), &chosen.weighting, &renderer, &given, &Silent, |_, frame| {
+        same.push(frame);
+        Ok::<(), RenderError>(())
+    })?;
+    assert_eq!((frames.len(), same.len()), (1, 1));
+    assert_eq!(frames[0].colours, same[0].colours);
+    assert_eq!(frames[0].confidences, same[0].confidences);
+    assert_eq!(frames[0].confidences.len(), frames[0].colours.len());
+    assert!(frames[0].confidences.iter().all(|confidence| (0.0..=1.0).contains(confidence)));
+    Ok(())
+}
+
+#[test]
+fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 6);
+    let (frames, chosen) = automatic(&scene)?;
+    let Chosen { candidates, left_out, weighting, settings, .. } = &chosen;
+    assert_eq!(left_out.len(), 5.min(MOST_LEFT_OUT));
+    assert!(candidates.len() > schemes().len(), "the field's scalars are tried as well");
+    assert!(candidates.iter().all(|candidate| candidate.scores.iter().all(|score| *score > 5.0)));
+    let score = |candidate: &auto::Candidate| candidate.psnr;
+    let own = candidates.iter().find(|one| one.weighting == weighting.to_string() && &one.settings == settings);
+    let own = own.map(score).ok_or("the choice was tried")?;
+    assert!(own >= score(&candidates[0]), "{own} is below the default");
+    let expected = chosen.expected(&frames[0]).ok_or("a score to expect")?;
+    let truth = frames[0].truth.as_ref().ok_or("a truth")?.psnr;
+    println!("expected {expected:?}, true {truth:.2} dB");
+    assert!(expected.interval[0] < expected.psnr && expected.psnr < expected.interval[1]);
+    assert!((expected.psnr - truth).abs() < 4.0, "{expected:?} instead of {truth:.2} dB");
+    Ok(())
+}
+
+#[test]
+fn two_sources_give_the_default_and_no_expectation() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 3);
+    let (frames, chosen) = automatic(&scene)?;
+    assert!(chosen.candidates.is_empty() && chosen.settings.is_empty() && chosen.left_out.is_empty());
+    assert_eq!(chosen.expected(&frames[0]), None);
+    Ok(())
+}
+
+#[test]
+fn a_field_without_scalars_has_its_scheme_chosen() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 3);
+    let network = test_networks::body(&Architecture::small(16));
+    let field = PixelNerf::new(&network, PixelNerfOptions::default())?;
+    let chosen = chosen(&scene, &[0, 1, 2], &field, &Silent)?;
+    assert_eq!((chosen.candidates.len(), chosen.settings.len()), (schemes().len(), 0));
+    Ok(())
+}
+
+/// Stops after so many looks.
+struct Patience(AtomicUsize);
+
+impl Progress for Patience {
+    fn is_cancelled(&self) -> bool {
+        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(1)).is_err()
+    }
+}
+
+#[test]
+fn it_can_be_stopped() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 4);
+    for looks in [0, 5, 40] {
+        let patience = Patience(AtomicUsize::new(looks));
+        let Err(error) = chosen(&scene, &[0, 1, 2, 3], &TrainingFree::default(), &patience) else {
+            panic!("{looks} looks are not enough");
+        };
+        let mut causes = std::iter::successors(Some(&error as &dyn Error), |error| error.source());
+        assert!(causes.any(|cause| cause.is::<Interrupted>()), "{error}");
+    }
+    Ok(())
+}
