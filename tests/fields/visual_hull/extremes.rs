@@ -84,7 +84,6 @@ fn pictures_of_hardly_any_pixels() {
             has_silhouettes: true,
             points: Vec::new(),
             near_far: None,
-            near_far: None,
             warning: None,
         };
         for target_side in [1, 5] {

@@ -85,7 +85,6 @@ pub(crate) fn views(object: &Object, cameras: &[Camera]) -> SourceImages {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
-        near_far: None,
         warning: None,
     }
 }
