@@ -140,8 +140,12 @@ fn it_can_be_stopped() -> Result<(), Box<dyn Error>> {
         let Err(error) = chosen(&scene, &[0, 1, 2, 3], &TrainingFree::default(), &patience) else {
             panic!("{looks} looks are not enough");
         };
-        let mut causes = std::iter::successors(Some(&error as &dyn Error), |error| error.source());
-        assert!(causes.any(|cause| cause.is::<Interrupted>()), "{error}");
+        let (mut cause, mut is_interrupted): (Option<&dyn Error>, bool) = (Some(&error), false);
+        while let Some(error) = cause {
+            is_interrupted |= error.is::<Interrupted>();
+            cause = error.source();
+        }
+        assert!(is_interrupted, "{looks} looks: {error}");
     }
     Ok(())
 }
