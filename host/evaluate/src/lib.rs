@@ -1,6 +1,6 @@
-//! How good pictures are, and at what cost.
+//! The quality of pictures and their run time.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! inspect      what a scene holds and what looks wrong with it
