@@ -18,7 +18,7 @@ use viewfuse_weighting::sources::MOST_SOURCES;
 const LOOK_SIDE: u32 = 128;
 /// A rig whose axes miss their common point by more than this share of the distance has no common subject.
 const MOST_AXIS_MISS: f32 = 0.25;
-/// Range of distances for which the parameters of published schemes (Gaussian, attention) were chosen.
+/// Range of distances for which the parameters of published schemes (Gaussian, attention) are meaningful.
 const USUAL_DISTANCES: (f32, f32) = (0.1, 100.0);
 
 /// The findings about a scene. Lengths in world units, world coordinates.

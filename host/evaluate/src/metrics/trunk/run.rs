@@ -93,7 +93,7 @@ impl<D: Device> LoadedConvolution<D> {
         debug_assert_eq!(padding, convolution.padding[1] + left, "{}", convolution.name);
         let (stride, padding) = (convolution.stride as u32, Some(padding as u32));
         let options = ConvolutionOptions { stride, padding, ..ConvolutionOptions::RELU };
-        // Scores must be exact: the fast convolution for large images is not allowed.
+        // Scores must be exact: no device may use another algorithm for large images.
         let layer = weights.load(device, 0)?;
         Ok(LoadedConvolution { layer, options })
     }
