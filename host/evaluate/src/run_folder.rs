@@ -52,7 +52,7 @@ pub enum FolderError {
     },
     /// The folder is that of another evaluation.
     #[error(
-        "{}: is of an evaluation with other settings ({}); take another folder, or the same settings to go on with it",
+        "{}: is of an evaluation with other settings ({}); use another folder, or the same settings to resume it",
         path.display(), differences.join("; ")
     )]
     Different {
@@ -62,7 +62,7 @@ pub enum FolderError {
         differences: Vec<String>,
     },
     /// A finished job does not belong to this evaluation, although the settings are the same.
-    #[error("{}: job {job} has other views than this version of the program would take; take another folder", path.display())]
+    #[error("{}: job {job} has other views than this version of the program would use; use another folder", path.display())]
     OtherJob {
         /// The folder.
         path: PathBuf,

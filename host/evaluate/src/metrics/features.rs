@@ -35,7 +35,7 @@ pub enum SetError {
         /// The required number in a row.
         dimension: usize,
     },
-    /// A number is infinite or not a number.
+    /// A number is infinite or NaN.
     #[error("number {index} of row {row} is not finite")]
     NotFinite {
         /// The picture.
