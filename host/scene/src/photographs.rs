@@ -33,7 +33,7 @@ pub enum PhotographsError {
     },
     /// The background covers the whole photograph, or nothing of it.
     #[error(
-        "{path}: shows no object before the background ({colour}); give the background's colour, or photographs with an \
+        "{path}: shows no object in front of the background ({colour}); give the background's colour, or photographs with an \
          alpha channel"
     )]
     NoSilhouette {
@@ -244,7 +244,7 @@ impl<'a> Album<'a> {
         };
         if choice == BackgroundChoice::Auto && whole_pictures {
             warning = Some(format!(
-                "the photographs' borders are not of one colour (they stray by {:.0} of 255 from {backdrop}): nothing is cut \
+                "the photographs' borders are not of one colour (they deviate by {:.0} of 255 from {backdrop}): nothing is cut \
                  out, whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG \
                  with alpha)",
                 backdrop.noise_level()
@@ -264,7 +264,7 @@ impl<'a> Album<'a> {
         match all(&borders) {
             Err(PhotographsError::NoSilhouette { path, colour }) if choice == BackgroundChoice::Auto => {
                 warning = Some(format!(
-                    "{path}: shows no object before a background of {colour}: nothing is cut out, whole pictures are used"
+                    "{path}: shows no object in front of a background of {colour}: nothing is cut out, whole pictures are used"
                 ));
                 borders.iter_mut().for_each(|border| *border = None);
                 let images = views

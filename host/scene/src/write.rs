@@ -83,7 +83,7 @@ pub enum WriteSceneError {
         reason: String,
     },
     /// The path exists already.
-    #[error("{}: is there already and not an empty folder; give another name", folder.display())]
+    #[error("{}: exists already and is not an empty folder; give another name", folder.display())]
     Occupied {
         /// The folder to write.
         folder: PathBuf,
