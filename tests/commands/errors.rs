@@ -107,7 +107,7 @@ fn photographs_that_are_none() {
 fn nothing_but_background() {
     let folder = toy();
     folder.image("toy/rgb/000003.png", 128, 128);
-    assert_scene_refused(&folder, &["toy/rgb/000003.png: shows no object before the background", "--background"]);
+    assert_scene_refused(&folder, &["toy/rgb/000003.png: shows no object in front of the background", "--background"]);
 }
 
 fn silhouettes_with_nothing_in_common() {

@@ -1,15 +1,15 @@
-//! Pictures that need no field: what every field must be above.
+//! Baselines without a field: copies and warps of the nearest sources. A field must score above them.
 //!
 //! ```text
-//! plane   how far the scene is, as one number for each target
+//! plane   one scene depth for each target
 //! warp    a source as the target would see it if the scene were a plane at that depth
 //! ```
 //!
 //! | row | picture |
 //! |---|---|
 //! | `nearest copy` | the source whose camera is nearest, as it is |
-//! | `warped copy` | the same source, warped by the homography of the plane |
-//! | `warped blend` | the mean of the four nearest sources, each so warped |
+//! | `warped copy` | the same source, warped by the plane's homography |
+//! | `warped blend` | the mean of the four nearest sources, each warped |
 //!
 //! The plane is perpendicular to the target's principal axis. All arithmetic is in `f64` on the host; values are 8-bit
 //! levels, looked up bilinearly and rounded once at the end.
@@ -25,7 +25,7 @@ use std::fmt;
 use viewfuse_core::camera::Camera;
 use warp::Homography;
 
-/// A source photograph with the camera of exactly these pixels.
+/// A source photograph and the camera of its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
     /// Its camera; width and height are the picture's.
@@ -34,22 +34,22 @@ pub struct Shot {
     pub picture: RgbImage,
 }
 
-/// A picture made of sources without a field.
+/// A picture computed from the sources without a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Baseline {
     /// The nearest source as it is, resampled to the target's size.
     NearestCopy,
     /// The nearest source warped by the homography of a plane.
     WarpedCopy,
-    /// The mean of the [`BLENDED`] nearest sources so warped.
+    /// The mean of the [`BLENDED`] nearest sources, each warped.
     WarpedBlend,
 }
 
-/// Sources that [`Baseline::WarpedBlend`] takes.
+/// Number of sources that [`Baseline::WarpedBlend`] uses.
 pub const BLENDED: usize = 4;
 
 impl Baseline {
-    /// All of them, in the order of their rows.
+    /// All baselines, in the order of their rows.
     pub const ALL: [Baseline; 3] = [Baseline::NearestCopy, Baseline::WarpedCopy, Baseline::WarpedBlend];
 
     /// The name of its row.
@@ -61,12 +61,12 @@ impl Baseline {
         }
     }
 
-    /// Whether a row of this name is a baseline and no scheme.
+    /// Whether a row of this name is a baseline and not a scheme.
     pub fn is_named(row: &str) -> bool {
         Baseline::ALL.iter().any(|baseline| baseline.name() == row)
     }
 
-    /// How many sources it takes at most, the nearest first.
+    /// The largest number of sources that it uses, nearest first.
     pub const fn source_count(self) -> usize {
         match self {
             Baseline::NearestCopy | Baseline::WarpedCopy => 1,
@@ -76,7 +76,7 @@ impl Baseline {
 
     /// The picture at a target, of the target's size. `nearest` are sources, the nearest to the target first; `depth` is
     /// that of the plane along the target's principal axis in world units, infinite for the homography of a pure
-    /// rotation. Of no source the picture is black.
+    /// rotation. Without sources the picture is black.
     ///
     /// Where the plane's point lies outside a source, the copy takes the source's nearest pixel. The blend is the mean of
     /// those sources that show the point, and where none does, the nearest source's nearest pixel.
@@ -105,7 +105,7 @@ impl fmt::Display for Baseline {
     }
 }
 
-/// The mean of those looks that are inside their picture; if none is, the first look. Of no look 0.
+/// The mean of the samples that are inside their picture; if none is, the first sample. Without samples 0.
 fn mean_of_seen(looks: impl Iterator<Item = Look>) -> [f64; 3] {
     let (mut sum, mut count, mut first) = ([0.0; 3], 0_u32, None);
     for look in looks {

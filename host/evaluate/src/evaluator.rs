@@ -1,4 +1,4 @@
-//! How good is each weighting scheme: views are left out of the sources, rendered, and compared with their photographs.
+//! Scores each weighting scheme: views are held out of the sources, rendered, and compared with their photographs.
 
 use crate::baseline::plane::plane_depth;
 use crate::baseline::{BLENDED, Baseline, Shot};
@@ -19,7 +19,7 @@ use viewfuse_weighting::Weighting;
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
 pub enum EvaluateError {
-    /// The choice of views is no job.
+    /// The selection of views is invalid.
     #[error(transparent)]
     Selection(#[from] SelectionError),
     /// A target has no photograph to compare with.
@@ -51,11 +51,12 @@ pub struct Score {
     pub scheme: String,
     /// The target view.
     pub target: String,
-    /// How many sources there were.
+    /// Number of sources.
     pub source_count: usize,
     /// Metrics by name, [`PSNR`] first.
     pub values: Vec<(String, f64)>,
-    /// Encoding and rendering for this target and scheme; encoding that targets share is divided among them.
+    /// Seconds for encoding and rendering this target with this scheme; encoding that targets share is divided among
+    /// them.
     pub time: Duration,
 }
 
@@ -78,7 +79,7 @@ pub struct Subject<'a> {
     pub masked: Option<&'a Scene>,
 }
 
-/// A scene whose photographs have no masks beside them: they are seen whole.
+/// A scene whose photographs have no masks: whole photographs are used.
 pub fn without_masks(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     scene.views.iter_mut().for_each(|view| view.mask = None);
@@ -181,7 +182,7 @@ impl Evaluator<'_> {
         Ok(values)
     }
 
-    /// The truth of a target with its mask, if masked metrics are wanted and it has one.
+    /// The truth of a target with its mask, if masked metrics are requested and it has a mask.
     fn mask(
         &self,
         masked: Option<&Scene>,

@@ -30,7 +30,7 @@ pub enum GalleryError {
         /// What the system said.
         cause: std::io::Error,
     },
-    /// A file is no description of pictures.
+    /// A file does not describe pictures.
     #[error("{}: does not describe pictures of an evaluation: {cause}", path.display())]
     Json {
         /// The file.
@@ -40,7 +40,7 @@ pub enum GalleryError {
     },
 }
 
-/// What there is to see of a target. File names are relative to the folder of pictures.
+/// The pictures of a target. File names are relative to the folder of pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shown {
     /// The job's number.
@@ -71,11 +71,11 @@ pub struct ShownSource {
 pub struct ShownScheme {
     /// The scheme.
     pub scheme: String,
-    /// What it made of the sources.
+    /// The rendered picture.
     pub file: String,
-    /// Weight of each source as used, in their order.
+    /// Weight of each source as used, in the order of the sources.
     pub weights: Vec<f32>,
-    /// How good the picture is, by name of the metric; null for what is no finite number.
+    /// Scores by name of the metric; null for a score that is not finite.
     pub values: Vec<(String, Option<f64>)>,
 }
 
@@ -88,7 +88,7 @@ pub struct Gallery {
 }
 
 impl Gallery {
-    /// Takes what is needed of a frame.
+    /// Stores the parts of a frame that the report needs.
     pub fn add(&mut self, weighting: &Weighting, frame: &Frame, values: &[(String, f64)], sources: &SourceImages) {
         let Some(truth) = &frame.truth else { return };
         if self.sources.is_empty() {
@@ -105,7 +105,7 @@ impl Gallery {
         self.schemes.push((frame.picture.clone(), shown));
     }
 
-    /// Writes the pictures and then what describes them. `names` are those of the sources.
+    /// Writes the pictures and then their description. `names` are those of the sources.
     ///
     /// # Errors
     /// [`GalleryError::Write`].
@@ -152,7 +152,7 @@ fn thumbnail(picture: RgbImage) -> RgbImage {
     imageops::resize(&picture, scaled(width), scaled(height), imageops::FilterType::Triangle)
 }
 
-/// What there is to see in the folder of an evaluation, by number of job; nothing if it has no pictures.
+/// The pictures in the folder of an evaluation, by number of job; empty if it has none.
 ///
 /// # Errors
 /// [`GalleryError`].

@@ -1,4 +1,4 @@
-//! What a scene holds and what looks wrong with it: before hours are spent on rendering.
+//! The contents of a scene and likely faults in it, to be checked before hours of rendering.
 
 use image::RgbImage;
 use serde::Serialize;
@@ -14,14 +14,14 @@ use viewfuse_scene::rig::Rig;
 use viewfuse_scene::{Scene, View};
 use viewfuse_weighting::sources::MOST_SOURCES;
 
-/// Longest side at which photographs are looked at: enough to find the object.
+/// Longest side at which photographs are read, in pixels: enough to find the object.
 const LOOK_SIDE: u32 = 128;
 /// A rig whose axes miss their common point by more than this share of the distance has no common subject.
 const MOST_AXIS_MISS: f32 = 0.25;
-/// Distances within which the parameters of published schemes (Gaussian, attention) mean something.
+/// Range of distances for which the parameters of published schemes (Gaussian, attention) are meaningful.
 const USUAL_DISTANCES: (f32, f32) = (0.1, 100.0);
 
-/// What was found out about a scene. Lengths in world units, world coordinates.
+/// The findings about a scene. Lengths in world units, world coordinates.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspection {
     /// The path it was opened from.
@@ -32,7 +32,7 @@ pub struct Inspection {
     pub photograph_count: usize,
     /// Target poses without one.
     pub target_count: usize,
-    /// Views whose photograph was taken through a lens that is undone when it is read.
+    /// Views whose photograph is undistorted when it is read.
     pub lens_count: usize,
     /// Views with a mask.
     pub mask_count: usize,
@@ -54,19 +54,19 @@ pub struct Inspection {
     pub axis_miss: f32,
     /// Least and greatest distance of a camera from it.
     pub distances: [f32; 2],
-    /// Which way is up.
+    /// The up direction.
     pub up: [f32; 3],
-    /// Least and greatest corner of the box around the object that the silhouettes show, if they show one.
+    /// Least and greatest corner of the bounding box of the visual hull, if there is one.
     pub object: Option<[[f32; 3]; 2]>,
     /// Least depth of the object in any view, or of the ball that the cameras see.
     pub near: f32,
     /// Greatest depth.
     pub far: f32,
-    /// What looks wrong, one line each.
+    /// Warnings, one line each.
     pub warnings: Vec<String>,
 }
 
-/// Looks at a scene. Photographs are read at a small size to find the object; if that fails, the reason is a warning.
+/// Inspects a scene. Photographs are read at a small size to find the object; if that fails, the reason is a warning.
 ///
 /// # Errors
 /// [`Interrupted`] if the work is stopped.
@@ -118,7 +118,7 @@ pub fn inspect(
     })
 }
 
-/// What looks wrong with the cameras.
+/// Warnings about the cameras.
 fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
     let mut warnings = Vec::new();
     let cameras = || scene.views.iter().map(|view| &view.camera);
@@ -163,7 +163,7 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
     warnings
 }
 
-/// The object that the silhouettes show, or why there is none.
+/// The bounding box of the visual hull, or why there is none.
 fn object_of(
     scene: &Scene,
     background: BackgroundChoice,
@@ -197,7 +197,7 @@ fn depth_range(cameras: &[Camera], rig: &Rig, object: Option<&ObjectBlock>) -> [
             }
         }
     }
-    // Cameras that look away from everything have nothing before them: the range is empty then, not inside out.
+    // Cameras that look away from everything have nothing in front of them: the range is then empty, not inverted.
     range[0] = range[0].max(0.01 * rig.distance);
     range[1] = range[1].max(range[0]);
     range
@@ -243,7 +243,7 @@ pub fn camera_map(scene: &Scene, inspection: &Inspection) -> RgbImage {
         let ahead = flat(pose.centre_world() + pose.forward_world() * (0.12 * reach));
         canvas.line(from, at(ahead), colour);
         canvas.disc(from, 7, colour);
-        // Names stand outside the ring.
+        // Names are drawn outside the ring.
         let outwards = (from.0 - middle.0, from.1 - middle.1);
         let label = short_name(&view.name);
         let width = label.len() as i32 * 6;

@@ -1,15 +1,15 @@
-//! How good pictures are, and at what cost.
+//! The quality of pictures and their run time.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! inspect      what a scene holds and what looks wrong with it
-//! metrics      how good is a picture
-//! baseline     pictures that need no field: copies and warps of the nearest sources
+//! metrics      metrics of pictures
+//! baseline     baselines without a field: copies and warps of the nearest sources
 //! evaluator    each weighting scheme on views that are left out      Evaluator
 //! protocol     which views are sources, which are targets
 //! pareto       error against run time
-//! run_folder   an evaluation that goes on after a kill, in shards
+//! run_folder   an evaluation that resumes after a kill, in shards
 //! summary      its tables: means with intervals
 //! gallery      its pictures
 //! report       all of it on one page

@@ -1,20 +1,20 @@
-//! How good pictures are: as numbers, and through the eyes of published networks.
+//! Metrics of pictures: directly from pixels, and with the features of published networks.
 //!
 //! ```text
 //! similarity       SSIM with a Gaussian window
 //! trunk            the networks' layers, on any device
-//! heads            the few numbers that were fitted to people's judgement
+//! heads            the few weights that were fitted to human judgement
 //! lpips, dists     distance of two pictures
-//! features         a set of pictures as Inception's numbers
+//! features         a set of pictures as Inception's features
 //! frechet, kernel  distance of two sets: FID, KID
-//! convention       what published tables mean by their scores
+//! convention       how published tables compute their scores
 //! masked           PSNR and SSIM of the object alone
-//! interval         means over scenes, and how sure they are
+//! interval         means over scenes with confidence intervals
 //! ```
 //!
 //! PSNR and SSIM with a uniform window are in [`viewfuse_core::metrics`]. The networks' weights are not part of this
-//! project: a person brings the `state_dict`s that torchvision and pytorch-fid publish. [`Metrics`] is what the commands
-//! use.
+//! project: the user supplies the `state_dict`s that torchvision and pytorch-fid publish. [`Metrics`] is the interface
+//! that the commands use.
 
 pub mod convention;
 pub mod dists;
@@ -55,7 +55,7 @@ pub enum MetricError {
         /// Its height.
         height: usize,
     },
-    /// Two pictures that are to be compared have different sizes.
+    /// Two pictures to compare have different sizes.
     #[error("a picture of {}x{} cannot be compared with one of {}x{}", prediction[0], prediction[1], truth[0], truth[1])]
     Sizes {
         /// Width and height of the prediction.
@@ -82,9 +82,9 @@ pub struct Scored {
     pub more_is_better: bool,
 }
 
-/// The metrics that a person asked for, their networks on a device.
+/// The requested metrics, their networks on a device.
 pub struct Metrics<D: Device> {
-    /// What the scores are to mean.
+    /// The convention of the scores.
     pub convention: Convention,
     /// LPIPS by any number of trunks.
     pub lpips: Vec<Lpips<D>>,
@@ -100,8 +100,8 @@ impl<D: Device> Metrics<D> {
         Metrics { convention: Convention::Plain, lpips: Vec::new(), dists: None, inception: None }
     }
 
-    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, and what networks there are, in the order of
-    /// [`Scored::name`]'s list.
+    /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, and the metrics of the loaded networks, in the
+    /// order of [`Scored::name`]'s list.
     ///
     /// # Errors
     /// [`MetricError`].
@@ -125,7 +125,7 @@ impl<D: Device> Metrics<D> {
         Ok(scores)
     }
 
-    /// What Inception sees in predictions as the convention shows them; `None` without that network.
+    /// Inception's features of predictions under the convention; `None` without that network.
     ///
     /// # Errors
     /// [`MetricError`].
@@ -138,7 +138,7 @@ impl<D: Device> Metrics<D> {
         self.features_of_truths(device, shown.iter().map(AsRef::as_ref))
     }
 
-    /// What Inception sees in photographs; `None` without that network.
+    /// Inception's features of photographs; `None` without that network.
     ///
     /// # Errors
     /// [`MetricError`].
@@ -151,7 +151,7 @@ impl<D: Device> Metrics<D> {
     }
 }
 
-/// What scores pictures, wherever its networks run.
+/// Scores pictures, on any device.
 pub trait Scorer {
     /// Scores a prediction, as [`Metrics::compare`] does.
     ///

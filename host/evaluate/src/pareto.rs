@@ -1,11 +1,11 @@
-//! Error against run time: one scene rendered under a list of settings, each compared with the first of them, which
-//! leaves nothing out.
+//! Error against run time: one scene rendered under a list of settings, each compared with the first one, the exact
+//! one, which skips nothing.
 //!
-//! A field says what can be set about it in [`settings`]; [`Subject::measure`] renders, [`front`] marks the settings that are the
-//! best for their time, [`plot`] and [`record`] show the outcome. Nothing here knows a particular field but the lists.
+//! [`settings`] lists the settings of each field; [`Subject::measure`] renders, [`front`] marks the Pareto-optimal
+//! settings, [`plot`] and [`record`] show the results. Only the lists depend on a particular field.
 //!
-//! Times are medians over rounds. A round goes once through all settings, so that what else a machine does at one time
-//! falls on all of them; still, times on a shared machine are noisy, and differences of a few percent mean nothing.
+//! Times are medians over rounds. A round runs every setting once, so that other load on the machine affects all of
+//! them; still, times on a shared machine are noisy, and differences of a few percent are not significant.
 
 pub mod difference;
 pub mod front;
@@ -27,25 +27,25 @@ use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{Album, SourceImages};
 use viewfuse_weighting::Weighting;
 
-/// One way to make the pictures.
+/// One configuration for rendering.
 #[derive(Clone)]
 pub struct Setting {
-    /// In a few words, for tables and labels.
+    /// A short name, for tables and labels.
     pub words: String,
     /// The field, set up for it.
     pub field: AnyField,
-    /// What is set outside of the field. The size must be the same in all settings.
+    /// Options outside of the field. The size must be the same in all settings.
     pub options: RenderOptions,
 }
 
-/// What a setting gave.
+/// The result of a setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// The setting, in a few words.
+    /// The setting's short name.
     pub setting: String,
     /// Seconds for a target, encoding included: the median over the rounds.
     pub seconds: f64,
-    /// The least and the most of the rounds.
+    /// Least and greatest time of the rounds.
     pub seconds_range: [f64; 2],
     /// Seconds of that for encoding the sources: the median over the rounds.
     pub encode_seconds: f64,
@@ -54,13 +54,13 @@ pub struct Point {
     /// Peak signal to noise ratio against the photographs in decibels, of 8-bit values, the mean over the targets that
     /// have one.
     pub truth_psnr: Option<f64>,
-    /// What the field did and left out in one round.
+    /// The work that the field did and skipped in one round.
     pub record: Record,
-    /// Whether every round gave the same pictures, bit for bit.
+    /// Whether every round rendered the same pictures, bit for bit.
     pub is_repeatable: bool,
 }
 
-/// What all settings gave on a device.
+/// The results of all settings on a device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
     /// One for each setting, in their order.
@@ -95,7 +95,7 @@ pub struct Subject<'a> {
 
 impl Subject<'_> {
     /// Renders all targets under every setting, `round_count` times after a first round that is not timed. In each round a
-    /// setting starts with nothing encoded; taking photographs and parameters to the device is not counted.
+    /// setting starts with nothing encoded; uploading photographs and parameters to the device is not counted.
     ///
     /// `progress` gets a step for every picture.
     ///
@@ -110,7 +110,7 @@ impl Subject<'_> {
     ) -> Result<Measured, RenderError> {
         progress.expect(settings.len() * self.job.targets.len() * (round_count as usize + 1));
         let images = self.images(settings, progress)?;
-        // Later rounds only take time: they are not compared with the truth.
+        // Later rounds are only timed, not compared with the truth.
         let mut without_truth = self.job.targets.clone();
         without_truth.iter_mut().for_each(|target| target.truth = None);
         let mut exact: Vec<Vec<[f32; 4]>> = Vec::new();
@@ -140,7 +140,7 @@ impl Subject<'_> {
         Ok(Measured { points, exact, size })
     }
 
-    /// The sources for each setting; those of one size are prepared once.
+    /// The sources for each setting; sources of the same size are prepared once.
     fn images(&self, settings: &[Setting], progress: &dyn Progress) -> Result<Vec<Arc<SourceImages>>, RenderError> {
         let Subject { scene, album, job, .. } = self;
         let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
@@ -170,7 +170,7 @@ impl Subject<'_> {
     ) -> Result<Round, RenderError> {
         let (images, sources, quiet) = (Arc::clone(images), &self.job.sources, Quiet(progress));
         let mut stage = Stage::of_images(self.scene, self.album, sources, images, renderer, options, &quiet)?;
-        // What was sent to the device must not end within the first measured time.
+        // Uploads to the device must end before the first measurement.
         renderer.finish().map_err(viewfuse_field::FieldError::Device)?;
         stage.weigh(self.weighting, &quiet)?;
         let mut frames = Vec::new();
@@ -184,14 +184,14 @@ impl Subject<'_> {
 
 /// All targets rendered once under a setting.
 struct Round {
-    /// What the targets share.
+    /// The state that the targets share.
     encode: Duration,
     record: Record,
     frames: Vec<Frame>,
 }
 
 impl Round {
-    /// In all, and for encoding alone.
+    /// In total, and for encoding alone.
     fn seconds_a_target(&self) -> [f64; 2] {
         let encode = self.encode + self.frames.iter().map(|frame| frame.encode).sum::<Duration>();
         let all = self.encode + self.frames.iter().map(|frame| frame.time).sum::<Duration>();
@@ -199,7 +199,7 @@ impl Round {
     }
 }
 
-/// What is kept of a setting's first round.
+/// The results kept from a setting's first round.
 struct First {
     difference: Difference,
     truth_psnr: Option<f64>,
@@ -219,7 +219,7 @@ impl First {
         First { difference, truth_psnr, record, fingerprint: fingerprint(frames), is_repeatable: true }
     }
 
-    /// `times[round]`: in all and for encoding.
+    /// `times[round]`: in total and for encoding.
     fn point(self, words: &str, times: &[[f64; 2]]) -> Point {
         let First { difference, truth_psnr, record, is_repeatable, .. } = self;
         let all = sorted(times.iter().map(|[all, _]| *all));
@@ -238,7 +238,7 @@ impl First {
     }
 }
 
-/// A number that two sets of pictures share only if they are the same bit for bit (or by a chance of one in 2^64).
+/// A hash of a set of pictures: equal for equal pictures; different pictures collide with probability 2^-64.
 fn fingerprint(frames: &[Frame]) -> u64 {
     let mut hasher = DefaultHasher::new();
     for frame in frames {
@@ -253,7 +253,7 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
     values
 }
 
-/// The middle of sorted values, or the mean of the two middle ones; NaN of none.
+/// The middle of sorted values, or the mean of the two middle ones; NaN without values.
 fn median(sorted: &[f64]) -> f64 {
     match (sorted.len(), sorted.len() / 2) {
         (0, _) => f64::NAN,

@@ -4,13 +4,13 @@
 //! random               sources and targets drawn from all photographs (the paper's first table)
 //! close                five sources, exactly one of them near the target (its second table)
 //! count                2, 8, 16, 32 sources, each set within the next, the same targets (its figures)
-//! fixed                the view lists that were published, or a person's own
+//! fixed                the view lists that were published, or the user's own
 //! nearest              each target from the views nearest to it
 //! llff, dtu, blender   the benchmarks of few-shot papers
 //! ```
 //!
-//! What is drawn hangs on the seed, the scene's name and the number of the trial, and on nothing else: not on which
-//! machine takes which job, nor on the order of the scenes. `random` and `count` of one seed draw the same targets.
+//! Draws depend only on the seed, the scene's name and the number of the trial: not on which machine runs which job,
+//! nor on the order of the scenes. `random` and `count` of one seed draw the same targets.
 
 mod benchmark;
 mod draw;
@@ -30,13 +30,13 @@ use viewfuse_core::Vec3;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::reduced_size;
 
-/// Sources of `random` unless a person says otherwise.
+/// Default number of sources of `random`.
 pub const RANDOM_SOURCES: usize = 3;
-/// Sources of `close` unless a person says otherwise: the paper's.
+/// Default number of sources of `close`: the paper's.
 pub const CLOSE_SOURCES: usize = 5;
-/// What counts as near for `close` unless a person says otherwise, in degrees: the paper's.
+/// Default angle below which a source is near for `close`, in degrees: the paper's.
 pub const CLOSE_DEGREES: f32 = 10.0;
-/// Numbers of sources of `count` unless a person says otherwise: the paper's.
+/// Default numbers of sources of `count`: the paper's.
 pub const COUNTS: [usize; 4] = [2, 8, 16, 32];
 
 /// How sources and targets are chosen. As text: `NAME` or `NAME:KEY=VALUE[,KEY=VALUE]`, of `fixed` `fixed:LIST` or
@@ -44,20 +44,20 @@ pub const COUNTS: [usize; 4] = [2, 8, 16, 32];
 /// `NAME:K,masks=given`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Protocol {
-    /// So many sources; they and the targets are drawn from all photographs.
+    /// This many sources; sources and targets are drawn from all photographs.
     Random {
         /// How many sources.
         sources: usize,
     },
-    /// Each target has its own sources, of which exactly one is near: seen from what the cameras look at, it stands less
-    /// than this angle away. All others stand farther.
+    /// Each target has its own sources, of which exactly one is near: seen from the rig's focus, its angle to the
+    /// target is below this. The angles of all others are larger.
     Close {
         /// How many sources, the near one included.
         sources: usize,
-        /// What is near, in degrees.
+        /// The largest angle of a near source, in degrees.
         degrees: f32,
     },
-    /// Several numbers of sources for the same targets; of fewer sources all are among those of more.
+    /// Several numbers of sources for the same targets; a smaller set is part of each larger one.
     Count {
         /// The numbers, ascending.
         sources: Vec<usize>,
@@ -82,29 +82,29 @@ pub enum Protocol {
         benchmark: Benchmark,
         /// How many sources.
         sources: usize,
-        /// Whether fields are given the masks that stand beside the photographs. Papers' methods are not: there, the
-        /// truth's mask serves the metric only.
+        /// Whether fields are given the photographs' masks. The papers' methods are not: there, only the metric uses
+        /// the truth's mask.
         masks_given: bool,
     },
 }
 
-/// How much is drawn, and from which seed.
+/// The number of draws, and their seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Draws {
     /// Seed of all draws.
     pub seed: u64,
     /// How many times sources and targets are drawn for every scene. Protocols that draw nothing have one trial.
     pub trial_count: u32,
-    /// Targets of a trial. Protocols that draw nothing say their targets themselves.
+    /// Targets of a trial. Protocols that draw nothing define their targets themselves.
     pub target_count: usize,
 }
 
-/// A set of sources with the targets that are rendered from it: what one device does in one go.
+/// A set of sources with the targets that are rendered from it: the unit of work of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Job {
-    /// Which of the scenes.
+    /// Index of the scene.
     pub scene: usize,
-    /// Which draw.
+    /// Number of the trial.
     pub trial: u32,
     /// Source views, ascending.
     pub sources: Vec<usize>,
@@ -112,25 +112,25 @@ pub struct Job {
     pub targets: Vec<usize>,
 }
 
-/// All jobs of an evaluation, in an order that only the scenes' order and the protocol decide.
+/// All jobs of an evaluation, in an order that depends only on the scenes' order and the protocol.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
     /// The jobs; a job's number is its place.
     pub jobs: Vec<Job>,
-    /// What the protocol wanted of a scene and the scene has not, a line each.
+    /// What the protocol requires and a scene lacks, a line each.
     pub notes: Vec<String>,
 }
 
 impl Protocol {
-    /// The jobs on these scenes. `least_sources` is what the field needs.
+    /// The jobs on these scenes. `least_sources` is the least number that the field requires.
     ///
-    /// A scene with too few photographs for a number of sources beside the targets is left out for that number, with a note.
-    /// So is, for [`Protocol::Close`], a view that no other is near to, or that fewer are far from than sources are wanted;
-    /// other views are targets then.
+    /// A scene with too few photographs for a number of sources and the targets is skipped for that number, with a
+    /// note. [`Protocol::Close`] also skips a view as a target if no other view is near it, or too few views are far
+    /// from it; other views replace it.
     ///
     /// # Errors
-    /// [`ProtocolError`] if no job is left or the field needs more sources; [`SelectionError`] of a list that does not fit
-    /// a scene.
+    /// [`ProtocolError`] if no job is left or the field needs more sources; [`SelectionError`] for a list that does not
+    /// fit a scene.
     pub fn plan(&self, scenes: &[Scene], draws: Draws, least_sources: usize) -> Result<Plan, ProtocolError> {
         let fewest = match self {
             Protocol::Random { sources }
@@ -171,7 +171,7 @@ impl Protocol {
                         Err(lack) => vec![format!("{} {lack}", scene.name())],
                     },
                 };
-                // What a scene has not is the same in every trial.
+                // What a scene lacks is the same in every trial.
                 plan.notes.extend(notes.into_iter().filter(|_| trial == 0));
             }
         }
@@ -196,21 +196,21 @@ impl Protocol {
         matches!(self, Protocol::Benchmark { benchmark, .. } if benchmark.is_masked())
     }
 
-    /// Whether masks that stand beside photographs are kept from the field.
+    /// Whether the photographs' masks are withheld from the field.
     pub fn hides_masks(&self) -> bool {
         matches!(self, Protocol::Benchmark { benchmark, masks_given: false, .. } if benchmark.is_masked())
     }
 
-    /// The size of a scene's pictures that the protocol asks for: that of its first view, with the longest side of the
-    /// benchmark and of `longest`, what the field can at most; never larger than the photograph. `None` for protocols that
-    /// leave the size open.
+    /// The size of a scene's pictures that the protocol requires: that of its first view, scaled to the smaller of the
+    /// benchmark's longest side and `longest`, the field's limit; never larger than the photograph. `None` for
+    /// protocols that leave the size open.
     pub fn picture_size(&self, scene: &Scene, longest: u32) -> Option<[u32; 2]> {
         let Protocol::Benchmark { benchmark, .. } = self else { return None };
         let side = benchmark.published_size().into_iter().max()?.min(longest);
         scene.views.first().map(|view| reduced_size(&view.camera, side).into())
     }
 
-    /// What is scored, in words for records.
+    /// A description of the metric, for records.
     pub fn metric_words(&self) -> &'static str {
         match (self.is_masked(), self.hides_masks()) {
             (false, _) => "full: prediction and photograph over the run's background",

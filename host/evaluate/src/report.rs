@@ -1,8 +1,8 @@
 //! A report: evaluations, sweeps of run time and trainings on one HTML page that holds everything it shows.
 //!
-//! The page needs no network and no scripts, and says so to the browser (a content security policy that lets nothing in but
-//! its own styles and pictures). What people read off it are tables as papers print them (the best value of a column bold,
-//! the next underlined), figures as SVG, pictures, and the records of how it all came about.
+//! The page needs no network and no scripts, and states so in its content security policy, which allows only its own
+//! styles and pictures. It shows tables as papers print them (the best value of a column bold, the next underlined),
+//! figures as SVG, pictures, and the records of the runs.
 //!
 //! ```text
 //! evaluation   a folder of `evaluate --protocol`: its tables, pictures, record
@@ -51,12 +51,12 @@ pub enum ReportError {
         /// What the system said.
         cause: std::io::Error,
     },
-    /// A file is not what it should be.
+    /// A file does not have the expected content.
     #[error("{}: is not a record of viewfuse {command}: {cause}", path.display())]
     Json {
         /// The file.
         path: PathBuf,
-        /// The command that writes such.
+        /// The command that writes such files.
         command: &'static str,
         /// What is wrong with it.
         cause: serde_json::Error,
@@ -86,7 +86,7 @@ fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
     std::fs::read(path).map_err(|cause| ReportError::Read { path: path.to_path_buf(), cause })
 }
 
-/// Bytes as an address that holds them.
+/// Bytes as a data URL.
 fn data_address(kind: &str, bytes: &[u8]) -> String {
     format!("data:{kind};base64,{}", STANDARD.encode(bytes))
 }

@@ -1,14 +1,14 @@
-//! The folder of an evaluation: it goes on after a kill, and several machines can share it.
+//! The folder of an evaluation: an interrupted run resumes, and several machines can share it.
 //!
 //! ```text
-//! run.json              what is evaluated; written first, and compared ever after
+//! run.json              what is evaluated; written first, and compared by every later run
 //! scores-I-of-N.jsonl   finished jobs of shard I of N, a line each
 //! pictures/             of a few jobs: sources, predictions, truth (`gallery`)
-//! scores.csv            every score, once all jobs are there
+//! scores.csv            every score, once all jobs are finished
 //! ```
 //!
-//! Whoever reads takes the lines of all shards together, by number of job. It makes no difference how many shards there
-//! were, whether their number changed on the way, or which of them were started again.
+//! Readers merge the lines of all shards by number of job. The result does not depend on the number of shards, on
+//! changes of that number during the run, or on restarts.
 
 mod journal;
 mod settings;
@@ -40,7 +40,7 @@ pub enum FolderError {
     /// A file cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
-    /// A file, or a line of it, is not what this program writes.
+    /// A file, or a line of it, was not written by this program.
     #[error("{}{}: is not of an evaluation: {cause}", path.display(), line.map_or(String::new(), |line| format!(":{line}")))]
     Json {
         /// The file.
@@ -52,7 +52,7 @@ pub enum FolderError {
     },
     /// The folder is that of another evaluation.
     #[error(
-        "{}: is of an evaluation with other settings ({}); take another folder, or the same settings to go on with it",
+        "{}: is of an evaluation with other settings ({}); use another folder, or the same settings to resume it",
         path.display(), differences.join("; ")
     )]
     Different {
@@ -61,15 +61,15 @@ pub enum FolderError {
         /// What differs, and how.
         differences: Vec<String>,
     },
-    /// A finished job is none of this evaluation, although the settings are the same.
-    #[error("{}: job {job} has other views than this version of the program would take; take another folder", path.display())]
+    /// A finished job does not belong to this evaluation, although the settings are the same.
+    #[error("{}: job {job} has other views than this version of the program would use; use another folder", path.display())]
     OtherJob {
         /// The folder.
         path: PathBuf,
         /// Its number.
         job: usize,
     },
-    /// Another process does the same shard.
+    /// Another process runs the same shard.
     #[error("{}: another process is writing to it", path.display())]
     Busy {
         /// The journal.
@@ -85,7 +85,7 @@ pub struct RunFolder {
 }
 
 impl RunFolder {
-    /// Begins an evaluation, or goes on with it.
+    /// Begins an evaluation, or resumes it.
     ///
     /// # Errors
     /// [`FolderError`]: above all, if the folder is that of an evaluation with other settings.
@@ -101,7 +101,7 @@ impl RunFolder {
         }
         let json = serde_json::to_vec_pretty(&settings);
         let json = json.map_err(|cause| FolderError::Json { path: file.clone(), line: None, cause })?;
-        // Several shards may do this at once: they write the same.
+        // Several shards may do this at once: they write the same content.
         write_whole(&file, &json)?;
         Ok(RunFolder { path: path.to_path_buf(), settings })
     }
@@ -119,7 +119,7 @@ impl RunFolder {
         Ok(RunFolder { path: path.to_path_buf(), settings })
     }
 
-    /// Where it is.
+    /// The folder's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -129,15 +129,15 @@ impl RunFolder {
         &self.settings
     }
 
-    /// The journal of a shard, to be added to. A last line that was cut off by a kill is removed.
+    /// The journal of a shard, opened for appending. An incomplete last line of a killed process is removed.
     ///
     /// # Errors
-    /// [`FolderError`]; [`FolderError::Busy`] while another process adds to it.
+    /// [`FolderError`]; [`FolderError::Busy`] while another process has it open.
     pub fn journal(&self, shard: Shard) -> Result<Journal, FolderError> {
         Journal::open(&self.path, shard)
     }
 
-    /// Every finished job of every shard, by number. Of a job that was done twice, the first shard's.
+    /// Every finished job of every shard, by number. For a job that was run twice, the first shard's result.
     ///
     /// # Errors
     /// [`FolderError`].

@@ -1,14 +1,14 @@
 //! The tables of an evaluation: means with intervals, and how each scheme compares with averaging the views and with the
 //! baselines.
 //!
-//! Every scene counts the same: the targets and trials of a scene are averaged first, then the scenes. The difference of
-//! two rows is taken scene by scene before it is averaged: how hard a scene is cancels out. Of a single scene the views
-//! take the place of the scenes ([`Unit::Views`]): the intervals are then about other views of this scene, not about other
-//! scenes.
+//! Every scene has the same weight: the targets and trials of a scene are averaged first, then the scenes. The
+//! difference of two rows is computed scene by scene before it is averaged, so that the difficulty of a scene cancels.
+//! For a single scene the views replace the scenes ([`Unit::Views`]): the intervals then apply to other views of this
+//! scene, not to other scenes.
 //!
 //! ```text
 //! metric    how a metric is written
-//! verdict   where a scheme stands against the baselines, in words
+//! verdict   comparison of each scheme with the baselines, in words
 //! ```
 
 mod metric;
@@ -28,7 +28,7 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The scheme that others are compared with: what published systems do.
 pub const REFERENCE: &str = "mean";
 
-/// What is counted: what intervals are over.
+/// The sampling unit of the intervals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Unit {
@@ -41,19 +41,19 @@ pub enum Unit {
 /// All schemes under the same conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Table {
-    /// The numbers of sources in it, ascending.
+    /// The numbers of sources of its jobs, ascending.
     pub source_counts: Vec<usize>,
-    /// How many scenes.
+    /// Number of scenes.
     pub scene_count: usize,
-    /// How many pictures of every scheme.
+    /// Number of pictures of every scheme.
     pub target_count: usize,
-    /// What intervals are over.
+    /// The sampling unit of the intervals.
     pub unit: Unit,
     /// The metrics, in the order of their columns.
     pub metrics: Vec<Metric>,
     /// The metric that rows are compared by: an index into the metrics.
     pub headline: usize,
-    /// The baselines first, then the schemes in the order in which they were asked for.
+    /// The baselines first, then the schemes in the requested order.
     pub rows: Vec<Row>,
     /// Every scheme's difference from every baseline in the headline metric.
     pub comparisons: Vec<Comparison>,
@@ -66,7 +66,7 @@ pub struct Row {
     pub scheme: String,
     /// Whether it is a baseline.
     pub is_baseline: bool,
-    /// One a metric; `None` where no picture has it.
+    /// One value for each metric; `None` where no picture has it.
     pub cells: Vec<Option<Cell>>,
     /// Mean time of a picture in seconds; `None` for baselines.
     pub seconds: Option<f64>,
@@ -81,10 +81,10 @@ pub struct Cell {
     pub versus_reference: Option<Interval>,
     /// The difference from copying the nearest source, if that is in the table and this is another.
     pub versus_copy: Option<Interval>,
-    /// 1 for the best of the column as it is written, 2 for the next; equal ones share a place.
+    /// Rank in the column by the printed value: 1 for the best, 2 for the next; equal values share a rank.
     pub place: usize,
     /// Whether it is the best of the column, or does not differ from the best beyond the interval of their difference.
-    /// Nothing leads where that is true of all, or where there is a single scene or view to tell by.
+    /// `false` for all rows if it would be true for all, or with a single scene or view.
     pub leads: bool,
 }
 
@@ -93,9 +93,9 @@ pub struct Cell {
 pub enum Column {
     /// A metric, by its index.
     Value(usize),
-    /// What the headline metric is above that of copying the nearest source.
+    /// The difference of the headline metric from that of copying the nearest source.
     OverCopy,
-    /// What it is above that of [`REFERENCE`].
+    /// Its difference from that of [`REFERENCE`].
     OverReference,
 }
 
@@ -108,7 +108,7 @@ impl Column {
         }
     }
 
-    /// The difference that a cell of the column's metric has in it; `None` for values.
+    /// The difference that a cell of the column shows; `None` for columns of values.
     pub fn difference(self, cell: Option<&Cell>) -> Option<Interval> {
         match self {
             Column::Value(_) => None,
@@ -119,7 +119,8 @@ impl Column {
 }
 
 impl Table {
-    /// The columns that are shown: every metric, behind the headline metric its differences from the rows that are there.
+    /// The columns that are shown: every metric, and after the headline metric its differences from the reference rows
+    /// in the table.
     pub fn columns(&self) -> Vec<Column> {
         let has = |scheme: &str| self.rows.iter().any(|row| row.scheme == scheme);
         let mut columns = Vec::new();
@@ -133,7 +134,7 @@ impl Table {
         columns
     }
 
-    /// What stands above a column.
+    /// The heading of a column.
     pub fn heading(&self, column: Column) -> String {
         match column {
             Column::Value(metric) => self.metrics[metric].heading(),
@@ -143,12 +144,12 @@ impl Table {
     }
 }
 
-/// A score and where it is from.
+/// A score and its origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a> {
-    /// Which scene.
+    /// The scene.
     pub scene: usize,
-    /// Which job: what tells the targets of one name apart.
+    /// The job, which distinguishes targets of the same name.
     pub job: usize,
     /// The score.
     pub score: &'a Score,
@@ -164,7 +165,7 @@ pub fn tables<'a>(finished: impl IntoIterator<Item = &'a Finished>, by_source_co
     groups.values().map(|observations| table(observations)).collect()
 }
 
-/// What is counted once: a scene, or a target of a job.
+/// A sampling unit: a scene, or a target of a job.
 type Counted<'a> = (usize, usize, &'a str);
 
 /// One table of these scores.
@@ -255,12 +256,12 @@ fn cell(means: &Means<'_>, scheme: &str, metric: &str) -> Option<Cell> {
     })
 }
 
-/// A row's value in a column as it is written.
+/// A row's value in a column as it is printed.
 fn written(row: &Row, column: usize, metric: &Metric) -> Option<f64> {
     metric.text(row.cells[column].as_ref()?.value.mean).parse().ok()
 }
 
-/// Places in a column, by what is written: values that look the same are equally good.
+/// Ranks in a column, by the printed values: values that print the same are equally good.
 fn place(rows: &mut [Row], column: usize, metric: &Metric) {
     let mut values: Vec<f64> =
         rows.iter().filter_map(|row| written(row, column, metric)).filter(|value| !value.is_nan()).collect();
@@ -275,7 +276,7 @@ fn place(rows: &mut [Row], column: usize, metric: &Metric) {
     }
 }
 
-/// Which rows of a column no other is above beyond the interval. Places must be there already.
+/// The rows of a column that no other row exceeds beyond the interval. Requires the ranks.
 fn lead(rows: &mut [Row], column: usize, metric: &Metric, means: &Means<'_>) {
     let first = rows.iter().find(|row| row.cells[column].as_ref().is_some_and(|cell| cell.place == 1));
     let Some(best) = first.and_then(|row| means.get(&(row.scheme.as_str(), metric.name.as_str()))) else { return };
@@ -288,7 +289,7 @@ fn lead(rows: &mut [Row], column: usize, metric: &Metric, means: &Means<'_>) {
             let Some(cell) = &row.cells[column] else { return false };
             let own = means.get(&(row.scheme.as_str(), metric.name.as_str()));
             let difference = own.and_then(|own| Interval::of_differences(best, own));
-            // Where the interval is not known, as of infinite scores, what is written decides.
+            // Where the interval is unknown, as for infinite scores, the printed values decide.
             let is_close = difference.is_some_and(|own| own.half_width.is_some() && !own.excludes_zero());
             cell.place == 1 || is_close
         })

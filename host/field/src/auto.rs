@@ -1,16 +1,16 @@
-//! Chooses the weighting scheme and the field's scalars for a scene, and says which score to expect, from the sources alone:
-//! some of them are left out, one at a time, and rendered coarsely from the others.
+//! Chooses the weighting scheme and the field's scalars for a scene, and estimates the expected score, from the sources
+//! alone: some of them are left out, one at a time, and rendered coarsely from the others.
 //!
 //! ```text
 //! geometry      how far a camera is from its sources
 //! leave_out     sources rendered from the others
-//! detail        what coarse pictures do not show
+//! detail        the detail that coarse pictures lack
 //! expectation   from these scores to a target's
 //! ```
 //!
-//! The choice goes one coordinate at a time, the scheme first, then each of the field's scalars. All candidates are rendered
-//! from what is encoded once, under the first scheme. A candidate replaces what it is compared with only if its gain is beyond
-//! the noise. With too few sources to leave one out, everything stays at its default.
+//! The choice is a coordinate search: the scheme first, then each of the field's scalars. All candidates are rendered
+//! from one encoding, under the first scheme. A candidate replaces the current choice only if its gain exceeds the
+//! noise. With too few sources to leave one out, everything stays at its default.
 
 mod detail;
 mod expectation;
@@ -34,8 +34,8 @@ use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::{Album, SourceImages};
 use viewfuse_weighting::Weighting;
 
-/// The schemes that are tried. The first is what the others must beat: where sources were left out, the inverse square of the
-/// distance did best on average.
+/// The schemes that are tried. The first is the baseline of the others: on left-out sources, the inverse square of the
+/// distance was best on average.
 pub fn schemes() -> Vec<Scheme> {
     let of = |formula, choice, parameter| Scheme::new(formula, choice, parameter).ok();
     let first = [of(Formula::Distance, 2, 0.0), of(Formula::Distance, 3, 0.0), of(Formula::Error, 0, 0.5)];
@@ -43,7 +43,7 @@ pub fn schemes() -> Vec<Scheme> {
     first.into_iter().flatten().chain(plain).collect()
 }
 
-/// Least gain that is no noise, decibels. Of 0, 0.03 and 0.1, with and without a margin for the spread between sources, this
+/// Least significant gain, decibels. Of 0, 0.03 and 0.1, with and without a margin for the spread between sources, this
 /// came nearest to the best choice in hindsight over 15 scenes and selections.
 const LEAST_GAIN: f64 = 0.1;
 
@@ -67,9 +67,9 @@ pub struct LeftOutSource {
     pub source: String,
     /// Its score, decibels.
     pub psnr: f64,
-    /// Where it stands among the others.
+    /// Its geometry among the others.
     pub standing: Standing,
-    /// Mean confidence of its pixels; null for fields that do not tell.
+    /// Mean confidence of its pixels; null for fields that do not estimate it.
     pub confidence: Option<f64>,
 }
 
@@ -80,23 +80,23 @@ pub struct Chosen {
     pub weighting: Weighting,
     /// The field's scalars that are not at their defaults.
     pub settings: Vec<Setting>,
-    /// All that was tried, in that order.
+    /// All candidates, in the order in which they were tried.
     pub candidates: Vec<Candidate>,
     /// The sources that were left out; empty if there are too few.
     pub left_out: Vec<LeftOutSource>,
-    /// What a target's score is expected from; `None` if nothing could be left out.
+    /// The data for a target's expected score; `None` if nothing could be left out.
     pub basis: Option<Basis>,
     measure: Measure,
     poses: Vec<Pose>,
 }
 
 impl Chosen {
-    /// Where a target stands among the sources.
+    /// The geometry of a target among the sources.
     pub fn standing(&self, frame: &Frame) -> Standing {
         self.measure.standing(&frame.target.camera.pose, self.poses.iter())
     }
 
-    /// The score to expect of a target's picture; `None` if nothing could be left out.
+    /// The expected score of a target's picture; `None` if nothing could be left out.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
         self.basis.map(|basis| basis.expected(self.standing(frame), mean(&frame.confidences)))
     }
@@ -169,7 +169,7 @@ pub fn choose(
     Ok(chosen)
 }
 
-/// What is tried, and what came of it.
+/// The candidates and their results.
 struct Search<'t, 'a> {
     trials: &'t mut Trials<'a>,
     candidates: Vec<Candidate>,
@@ -186,7 +186,7 @@ impl Search<'_, '_> {
     }
 }
 
-/// Whether a candidate beats the best one so far, and the one that it would replace by more than the noise.
+/// Whether a candidate beats the best one so far, and the one it replaces by more than the noise.
 fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> bool {
     mean_score(candidate) > mean_score(best) && mean_score(candidate) - mean_score(replaced) > LEAST_GAIN
 }
@@ -196,7 +196,7 @@ fn mean_score(outcomes: &[Outcome]) -> f64 {
     outcomes.iter().map(|outcome| outcome.psnr).sum::<f64>() / outcomes.len().max(1) as f64
 }
 
-/// As [`crate::render::render`], with what is chosen for the scene. Each frame comes with the score to expect.
+/// As [`crate::render::render`], with the choice for the scene. Each frame has its expected score.
 ///
 /// # Errors
 /// [`RenderError`]; those of `deliver` pass through.

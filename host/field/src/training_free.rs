@@ -4,7 +4,7 @@
 //! hull     sources that show a silhouette: a solid carved by them and by photo-consistency
 //! sweep    any sources: planes through the frusta of sources and target
 //! space    near and far bounds, for the planes
-//! exposure gains by which the sources become equally light
+//! exposure gains that equalise the sources' exposure
 //! ```
 
 mod exposure;
@@ -20,21 +20,21 @@ use viewfuse_scene::photographs::SourceImages;
 pub use hull::{NoObject, find_object};
 pub use sweep::Sweep;
 
-/// Depths from what the photographs have in common, colour by weighted fusion with visibility. Nothing is learned.
+/// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingFree {
-    /// How it goes about sources with silhouettes.
+    /// Settings for sources with silhouettes.
     pub hull: hull::Hull,
-    /// How it goes about others.
+    /// Settings for other sources.
     pub sweep: Sweep,
-    /// Side of the sources as a share of the pictures', above 0: matching sources costs less and less as they shrink.
+    /// Side of the sources as a share of the pictures', above 0: smaller sources take less time to match.
     pub source_share: f32,
-    /// Sweep also where there are silhouettes.
+    /// Use the plane sweep also for sources with silhouettes.
     pub always_sweep: bool,
 }
 
 impl Default for TrainingFree {
-    /// Sources as large as the pictures.
+    /// Sources at the size of the pictures.
     fn default() -> TrainingFree {
         TrainingFree {
             hull: hull::Hull::default(),
@@ -48,7 +48,7 @@ impl Default for TrainingFree {
 impl Field for TrainingFree {
     fn about(&self) -> About {
         About {
-            // One view shows no depth.
+            // Depth needs at least two views.
             least_sources: 2,
             source_side: SourceSide::Share(self.source_share),
             encoding: Encoding::EachWeighting,

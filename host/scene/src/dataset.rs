@@ -1,12 +1,12 @@
 //! Data sets: many scenes of one kind, in folders for training, validation and test.
 //!
-//! What is found where, for the training split of `data/cars` (the others end in `_val` and `_test`):
+//! The searched places, for the training split of `data/cars` (the others end in `_val` and `_test`):
 //!
 //! ```text
 //! data/cars_train/<object>/                    the path names the data set, as in the code that PixelNeRF was published with
 //! data/cars/cars_train/<object>/               the path is a folder around it
 //! .../chairs_train/chairs_2.0_train/<object>/  one folder more, as in the archive of the chairs
-//! data/cars/<object>/                          a folder of scenes, which then serves every split
+//! data/cars/<object>/                          a folder of scenes, which is then used for every split
 //! ```
 //!
 //! An object is a folder in SRN's layout: one that holds `intrinsics.txt`. Nothing else is read here; a scene is checked
@@ -22,7 +22,7 @@ pub use crate::scene::{Split, UnknownSplit};
 /// The scenes of one split.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Dataset {
-    /// What people call it: `cars` for `cars_train/`, otherwise the folder's name.
+    /// Its name: `cars` for `cars_train/`, otherwise the folder's name.
     pub name: String,
     /// The folders of the objects, sorted by name; at least one.
     pub scenes: Vec<PathBuf>,
@@ -31,48 +31,48 @@ pub struct Dataset {
 /// Why a data set was not found.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
-    /// Nothing at the path looks like a data set.
+    /// No data set was found at the path.
     #[error(
         "{}: no data set: looked for a folder {}, for one folder *_{split} inside, and for folders with intrinsics.txt inside",
         path.display(), beside.display()
     )]
     NotFound {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
-        /// The split asked for.
+        /// The requested split.
         split: Split,
-        /// The folder that the path would be short for.
+        /// The folder that the path would abbreviate.
         beside: PathBuf,
     },
     /// There is more than one data set.
     #[error("{}: holds several data sets ({}); name one of them", path.display(), names.join(", "))]
     Several {
-        /// The path asked for.
+        /// The requested path.
         path: PathBuf,
         /// The folders found.
         names: Vec<String>,
     },
-    /// The folder of the split is there, but no scene in it.
+    /// The folder of the split exists, but holds no scene.
     #[error("{}: no scenes: looked for folders with intrinsics.txt inside", path.display())]
     NoScenes {
         /// The folder of the split.
         path: PathBuf,
     },
-    /// The file system refused.
+    /// The file system reported an error.
     #[error("{}: cannot be read", path.display())]
     Io {
         /// The folder.
         path: PathBuf,
-        /// Why.
+        /// The cause.
         source: io::Error,
     },
 }
 
 impl Dataset {
-    /// Finds the scenes of a split. Of the places in [the list above](self), the first that is there counts.
+    /// Finds the scenes of a split. The first existing place of [the list above](self) is used.
     ///
     /// # Errors
-    /// [`DatasetError`] with the path and what was looked for.
+    /// [`DatasetError`] with the path and the searched places.
     pub fn open(path: impl AsRef<Path>, split: Split) -> Result<Dataset, DatasetError> {
         let path = path.as_ref();
         let ending = format!("_{split}");
@@ -90,7 +90,7 @@ impl Dataset {
         let of_split: Vec<&PathBuf> = inside.iter().filter(|folder| name_of(folder).ends_with(&ending)).collect();
         match of_split[..] {
             [] => {}
-            // What holds scenes is no data set's folder, whatever its scenes are called.
+            // A folder that holds scenes is not a data set's folder, whatever the names of its scenes.
             _ if inside.iter().any(|folder| is_scene(folder)) => {}
             [folder] => {
                 let name = name_of(folder).trim_end_matches(&ending).to_owned();
@@ -123,7 +123,7 @@ fn is_scene(folder: &Path) -> bool {
     folder.join("intrinsics.txt").is_file()
 }
 
-/// The folders in a folder, sorted by name, without hidden ones: those may be unfinished.
+/// The folders in a folder, sorted by name, without hidden ones, which may be unfinished.
 fn folders(folder: &Path) -> Result<Vec<PathBuf>, DatasetError> {
     let failed = |source| DatasetError::Io { path: folder.to_owned(), source };
     let mut all = Vec::new();

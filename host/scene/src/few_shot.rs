@@ -1,8 +1,8 @@
-//! The job: which views are sources, which cameras are targets.
+//! The selection of source views and target cameras.
 //!
 //! Views are chosen by a list of items separated by commas: a view's name, a range `A..B` of names (both ends
-//! included), `all`, a part of the scene (`train`, `val`, `test`, where its files know parts), and `/STEP` behind either to
-//! take every `STEP`-th.
+//! included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
+//! either to take every `STEP`-th.
 
 use crate::rig::Rig;
 use crate::{Scene, Split, View};
@@ -10,7 +10,7 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::PoseError;
 use viewfuse_weighting::sources::MOST_SOURCES;
 
-/// Why a choice of views is not a job.
+/// Why a selection of views is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectionError {
     /// A name in a list is no view of the scene.
@@ -18,7 +18,7 @@ pub enum SelectionError {
     NoSuchView {
         /// The scene's path.
         scene: String,
-        /// What was given.
+        /// The given name.
         name: String,
         /// Name of the scene's first view.
         first: String,
@@ -63,7 +63,7 @@ pub enum SelectionError {
         /// How many are needed.
         least: usize,
     },
-    /// There are more sources than the program holds.
+    /// There are more sources than the program supports.
     #[error("{scene}: {count} source views; at most {MOST_SOURCES} fit")]
     TooManySources {
         /// The scene's path.
@@ -71,7 +71,7 @@ pub enum SelectionError {
         /// How many there are.
         count: usize,
     },
-    /// No target was asked for and none can be guessed.
+    /// No target was requested and the scene has no target poses.
     #[error("{scene}: no targets were chosen, and the scene has no poses without photographs")]
     NoTargets {
         /// The scene's path.
@@ -92,7 +92,7 @@ pub enum SelectionError {
 pub struct Target {
     /// Name for files and tables.
     pub name: String,
-    /// Where to look from.
+    /// The camera to render from.
     pub camera: Camera,
     /// The view of the scene that shows the truth, as an index into its views.
     pub truth: Option<usize>,
@@ -107,7 +107,7 @@ pub struct FewShot {
     pub targets: Vec<Target>,
 }
 
-/// What a person asked for.
+/// The requested sources and targets.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     /// `--targets`.
@@ -124,7 +124,7 @@ impl Selection {
     /// Sources and targets for a render. Without `--targets` and `--orbit` the targets are the scene's target poses.
     ///
     /// # Errors
-    /// [`SelectionError`]; `least_sources` is what the field needs.
+    /// [`SelectionError`]; `least_sources` is the number that the field requires.
     pub fn resolve(&self, scene: &Scene, least_sources: usize) -> Result<FewShot, SelectionError> {
         let target_views = match &self.targets {
             Some(list) => view_list(scene, list)?,
@@ -208,7 +208,7 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
     };
     let mut chosen = Vec::new();
     for item in list.split(',').map(str::trim).filter(|item| !item.is_empty()) {
-        // A view may be called `a/b`: only what is no name is taken apart.
+        // A view may be called `a/b`: only an item that is not a name is split.
         if let Some(view) = scene.view_named(item) {
             chosen.push(view);
             continue;
@@ -246,7 +246,7 @@ pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError
     Ok(chosen)
 }
 
-/// The photographs of a part of the scene, if a text names one that it has.
+/// The photographs of a split of the scene, if a text names a split that it has.
 fn part_named(scene: &Scene, text: &str) -> Option<Vec<usize>> {
     let part: Split = text.parse().ok()?;
     let is_in = |view: &View| view.image.is_some() && view.split == Some(part);

@@ -1,6 +1,6 @@
 //! Posed photographs: from folders on disk to source views at working size, and the choice of sources and targets.
 //!
-//! The modules stand in the order of the data; a module uses only modules listed above it:
+//! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! scene         a folder of posed photographs, in any layout: Scene, View, Photograph, ScenePoint

@@ -1,4 +1,4 @@
-//! Photographs as a field needs them: at working size, premultiplied, with the background taken out.
+//! Photographs prepared for a field: at working size, premultiplied, with the background removed.
 
 mod matte;
 mod resample;
@@ -24,16 +24,16 @@ pub enum PhotographsError {
     Size {
         /// The view.
         view: String,
-        /// Wanted width.
+        /// Requested width.
         width: u32,
-        /// Wanted height.
+        /// Requested height.
         height: u32,
         /// What is wrong with it.
         error: PinholeError,
     },
     /// The background covers the whole photograph, or nothing of it.
     #[error(
-        "{path}: shows no object before the background ({colour}); give the background's colour, or photographs with an \
+        "{path}: shows no object in front of the background ({colour}); give the background's colour, or photographs with an \
          alpha channel"
     )]
     NoSilhouette {
@@ -75,15 +75,16 @@ impl SourceImage {
 pub struct SourceImages {
     /// In the order of the sources.
     pub images: Vec<SourceImage>,
-    /// What is behind the object, red green blue in `[0, 1]`.
+    /// The background's colour, red green blue in `[0, 1]`.
     pub background: [f32; 3],
-    /// Whether alpha is an object's silhouette. Otherwise photographs are whole, and alpha 0 marks what they do not show.
+    /// Whether alpha is an object's silhouette. Otherwise whole photographs are used, and alpha 0 marks pixels outside
+    /// them.
     pub has_silhouettes: bool,
-    /// Points of surfaces in world coordinates that two or more of the sources saw, where the scene's files know some.
+    /// Surface points in world coordinates that two or more of the sources saw, where the scene's files have them.
     pub points: Vec<Vec3>,
-    /// Nearest and farthest depth of what the sources show, where the scene's files say so.
+    /// Near and far bound of the sources, where the scene's files state them.
     pub near_far: Option<[f32; 2]>,
-    /// What is doubtful about the background, if anything.
+    /// A warning about the background, if there is one.
     pub warning: Option<String>,
 }
 
@@ -98,34 +99,34 @@ impl SourceImages {
     }
 }
 
-/// Most bytes of decoded photographs that are kept. Where a run needs more, each is decoded again whenever it is needed.
+/// Most bytes of decoded photographs that are kept. If a run needs more, each is decoded again at every use.
 const MOST_KEPT_BYTES: u64 = 512 << 20;
 
-/// Most bytes of photographs that are being decoded at a time, but for a single one that needs more.
+/// Most bytes of photographs decoded at the same time, unless a single one needs more.
 const MOST_DECODING_BYTES: u64 = 512 << 20;
 
-/// What decoding takes for a pixel: as decoded, as RGBA, undistorted.
+/// Bytes for decoding a pixel: as decoded, as RGBA, undistorted.
 const DECODING_BYTES: u64 = 16;
 
-/// Photographs of less than twice this side are kept at their own size, however small they are needed.
+/// Photographs of less than twice this side are kept at their own size, for any working size.
 const LEAST_KEPT_SIDE: u32 = 640;
 
-/// Points of a larger reprojection error, in pixels, do not count.
+/// Points with a larger reprojection error, in pixels, are ignored.
 const MOST_POINT_ERROR: f32 = 2.0;
 
-/// Photographs of a scene, decoded once where memory allows.
+/// Photographs of a scene, decoded once if memory allows.
 pub struct Album<'a> {
     scene: &'a Scene,
     kept: Vec<Option<Photograph>>,
-    /// The longest side that is worth keeping.
+    /// The longest side that is kept, in pixels.
     side: Option<u32>,
 }
 
 impl<'a> Album<'a> {
     /// Reads the photographs of these views at their own size, all cores at once.
     ///
-    /// At most 512 MiB of them are kept; where they need more, each is read again whenever it is needed. Beside them, at most
-    /// 512 MiB are in use while photographs are decoded, or what a single one needs.
+    /// At most 512 MiB of them are kept; if they need more, each is read again at every use. Decoding uses at most
+    /// another 512 MiB, or the memory of a single photograph if that is more.
     ///
     /// # Errors
     /// [`PhotographsError`] of the first view that cannot be read, or if the work is stopped.
@@ -138,8 +139,8 @@ impl<'a> Album<'a> {
     }
 
     /// As [`Album::open`], for sources and truths of at most `longest_side` pixels on a side: larger photographs are reduced as
-    /// soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times that side, keep
-    /// their own size, and give the same numbers to the bit.
+    /// soon as they are decoded, to no less than twice that side. Those below 1280 pixels, or four times that side,
+    /// keep their own size, with bit-identical results.
     ///
     /// # Errors
     /// As [`Album::open`].
@@ -217,7 +218,7 @@ impl<'a> Album<'a> {
         }
     }
 
-    /// The sources, reduced to at most `longest_side` pixels on a side, the background taken out as `choice` says.
+    /// The sources, reduced to at most `longest_side` pixels on a side, the background removed according to `choice`.
     ///
     /// # Errors
     /// [`PhotographsError`].
@@ -228,7 +229,7 @@ impl<'a> Album<'a> {
         choice: BackgroundChoice,
         progress: &dyn Progress,
     ) -> Result<SourceImages, PhotographsError> {
-        // Twice over the photographs, so that never more of them than there are threads must be in memory.
+        // Two passes over the photographs, so that at most one for each thread must be in memory.
         let look = |&view: &usize| {
             progress.check()?;
             Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
@@ -243,7 +244,7 @@ impl<'a> Album<'a> {
         };
         if choice == BackgroundChoice::Auto && whole_pictures {
             warning = Some(format!(
-                "the photographs' borders are not of one colour (they stray by {:.0} of 255 from {backdrop}): nothing is cut \
+                "the photographs' borders are not of one colour (they deviate by {:.0} of 255 from {backdrop}): nothing is cut \
                  out, whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG \
                  with alpha)",
                 backdrop.noise_level()
@@ -263,7 +264,7 @@ impl<'a> Album<'a> {
         match all(&borders) {
             Err(PhotographsError::NoSilhouette { path, colour }) if choice == BackgroundChoice::Auto => {
                 warning = Some(format!(
-                    "{path}: shows no object before a background of {colour}: nothing is cut out, whole pictures are used"
+                    "{path}: shows no object in front of a background of {colour}: nothing is cut out, whole pictures are used"
                 ));
                 borders.iter_mut().for_each(|border| *border = None);
                 let images = views
@@ -286,7 +287,7 @@ impl<'a> Album<'a> {
         }
     }
 
-    /// Points that at least two of these views saw, and the bounds of depth that all of them state.
+    /// Points that at least two of these views saw, and the depth bounds over all of them.
     fn space(&self, views: &[usize]) -> (Vec<Vec3>, Option<[f32; 2]>) {
         let saw = |point: &&crate::ScenePoint| {
             let is_source = |view: &&u32| views.contains(&(**view as usize));
@@ -299,7 +300,7 @@ impl<'a> Album<'a> {
         (points, near_far)
     }
 
-    /// A source at working size; `must_show` says that it must show both an object and, unless its alpha channel says so, a
+    /// A source at working size; `must_show` requires that it shows an object and, unless it has an alpha channel, a
     /// background.
     fn cut_out(
         &self,
@@ -338,8 +339,8 @@ impl<'a> Album<'a> {
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
     }
 
-    /// The truth at a view, resampled to a size, rounded to 8 bits: what is cut out of it is laid over a background, if there is
-    /// one; otherwise the whole photograph.
+    /// The truth at a view, resampled to a size, rounded to 8 bits: composited over the background if there is one;
+    /// otherwise the whole photograph.
     ///
     /// # Errors
     /// [`SceneError`] if it cannot be read.
@@ -355,7 +356,7 @@ impl<'a> Album<'a> {
     }
 }
 
-/// The whole photograph, whatever its mask says.
+/// The whole photograph, without its mask.
 fn without_alpha(mut photograph: Photograph) -> Photograph {
     photograph.pixels.pixels_mut().for_each(|pixel| pixel[3] = 255);
     Photograph { has_alpha: false, ..photograph }

@@ -1,4 +1,4 @@
-//! The cameras of a scene as a whole: what they look at, from how far, which way is up.
+//! The cameras of a scene as a whole: their focus, their distance from it, and the up direction.
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
@@ -13,7 +13,7 @@ pub struct Rig {
     pub axis_miss: f32,
     /// Mean distance of the camera centres from the focus.
     pub distance: f32,
-    /// Which way is up: the mean of the cameras' up directions, or the axis of their ring where those cancel. Unit.
+    /// The up direction: the mean of the cameras' up directions, or the axis of their ring where those cancel. Unit.
     pub up: Vec3,
     /// Radius of the ball around the focus that a camera sees whole or in part: the mean over the cameras of the
     /// focus's depth times half the image's diagonal over the focal length.
@@ -21,8 +21,8 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Looks at all cameras together. `cameras` must not be empty. A single camera, or cameras whose axes are parallel,
-    /// leave the focus undetermined along the axes: it is then put one unit, or the cameras' spread, ahead.
+    /// The rig of these cameras, of which there must be at least one. A single camera, or cameras whose axes are
+    /// parallel, leave the focus undetermined along the axes: it is then put one unit, or the cameras' spread, ahead.
     pub fn of(cameras: &[Camera]) -> Rig {
         let count = cameras.len().max(1) as f32;
         let centroid = cameras.iter().map(|c| c.pose.centre_world()).sum::<Vec3>() / count;
@@ -79,8 +79,8 @@ fn half_diagonal_slope(pinhole: &Pinhole) -> f32 {
     (pinhole.width() as f32 / (2.0 * fx)).hypot(pinhole.height() as f32 / (2.0 * fy))
 }
 
-/// The point nearest to lines given by a point and a unit direction each, in the sense of least squares, or `None` where
-/// they are too nearly parallel to say.
+/// The point nearest to lines given by a point and a unit direction each, in the sense of least squares, or `None`
+/// where they are too nearly parallel.
 pub fn nearest_point_to_lines(lines: &[(Vec3, Vec3)]) -> Option<Vec3> {
     let count = lines.len() as f64;
     let centroid = lines.iter().map(|(point, _)| point.as_dvec3()).sum::<glam::DVec3>() / count.max(1.0);

@@ -1,8 +1,8 @@
 //! Scenes: posed photographs on disk.
 //!
-//! [`Scene::open`] asks each reader of a layout whether a folder is its own, reads every pose and every image *header* and
+//! [`Scene::open`] asks each reader whether it recognises a folder, reads every pose and every image *header* and
 //! checks them all: counts, finite and rigid poses, sizes. The pixels of a view are read when they are first needed
-//! ([`Scene::photograph`]), so that a command that needs only poses touches no image.
+//! ([`Scene::photograph`]), so that a command that needs only poses decodes no image.
 
 use std::collections::{HashMap, HashSet};
 use std::fs;
@@ -41,7 +41,7 @@ pub use fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
-/// The readers of all layouts, in the order in which they are asked: a path is taken for the first that fits.
+/// The readers of all layouts, in the order in which they are tried: the first that recognises a path reads it.
 pub const READERS: [&dyn Reader; 6] =
     [&transforms::Transforms, &middlebury::Middlebury, &srn::Srn, &neus::Neus, &llff::Llff, &colmap::Colmap];
 
@@ -53,35 +53,36 @@ pub fn looked_for(readers: &[&dyn Reader]) -> String {
 /// Most pixels that an image may have on a side: a larger header is refused before anything is allocated.
 pub const LARGEST_SIDE: u32 = 16_384;
 
-/// One camera of a scene, with the photograph it took if there is one.
+/// One camera of a scene, with its photograph if there is one.
 ///
-/// The camera is always a pinhole. Where the photograph was taken through a lens that is none, [`Scene::photograph`] undistorts
-/// it to that pinhole, at the same size.
+/// The camera is always a pinhole. If the photograph has lens distortion, [`Scene::photograph`] undistorts it to that
+/// pinhole, at the same size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// What people call it: the stem of the photograph's file; `target_1` for `target_pose/1.txt` of an SRN folder.
-    /// No two views of a scene have the same, and none holds a separator of folders.
+    /// Its name: the stem of the photograph's file; `target_1` for `target_pose/1.txt` of an SRN folder.
+    /// Names are unique in a scene and contain no path separator.
     pub name: String,
-    /// Where the camera was and how it maps the world to its image.
+    /// The pinhole camera with its pose.
     pub camera: Camera,
     /// The photograph; `None` for a target pose without one.
     pub image: Option<PathBuf>,
-    /// What the lens did to the stored photograph; `None` where it is a pinhole's. Normalised coordinates of `camera`.
+    /// The lens distortion of the stored photograph; `None` if it is a pinhole's. Normalised coordinates of `camera`.
     pub lens: Option<Lens>,
-    /// A file whose pixels say what of the stored photograph counts (0: nothing): it becomes the alpha channel.
+    /// The mask's file (0: pixel does not count). It becomes the alpha channel.
     pub mask: Option<PathBuf>,
-    /// Nearest and furthest depth of what the view shows, where its file says so: along the principal axis, in world units.
+    /// Near and far bound of the view, if its file states them: along the principal axis, in world units.
     pub near_far: Option<[f32; 2]>,
-    /// The part of the scene that it belongs to, where its files say so.
+    /// The split of the scene that it belongs to, if its files define splits.
     pub split: Option<Split>,
 }
 
-/// A point of the scene that was reconstructed with its cameras.
+/// A sparse point that was reconstructed with the cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScenePoint {
     /// World coordinates.
     pub position_world: Vec3,
-    /// Mean reprojection error in pixels of the photographs that it was made from; `None` where the file does not say.
+    /// Mean reprojection error in pixels of the photographs that it was made from; `None` if the file does not state
+    /// it.
     pub error: Option<f32>,
     /// Red, green, blue.
     pub colour: [u8; 3],
@@ -89,12 +90,13 @@ pub struct ScenePoint {
     pub views: Vec<u32>,
 }
 
-/// Where the world lies in the coordinates of the scene's files: `point_file = origin + scale * point_world`.
+/// The world's place in the coordinates of the scene's files: `point_file = origin + scale * point_world`.
 ///
-/// Cameras far from the origin (surveyed coordinates) would lose what lies between them to rounding, so that they are moved
-/// there before anything is rounded to `f32`: where the centroid of their centres is more than 16 times their spread (root
-/// mean square distance from it) away. The scale is a power of two, other than 1 only where that spread is below 1e-3
-/// or above 1e4. An ordinary scene keeps its numbers to the bit: learned fields depend on the unit.
+/// Rounding to `f32` would lose the distances between cameras far from the origin (surveyed coordinates). The origin is
+/// therefore moved to the centroid of their centres before rounding, if that is more than 16 times their spread (root
+/// mean square distance from it) away from the origin. The scale is a power of two, other than 1 only where that spread
+/// is below 1e-3 or above 1e4. An ordinary scene keeps its numbers bit for bit, because learned fields depend on the
+/// unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneFrame {
     /// The world's origin in the file's coordinates.
@@ -104,7 +106,7 @@ pub struct SceneFrame {
 }
 
 impl SceneFrame {
-    /// The file's coordinates themselves.
+    /// The file's coordinates, unchanged.
     pub const FILE: SceneFrame = SceneFrame { origin: DVec3::ZERO, scale: 1.0 };
 
     /// A point of the file in the world.
@@ -123,10 +125,10 @@ impl SceneFrame {
 pub struct Photograph {
     /// Straight (not premultiplied) 8-bit RGBA.
     pub pixels: image::RgbaImage,
-    /// Whether any pixel is not opaque, or a mask said what counts; if not, the background must be told from the colours.
+    /// Whether any pixel is not opaque, or there is a mask. If not, the background must be estimated from the colours.
     pub has_alpha: bool,
-    /// 255 where the undistorted picture shows something, 0 where the stored photograph ends; there, `pixels` repeat what is
-    /// nearest. `None` where all of it shows something.
+    /// 255 inside the stored photograph, 0 outside of it, where `pixels` repeat the nearest pixel of the photograph.
+    /// `None` if the undistorted picture is inside everywhere.
     pub seen: Option<image::GrayImage>,
 }
 
@@ -135,21 +137,21 @@ pub struct Photograph {
 pub struct Scene {
     /// The folder or file it was opened from.
     pub path: PathBuf,
-    /// How it is laid out: the name of the reader that fitted.
+    /// Its layout: the name of the reader that recognised it.
     pub layout: &'static str,
     /// Views with photographs first (at least one), then target poses without. In the order of the list where the
     /// layout has one, otherwise in natural order of the names (`2` before `10`).
     pub views: Vec<View>,
-    /// Points that were reconstructed with the cameras; often none.
+    /// Sparse points that were reconstructed with the cameras; often none.
     pub points: Vec<ScenePoint>,
-    /// What was left out or ignored when the scene was opened, a line each: photographs that are missing, keys without use.
+    /// Warnings from opening the scene, a line each: missing photographs, ignored keys.
     pub warnings: Vec<String>,
-    /// Where the world lies in the coordinates of the files.
+    /// The world's place in the coordinates of the files.
     pub frame: SceneFrame,
 }
 
 impl Scene {
-    /// Opens a scene by the first of [`READERS`] that fits, and checks it.
+    /// Opens a scene with the first of [`READERS`] that recognises it, and checks it.
     ///
     /// # Errors
     /// As [`Scene::open_with`].
@@ -157,8 +159,8 @@ impl Scene {
         Scene::open_with(path, &READERS)
     }
 
-    /// Opens a scene by the first of these readers that fits: reads every pose and every image header, and checks them.
-    /// A crate outside puts its own readers before or behind [`READERS`].
+    /// Opens a scene with the first of these readers that recognises it: reads every pose and every image header, and
+    /// checks them. Other crates put their own readers before or after [`READERS`].
     ///
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
@@ -183,7 +185,7 @@ impl Scene {
         Err(SceneError::UnknownLayout { path: path.to_path_buf(), looked_for: looked_for(readers) })
     }
 
-    /// What people call it: the name of its folder, however the path was written.
+    /// Its name: that of its folder, for any spelling of the path.
     pub fn name(&self) -> String {
         let whole = fs::canonicalize(&self.path).unwrap_or_else(|_| self.path.clone());
         let folder = if whole.is_file() { whole.parent().map(Path::to_path_buf) } else { Some(whole) };
@@ -192,11 +194,11 @@ impl Scene {
     }
 
     /// Decodes the photograph of the view with this index: turned upright where the cameras are those of the upright
-    /// picture, its mask as the alpha channel, undistorted to the view's pinhole.
+    /// picture, with its mask as the alpha channel, undistorted to the view's pinhole.
     ///
     /// # Errors
     /// [`SceneError`] if there is no such view, if it has no photograph, if a file cannot be decoded, or if its size
-    /// is no longer what it was when the scene was opened.
+    /// has changed since the scene was opened.
     pub fn photograph(&self, view: usize) -> Result<Photograph, SceneError> {
         self.photograph_after(view, |stored| stored)
     }
@@ -244,10 +246,10 @@ impl Scene {
         image.as_deref().ok_or_else(missing)
     }
 
-    /// The index of the view that a person means by `text`: the view of exactly this name; otherwise, if `text` is a
+    /// The index of the view that `text` refers to: the view of exactly this name; otherwise, if `text` is a
     /// whole number, the one view whose name ends in that number, leading zeros aside.
     ///
-    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. It never is a position in
+    /// `1` finds `dinoSR0001`, `3` finds `000003`, also where the count starts at 0. It is never an index into
     /// [`Scene::views`]: some data sets count from 1 and some from 0. Of a photograph and a target pose of the same
     /// number the photograph is meant. `None` if no view fits or, by number, several do.
     pub fn view_named(&self, text: &str) -> Option<usize> {
@@ -268,7 +270,8 @@ impl Scene {
     }
 }
 
-/// Views of several cameras are often numbered alike in a folder each: those get the folder's name in front of theirs.
+/// Views of several cameras are often numbered alike, in a folder for each camera: their names get the folder's name as
+/// a prefix.
 fn distinguish(views: &mut [View]) {
     let folder_of = |view: &View| view.image.as_deref().and_then(Path::parent).map(Path::to_path_buf);
     let mut folders: HashMap<String, Vec<PathBuf>> = HashMap::new();

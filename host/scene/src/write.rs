@@ -1,11 +1,11 @@
 //! Writing a scene out, in each layout that can hold it.
 //!
-//! Poses are written in the coordinates of the scene's own files ([`crate::SceneFrame`]). Photographs are copied as they are where
-//! the layout holds their lens and their mask; otherwise they are written as the pinhole's pictures, with the mask as the
-//! alpha channel. A layout that cannot hold a scene refuses it with the reason; what is lost on the way without changing
-//! what the cameras see (points, near and far, parts) is listed in [`Written::left_out`].
+//! Poses are written in the coordinates of the scene's own files ([`crate::SceneFrame`]). Photographs are copied
+//! unchanged if the layout can hold their lens and their mask; otherwise they are written undistorted, with the mask as
+//! the alpha channel. A layout that cannot hold a scene refuses it with the reason; data that is lost without changing
+//! what the cameras see (points, near and far bounds, splits) is listed in [`Written::left_out`].
 //!
-//! The folder appears whole or not at all: it is filled under another name beside its place, and renamed.
+//! The folder appears whole or not at all: it is filled under a temporary name in the same folder, and renamed.
 
 mod colmap;
 mod llff;
@@ -23,7 +23,7 @@ use viewfuse_job::progress::{Interrupted, Progress};
 
 use crate::{Scene, SceneError, View};
 
-/// A layout that scenes are written in.
+/// A layout in which scenes can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// `transforms.json`, `images/`, `masks/`, as nerfstudio reads them.
@@ -32,7 +32,7 @@ pub enum Layout {
     Colmap,
     /// `rgb/`, `pose/`, `target_pose/`, `intrinsics.txt`.
     Srn,
-    /// `scene_par.txt` beside the photographs.
+    /// `scene_par.txt` next to the photographs.
     Middlebury,
     /// `poses_bounds.npy`, `images/`.
     Llff,
@@ -56,7 +56,7 @@ impl fmt::Display for Layout {
     }
 }
 
-/// The name is none of a layout that is written.
+/// The name is not that of a layout that can be written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is not a layout that is written: transforms, colmap, srn, middlebury or llff")]
 pub struct UnknownLayout(String);
@@ -79,16 +79,16 @@ pub enum WriteSceneError {
         scene: PathBuf,
         /// The layout.
         layout: Layout,
-        /// What it cannot hold.
+        /// The content that it cannot hold.
         reason: String,
     },
-    /// There is something at the place already.
-    #[error("{}: is there already and not an empty folder; give another name", folder.display())]
+    /// The path exists already.
+    #[error("{}: exists already and is not an empty folder; give another name", folder.display())]
     Occupied {
-        /// The folder that was to be written.
+        /// The folder to write.
         folder: PathBuf,
     },
-    /// The operating system refused.
+    /// The operating system reported an error.
     #[error("{}: cannot be written: {cause}", path.display())]
     Io {
         /// The file or folder.
@@ -102,7 +102,7 @@ pub enum WriteSceneError {
     /// A photograph could not be encoded.
     #[error("{}: cannot be encoded: {cause}", path.display())]
     Encode {
-        /// The file that was to appear.
+        /// The file to write.
         path: PathBuf,
         /// What the encoder said.
         cause: image::ImageError,
@@ -112,21 +112,21 @@ pub enum WriteSceneError {
     Interrupted(#[from] Interrupted),
 }
 
-/// What was written.
+/// The result of writing a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Written {
     /// The folder.
     pub folder: PathBuf,
-    /// How many photographs it has.
+    /// Number of photographs.
     pub photograph_count: usize,
-    /// What of the scene the layout does not hold, a line each.
+    /// The content that the layout does not hold, a line each.
     pub left_out: Vec<String>,
 }
 
-/// Writes a scene in a layout to a folder that is not there yet, or is empty.
+/// Writes a scene in a layout to a folder that does not exist or is empty.
 ///
 /// # Errors
-/// [`WriteSceneError`]; nothing is left behind then.
+/// [`WriteSceneError`]; no files remain then.
 pub fn write(
     scene: &Scene,
     layout: Layout,
@@ -168,7 +168,7 @@ pub fn write(
     Ok(Written { folder: folder.to_path_buf(), photograph_count, left_out: left_out(scene, layout) })
 }
 
-/// Temporary folders are their owner's only, which is wrong for a result.
+/// Temporary folders are accessible to their owner only, which is wrong for a result.
 fn open_to_all(folder: &Path) -> std::io::Result<()> {
     #[cfg(unix)]
     {
@@ -186,7 +186,7 @@ struct Draft<'a> {
 }
 
 impl Draft<'_> {
-    /// The path of a file in it, whose folder is made.
+    /// The path of a file in it; creates the file's folder.
     fn file(&self, name: &str) -> Result<PathBuf, WriteSceneError> {
         let path = self.folder.join(name);
         if let Some(folder) = path.parent() {
@@ -210,7 +210,7 @@ fn all_photographed(scene: &Scene) -> Result<(), String> {
     }
 }
 
-/// What a layout does not hold.
+/// The content that a layout does not hold.
 fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
     let views = |has: fn(&View) -> bool| scene.views.iter().filter(|view| has(view)).count();
     let mut lines = Vec::new();
@@ -254,7 +254,7 @@ fn camera_from_world(scene: &Scene, view: &View) -> [[f64; 4]; 3] {
     [row(0), row(1), row(2)]
 }
 
-/// Numbers with blanks between them, as many digits as they need to be read back the same.
+/// Numbers separated by spaces, with as many digits as needed to read back the same values.
 fn words(numbers: impl IntoIterator<Item = f64>) -> String {
     numbers.into_iter().map(|number| number.to_string()).collect::<Vec<_>>().join(" ")
 }

@@ -1,10 +1,10 @@
-//! A scheme that a person names, or `auto`: the best one for the scene.
+//! A named scheme, or `auto`: the best one for the scene.
 
 use crate::spec::{WeightingError, WeightingSpec, grammar};
 use std::fmt;
 use std::str::FromStr;
 
-/// The text form of the choice that is left to the program.
+/// The text form of the automatic choice.
 const AUTO: &str = "auto";
 
 /// The text forms, for help texts: `auto` before those of [`grammar`].
@@ -15,7 +15,7 @@ pub fn choice_grammar() -> String {
 /// Which scheme a run uses.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WeightingChoice {
-    /// The one that suits the scene best, found from the sources alone.
+    /// The best one for the scene, found from the sources alone.
     Auto,
     /// This one.
     Given(WeightingSpec),

@@ -144,7 +144,7 @@ fn other_settings_are_refused() {
     let beginning = "out/run.json: is of an evaluation with other settings (";
     refused(
         &first.replace("--trials 1", "--trials 2"),
-        &[beginning, "trials: 2 here, 1 there)", "take another folder"],
+        &[beginning, "trials: 2 here, 1 there)", "use another folder"],
     );
     refused(&first.replace("24x24", "16x16"), &["size: 16x16 here, 24x24 there"]);
     refused(&first.replace("random", "random:sources=4"), &["protocol: random:sources=4 here, random:sources=3 there"]);

@@ -1,4 +1,4 @@
-//! The homography between two cameras that a plane induces, and the look-up in a photograph.
+//! The homography between two cameras that a plane induces, and sampling of a photograph.
 //!
 //! A target pixel `(x, y)` has the direction `u = ((x - cx) / fx, (y - cy) / fy, 1)` in the target camera's coordinates.
 //! The plane at depth `z` along the target's axis holds the point `z u`. With the rotation `R` and translation `t` from
@@ -10,7 +10,7 @@ use image::RgbImage;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::Pose;
 
-/// What a photograph has at a place.
+/// A sample of a photograph.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
     /// Levels of red, green and blue from 0 to 255, interpolated.
@@ -28,7 +28,7 @@ pub(super) struct Homography {
 }
 
 impl Homography {
-    /// That of the plane at this depth along the target's principal axis.
+    /// The homography of the plane at this depth along the target's principal axis.
     pub(super) fn of_plane(target: &Camera, source: &Camera, depth: f64) -> Homography {
         let (from_target, from_source) = (frame(&target.pose), frame(&source.pose));
         let rotation = from_source.0.transpose() * from_target.0;
@@ -37,7 +37,7 @@ impl Homography {
         Homography { target: target.pinhole, source: source.pinhole, source_from_target: matrix }
     }
 
-    /// What the source shows at the target's pixel. A point behind the source's camera is outside, at the border that its
+    /// The source's sample at the target's pixel. A point behind the source's camera is outside, at the border that its
     /// direction points to.
     pub(super) fn look(&self, picture: &RgbImage, column: u32, row: u32) -> Look {
         let [fx, fy] = self.target.focal().map(f64::from);
@@ -74,7 +74,8 @@ fn bilinear(picture: &RgbImage, x: f64, y: f64) -> [f64; 3] {
     })
 }
 
-/// The share of the later of the two pixels that a coordinate lies between, that pixel, and the earlier one.
+/// The two pixels that a coordinate lies between: the weight of the later one, its index, and the index of the earlier
+/// one.
 fn between(coordinate: f64, size: u32) -> (f64, u32, u32) {
     let last = size.saturating_sub(1);
     let place = (coordinate - 0.5).clamp(0.0, f64::from(last));

@@ -1,4 +1,4 @@
-//! What published tables mean by their scores.
+//! How published tables compute their scores.
 //!
 //! | | PSNR, SSIM | LPIPS | DISTS, FID |
 //! |---|---|---|---|
@@ -10,9 +10,9 @@
 //! sxyu/pixel-nerf, and `eval.py`, `eval_fid_lpips_dists.py` and `utils.py` of alexberian/ViewAttention, whose GeNVS is the
 //! only one with published code for scores; the GeNVS paper's own is not published, so there is no convention of that name.
 //!
-//! Two things are not copied: both codes cut off levels where `plain` rounds (a prediction of 0.9 steps is 0 there), and
-//! that cannot be told from a picture of 8 bits; and stretching computes with whole numbers here, where `f32` sometimes
-//! lands a step lower.
+//! Two things are not copied: both codes truncate levels where `plain` rounds (a prediction of 0.9 steps is 0 there),
+//! which cannot be recovered from an 8-bit picture; and stretching uses integers here, where `f32` is sometimes one
+//! level lower.
 
 use super::lpips::LpipsTrunk;
 use image::RgbImage;
@@ -20,7 +20,7 @@ use std::borrow::Cow;
 use std::fmt::{Display, Formatter};
 use std::str::FromStr;
 
-/// What scores mean.
+/// How scores are computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Convention {
     /// Of the pictures as they are.
@@ -44,7 +44,7 @@ impl Convention {
         }
     }
 
-    /// A picture as PSNR and SSIM see it.
+    /// A picture as PSNR and SSIM compare it.
     pub fn shown(self, picture: &RgbImage) -> Cow<'_, RgbImage> {
         match self {
             Convention::Plain | Convention::PixelNerf => Cow::Borrowed(picture),
@@ -77,8 +77,8 @@ impl FromStr for Convention {
     }
 }
 
-/// The least level of all channels becomes 0, the largest 255; what lies between is cut off to whole levels. A picture of
-/// one level is black.
+/// The least level of all channels becomes 0, the largest 255; values between are truncated to whole levels. A picture
+/// of one level is black.
 fn stretched(picture: &RgbImage) -> RgbImage {
     let levels = || picture.as_raw().iter().map(|level| u32::from(*level));
     let (least, largest) = (levels().min().unwrap_or(0), levels().max().unwrap_or(0));

@@ -1,10 +1,11 @@
-//! DISTS: how far two pictures are apart in structure and texture.
+//! DISTS: the distance of two pictures in structure and texture.
 //!
 //! At the picture itself and at each tap of VGG16 (with L2 pools in place of max pools), every channel is compared
-//! by its means, `(2 m n + c) / (m^2 + n^2 + c)`, and by its covariance, `(2 cov + c) / (var + var + c)`, `c = 1e-6`. What
-//! these lack of 1, weighted by the published `alpha` and `beta` divided by their sum, is the distance (Ding, Ma, Wang,
-//! Simoncelli: "Image quality assessment: unifying structure and texture similarity", TPAMI 2022; dingkeyan93/DISTS). The
-//! trunk computes in `f32`, the rest is `f64`, so that equal pictures have the distance 0 and not a rounding.
+//! by its means, `(2 m n + c) / (m^2 + n^2 + c)`, and by its covariance, `(2 cov + c) / (var + var + c)`, `c = 1e-6`.
+//! The distance is the sum of 1 minus each, weighted by the published `alpha` and `beta` divided by their sum (Ding,
+//! Ma, Wang, Simoncelli: "Image quality assessment: unifying structure and texture similarity", TPAMI 2022;
+//! dingkeyan93/DISTS). The trunk computes in `f32`, the rest is `f64`, so that equal pictures have a distance of
+//! exactly 0.
 //!
 //! Pictures are compared at their own size; the published script first reduces pictures whose shorter side is above 256
 //! to that, which is left to the caller.
@@ -21,7 +22,7 @@ const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
 const DEVIATION: [f32; 3] = [0.229, 0.224, 0.225];
 /// Channels of the picture and of all taps.
 const CHANNELS: usize = 3 + 64 + 128 + 256 + 512 + 512;
-/// What keeps the quotients finite.
+/// Added to numerators and denominators, to keep the quotients finite.
 const FLOOR: f64 = 1.0e-6;
 
 /// DISTS with its parameters on a device.
@@ -38,7 +39,7 @@ impl<D: Device> Dists<D> {
     /// and `beta`.
     ///
     /// # Errors
-    /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
+    /// [`MetricError::Checkpoint`] with the tensors that are missing or of another shape; [`MetricError::Device`].
     pub fn new(device: &D, trunk: &Checkpoint, weights: &Checkpoint) -> Result<Dists<D>, MetricError> {
         let expected =
             ["alpha", "beta"].map(|name| TensorShape { name: name.to_owned(), shape: vec![1, CHANNELS, 1, 1] });
@@ -54,7 +55,7 @@ impl<D: Device> Dists<D> {
         Ok(Dists { trunk, alpha, beta })
     }
 
-    /// The distance: 0 for equal pictures, the same both ways, seldom above 1.
+    /// The distance: 0 for equal pictures, symmetric, rarely above 1.
     ///
     /// # Errors
     /// [`MetricError`] if the sizes differ, or if the device fails.
@@ -74,7 +75,7 @@ impl<D: Device> Dists<D> {
     }
 }
 
-/// What each channel's similarity of means and of structure lacks of 1.
+/// 1 minus each channel's similarity of means, and of structure.
 fn channels_lacking(prediction: &HostImage, truth: &HostImage) -> Vec<[f64; 2]> {
     let count = (truth.height * truth.width) as f64;
     let lacking = |channel: usize| {

@@ -1,9 +1,9 @@
-//! Sets of pictures as numbers: what the Inception network that FID is defined with sees in them.
+//! Sets of pictures as feature vectors of the Inception network that FID is defined with.
 //!
-//! As pytorch-fid does it (mseitzer/pytorch-fid): a picture, levels in `[0, 1]`, is resized to 299x299 (bilinear between
-//! the four nearest pixels, whatever the size: nothing is blurred before it is made smaller), stretched to `[-1, 1]`, and
-//! the 2048 channels at the end are averaged over pixels. Which of the two Inceptions a file holds, its last layer tells
-//! ([`InceptionKind`]); with torchvision's, `transform_input` is left out, as pytorch-fid does.
+//! As pytorch-fid does it (mseitzer/pytorch-fid): a picture, levels in `[0, 1]`, is resized to 299x299 (bilinear
+//! between the four nearest pixels at any size, without a blur before downscaling), stretched to `[-1, 1]`, and the
+//! 2048 channels at the end are averaged over pixels. The size of a file's last layer determines which of the two
+//! Inceptions it holds ([`InceptionKind`]); with torchvision's, `transform_input` is left out, as pytorch-fid does.
 
 use super::trunk::{InceptionKind, Trunk, inception};
 use super::{MetricError, seen};
@@ -12,9 +12,9 @@ use viewfuse_device::Device;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes};
 use viewfuse_nn::image::HostImage;
 
-/// Side of the pictures that Inception sees.
+/// Side of Inception's input, in pixels.
 const SIDE: usize = 299;
-/// Numbers that a picture becomes.
+/// Features of a picture.
 const DIMENSION: usize = 2048;
 
 /// A set of pictures as points: as many numbers each, all finite.
@@ -24,7 +24,7 @@ pub struct Features {
     values: Vec<f64>,
 }
 
-/// Why numbers are no set of points, or two sets cannot be compared.
+/// Why numbers are not a set of points, or two sets cannot be compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SetError {
     /// Rows of another length, or none.
@@ -32,10 +32,10 @@ pub enum SetError {
     Rows {
         /// How many numbers there are.
         count: usize,
-        /// How many a row is to have.
+        /// The required number in a row.
         dimension: usize,
     },
-    /// A number is infinite or not a number.
+    /// A number is infinite or NaN.
     #[error("number {index} of row {row} is not finite")]
     NotFinite {
         /// The picture.
@@ -49,7 +49,7 @@ pub enum SetError {
     /// One picture has no spread.
     #[error("sets of {0} and {1} pictures cannot be compared; each needs at least 2")]
     Few(usize, usize),
-    /// The decomposition of a matrix did not come to an end.
+    /// The decomposition of a matrix did not converge.
     #[error("the singular values of the sets' common matrix cannot be computed")]
     NotConverged,
 }
@@ -117,7 +117,7 @@ impl<D: Device> Inception<D> {
     /// From pytorch-fid's or torchvision's `state_dict`.
     ///
     /// # Errors
-    /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
+    /// [`MetricError::Checkpoint`] with the tensors that are missing or of another shape; [`MetricError::Device`].
     pub fn new(device: &D, checkpoint: &Checkpoint) -> Result<Inception<D>, MetricError> {
         let kind = kind_of(checkpoint)?;
         let optional = |name: &str| {
@@ -131,7 +131,7 @@ impl<D: Device> Inception<D> {
         self.kind
     }
 
-    /// What it sees in pictures of any sizes; of none, a set of none.
+    /// The features of pictures of any sizes; an empty set for no pictures.
     ///
     /// # Errors
     /// [`MetricError::NotFinite`]; [`MetricError::Device`].
@@ -153,7 +153,7 @@ impl<D: Device> Inception<D> {
     }
 }
 
-/// The last layer's classes tell the two apart.
+/// The number of classes of the last layer distinguishes the two.
 fn kind_of(checkpoint: &Checkpoint) -> Result<InceptionKind, CheckpointError> {
     let sizes = Sizes::new(checkpoint, "Inception v3");
     match sizes.size("fc.weight", 2, 0)? {
@@ -166,7 +166,7 @@ fn kind_of(checkpoint: &Checkpoint) -> Result<InceptionKind, CheckpointError> {
     }
 }
 
-/// A square image, bilinear between the four nearest pixels, the outer edges of both laid over one another (PyTorch's
+/// A square image, bilinear between the four nearest pixels, with the outer edges of both aligned (PyTorch's
 /// `interpolate` without `align_corners`).
 fn resized(image: &HostImage, side: usize) -> HostImage {
     let along = |length: usize| -> Vec<(usize, usize, f32)> {

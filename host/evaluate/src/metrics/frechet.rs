@@ -1,22 +1,22 @@
 //! The Frechet distance of two sets of points, FID where the points are Inception's.
 //!
-//! Both sets are taken for normal distributions with their means `m` and sample covariances `S` (divided by the count less
-//! one): `|m1 - m2|^2 + Tr S1 + Tr S2 - 2 Tr (S1^(1/2) S2 S1^(1/2))^(1/2)` (Heusel et al.: "GANs trained by a two
+//! Both sets are modelled as normal distributions with their means `m` and sample covariances `S` (divided by the count
+//! less one): `|m1 - m2|^2 + Tr S1 + Tr S2 - 2 Tr (S1^(1/2) S2 S1^(1/2))^(1/2)` (Heusel et al.: "GANs trained by a two
 //! time-scale update rule converge to a local Nash equilibrium", NeurIPS 2017).
 //!
 //! With `S1 = A' A` and `S2 = B' B`, `A` and `B` the centred points divided by the root of the count less one, the last
 //! trace is the sum of the singular values of `A B'`: the eigenvalues of the symmetric `S1^(1/2) S2 S1^(1/2)` are their
 //! squares. They are real and not negative by construction, no covariance and no root of one is ever formed, and sets with
-//! fewer points than dimensions are only smaller matrices: the published code's imaginary parts, and what it adds to
-//! singular products, do not come up. All of it is `f64`.
+//! fewer points than dimensions are only smaller matrices: the imaginary parts of the published code, and its offset
+//! for singular products, do not arise. All arithmetic is `f64`.
 //!
-//! A warning: few points underestimate spreads. FID of fewer pictures than its 2048 dimensions says little; use
-//! [`super::kernel`] beside it.
+//! A warning: few points underestimate spreads. FID of fewer pictures than its 2048 dimensions says little; report
+//! [`super::kernel`] next to it.
 
 use super::features::{Features, SetError};
 use faer::Mat;
 
-/// The distance: 0 for equal sets, the same both ways, never negative. Two sets of 2048 dimensions and 3000 points take
+/// The distance: 0 for equal sets, symmetric, never negative. Two sets of 2048 dimensions and 3000 points take
 /// seconds; of fewer than 100 points, milliseconds.
 ///
 /// # Errors
@@ -29,7 +29,7 @@ pub fn frechet_distance(a: &Features, b: &Features) -> Result<f64, SetError> {
     let traces = spread_a.squared_norm_l2() + spread_b.squared_norm_l2();
     let common = reduced(spread_a) * reduced(spread_b).transpose();
     let singular_values = common.singular_values().map_err(|_| SetError::NotConverged)?;
-    // What is left of equal sets is rounding, of either sign.
+    // For equal sets the result is rounding error, of either sign.
     Ok((between + traces - 2.0 * singular_values.iter().sum::<f64>()).max(0.0))
 }
 

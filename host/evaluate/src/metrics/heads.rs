@@ -1,4 +1,4 @@
-//! Heads: the few numbers on top of a trunk that were fitted to people's judgement.
+//! Heads: the few numbers on top of a trunk that were fitted to human judgement.
 //!
 //! The published ones are part of this project: LPIPS version 0.1 (`lin*.model.1.weight` for AlexNet, VGG16 and
 //! SqueezeNet; BSD 2-clause, `heads/LICENSE-LPIPS.txt`) and DISTS (`alpha`, `beta`; MIT, `heads/LICENSE-DISTS.txt`). Others

@@ -1,35 +1,36 @@
-//! Means over scenes, and how sure they are.
+//! Means over scenes with confidence intervals.
 //!
-//! Views of one scene are alike, so a scene's score is one number, the mean over its views ([`scene_means`]), and scenes
-//! are what is counted. The interval is Student's: the mean, and to both sides the standard deviation of scenes (divided by
-//! their count less one) over the root of their count, times the quantile of the t distribution. It holds the mean over all
-//! scenes of the kind in 95 of 100 evaluations if scenes are drawn at random and their scores are not far from normal.
+//! Views of one scene are alike, so a scene's score is one number, the mean over its views ([`scene_means`]), and the
+//! sample size is the number of scenes. The interval is Student's: the mean plus and minus the standard error (the
+//! standard deviation of scenes, with their count less one, over the root of their count) times the quantile of the t
+//! distribution. It contains the mean over all scenes of the kind in 95 of 100 evaluations if scenes are drawn at
+//! random and their scores are approximately normal.
 //!
-//! Two schemes are compared by what they differ by on each scene ([`Interval::of_differences`]): most of what scenes differ
-//! by, they differ by for both.
+//! Two schemes are compared by their difference on each scene ([`Interval::of_differences`]): most of the variation
+//! between scenes is common to both.
 
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::{Display, Formatter};
 
-/// How often the interval is to hold the truth.
+/// The confidence level.
 const CONFIDENCE: f64 = 0.95;
 
-/// A mean and how far it can be off.
+/// A mean with its confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Interval {
     /// Mean over scenes.
     pub mean: f64,
-    /// Half the width of the 95 % interval; `None` of a single scene, which tells nothing about others, and where a score
-    /// is infinite.
+    /// Half the width of the 95 % interval; `None` for a single scene, from which it cannot be estimated, and where a
+    /// score is infinite.
     pub half_width: Option<f64>,
     /// How many scenes.
     pub count: usize,
 }
 
 impl Interval {
-    /// Of one score a scene; `None` of no scene.
+    /// From one score for each scene; `None` without scenes.
     pub fn of(scores: &[f64]) -> Option<Interval> {
         let count = scores.len();
         if count == 0 {
@@ -44,7 +45,7 @@ impl Interval {
         Some(Interval { mean, half_width, count })
     }
 
-    /// Of the differences `a - b` on the scenes that both have; `None` if there is no such scene.
+    /// From the differences `a - b` on the scenes that both have; `None` if there is no such scene.
     pub fn of_differences<S: Ord>(a: &BTreeMap<S, f64>, b: &BTreeMap<S, f64>) -> Option<Interval> {
         // Two infinite scores are two equal pictures.
         let difference = |a: f64, b: f64| if a == b { 0.0 } else { a - b };
@@ -52,7 +53,7 @@ impl Interval {
         Interval::of(&differences.collect::<Vec<_>>())
     }
 
-    /// Whether 0 lies outside: of a difference, whether it is more than chance. Without a width it is not known: `false`.
+    /// Whether 0 lies outside: for a difference, whether it is significant. Without a width it is unknown: `false`.
     pub fn excludes_zero(&self) -> bool {
         self.half_width.is_some_and(|half_width| self.mean.abs() > half_width)
     }
@@ -80,8 +81,7 @@ pub fn scene_means<'a>(scores: impl IntoIterator<Item = (&'a str, f64)>) -> BTre
     sums.into_iter().map(|(scene, (sum, count))| (scene, sum / count as f64)).collect()
 }
 
-/// What a variable with Student's t distribution of that many degrees of freedom, at least 1, stays below in magnitude with
-/// a probability of 95 %.
+/// The two-sided 95 % quantile of Student's t distribution with this many degrees of freedom, at least 1.
 fn quantile(freedom: usize) -> f64 {
     let root = (freedom as f64).sqrt();
     // In the angle whose tangent is t / root the probability grows from 0 to 1 at pi / 2.
@@ -158,7 +158,7 @@ mod tests {
         assert!(difference.count == 4 && difference.excludes_zero() && difference.mean > 1.0, "{difference}");
         let alone = Interval::of(&better.values().copied().collect::<Vec<_>>()).expect("four scenes");
         assert!(alone.half_width > difference.half_width.map(|half_width| 100.0 * half_width));
-        // Scenes that one of them lacks do not count; equal infinite scores differ by nothing.
+        // Scenes that one of them lacks do not count; the difference of equal infinite scores is 0.
         let mut fewer = better.clone();
         fewer.remove("a");
         assert_eq!(Interval::of_differences(&fewer, &worse).map(|interval| interval.count), Some(3));

@@ -1,21 +1,21 @@
 //! The kernel distance of two sets of points, KID where the points are Inception's.
 //!
 //! The square of the maximum mean discrepancy with the kernel `k(x, y) = (x.y / d + 1)^3`, `d` the dimension, without bias:
-//! the mean of `k` within each set, no point with itself, less twice its mean between the sets (Binkowski, Sutherland,
-//! Arbel, Gretton: "Demystifying MMD GANs", ICLR 2018). Its expectation does not depend on how many points there are, as
-//! that of the Frechet distance does, so it can be asked of few pictures; near 0 it may be negative.
+//! the mean of `k` within each set (no point with itself), minus twice its mean between the sets (Binkowski,
+//! Sutherland, Arbel, Gretton: "Demystifying MMD GANs", ICLR 2018). Unlike that of the Frechet distance, its
+//! expectation does not depend on the number of points, so it is valid for few pictures; near 0 it may be negative.
 //!
 //! Published scores are means over 100 random subsets of at most 1000 points of each set. Where both sets are no larger
-//! than that, a subset as large as its set is the set: all points are taken at once, which is the same number with less
-//! chance in it ([`kernel_distance`]). All of it is `f64`.
+//! than that, all points are used at once, which estimates the same number with less variance ([`kernel_distance`]).
+//! All arithmetic is `f64`.
 
 use super::features::{Features, SetError};
 use faer::Mat;
 use viewfuse_core::random::threefry_2x32;
 
-/// How many subsets published scores are means of.
+/// Number of subsets in published scores.
 pub const SUBSET_COUNT: u32 = 100;
-/// Points in a subset, if both sets have as many.
+/// Points in a subset, if both sets have that many.
 pub const SUBSET_SIZE: usize = 1000;
 
 /// The distance of two sets; by subsets if one has more than [`SUBSET_SIZE`] points.
@@ -31,8 +31,8 @@ pub fn kernel_distance(a: &Features, b: &Features, seed: u64) -> Result<f64, Set
     Ok(distance(&all(a), &all(b)))
 }
 
-/// The mean distance of random subsets of `size` points of each set (fewer if a set has fewer, at least 2), drawn without
-/// putting back. The same seed draws the same subsets.
+/// The mean distance of random subsets of `size` points of each set (fewer if a set has fewer, at least 2), drawn
+/// without replacement. The same seed draws the same subsets.
 ///
 /// # Errors
 /// [`SetError::Dimensions`], [`SetError::Few`].
@@ -72,7 +72,7 @@ fn drawn(count: usize, size: usize, seed: u64, draw: u32) -> Vec<usize> {
     let mut numbers: Vec<usize> = (0..count).collect();
     for place in 0..size {
         let [low, high] = threefry_2x32([seed as u32, (seed >> 32) as u32], [place as u32, draw]);
-        // 64 random bits: what is left over favours no number by more than `count / 2^64`.
+        // 64 random bits: the modulo bias is at most `count / 2^64`.
         let word = u64::from(high) << 32 | u64::from(low);
         numbers.swap(place, place + (word % (count - place) as u64) as usize);
     }

@@ -1,4 +1,4 @@
-//! LPIPS: how far two pictures are apart in a network's eyes.
+//! LPIPS: the distance of two pictures in a network's features.
 //!
 //! At each tap of the trunk, every pixel's channels are scaled to length 1; the squares of the differences, weighted by
 //! the head, are added up over channels and averaged over pixels; the taps are added up. Version 0.1 of the published code
@@ -14,13 +14,13 @@ use viewfuse_device::Device;
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse_nn::image::HostImage;
 
-/// What pictures, levels in `[-1, 1]`, are shifted by and divided by.
+/// Shift and divisor of pictures with levels in `[-1, 1]`.
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
 const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
 /// Added to lengths.
 const FLOOR: f64 = 1.0e-10;
 
-/// The network that LPIPS looks through.
+/// The network whose features LPIPS compares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LpipsTrunk {
     /// AlexNet, the published default for scores.
@@ -100,14 +100,14 @@ impl<D: Device> Lpips<D> {
     /// `lin0.model.1.weight` and so on.
     ///
     /// # Errors
-    /// [`MetricError::Checkpoint`] with the tensors that are not as they must be; [`MetricError::Device`].
+    /// [`MetricError::Checkpoint`] with the tensors that are missing or of another shape; [`MetricError::Device`].
     pub fn new(device: &D, kind: LpipsTrunk, trunk: &Checkpoint, heads: &Checkpoint) -> Result<Lpips<D>, MetricError> {
         let shape = |(tap, channels): (usize, &usize)| TensorShape {
             name: format!("lin{tap}.model.1.weight"),
             shape: vec![1, *channels, 1, 1],
         };
         let expected: Vec<TensorShape> = kind.channels().iter().enumerate().map(shape).collect();
-        // A whole LPIPS, as it is saved, has the trunk, and the heads a second time.
+        // A saved LPIPS module contains the trunk, and the heads twice.
         heads.check(&expected, |name| ["lins.", "net.", "scaling_layer."].iter().any(|own| name.starts_with(own)))?;
         let heads = expected.iter().map(|tensor| heads.tensor(&tensor.name)).collect::<Result<_, _>>()?;
         let trunk = Trunk::load(device, trunk, &kind.steps(), |name| name.starts_with("classifier."))?;
@@ -119,7 +119,7 @@ impl<D: Device> Lpips<D> {
         self.kind
     }
 
-    /// The distance: 0 for equal pictures, the same both ways, about 1 for pictures that have nothing in common.
+    /// The distance: 0 for equal pictures, symmetric, about 1 for unrelated pictures.
     ///
     /// # Errors
     /// [`MetricError`] if the sizes differ or are too small for the network, or if the device fails.
@@ -134,7 +134,7 @@ impl<D: Device> Lpips<D> {
     }
 }
 
-/// The share of one tap.
+/// The contribution of one tap.
 fn tap_distance(prediction: &HostImage, truth: &HostImage, head: &[f32]) -> f64 {
     let length = |pixel: &[f32]| pixel.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>().sqrt() + FLOOR;
     let distance = |(prediction, truth): (&[f32], &[f32])| -> f64 {

@@ -1,8 +1,8 @@
-//! PSNR and SSIM of the object alone, as few-shot papers report for DTU: prediction and truth are both laid over white by
-//! the mask of the *truth*, and compared over the whole picture.
+//! PSNR and SSIM of the object alone, as few-shot papers report for DTU: prediction and truth are both composited over
+//! white with the mask of the *truth*, and compared over the whole picture.
 //!
-//! The prediction is not cut out by what it knows of the object itself: what it paints inside the mask counts, what it
-//! paints outside does not. Both pictures have 8 bits, whatever convention the other metrics follow.
+//! The prediction's own opacity is not used: its pixels inside the mask count, its pixels outside do not. Both pictures
+//! have 8 bits, under every convention of the other metrics.
 
 use image::RgbImage;
 use viewfuse_core::metrics::{psnr, ssim};
@@ -12,7 +12,7 @@ pub const PSNR_MASKED: &str = "psnr-masked";
 /// Name of the masked structural similarity.
 pub const SSIM_MASKED: &str = "ssim-masked";
 
-/// A truth of which the mask is known.
+/// A truth with its mask.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaskedTruth {
     over_white: RgbImage,
@@ -21,7 +21,8 @@ pub struct MaskedTruth {
 }
 
 impl MaskedTruth {
-    /// Of the same photograph laid over white and over black, of equal size; `None` where these are equal: it has no mask.
+    /// From the same photograph composited over white and over black, of equal size; `None` where these are equal,
+    /// because it then has no mask.
     pub fn of(over_white: RgbImage, over_black: &RgbImage) -> Option<MaskedTruth> {
         if over_white == *over_black || over_white.dimensions() != over_black.dimensions() {
             return None;
@@ -34,7 +35,7 @@ impl MaskedTruth {
         Some(MaskedTruth { over_white, shares })
     }
 
-    /// A picture laid over white by this truth's mask. It must have the truth's size.
+    /// A picture composited over white with this truth's mask. It must have the truth's size.
     pub fn over_white(&self, picture: &RgbImage) -> RgbImage {
         let mut laid = picture.clone();
         for (pixel, share) in laid.pixels_mut().zip(&self.shares) {

@@ -1,12 +1,11 @@
 //! SSIM with a Gaussian window, as Wang et al. defined it and many tables use it.
 //!
-//! The other one, with a uniform window of 7x7, is [`viewfuse_core::metrics::ssim`]; it is what scikit-image does unless
-//! told otherwise, and what the published evaluations of this field's systems used. On one pair of pictures the two differ
-//! by up to a tenth.
+//! The other one, with a uniform window of 7x7, is [`viewfuse_core::metrics::ssim`]; it is the default of scikit-image,
+//! and the published evaluations of this field's systems used it. On one pair of pictures the two differ by up to 0.1.
 
 use image::RgbImage;
 
-/// Side of the window: 3.5 deviations to each side, as scikit-image cuts it.
+/// Side of the window: 3.5 deviations to each side, as in scikit-image.
 pub const GAUSSIAN_WINDOW: usize = 11;
 /// Standard deviation of the window, pixels.
 const DEVIATION: f64 = 1.5;
@@ -34,7 +33,7 @@ pub fn ssim_gaussian(prediction: &RgbImage, truth: &RgbImage) -> Option<f64> {
     Some(sums.sum::<f64>() / (3 * window_count) as f64)
 }
 
-/// Of a window, by its means of the levels, of their squares and of their product.
+/// SSIM of a window from its means of the levels, of their squares and of their product.
 fn similarity(means: [f64; 2], squares: [f64; 2], product: f64) -> f64 {
     const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
     const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);

@@ -1,6 +1,7 @@
-//! Trunks: the published image networks that metrics look at pictures through, as trees of steps.
+//! Trunks: the published image networks whose features metrics compare, as trees of steps.
 //!
-//! A trunk is data ([`Step`]): which layers follow one another, which are concatenated, and where the metric taps it. The same tree says which tensors a `state_dict` must have, is read from a checkpoint, and runs on any device
+//! A trunk is data ([`Step`]): which layers follow one another, which are concatenated, and where the metric taps it.
+//! The same tree lists the tensors that a `state_dict` must have, is read from a checkpoint, and runs on any device
 //! ([`Trunk`]).
 
 mod architectures;
@@ -12,7 +13,7 @@ pub use run::Trunk;
 use viewfuse_nn::checkpoint::TensorShape;
 use viewfuse_nn::pool::MaxPool;
 
-/// A convolution with bias; its output is rectified, as all of these networks do.
+/// A convolution with bias, followed by a ReLU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Convolution {
     /// Its name in a `state_dict`.
@@ -42,7 +43,7 @@ impl Convolution {
         }
     }
 
-    /// Every tensor that it has, if its input has this many channels.
+    /// Its tensors, for an input of this many channels.
     fn tensors(&self, in_channels: usize) -> Vec<TensorShape> {
         let [rows, columns] = self.window;
         let kernel = vec![self.channels, in_channels, rows, columns];
@@ -71,13 +72,13 @@ pub enum Step<C> {
     /// DISTS' L2 pool: the square root of the squares, blurred with `[1, 2, 1] / 4` in both directions, at every second
     /// pixel.
     L2Pool,
-    /// Steps that see the same image, their outputs concatenated by channels.
+    /// Branches on the same image, their outputs concatenated by channels.
     Concatenate(Vec<Vec<Step<C>>>),
-    /// The metric wants the image that is here.
+    /// A tap: the metric uses the image at this step.
     Tap,
 }
 
-/// Every tensor that the steps have, in the order of the data, and the number of channels that come out.
+/// Every tensor of the steps, in the order of the data, and the number of output channels.
 pub fn tensors(steps: &[Step<Convolution>], in_channels: usize) -> (Vec<TensorShape>, usize) {
     let (mut all, mut channels) = (Vec::new(), in_channels);
     for step in steps {

@@ -1,5 +1,4 @@
-//! How far pictures are from each other, of values that are not rounded: rounding to 8 bits would hide everything below
-//! half a level.
+//! The difference of pictures, from unrounded values: rounding to 8 bits would hide differences below half a level.
 
 /// A difference over any number of pictures: squares are summed over all of them, in `f64`, in the order of the pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -10,8 +9,8 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Adds a picture and what it is compared with: red, green and blue; opacity is not compared. Of pictures of different
-    /// length the difference is NaN.
+    /// Adds a picture and its reference: red, green and blue; opacity is not compared. For pictures of different length
+    /// the difference is NaN.
     pub fn add(&mut self, picture: &[[f32; 4]], exact: &[[f32; 4]]) {
         if picture.len() != exact.len() {
             (self.squares, self.largest) = (f64::NAN, f64::NAN);
@@ -29,17 +28,17 @@ impl Difference {
         }
     }
 
-    /// The largest difference of a channel whose range is 1; NaN if any value was none.
+    /// The largest difference of a channel whose range is 1; NaN if any value was NaN.
     pub fn largest(&self) -> f64 {
         self.largest
     }
 
-    /// The root of the mean square, for channels whose range is 1: 0 of equal pictures, NaN if any value was none.
+    /// The root of the mean square, for channels whose range is 1: 0 of equal pictures, NaN if any value was NaN.
     pub fn root_mean_square(&self) -> f64 {
         if self.count == 0 { self.squares } else { (self.squares / self.count as f64).sqrt() }
     }
 
-    /// Peak signal to noise ratio in decibels for a peak of 1: infinite for equal pictures, NaN if any value was none.
+    /// Peak signal to noise ratio in decibels for a peak of 1: infinite for equal pictures, NaN if any value was NaN.
     pub fn psnr(&self) -> f64 {
         let error = self.root_mean_square();
         if error == 0.0 { f64::INFINITY } else { -20.0 * error.log10() }

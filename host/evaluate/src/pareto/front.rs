@@ -1,16 +1,16 @@
-//! Which points are the best for their time, and which one to take.
+//! The Pareto front of time and error, and the recommended point.
 
 use super::Point;
 
-/// Largest loss against the photographs that a person would not see, decibels.
+/// Largest invisible loss against the photographs, decibels.
 pub const LARGEST_LOSS: f64 = 0.1;
 /// Peak signal to noise ratio against the exact picture from which two pictures look the same, decibels: a difference of
 /// 1 % of the range.
 pub const SAME_LOOK: f64 = 40.0;
 
-/// Marks the points, given as time and error, that no other point beats: none is at most as slow and at most as far off,
-/// and better in one of the two. Of points that are the same in both, all are marked. A point with a NaN is never
-/// marked and beats none.
+/// Marks the points, given as time and error, that no other point dominates: none is at most as slow and at most as far
+/// off, and better in one of the two. Points that are equal in both are all marked. A point with a NaN is never marked
+/// and dominates none.
 pub fn best_for_their_time(points: &[[f64; 2]]) -> Vec<bool> {
     let is_number = |point: &[f64; 2]| point.iter().all(|value| !value.is_nan());
     let beats = |[time, error]: &[f64; 2], other: &[f64; 2]| {
@@ -25,7 +25,8 @@ pub fn best_points(points: &[Point]) -> Vec<bool> {
     best_for_their_time(&pairs)
 }
 
-/// What a point loses against the photographs compared with the first one, decibels; negative where it is nearer to them.
+/// The loss of a point in PSNR against the photographs compared with the first point, decibels; negative if it is
+/// nearer to them.
 pub fn loss(points: &[Point], point: &Point) -> Option<f64> {
     Some(points.first()?.truth_psnr? - point.truth_psnr?)
 }
@@ -35,7 +36,7 @@ pub fn fastest_without_loss(points: &[Point]) -> Option<&Point> {
     fastest(points, |point| loss(points, point).is_some_and(|loss| loss <= LARGEST_LOSS))
 }
 
-/// The fastest point whose pictures are at least [`SAME_LOOK`] from the first one's.
+/// The fastest point whose pictures have a PSNR of at least [`SAME_LOOK`] against the first one's.
 pub fn fastest_of_same_look(points: &[Point]) -> Option<&Point> {
     fastest(points, |point| point.difference.psnr() >= SAME_LOOK)
 }

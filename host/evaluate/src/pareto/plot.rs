@@ -1,5 +1,5 @@
 //! Error against run time as a picture (SVG): time on a logarithmic axis, nearness to the exact pictures in decibels
-//! upwards, a colour and a shape for each device, the points that are the best for their time ringed, joined and named.
+//! upwards, a colour and a shape for each device, the points on the Pareto front ringed, joined and named.
 
 mod axis;
 mod labels;
@@ -18,7 +18,7 @@ use std::error::Error;
 pub struct PlotError(String);
 
 const SIZE: (u32, u32) = (1100, 720);
-/// Told apart also by people who do not see all colours (Okabe and Ito).
+/// Distinguishable also with colour blindness (Okabe and Ito).
 pub(crate) const COLOURS: [RGBColor; 6] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -105,7 +105,7 @@ fn draw(picture: &mut String, title: &str, devices: &[DeviceRecord]) -> Result<(
             if label.is_far(at, RING) {
                 area.draw(&PathElement::new([(at[0], at[1]), label.nearest(at)], style.colour.mix(0.4)))?;
             }
-            // Lines stay readable as lines, words as words.
+            // Lines and text stay separate elements.
             let Space { left, right, top, bottom } = label;
             area.draw(&Rectangle::new([(left, top), (right, bottom)], WHITE.mix(0.8).filled()))?;
             text(&area, words, label.middle(), LABEL_SIZE, HPos::Center, style.colour)?;

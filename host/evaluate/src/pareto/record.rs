@@ -1,4 +1,4 @@
-//! The outcome of a sweep for other programs: JSON with all that led to it, and a CSV table of the points.
+//! The results of a sweep for other programs: JSON with all inputs, and a CSV table of the points.
 
 use super::Point;
 use super::difference::Difference;
@@ -15,7 +15,7 @@ pub struct ParetoRecord {
     pub scene: String,
     /// The field.
     pub field: &'static str,
-    /// Where its network's parameters come from; null for the field that needs none.
+    /// Where its network's parameters come from; null for a field without a network.
     pub model: Option<String>,
     /// The weighting scheme.
     pub weighting: String,
@@ -27,11 +27,11 @@ pub struct ParetoRecord {
     pub sources: Vec<String>,
     /// Names of the targets.
     pub targets: Vec<String>,
-    /// How many timed rounds there were.
+    /// Number of timed rounds.
     pub round_count: u32,
-    /// One entry a device.
+    /// One entry for each device.
     pub devices: Vec<DeviceRecord>,
-    /// Devices that failed, and how.
+    /// Devices that failed, with the error.
     pub failures: Vec<String>,
 }
 
@@ -46,12 +46,12 @@ pub struct DeviceRecord {
     pub fastest_without_loss: Option<String>,
     /// The fastest setting whose pictures look the same as the exact ones ([`fastest_of_same_look`]).
     pub fastest_of_same_look: Option<String>,
-    /// One entry a setting.
+    /// One entry for each setting.
     pub points: Vec<PointRecord>,
 }
 
-/// A difference. JSON knows neither infinity nor NaN: where a value was none, `root_mean_square` is null; where pictures
-/// are equal it is 0 and `psnr` is null.
+/// A difference. JSON knows neither infinity nor NaN: where a value was NaN or infinite, `root_mean_square` is null;
+/// where pictures are equal it is 0 and `psnr` is null.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct DifferenceRecord {
     /// Root mean square over pixels and channels of range 1.
@@ -72,34 +72,34 @@ impl From<Difference> for DifferenceRecord {
     }
 }
 
-/// A setting with what it gave.
+/// A setting with its results.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PointRecord {
-    /// The setting, in a few words.
+    /// The setting's short name.
     pub setting: String,
-    /// Whether no other setting of the device is both as fast and as near to the exact pictures.
+    /// Whether it is on the device's Pareto front of time and error.
     pub best: bool,
     /// Time for a target, encoding included: the median over the rounds.
     pub seconds: f64,
-    /// The least and the most of the rounds.
+    /// Least and greatest time of the rounds.
     pub seconds_range: [f64; 2],
     /// The part of it for encoding the sources: the median over the rounds.
     pub encode_seconds: f64,
-    /// How many times as fast as the exact pictures.
+    /// Speed relative to the exact pictures.
     pub gain: f64,
     /// How the pictures differ from the exact ones, not rounded.
     pub versus_exact: DifferenceRecord,
     /// Peak signal to noise ratio against the photographs, decibels, of 8-bit values, mean over the targets that have one.
     pub truth_psnr: Option<f64>,
-    /// What that loses compared with the exact pictures.
+    /// Its loss compared with the exact pictures.
     pub truth_loss: Option<f64>,
-    /// What the field left out in one round; not read back.
+    /// The work that the field skipped in one round; not read back.
     #[serde(skip_deserializing)]
     pub left_out: Vec<LeftOut>,
-    /// How the field went from noise to the pictures of one round; null for fields that do not; not read back.
+    /// The denoising of one round's pictures; null for fields without a denoiser; not read back.
     #[serde(skip_deserializing)]
     pub denoising: Option<Denoising>,
-    /// Whether every round gave the same pictures, bit for bit.
+    /// Whether every round rendered the same pictures, bit for bit.
     pub repeatable: bool,
 }
 
@@ -136,9 +136,9 @@ impl DeviceRecord {
     }
 }
 
-/// The points of all devices as CSV, one a line. The ratio of equal pictures is `inf`, of pictures with a value that is
-/// none `NaN`. Fields with a denoiser have a column for its calls in one round. For
-/// everything that the field leaves out there are two columns: how much of it, and of how much.
+/// The points of all devices as CSV, one a line. The PSNR of equal pictures is `inf`, that of pictures with a NaN
+/// `NaN`. Fields with a denoiser have a column for its calls in one round. Each kind of work that the field skips has
+/// two columns: the amount skipped and the total.
 ///
 /// # Errors
 /// Only if memory runs out.
@@ -162,7 +162,7 @@ pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
     .map(str::to_owned)
     .to_vec();
     let points = || record.devices.iter().flat_map(|device| device.points.iter().map(move |point| (device, point)));
-    // Fields that go from noise to a picture have another column, and all settings are of one field.
+    // Fields with a denoiser have one more column, and all settings are of one field.
     let has_calls = points().any(|(_, point)| point.denoising.is_some());
     if has_calls {
         header.push("calls".to_owned());

@@ -1,4 +1,4 @@
-//! What is tried of each field. The first setting of a list leaves nothing out.
+//! The settings tried for each field. The first one of a list skips nothing.
 
 mod genvs;
 
@@ -10,13 +10,13 @@ use viewfuse_field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions, Sampling
 use viewfuse_field::render::RenderOptions;
 use viewfuse_field::training_free::TrainingFree;
 
-/// What the setting that leaves nothing out is called.
+/// Name of the setting that skips nothing.
 pub const EXACT: &str = "exact";
-/// What the setting is called that leaves out all that a run leaves out unless told otherwise.
+/// Name of the setting that skips everything that a run skips by default.
 pub const ALL: &str = "all";
 
-/// The settings of a field, for so many targets. Of `options` is taken what `all` leaves out, besides the size and the
-/// background. A field without a list of its own has two settings: nothing left out, and what `options` say.
+/// The settings of a field for this many targets. `options` give what `all` skips, the size and the background. A field
+/// without a list of its own has two settings: nothing skipped, and `options` as they are.
 pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Setting> {
     if let Some(field) = field.downcast_ref::<TrainingFree>() {
         of_training_free(field, options)
@@ -36,7 +36,8 @@ const VIEWS: Omissions = Omissions { unused_views: true, ..NONE };
 const PROBED: Omissions = Omissions { empty_space: 4, probe_error: 1.0 / 128.0, ..NONE };
 const HIDDEN: Omissions = Omissions { hidden_samples: true, ..NONE };
 
-/// PixelNeRF: each of these alone, with everything else as exact. Words, what is left out, `--leave-out`, `--early-termination`.
+/// PixelNeRF: each of these alone, everything else exact. Words, what is left out, `--leave-out`,
+/// `--early-termination`.
 #[rustfmt::skip]
 const ALONE: [(&str, Omissions, f32, f32); 16] = [
     ("unused views",    VIEWS,                                     0.0,  0.0),
@@ -57,8 +58,8 @@ const ALONE: [(&str, Omissions, f32, f32); 16] = [
     ("hidden, 1/4",     HIDDEN,                                    0.0,  1.0 / 4.0),
 ];
 
-/// PixelNeRF: all but each of these, because what is harmless alone may not be so together. Words as `--compute` takes
-/// them.
+/// PixelNeRF: all but each of these, because omissions that are harmless alone may not be so together. Words as
+/// `--compute` takes them.
 #[rustfmt::skip]
 const ALL_BUT: [(&str, Omissions); 6] = [
     ("views",  Omissions { unused_views: false, ..Omissions::ALL }),
@@ -69,11 +70,11 @@ const ALL_BUT: [(&str, Omissions); 6] = [
     ("hidden", Omissions { hidden_samples: false, ..Omissions::ALL }),
 ];
 
-/// PixelNeRF: with all left out, so many eighths of the exact picture's samples in the first and in the second pass.
+/// PixelNeRF: with everything skipped, eighths of the exact picture's samples in the first and in the second pass.
 const SAMPLES: [[u32; 2]; 8] = [[6, 6], [4, 4], [3, 3], [2, 2], [1, 1], [8, 0], [4, 0], [2, 0]];
 
-/// The settings of a PixelNeRF. Of `field` the sampling is taken, and of `options` what `all` leaves out, besides the size
-/// and the background; what the field itself leaves out does not matter.
+/// The settings of a PixelNeRF. `field` gives the sampling; `options` give what `all` skips, the size and the
+/// background. What the field itself skips is ignored.
 fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting> {
     let full = field.options().sampling;
     let setting = |words: &str, sampling, omissions, leave_out, early_termination| Setting {
@@ -123,8 +124,7 @@ const EARLY: [(&str, f32, f32); 8] = [
 /// The training-free field: the sources' side as a share of the pictures', alone and with all.
 const SOURCES: [(&str, f32); 3] = [("3/4", 0.75), ("1/2", 0.5), ("1/4", 0.25)];
 
-/// The settings of the training-free field. Of `options` is taken what `all` leaves out, besides the size and the
-/// background.
+/// The settings of the training-free field. `options` give what `all` skips, the size and the background.
 fn of_training_free(field: &TrainingFree, options: &RenderOptions) -> Vec<Setting> {
     let setting = |words: &str, source_share, leave_out, early_termination| Setting {
         words: words.to_owned(),

@@ -10,8 +10,8 @@
 //! rounded half to even. `dtu` is pixelNeRF's split, whose order RegNeRF fixed, without the 15 views of wrong exposure.
 //! `blender` is that of DietNeRF and FreeNeRF.
 //!
-//! A benchmark's views have numbers. A scene that has all of the benchmark's views is taken by position; of a part of one,
-//! the number is that in which a view's name ends.
+//! A benchmark's views have numbers. In a scene with all of the benchmark's views, the number is the position;
+//! otherwise it is the number at the end of the view's name.
 
 use super::photographed;
 use std::fmt;
@@ -29,7 +29,7 @@ pub enum Benchmark {
     Blender,
 }
 
-/// Every how many views one is a target.
+/// Every view with an index divisible by this is a target.
 const EVERY: usize = 8;
 /// Sources of DTU in the order in which more are added.
 const DTU_SOURCES: [usize; 9] = [25, 22, 28, 40, 44, 48, 0, 8, 13];
@@ -105,14 +105,15 @@ impl Benchmark {
         }
     }
 
-    /// Whether a scene of this name is one of [`Benchmark::scenes`]: between other letters and digits its name stands alone.
+    /// Whether a scene of this name is one of [`Benchmark::scenes`]: the name contains that scene's name as a whole
+    /// word.
     pub fn has_scene(self, name: &str) -> bool {
         let name = name.to_ascii_lowercase();
         let mut words = name.split(|letter: char| !letter.is_ascii_alphanumeric());
         words.any(|word| self.scenes().contains(&word))
     }
 
-    /// The views that it takes of a scene with this many sources; otherwise what the scene lacks, in words.
+    /// The benchmark's views of a scene for this many sources; otherwise what the scene lacks, in words.
     pub(super) fn choose(self, scene: &Scene, source_count: usize) -> Result<Chosen, String> {
         match self {
             Benchmark::Llff => evenly(&photographed(scene).collect::<Vec<_>>(), source_count),
@@ -165,7 +166,8 @@ fn evenly(views: &[usize], source_count: usize) -> Result<Chosen, String> {
     Ok((evenly_spaced(others.len(), source_count).into_iter().map(|place| others[place]).collect(), targets))
 }
 
-/// `numpy.linspace(0, length - 1, count)` rounded half to even. `count` must be at most `length`: no place comes twice then.
+/// `numpy.linspace(0, length - 1, count)` rounded half to even. `count` must be at most `length`, so that no index
+/// occurs twice.
 fn evenly_spaced(length: usize, count: usize) -> Vec<usize> {
     let last = length.saturating_sub(1);
     let step = last as f64 / count.saturating_sub(1).max(1) as f64;
@@ -181,7 +183,7 @@ fn of_split(scene: &Scene, split: Split) -> Vec<usize> {
 fn numbered(scene: &Scene, views: &[usize], whole: usize, numbers: &[usize]) -> Vec<Result<usize, usize>> {
     let named = |number: usize| {
         let mut found = views.iter().copied().filter(|&view| number_of(&scene.views[view]) == Some(number));
-        // Two views of one number: nobody can tell which is meant.
+        // Two views with the same number: ambiguous.
         found.next().filter(|_| found.next().is_none())
     };
     let find = |&number: &usize| {
@@ -208,7 +210,7 @@ fn all_of(found: Vec<Result<usize, usize>>, what: &str) -> Result<Vec<usize>, St
     Ok(views)
 }
 
-/// The views that are there.
+/// The views that exist.
 fn some_of(found: Vec<Result<usize, usize>>) -> Result<Vec<usize>, String> {
     let views: Vec<usize> = found.into_iter().flatten().collect();
     if views.is_empty() { Err("has none of the target views".to_owned()) } else { Ok(views) }

@@ -1,4 +1,4 @@
-//! Random orders of views that hang on what is drawn and not on when.
+//! Random orders of views that depend on the seed, scene and trial, and not on the order of draws.
 
 use viewfuse_core::random::threefry_2x32;
 
@@ -10,18 +10,18 @@ pub(super) struct Draw {
 }
 
 impl Draw {
-    /// Those of a seed, a scene's name and a trial.
+    /// The random numbers of a seed, a scene's name and a trial.
     pub(super) fn of(seed: u64, scene_name: &str, trial: u32) -> Draw {
         Draw { key: threefry_2x32(words(seed), words(fingerprint(scene_name))), trial }
     }
 
-    /// Those that belong to one view of the trial.
+    /// The random numbers of one view of the trial.
     pub(super) fn of_view(&self, view: usize) -> Draw {
         // The complement of the trial: a counter that no order of the trial itself uses.
         Draw { key: threefry_2x32(self.key, [!self.trial, view as u32]), trial: self.trial }
     }
 
-    /// Views in random order, whatever order they come in.
+    /// Views in random order, independent of their order in the input.
     pub(super) fn order(&self, views: impl IntoIterator<Item = usize>) -> Vec<usize> {
         let mut views: Vec<usize> = views.into_iter().collect();
         views.sort_unstable();

@@ -6,7 +6,8 @@ use viewfuse_core::camera::Camera;
 use viewfuse_scene::Scene;
 use viewfuse_scene::rig::Rig;
 
-/// The first views of the order are the targets, those behind them the sources: a smaller set is the beginning of a larger.
+/// The first views of the order are the targets, the next ones the sources: a smaller set of sources is a prefix of a
+/// larger one.
 pub(super) fn counted(
     scene: &Scene,
     draw: &Draw,

@@ -31,11 +31,11 @@ pub(super) fn fixed(
     Ok((sources, targets))
 }
 
-/// Each target of a list, or each view, with the `count` other views whose cameras are nearest to its own; of equally near
-/// ones the first.
+/// Each target of a list, or each view, with the `count` other views whose cameras are nearest to its own; the first of
+/// equally near ones.
 ///
 /// # Errors
-/// [`SelectionError`] of a list that does not fit the scene.
+/// [`SelectionError`] for a list that does not fit the scene.
 pub(super) fn nearest(
     scene: &Scene,
     count: usize,

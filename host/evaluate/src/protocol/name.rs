@@ -25,7 +25,7 @@ pub enum ProtocolError {
     /// No protocol has this name.
     #[error("unknown protocol '{text}'; there are: {GRAMMAR}")]
     Unknown {
-        /// What was given.
+        /// The given text.
         text: String,
     },
     /// A protocol's value is not usable.
@@ -35,9 +35,9 @@ pub enum ProtocolError {
         protocol: String,
         /// The key.
         key: &'static str,
-        /// What it must be.
+        /// The expected value.
         wanted: String,
-        /// What was given.
+        /// The given text.
         value: String,
     },
     /// The field needs more sources than the protocol has.
@@ -45,10 +45,10 @@ pub enum ProtocolError {
     FewSources {
         /// The protocol.
         protocol: String,
-        /// What the field needs.
+        /// The field's least number of sources.
         least_sources: usize,
     },
-    /// No scene has what the protocol wants.
+    /// No scene meets the protocol's requirements.
     #[error("protocol '{protocol}' fits none of the scenes: {notes}")]
     NoJobs {
         /// The protocol.
@@ -62,7 +62,7 @@ pub enum ProtocolError {
 }
 
 impl fmt::Display for Protocol {
-    /// As it is parsed, with every value.
+    /// In the form that is parsed, with every value.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Protocol::Random { sources } => write!(f, "random:sources={sources}"),

@@ -1,9 +1,9 @@
-//! Figures that others published for a benchmark, to stand beside a table of the same protocol.
+//! Published figures for a benchmark, to be shown next to a table of the same protocol.
 //!
 //! They are means over all scenes of the benchmark, as the papers report them, with *fixed* sources far apart. Figures of
 //! networks that choose the nearest sources for every target are another task and are not here. Some could not be
 //! reproduced by others (LLFF with 3 sources: reported 21.35, ten reruns 20.34 ± 0.19; DTU with 3: reported 19.21, rerun
-//! 17.86): they say where a field stands, not by how many tenths of a decibel.
+//! 17.86): they rank a field, but differences of tenths of a decibel are not significant.
 
 use super::Protocol;
 use super::benchmark::Benchmark;
@@ -14,13 +14,13 @@ use serde::Serialize;
 pub struct Figure {
     /// The method.
     pub method: &'static str,
-    /// What it needs beside the sources; empty if nothing.
+    /// What it needs in addition to the sources; empty if nothing.
     pub needs: &'static str,
     /// Mean PSNR in decibels over the benchmark's scenes.
     pub psnr: f64,
 }
 
-/// What is told of a method: its name, what it needs, its figures by number of sources.
+/// A method: its name, what it needs, its figures by number of sources.
 type Method = (&'static str, &'static str, &'static [(usize, f64)]);
 
 const DIFFUSION: &str = "a diffusion prior";
@@ -66,22 +66,22 @@ const DTU: [Method; 11] = [
 /// NeRF-synthetic at 400x400, full metric, 8 scenes: FreeNeRF (Yang 2023), DNGaussian (Li 2024).
 const BLENDER: [Method; 2] = [("FreeNeRF", "", &[(8, 24.26)]), ("DNGaussian", "", &[(8, 24.31)])];
 
-/// Published figures with what they are of.
+/// Published figures with their conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Published {
-    /// What they are of, in words: benchmark, sources, size, metric, and over which scenes the means are.
+    /// Their conditions, in words: benchmark, sources, size, metric, and over which scenes the means are.
     pub of: String,
     /// The figures, ascending; none where the pictures were not made under the same protocol.
     pub figures: Vec<Figure>,
-    /// Why there are none.
+    /// Why there are no figures.
     pub withheld: Option<String>,
 }
 
 impl Published {
     /// What was published for a protocol; `None` for a protocol without published figures. They are withheld where the
     /// pictures have another size than the papers', where the field is given masks that the papers' methods are not, or
-    /// where the metric is missing that they are of. `scenes` are the names of the scenes that were evaluated, `sizes`
-    /// those of their pictures, `has_masked` whether the masked metric was computed.
+    /// where their metric was not computed. `scenes` are the names of the scenes that were evaluated, `sizes` those of
+    /// their pictures, `has_masked` whether the masked metric was computed.
     pub fn of(protocol: &Protocol, scenes: &[String], sizes: &[[u32; 2]], has_masked: bool) -> Option<Published> {
         let Protocol::Benchmark { benchmark, sources, masks_given } = protocol else { return None };
         let methods: &[Method] = match benchmark {

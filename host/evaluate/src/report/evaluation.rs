@@ -116,7 +116,7 @@ impl Evaluation {
     }
 }
 
-/// What leads a table in a sentence, as far as intervals tell, and what the baselines say of the schemes.
+/// The best rows of a table in a sentence, as far as the intervals decide, and the comparison with the baselines.
 fn lead(table: &Table) -> Option<Markup> {
     let metric = table.metrics.get(table.headline)?;
     let cell = |row: &Row| row.cells[table.headline].clone();

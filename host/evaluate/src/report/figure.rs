@@ -13,11 +13,11 @@ use std::error::Error;
 use std::ops::Range;
 
 const SIZE: (u32, u32) = (520, 360);
-/// What copies look like: they are no scheme.
+/// The style of baselines, which are not schemes.
 const COPY: RGBColor = RGBColor(138, 143, 152);
 const FONT: &str = "sans-serif";
 const MARKER: i32 = 4;
-/// How far intervals of the first and the last scheme stand apart at one number of sources, in doublings.
+/// Horizontal distance of the first and the last scheme's intervals at one number of sources, in doublings.
 const SPREAD: f64 = 0.3;
 
 /// The baselines differ in the shape of their points.
@@ -25,7 +25,7 @@ fn baseline_shape(name: &str) -> usize {
     Baseline::ALL.iter().position(|baseline| baseline.name() == name).unwrap_or(0)
 }
 
-/// How a scheme's points look.
+/// The style of a scheme's points.
 #[derive(Clone, Copy)]
 struct Style {
     colour: RGBColor,
@@ -33,7 +33,7 @@ struct Style {
 }
 
 impl Style {
-    /// The reference is black, baselines are grey, the others, counted from 0, go through colours and then shapes.
+    /// The reference is black, baselines are grey, the others, counted from 0, cycle through colours and then shapes.
     fn of(scheme: &str, other: usize) -> Style {
         match scheme {
             REFERENCE => Style { colour: BLACK, shape: 0 },
@@ -59,7 +59,8 @@ struct Line {
     points: Vec<(usize, Interval)>,
 }
 
-/// For each metric of the tables, one a number of sources, two figures: the metric, and the difference from the mean.
+/// Two figures for each metric: the metric, and the difference from the mean. There is one table for each number of
+/// sources.
 pub(super) fn all(tables: &[Table]) -> Result<Vec<String>, ReportError> {
     let mut figures = Vec::new();
     for (column, metric) in tables.first().map_or(&[][..], |table| &table.metrics).iter().enumerate() {
@@ -72,7 +73,7 @@ pub(super) fn all(tables: &[Table]) -> Result<Vec<String>, ReportError> {
     Ok(figures)
 }
 
-/// What the points of all figures are.
+/// The key of all figures.
 pub(super) fn key(tables: &[Table]) -> Markup {
     html! {
         ul.key {
@@ -94,7 +95,7 @@ pub(super) fn key(tables: &[Table]) -> Markup {
     }
 }
 
-/// The schemes, and what they look like.
+/// The schemes with their styles.
 fn styles(tables: &[Table]) -> Vec<(&str, Style)> {
     let schemes = tables.first().into_iter().flat_map(|table| &table.rows).map(|row| row.scheme.as_str());
     let mut others = 0;
@@ -106,7 +107,8 @@ fn styles(tables: &[Table]) -> Vec<(&str, Style)> {
     schemes.map(style).collect()
 }
 
-/// The lines of a metric. Copies have no place among differences, and would hide those.
+/// The lines of a metric. Baselines are not in figures of differences: their range would hide the differences between
+/// schemes.
 fn lines(tables: &[Table], column: usize, differences: bool) -> Vec<Line> {
     let point = |table: &Table, scheme: &str| {
         let cell = table.rows.iter().find(|row| row.scheme == scheme)?.cells.get(column)?.as_ref()?;
@@ -130,7 +132,7 @@ fn svg(label: &str, lines: &[Line]) -> Result<String, ReportError> {
 fn draw(picture: &mut String, label: &str, lines: &[Line]) -> Result<(), Box<dyn Error>> {
     let root = SVGBackend::with_string(picture, SIZE).into_drawing_area();
     let heights = heights(lines);
-    // As many places as tell neighbouring labels apart.
+    // As many decimals as make neighbouring labels different.
     let places = (1.0 - ((heights.end - heights.start) / 2.0).log10().floor()).clamp(0.0, 6.0) as usize;
     let mut chart = ChartBuilder::on(&root)
         .margin(10)
@@ -171,7 +173,7 @@ fn draw(picture: &mut String, label: &str, lines: &[Line]) -> Result<(), Box<dyn
     Ok(())
 }
 
-/// From below the lowest point to above the highest; of intervals what reaches no farther than the points do again.
+/// From below the lowest point to above the highest; intervals extend it at most by the range of the points.
 fn heights(lines: &[Line]) -> Range<f64> {
     let intervals = || lines.iter().flat_map(|line| line.points.iter().map(|(_, interval)| interval));
     let (least, most) = intervals().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), interval| {

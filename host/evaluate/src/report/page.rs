@@ -3,7 +3,7 @@
 use super::{Report, ReportError};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// Nothing is let in but what the page holds.
+/// Only the page's own content is allowed.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
 /// The page as HTML.

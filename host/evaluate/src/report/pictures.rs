@@ -10,7 +10,7 @@ use std::path::Path;
 /// Width and height of a bar of weights, in units of the figure.
 const BAR: [f32; 2] = [8.0, 22.0];
 
-/// What there is to see of a target.
+/// The pictures of a target.
 pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportError> {
     let picture = |file: &str| -> Result<String, ReportError> {
         Ok(data_address("image/png", &read(&folder.join(PICTURES).join(file))?))
@@ -59,7 +59,7 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
     })
 }
 
-/// The name of a scheme, which may be broken where one of its parts ends.
+/// The name of a scheme, with line breaks allowed between its parts.
 fn breakable(name: &str) -> Markup {
     let pieces = name.split_inclusive([',', ':', '/']);
     html! { @for (index, piece) in pieces.enumerate() { @if index > 0 { wbr; } (piece) } }
@@ -81,7 +81,7 @@ fn bars(weights: &[f32], heaviest: f32) -> Markup {
     }
 }
 
-/// The weights as numbers, folded in.
+/// The weights as numbers, collapsed.
 fn weights(shown: &Shown) -> Markup {
     html! {
         details {

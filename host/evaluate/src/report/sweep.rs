@@ -7,7 +7,7 @@ use maud::{Markup, PreEscaped, html};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// What `pareto.json` says, as far as it is shown.
+/// The parts of `pareto.json` that are shown.
 #[derive(Clone, Debug, Deserialize)]
 struct Record {
     viewfuse: String,
@@ -89,7 +89,7 @@ impl Sweep {
     }
 }
 
-/// The settings of a device that are the best for their time.
+/// The settings on a device's Pareto front.
 fn points(device: &DeviceRecord) -> Markup {
     let mut best: Vec<&PointRecord> = device.points.iter().filter(|point| point.best).collect();
     best.sort_by(|a, b| b.seconds.total_cmp(&a.seconds));

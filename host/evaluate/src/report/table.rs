@@ -96,7 +96,7 @@ pub(super) fn legend() -> Markup {
     }
 }
 
-/// A record, folded in.
+/// A record, collapsed.
 pub(super) fn record(title: &str, rows: &[(String, String)]) -> Markup {
     html! {
         details {

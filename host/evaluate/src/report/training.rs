@@ -1,4 +1,4 @@
-//! A folder of `train` on the page: what its `record.json` says, and `curve.svg`, as far as they are there.
+//! A folder of `train` on the page: its `record.json` and `curve.svg`, as far as they exist.
 
 use super::{ReportError, data_address, read, table};
 use maud::{Markup, html};
@@ -25,7 +25,7 @@ impl Training {
             let json = serde_json::from_slice(&bytes);
             json.map_err(|cause| ReportError::Json { path: path.to_path_buf(), command: "train", cause })
         };
-        // Where neither is there, the message names the record.
+        // If neither exists, the message names the record.
         let record = if record.is_file() || !curve.is_file() { Some(parsed(&record)?) } else { None };
         let curve = if curve.is_file() { Some(read(&curve)?) } else { None };
         Ok(Training { folder: folder.to_path_buf(), record, curve })
@@ -53,7 +53,7 @@ impl Training {
     }
 }
 
-/// Single values by name; lists are told by their length and their last item.
+/// Single values by name; a list is shown as its length and its last item.
 fn flat(name: &str, value: &Value) -> Vec<(String, String)> {
     let below = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
     match value {

@@ -1,4 +1,4 @@
-//! Finished jobs, a line each, that survive a kill at any moment.
+//! Finished jobs, a line each. They survive a kill at any time.
 
 use super::FolderError;
 use crate::Score;
@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
 
-/// Which jobs are a process's own: those whose number leaves this rest when it is divided by the count.
+/// The jobs of a process: those whose number modulo `count` is `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
     /// From 0.
@@ -23,7 +23,7 @@ impl Shard {
     /// All jobs.
     pub const ALL: Shard = Shard { index: 0, count: 1 };
 
-    /// Whether it does the job of this number.
+    /// Whether the job with this number belongs to it.
     pub fn does(&self, job: usize) -> bool {
         job % self.count == self.index
     }
@@ -48,18 +48,18 @@ impl fmt::Display for Shard {
     }
 }
 
-/// A job that is done.
+/// A finished job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finished {
     /// Its number.
     pub job: usize,
-    /// Which of the scenes, from 0.
+    /// Index of the scene, from 0.
     pub scene: usize,
     /// The scene's name.
     pub scene_name: String,
-    /// Which draw.
+    /// Number of the trial.
     pub trial: u32,
-    /// The device that did it.
+    /// The device that ran it.
     pub device: String,
     /// Names of the sources.
     pub sources: Vec<String>,
@@ -68,7 +68,7 @@ pub struct Finished {
     pub scores: Vec<Score>,
 }
 
-/// Scores as JSON: numbers that JSON has not (a ratio of equal pictures is infinite) as text.
+/// Scores as JSON: numbers that JSON cannot hold (the PSNR of equal pictures is infinite) as text.
 mod score_lines {
     use super::{Deserialize, Duration, Score, Serialize};
     use serde::de::Error;
@@ -136,7 +136,7 @@ impl Journal {
         let failed = |doing, cause| FolderError::Io { path: path.clone(), doing, cause };
         let file = OpenOptions::new().create(true).append(true).read(true).open(&path);
         let file = file.map_err(|cause| failed("cannot be opened", cause))?;
-        // File systems that know no locks still work.
+        // File systems without locks still work.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(FolderError::Busy { path });
         }
@@ -178,7 +178,7 @@ pub(super) fn journals(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     Ok(journals)
 }
 
-/// The finished jobs of a journal. A last line without an end is being written, or was cut off: it does not count.
+/// The finished jobs of a journal. A last line without a line break is being written or is incomplete, and is ignored.
 pub(super) fn read(path: &Path) -> Result<Vec<Finished>, FolderError> {
     let text = read_bytes(path)?;
     let whole = text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n"));

@@ -1,4 +1,4 @@
-//! What an evaluation's numbers hang on.
+//! The settings that determine an evaluation's scores.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -7,8 +7,8 @@ use std::collections::BTreeMap;
 use viewfuse_job::digest::hexadecimal;
 use viewfuse_scene::Scene;
 
-/// Everything that decides which jobs there are and what they give. Not in it: which device a machine has (each finished
-/// job says its own), the shard, the number of threads, and where the scenes lie.
+/// Everything that determines the jobs and their results. Not included: the device (each finished job states its own),
+/// the shard, the number of threads, and the paths of the scenes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Version of the program.
@@ -19,29 +19,29 @@ pub struct Settings {
     pub schemes: Vec<String>,
     /// What makes the pictures.
     pub field: String,
-    /// What the metrics compare, in words.
+    /// A description of what the metrics compare.
     #[serde(default)]
     pub metric: String,
     /// Every option of the command and its value, defaults included.
     pub options: BTreeMap<String, String>,
     /// SHA-256 of the files of parameters: checkpoints, learned attention.
     pub files: BTreeMap<String, String>,
-    /// How many jobs there are.
+    /// Number of jobs.
     pub job_count: usize,
-    /// What the protocol wanted and the scenes have not.
+    /// What the protocol requires and the scenes lack.
     pub notes: Vec<String>,
     /// The scenes, in order.
     pub scenes: Vec<SceneSettings>,
 }
 
-/// A scene as far as it can be told without reading pixels.
+/// The properties of a scene that are known without reading pixels.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneSettings {
     /// Its name.
     pub name: String,
-    /// How many views it has.
+    /// Number of views.
     pub views: usize,
-    /// Of how many the photograph has a mask beside it.
+    /// Number of views whose photograph has a mask.
     #[serde(default)]
     pub masks: usize,
     /// Width and height of the pictures at its first view.
@@ -52,7 +52,7 @@ pub struct SceneSettings {
 }
 
 impl SceneSettings {
-    /// Those of a scene whose pictures have this size.
+    /// The properties of a scene whose pictures have this size.
     pub fn of(scene: &Scene, size: [u32; 2]) -> SceneSettings {
         let mut digest = Sha256::new();
         for view in &scene.views {
@@ -71,7 +71,7 @@ impl SceneSettings {
 }
 
 impl Settings {
-    /// What is not the same in `found`, in words: key, value here, value there.
+    /// The differences from `found`, in words: key, value here, value there.
     pub fn differences(&self, found: &Settings) -> Vec<String> {
         let (here, there) = (self.flat(), found.flat());
         let keys = here.keys().chain(there.keys().filter(|key| !here.contains_key(*key)));

@@ -1,11 +1,11 @@
-//! How metrics are written.
+//! How metrics are printed.
 
 use crate::metrics::interval::Interval;
 use crate::metrics::masked::{PSNR_MASKED, SSIM_MASKED};
 use crate::{PSNR, SSIM};
 use serde::Serialize;
 
-/// How a metric is written and read.
+/// How a metric is printed and read.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Metric {
     /// Its name in files.
@@ -21,7 +21,7 @@ pub struct Metric {
 }
 
 impl Metric {
-    /// The metric of this name. Those that are not known here are distances: less is better.
+    /// The metric of this name. Unknown metrics are distances: less is better.
     pub fn named(name: &str) -> Metric {
         let (label, unit, decimals, larger_is_better) = match name {
             PSNR => ("PSNR".to_owned(), "dB", 2, true),
@@ -33,7 +33,7 @@ impl Metric {
         Metric { name: name.to_owned(), label, unit, decimals, larger_is_better }
     }
 
-    /// The metrics of these names. Beside masked ones, those of the whole picture are called full.
+    /// The metrics of these names. Together with masked metrics, those of the whole picture are called full.
     pub fn all_named(names: &[&str]) -> Vec<Metric> {
         let mut metrics: Vec<Metric> = names.iter().map(|name| Metric::named(name)).collect();
         let is_masked = |metric: &Metric| [PSNR_MASKED, SSIM_MASKED].contains(&metric.name.as_str());
@@ -44,7 +44,7 @@ impl Metric {
         metrics
     }
 
-    /// What stands above its column.
+    /// The heading of its column.
     pub fn heading(&self) -> String {
         format!("{} {}", self.label, self.unit).trim_end().to_owned()
     }
@@ -54,7 +54,7 @@ impl Metric {
         format!("{value:.*}", self.decimals)
     }
 
-    /// An interval as text: the mean, and behind it half the interval's width where there is one.
+    /// An interval as text: the mean, followed by half the interval's width if there is one.
     pub fn interval_text(&self, interval: &Interval, signed: bool) -> String {
         let decimals = self.decimals;
         let mean = if signed { format!("{:+.decimals$}", interval.mean) } else { self.text(interval.mean) };

@@ -1,23 +1,23 @@
-//! Where a scheme stands against the baselines, as far as the intervals tell.
+//! Comparison of each scheme with the baselines, by the intervals.
 
 use super::{Metric, Row, Table, Unit};
 use crate::metrics::interval::Interval;
 use serde::Serialize;
 
-/// A scheme beside a baseline.
+/// A scheme compared with a baseline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// The scheme.
     pub scheme: String,
     /// The baseline.
     pub baseline: String,
-    /// What the scheme's headline metric is above the baseline's.
+    /// The difference of the scheme's headline metric from the baseline's.
     pub difference: Interval,
-    /// What that means.
+    /// The verdict on that difference.
     pub standing: Standing,
 }
 
-/// What a difference says.
+/// The verdict on a difference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Standing {
@@ -32,7 +32,7 @@ pub enum Standing {
 }
 
 impl Standing {
-    /// Of what a ratio of signal to noise, of which more is better, is above another.
+    /// From the difference of two PSNRs, of which the larger is better.
     fn of(difference: &Interval) -> Standing {
         match (difference.excludes_zero(), difference.mean >= 0.0) {
             (true, true) => Standing::Above,
@@ -43,7 +43,7 @@ impl Standing {
     }
 }
 
-/// Every scheme with every baseline.
+/// Every scheme compared with every baseline.
 pub(super) fn comparisons(rows: &[Row], difference: impl Fn(&str, &str) -> Option<Interval>) -> Vec<Comparison> {
     let mut comparisons = Vec::new();
     for scheme in rows.iter().filter(|row| !row.is_baseline) {
@@ -81,7 +81,7 @@ impl Table {
         sentences
     }
 
-    /// What the intervals of this table are over.
+    /// The sampling unit of this table's intervals, in words.
     pub fn interval_words(&self) -> String {
         match self.unit {
             Unit::Scenes => format!("±: 95 % intervals over {} scenes", self.scene_count),

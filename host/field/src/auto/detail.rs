@@ -1,9 +1,9 @@
-//! How much of the photographs coarse pictures do not show.
+//! The detail of the photographs that coarse pictures lack.
 
 use viewfuse_core::lookup::bilinear_from;
 use viewfuse_scene::photographs::{SourceImage, reduced_size};
 
-/// Mean square, over pixels and colours, of what the images lose when their longest side is reduced to `side`.
+/// Mean square, over pixels and colours, of the change of the images when their longest side is reduced to `side`.
 pub(super) fn lost_detail(images: &[SourceImage], side: u32) -> f64 {
     let (mut sum, mut count) = (0.0, 0_usize);
     for image in images {

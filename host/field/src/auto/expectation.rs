@@ -1,4 +1,4 @@
-//! The score to expect of a target's picture, from those of sources that were left out.
+//! The expected score of a target's picture, from the scores of sources that were left out.
 //!
 //! ```text
 //! expected = P + c0 + c1 log2(G / g) + c2 (k - K) + c3 D
@@ -13,9 +13,9 @@ use serde::Serialize;
 
 /// `c0` to `c3`. Least squares over 111 targets of 16 scenes ( fern, fox, cup, herz_jesus_p8, dtu_scan65, dino, three
 /// torcs_cars; the rooms, gardens and the lorry of `viewfuse-synthetic`) from 3 to 12 sources, at longest sides of 128 and 320
-/// pixels, each scene with the same weight in all. The example `self_knowledge` of `viewfuse-evaluate` prints what they were
-/// fitted to. Each scene predicted by a fit to the others: correlation 0.88, root mean square error 2.2 dB, 58 % of the targets
-/// within 1.5 dB, 79 % within the interval. They were fitted with `error:alpha=1` as the first scheme.
+/// pixels, each scene with the same weight in all. The example `self_knowledge` of `viewfuse-evaluate` prints the data
+/// of the fit. Cross-validated by scene: correlation 0.88, root mean square error 2.2 dB, 58 % of the targets within
+/// 1.5 dB, 79 % within the interval. They were fitted with `error:alpha=1` as the first scheme.
 const CONSTANTS: [f64; TERMS] = [1.37, 1.96, 15.1, 0.69];
 /// Root mean square error for scenes that the fit has not seen, decibels.
 const DEVIATION: f64 = 2.2;
@@ -24,25 +24,26 @@ const DEVIATIONS_OF_80: f64 = 1.2816;
 /// Terms of the sum.
 pub const TERMS: usize = 4;
 
-/// A score to expect, decibels.
+/// An expected score, decibels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Expected {
-    /// The middle.
+    /// The centre of the interval.
     pub psnr: f64,
     /// Lower and upper end of the interval that holds four of five scores.
     pub interval: [f64; 2],
 }
 
-/// What the sources that were left out say.
+/// The statistics of the sources that were left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Basis {
     /// Mean score, decibels.
     pub psnr: f64,
     /// Mean base-2 logarithm of the gaps.
     pub log_gap: f64,
-    /// Mean confidence; `None` if the field does not tell.
+    /// Mean confidence; `None` if the field does not estimate it.
     pub confidence: Option<f64>,
-    /// Mean square, in `[0, 1]`, of what the sources show at the pictures' size and not at that of the coarse ones.
+    /// Mean square, in `[0, 1]`, of the detail that the sources have at the pictures' size and not at that of the
+    /// coarse ones.
     pub detail: f64,
 }
 
@@ -69,7 +70,7 @@ impl Basis {
         [1.0, self.log_gap - standing.gap.log2(), surer, self.unseen()]
     }
 
-    /// The score to expect there.
+    /// The expected score there.
     pub fn expected(&self, standing: Standing, confidence: Option<f64>) -> Expected {
         let terms = self.terms(standing, confidence);
         let sum: f64 = terms.iter().zip(CONSTANTS).map(|(term, constant)| term * constant).sum();

@@ -1,4 +1,5 @@
-//! How far a camera is from its sources, in a measure that compares a target with a source that was left out.
+//! How far a camera is from its sources, in a measure that is comparable between a target and a source that was left
+//! out.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -6,21 +7,21 @@ use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_scene::rig::Rig;
 
-/// Squared gap below which sources count as one with the camera.
+/// Least squared gap: smaller ones are raised to it.
 const LEAST_SQUARED_GAP: f64 = 1.0e-8;
 
-/// Where a camera stands among its sources. With `g_i^2 = (d_i / D)^2 + a_i^2`, where `d_i` is the distance of the centres, `D` that
-/// to what the cameras look at, and `a_i` the angle between the principal axes in radians:
+/// A camera's geometry among its sources. With `g_i^2 = (d_i / D)^2 + a_i^2`, where `d_i` is the distance of the
+/// centres, `D` that to what the cameras look at, and `a_i` the angle between the principal axes in radians:
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Standing {
     /// `(sum_i 1 / g_i^2)^(-1/2)`: at most the gap to the nearest source, less with every further one.
     pub gap: f64,
-    /// `|sum_i v_i / g_i^2| / sum_i |v_i| / g_i^2` with `v_i` from the camera to a source: near 0 in the midst of the sources, 1
-    /// where all of them lie in one direction. For the record: the expectation does not use it.
+    /// `|sum_i v_i / g_i^2| / sum_i |v_i| / g_i^2` with `v_i` from the camera to a source: near 0 in the middle of the
+    /// sources, 1 if all of them are in one direction. Recorded only: the expectation does not use it.
     pub outside: f64,
 }
 
-/// What distances are measured by.
+/// The unit of distances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Measure {
     /// Distance from the cameras to what they look at, world units.
@@ -33,7 +34,7 @@ impl Measure {
         Measure { distance: f64::from(Rig::of(cameras).distance).max(1.0e-12) }
     }
 
-    /// Where a camera stands among its sources.
+    /// The geometry of a camera among its sources.
     pub(super) fn standing<'a>(&self, camera: &Pose, sources: impl Iterator<Item = &'a Pose>) -> Standing {
         let (mut sum, mut offset, mut length) = (0.0, DVec3::ZERO, 0.0);
         for source in sources {

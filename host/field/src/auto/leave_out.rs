@@ -1,4 +1,4 @@
-//! Sources rendered from the other sources, coarsely: what can be known of a field's pictures without any truth.
+//! Held-out sources, rendered coarsely from the other sources: an estimate of a field's quality without the truth.
 
 use super::geometry::{Measure, Standing};
 use crate::Setting;
@@ -40,16 +40,16 @@ struct Trial<'a> {
     standing: Standing,
 }
 
-/// How a source came out that was left out.
+/// The result of a source that was left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Outcome {
     /// As an index into the run's sources.
     pub(super) source: usize,
     /// Peak signal to noise ratio, decibels.
     pub(super) psnr: f64,
-    /// Mean confidence of its pixels; `None` if the field does not tell.
+    /// Mean confidence of its pixels; `None` if the field does not estimate it.
     pub(super) confidence: Option<f64>,
-    /// Where it stands among the others.
+    /// Its geometry among the others.
     pub(super) standing: Standing,
 }
 
@@ -61,8 +61,8 @@ pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOption
 }
 
 impl<'a> Trials<'a> {
-    /// Leaves sources of `stage` out and encodes the others, weighed as `weighting` says, with the settings' defaults. Empty if
-    /// there are too few sources. A source without which the field finds nothing is no trial.
+    /// Leaves sources of `stage` out and encodes the others, weighted by `weighting`, with the default settings. Empty
+    /// if there are too few sources. A source without which the field finds no object is skipped.
     pub(super) fn prepare(
         stage: &Stage<'a>,
         weighting: &Weighting,

@@ -1,25 +1,25 @@
-//! Exposure: a gain for each source and channel, by which photographs of the same surfaces become equally light.
+//! Exposure: a gain for each source and channel, that equalise the exposure of photographs of the same surfaces.
 
 use viewfuse_core::camera::CameraBlock;
 
 /// Confidence from which on a pixel's disparity counts.
 const LEAST_CONFIDENCE: f32 = 0.6;
-/// One pixel in so many is looked at, along both axes.
+/// Stride of the pixels that are sampled, along both axes.
 const STRIDE: u32 = 3;
 /// Colours that are compared lie between these: neither black nor saturated.
 const COMPARABLE: std::ops::Range<f32> = 0.04..0.94;
-/// Fewest common points from which a pair says something.
+/// Fewest common points of a usable pair.
 const FEWEST_POINTS: usize = 24;
-/// Median deviation of a pair's logarithms from their median beyond which it says nothing.
+/// Median absolute deviation of a pair's logarithms above which it is ignored.
 const MOST_SPREAD: f64 = 0.06;
-/// Weight of no gain at all, in common points.
+/// Weight of the prior towards a gain of 1, in common points.
 const PRIOR_POINTS: f64 = 64.0;
-/// Gains as natural logarithms: those below the first are not applied, those beyond the second are not believed.
+/// Gains as natural logarithms: those below the first are not applied, those above the second are rejected.
 const GAINS: (f64, f64) = (0.03, 0.7);
-/// Sweeps over the sources in which the equations are solved.
+/// Iterations over the sources for solving the equations.
 const ITERATIONS: usize = 200;
 
-/// What a pair of sources says: the second one's colours over the first one's.
+/// The estimate from a pair of sources: the second one's colours over the first one's.
 struct Ratio {
     first: usize,
     second: usize,

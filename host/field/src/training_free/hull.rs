@@ -14,7 +14,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_weighting::sources::SourceWeights;
 
-/// Rows rendered between two looks at the interrupt flag.
+/// Rows rendered between two checks of the interrupt flag.
 const BAND_ROWS: u32 = 16;
 /// Rows around a band that its depths depend on: the window's and the neighbours' reach.
 const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
@@ -23,7 +23,7 @@ const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
 #[derive(Clone, Copy, Debug)]
 pub struct Hull {
     /// Most values in each of the three buffers of a sweep. Larger pictures are swept in bands of rows, which changes
-    /// the memory and the time but not the result.
+    /// memory and run time but not the result.
     pub most_band_values: usize,
 }
 
@@ -34,7 +34,7 @@ impl Default for Hull {
     }
 }
 
-/// The silhouettes have no point of space in common.
+/// The visual hull of the silhouettes is empty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "the silhouettes of the sources have no common object: no point lies inside all of them; check the poses and the \
@@ -42,7 +42,7 @@ impl Default for Hull {
 )]
 pub struct NoObject;
 
-/// A view was to be encoded, or a target rendered, before a weighting began.
+/// A view was encoded, or a target rendered, before a weighting began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("depths are known only under a weighting, and none has begun")]
 struct NotWeighed;
@@ -58,14 +58,14 @@ pub(super) struct Views<'a, D: Device> {
     depths: Option<Depths<D>>,
 }
 
-/// Depth maps under a weighting, one behind another.
+/// Depth maps under a weighting, concatenated.
 struct Depths<D: Device> {
     maps: D::Buffer<f32>,
-    /// What further maps are made with, until the first target.
+    /// The inputs of further maps, until the first target.
     sweep: Option<Sweep<D>>,
 }
 
-/// What a depth map is made with.
+/// The inputs of a depth map.
 struct Sweep<D: Device> {
     /// `[view][other]`.
     pair_weights: D::Buffer<f32>,
@@ -76,7 +76,7 @@ struct Sweep<D: Device> {
 }
 
 impl Hull {
-    /// The depth maps of all sources, one behind another, row-major: depths along the principal axis in world units,
+    /// The depth maps of all sources, concatenated, row-major: depths along the principal axis in world units,
     /// [`NO_SURFACE`] where nothing was found. `relevance[view]` are the weights of all sources for source `view`.
     ///
     /// # Errors
@@ -97,7 +97,7 @@ impl Hull {
         Ok(device.download(&depths.maps)?)
     }
 
-    /// Takes the photographs to a device and finds the object.
+    /// Uploads the photographs to a device and finds the object.
     pub(super) fn views<'a, D: Device>(
         &'a self,
         device: &'a D,
@@ -135,7 +135,7 @@ impl<D: Device> Prepared for Views<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         let (device, texel_count) = (self.device, self.texel_count);
         let view_count = self.scene.object.view_count as usize;
-        // The last weighting's buffers go before there are new ones.
+        // The last weighting's buffers are freed before new ones are allocated.
         self.depths = None;
         let pair_weights: Vec<f32> =
             relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
@@ -212,13 +212,13 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 }
 
-/// The box around the object that the silhouettes of the sources show, or `None` if they show none.
+/// The bounding box of the visual hull of the sources' silhouettes, or `None` if it is empty.
 pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
     let (cameras, texels) = joined(&sources.images);
     bounds::find(&cameras, &texels)
 }
 
-/// All sources' texels behind one another, and the cameras that know where theirs are.
+/// All sources' texels, concatenated, and the cameras with the offsets of their texels.
 pub(super) fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
     let mut cameras = Vec::with_capacity(images.len());
     let mut texels = Vec::new();
@@ -231,12 +231,12 @@ pub(super) fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>
 
 /// A pixel's side at the middle of the object.
 fn footprint(object: &ObjectBlock, camera: &CameraBlock) -> f32 {
-    // A camera that has the object behind it sees nothing of it; any positive length will do.
+    // A camera with the object behind it does not see it; any positive length is valid.
     let depth = camera.project(object.middle()).depth.max(0.01 * object.radius);
     depth / camera.intrinsics[0]
 }
 
-/// Cuts a sweep over all rows into bands of bounded memory. With each band come the rows, counted from its first, whose
+/// Cuts a sweep over all rows into bands of bounded memory. Each band has the rows, counted from its first, whose
 /// depths are final; the others are its halo.
 fn bands(whole: SweepBlock, most_values: usize) -> Vec<(SweepBlock, Range<u32>)> {
     let row_values = whole.width as usize * whole.plane_count as usize;

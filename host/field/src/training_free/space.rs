@@ -1,4 +1,4 @@
-//! Which depths there are in a scene: near and far bounds of the planes, for any camera.
+//! The depth range of a scene: near and far bounds of the planes, for any camera.
 
 use crate::Surfaces;
 use viewfuse_core::Vec3;
@@ -6,24 +6,24 @@ use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::rig::Rig;
 
-/// The nearest and the farthest percentile of the points that counts.
+/// The percentiles of the points that are used as nearest and farthest.
 const PERCENTILES: [f64; 2] = [0.01, 0.99];
-/// How far before the nearest and behind the farthest point there may be something.
+/// Margin in front of the nearest and behind the farthest point.
 const MARGINS: [f32; 2] = [0.85, 1.3];
-/// Fewest points from which bounds are told.
+/// Fewest points from which bounds are estimated.
 const FEWEST_POINTS: usize = 32;
 
-/// What is known of the depths in a scene.
+/// The known depths of a scene.
 #[derive(Clone, Debug)]
 pub(super) struct Space {
-    /// Points of surfaces.
+    /// Surface points.
     points: Vec<Vec3>,
-    /// Least and greatest disparity where a camera sees too few points; `None` if nothing is known.
+    /// Least and greatest disparity for a camera that sees too few points; `None` if unknown.
     bounds: Option<[f32; 2]>,
 }
 
 impl Space {
-    /// What the scene's files know: bounds first, since they also say what is meant, then points.
+    /// The depths in the scene's files: bounds first, because they also state the intended range, then points.
     pub(super) fn of(sources: &SourceImages) -> Space {
         if let Some([near, far]) = sources.near_far {
             return Space { points: Vec::new(), bounds: Some([1.0 / far, 1.0 / near]) };
@@ -33,15 +33,15 @@ impl Space {
         if points.len() < FEWEST_POINTS { Space { points, bounds: None } } else { Space::of_points(points, &cameras) }
     }
 
-    /// From points on surfaces. Where they are too few for a camera, the bounds are those of all the cameras that see enough;
-    /// where none does, the volume that the cameras have in common.
+    /// From surface points. For a camera that sees too few, the bounds are those of all the cameras that see enough; if
+    /// there are none, those of the volume common to all cameras.
     pub(super) fn of_points(points: Vec<Vec3>, cameras: &[Camera]) -> Space {
         let seen = cameras.iter().filter_map(|camera| in_frustum(&points, &camera.block(0)));
         let bounds = seen.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_else(|| common_volume(cameras));
         Space { points, bounds: Some(bounds) }
     }
 
-    /// Whether anything is known.
+    /// Whether bounds are known.
     pub(super) fn is_known(&self) -> bool {
         self.bounds.is_some()
     }
@@ -83,7 +83,7 @@ fn common_volume(cameras: &[Camera]) -> [f32; 2] {
     [1.0 / (rig.distance + rig.subject_radius), 1.0 / near]
 }
 
-/// The greatest disparity worth a look before anything is known: that at the distance of neighbouring cameras, in the median.
+/// The greatest disparity that is searched when nothing is known: that at the median distance of neighbouring cameras.
 pub(super) fn first_guess(cameras: &[Camera]) -> [f32; 2] {
     let centres: Vec<Vec3> = cameras.iter().map(|camera| camera.pose.centre_world()).collect();
     let nearest = |own: usize| {

@@ -19,7 +19,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
-/// Longest side at which the range of depths is looked for.
+/// Longest side in the search for the depth range, in pixels.
 const RANGE_SIDE: u32 = 128;
 /// Planes of that search.
 const RANGE_PLANES: u32 = 128;
@@ -27,7 +27,8 @@ const RANGE_PLANES: u32 = 128;
 const RANGE_NEIGHBOURS: usize = 4;
 /// Confidence from which on a pixel counts there.
 const RANGE_CONFIDENCE: f32 = 0.6;
-/// Most other sources that a source is compared with, those of the greatest weights: cost is linear in the sources.
+/// Most other sources that a source is compared with, those with the greatest weights: run time is linear in the
+/// sources.
 const NEIGHBOURS: usize = 4;
 /// Most pairs that are compared, for each view.
 const PAIRS_PER_VIEW: usize = 3;
@@ -57,7 +58,7 @@ pub struct Sweep {
     pub plane_count: u32,
     /// Longest side at which views are compared, in pixels. Colours are blended at the size of the pictures.
     pub match_side: u32,
-    /// Cost of the nearest plane beside the farthest one: among equal matches the farther one wins.
+    /// Cost of the nearest plane relative to the farthest one: of equal matches the farther one is chosen.
     pub near_cost: f32,
     /// Cost of contradicting the sources' own disparities.
     pub dissent_share: f32,
@@ -71,7 +72,7 @@ impl Default for Sweep {
     }
 }
 
-/// Photographs on the device at two sizes, and what is known of their disparities.
+/// Photographs on the device at two sizes, and their disparity maps.
 pub(super) struct Views<'a, D: Device> {
     settings: Sweep,
     /// The settings before any scalar was chosen.
@@ -79,16 +80,16 @@ pub(super) struct Views<'a, D: Device> {
     device: &'a D,
     has_silhouettes: bool,
     background: [f32; 3],
-    /// As large as the pictures.
+    /// At the size of the pictures.
     pictures: Images<D>,
-    /// As large as they are compared.
+    /// At the size of the comparison.
     matched: Images<D>,
     disparities: D::Buffer<[f32; 2]>,
     /// From a plane's disparity to the next one's, of each view that has a map.
     steps: Vec<f32>,
     relevance: Vec<SourceWeights>,
     space: Space,
-    /// The matched sources' texels on the host, and the gains that they tell under the current weighting.
+    /// The matched sources' texels on the host, and the gains estimated from them under the current weighting.
     texels: Vec<[f32; 4]>,
     gains: Option<Vec<[f32; 4]>>,
 }
@@ -123,7 +124,7 @@ impl Range {
 }
 
 impl Sweep {
-    /// What can be chosen for a scene, by the names in [`TUNABLES`].
+    /// The scalars that can be chosen for a scene, by the names in [`TUNABLES`].
     fn scalars(&mut self) -> [(&'static str, &mut f32); 3] {
         [
             (NEAR_COST, &mut self.near_cost),
@@ -168,7 +169,7 @@ impl Sweep {
 }
 
 impl<D: Device> Views<'_, D> {
-    /// Points of surfaces, from a coarse sweep of every source against its nearest neighbours.
+    /// Surface points, from a coarse sweep of every source against its nearest neighbours.
     fn find_range(&self, images: &[SourceImage], progress: &dyn Progress) -> Result<Space, FieldError> {
         let device = self.device;
         let small = Images::upload(device, images)?;
@@ -198,7 +199,7 @@ impl<D: Device> Views<'_, D> {
         Ok(Space::of_points(points, &cameras))
     }
 
-    /// The views with a weight as they take part, those of the greatest weights first.
+    /// The views with a weight above 0, the greatest weights first.
     fn swept(&self, images: &Images<D>, maps: &Images<D>, weights: &[(usize, f32)], use_maps: bool) -> Vec<SweptView> {
         let mut order: Vec<(usize, f32)> = weights.iter().copied().filter(|(_, weight)| *weight > 0.0).collect();
         order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));

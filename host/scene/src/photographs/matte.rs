@@ -1,17 +1,18 @@
-//! Silhouettes: what of a photograph is the object and what is background.
+//! Silhouettes: the separation of a photograph into object and background.
 //!
-//! A photograph with an alpha channel says so itself. Otherwise the background is what is connected to the image's
-//! border and near to one colour (given, or the median of the border's pixels), so that dark parts inside an object on
-//! black stay part of it; pixels on the edge of the object get a fractional alpha from the colours around them.
+//! A photograph's alpha channel is used if it has one. Otherwise the background is the region that is connected to the
+//! image's border and near to one colour (given, or the median of the border's pixels), so that dark parts inside an
+//! object on black stay part of it; pixels on the edge of the object get a fractional alpha from the colours around
+//! them.
 
 use crate::Photograph;
 use std::fmt;
 use std::str::FromStr;
 
-/// Least and greatest threshold on the distance from the background colour, and its factor over the border's noise.
+/// Least and greatest threshold on the distance from the background colour, and its ratio to the border's noise.
 const THRESHOLD: (f32, f32) = (0.03, 0.12);
 const NOISE_FACTOR: f32 = 1.5;
-/// The noise of a border is the distance from its colour that this share of its pixels keeps.
+/// The noise of a border is this quantile of its pixels' distances from its colour.
 const NOISE_SHARE: f64 = 0.95;
 /// Rows and columns that make up the border.
 const BORDER: u32 = 2;
@@ -20,7 +21,7 @@ const EDGE_REACH: i64 = 2;
 /// Least alpha of an edge pixel that the flood did not reach.
 const LEAST_EDGE_ALPHA: f32 = 0.05;
 
-/// What a person says about the background.
+/// The choice of the background.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum BackgroundChoice {
     /// From the borders of the photographs; white behind photographs with an alpha channel.
@@ -71,7 +72,7 @@ impl fmt::Display for BackgroundChoice {
     }
 }
 
-/// The border of a photograph: its colour and how far its pixels stray from that.
+/// The border of a photograph: its colour and the deviation of its pixels from that colour.
 pub(super) struct Border {
     colour: [f32; 3],
     noise: f32,
@@ -88,7 +89,7 @@ impl Border {
     }
 }
 
-/// What is behind the object in all photographs of a run.
+/// The background of all photographs of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Backdrop {
     colour: [f32; 3],
@@ -96,13 +97,13 @@ pub(super) struct Backdrop {
     threshold: f32,
     /// Whether each photograph's own border colour is its background.
     from_border: bool,
-    /// How far the typical border strays from one colour.
+    /// The deviation of the typical border from one colour.
     noise: f32,
 }
 
 impl Backdrop {
-    /// Looks at the borders of all photographs together: the colour is the median over them, the threshold follows the
-    /// noise of the typical one.
+    /// Estimates the background from the borders of all photographs: the colour is their median, and the threshold is
+    /// proportional to the median noise.
     pub(super) fn of<'a>(borders: impl Iterator<Item = &'a Border>, choice: BackgroundChoice) -> Backdrop {
         let borders: Vec<&Border> = borders.collect();
         let median_colour =
@@ -116,12 +117,12 @@ impl Backdrop {
         Backdrop { colour, threshold: (NOISE_FACTOR * noise).clamp(THRESHOLD.0, THRESHOLD.1), from_border, noise }
     }
 
-    /// Whether an object can be told from it: its borders stray no further than a threshold allows for.
+    /// Whether an object can be separated from it: the noise of the borders is small enough for a threshold.
     pub(super) fn can_be_told(&self) -> bool {
         NOISE_FACTOR * self.noise <= THRESHOLD.1
     }
 
-    /// How far the typical border strays from one colour, of 255.
+    /// The deviation of the typical border from one colour, of 255.
     pub(super) fn noise_level(&self) -> f32 {
         self.noise * 255.0
     }
@@ -139,7 +140,7 @@ impl fmt::Display for Backdrop {
     }
 }
 
-/// The photograph as premultiplied RGBA with the background's share taken out; `border` is its own, `None` where its
+/// The photograph as premultiplied RGBA with the background's share removed; `border` is its own, `None` where its
 /// alpha channel says what is background.
 pub(super) fn premultiplied(photograph: &Photograph, border: Option<&Border>, backdrop: &Backdrop) -> Vec<[f32; 4]> {
     let Some(border) = border else {
@@ -226,7 +227,7 @@ fn silhouette(photograph: &Photograph, behind: [f32; 3], threshold: f32) -> Vec<
         }
     }
 
-    // A pixel of the object beside the background may be a mixture of both: project its colour on the line from the
+    // A pixel of the object next to the background may be a mixture of both: project its colour on the line from the
     // background's to that of the solid pixels nearby.
     let around = |at: usize, reach: i64| {
         let (x, y) = (at as i64 % width, at as i64 / width);

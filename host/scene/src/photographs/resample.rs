@@ -1,10 +1,12 @@
-//! Resampling by area: every output pixel is the mean of what it covers, so a silhouette becomes a fractional alpha.
+//! Resampling by area: every output pixel is the mean of the area that it covers, so a silhouette gets a fractional
+//! alpha.
 
 use crate::Photograph;
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use rayon::prelude::*;
 
-/// A photograph at a smaller size, its colours weighted by their alpha. What of it is not wholly seen counts as not seen.
+/// A photograph at a smaller size, its colours weighted by their alpha. Output pixels that are partly outside the seen
+/// area count as not seen.
 pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> Photograph {
     let (own_width, own_height) = photograph.pixels.dimensions();
     let (columns, rows) = (spans(own_width, width), spans(own_height, height));
@@ -13,7 +15,7 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
     let mut averaged = vec![[0_u8; 4]; width as usize * height as usize];
     let new_line = || vec![0.0_f32; stride];
     averaged.par_chunks_mut(width as usize).zip(&rows).for_each_init(new_line, |line, (output, row)| {
-        // Down first, in whole lines, then across: most of the work is one loop over bytes.
+        // Vertically first, in whole lines, then horizontally: most of the work is one loop over bytes.
         line.fill(0.0);
         for (y, share) in row {
             let source = &bytes[y * stride..(y + 1) * stride];
@@ -91,7 +93,7 @@ fn spans(own: u32, wanted: u32) -> Vec<Vec<(usize, f32)>> {
     (0..wanted)
         .map(|output| {
             let (start, end) = (f64::from(output) * step, f64::from(output + 1) * step);
-            // Rounding must not make a span touch a pixel by a hair.
+            // Rounding must not make a span touch another pixel.
             let first = (start + 1e-9).floor() as usize;
             let last = ((end - 1e-9).ceil() as usize).clamp(first + 1, own as usize);
             (first..last)

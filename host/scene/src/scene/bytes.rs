@@ -1,4 +1,4 @@
-//! Reading binary files, with the path and the byte in every error. All numbers are little endian.
+//! Reading binary files, with the path and the byte offset in every error. All numbers are little endian.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
     fs::read(path).map_err(|cause| unreadable(path, cause))
 }
 
-/// Bytes that are read from the front.
+/// A cursor over bytes.
 #[derive(Clone, Debug)]
 pub(super) struct Bytes<'a> {
     path: &'a Path,
@@ -25,7 +25,7 @@ impl<'a> Bytes<'a> {
         Bytes { path, bytes, at: 0 }
     }
 
-    /// Where the next byte stands in the file.
+    /// The offset of the next byte in the file.
     pub(super) fn place(&self) -> Place {
         Place::Byte(self.at)
     }
@@ -42,7 +42,7 @@ impl<'a> Bytes<'a> {
         self.path.to_path_buf()
     }
 
-    /// So many bytes; `of` says what they are part of.
+    /// This many bytes; `of` names what they are part of.
     pub(super) fn take(&mut self, count: usize, of: &'static str) -> Result<&'a [u8], SceneError> {
         let taken = self.at.checked_add(count).and_then(|end| self.bytes.get(self.at..end));
         let taken = taken.ok_or_else(|| self.truncated(of))?;
@@ -87,7 +87,8 @@ impl<'a> Bytes<'a> {
         Ok(numbers)
     }
 
-    /// How many things follow that take at least so many bytes each: no more than there is room for.
+    /// The count of the entries that follow, each of at least this many bytes; an error if the rest of the file is too
+    /// short for them.
     pub(super) fn count(&mut self, least_bytes: usize, of: &'static str) -> Result<usize, SceneError> {
         let place = self.place();
         let count = self.u64(of)?;

@@ -1,8 +1,8 @@
-//! Camera models by the names that COLMAP and nerfstudio give them: which parameter is what.
+//! Camera models by the names that COLMAP and nerfstudio give them: the meaning of each parameter.
 
 use viewfuse_core::lens::{Lens, LensError, Projection};
 
-/// What a parameter of a camera model is.
+/// The meaning of a camera model's parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Parameter {
     /// Focal length of both axes.
@@ -60,7 +60,7 @@ pub(super) const CAMERA_MODELS: [CameraModel; 9] = {
     ]
 };
 
-/// What the parameters of a camera say.
+/// The values of a camera's parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Parameters {
     pub(super) focal: [f64; 2],
@@ -78,12 +78,12 @@ impl CameraModel {
         CAMERA_MODELS.into_iter().find(|model| model.id == id)
     }
 
-    /// How many parameters it has.
+    /// Number of parameters.
     pub(super) fn parameter_count(&self) -> usize {
         self.parameters.len()
     }
 
-    /// What parameters in the model's order say; of too few the rest is 0.
+    /// The values of parameters in the model's order; missing ones are 0.
     pub(super) fn interpret(&self, numbers: &[f64]) -> Result<Parameters, LensError> {
         let (mut focal, mut principal, mut coefficients) = ([0.0; 2], [0.0; 2], [0.0; 8]);
         for (parameter, &number) in self.parameters.iter().zip(numbers) {

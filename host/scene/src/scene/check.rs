@@ -1,6 +1,6 @@
 //! The checks that every reader shares: numbers become poses and pinholes here, and nowhere else.
 //!
-//! All arithmetic is in f64; what is handed to core is rounded once.
+//! All arithmetic is in f64; values passed to core are rounded once.
 
 use std::path::Path;
 
@@ -15,13 +15,13 @@ use super::images;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView};
 use super::{SceneFrame, ScenePoint, View};
 
-/// The centroid of the cameras may be so many times their spread away from the origin.
+/// Largest distance of the cameras' centroid from the origin, as a multiple of their spread.
 const FAR_FROM_ORIGIN: f64 = 16.0;
 
 /// Spreads of cameras below this share of their distance from the origin are rounding errors of f64.
 const LEAST_SPREAD: f64 = 1.0e-12;
 
-/// Spreads of cameras, in units of the file, that need no other unit.
+/// Range of the cameras' spread, in units of the file, for which the unit is kept.
 const USUAL_SPREADS: std::ops::RangeInclusive<f64> = 1.0e-3..=1.0e4;
 
 /// A scene whose numbers were checked.
@@ -36,7 +36,7 @@ pub(super) struct Checked {
 pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<Checked, SceneError> {
     let RawScene { views: raw_views, points, warnings } = raw;
     let mut order: Vec<usize> = (0..raw_views.len()).collect();
-    // Stable: photographs first, otherwise as they were.
+    // Stable: photographs first, otherwise in their order.
     order.sort_by_key(|&view| raw_views[view].image.is_none());
     let no_views = || SceneError::NoViews { path: found.to_path_buf(), looked_for: form };
 
@@ -79,13 +79,13 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
     Ok(Checked { views, points, warnings, frame })
 }
 
-/// Where the world is put so that `f32` holds what lies between the cameras; see [`SceneFrame`].
+/// The world's place, chosen so that `f32` can represent the distances between the cameras; see [`SceneFrame`].
 fn frame_of(views: &[RawView]) -> SceneFrame {
     let centres: Vec<DVec3> = views.iter().map(|view| centre(&world_from_camera(&view.pose))).collect();
     let count = centres.len().max(1) as f64;
     let centroid = centres.iter().map(|centre| *centre / count).sum::<DVec3>();
     let spread = (centres.iter().map(|centre| centre.distance_squared(centroid) / count).sum::<f64>()).sqrt();
-    // One camera, or several in one place but for rounding: there is nothing between them to lose.
+    // One camera, or several in one place except for rounding: there are no distances to preserve.
     if !(spread > LEAST_SPREAD * centroid.length() && spread.is_finite()) {
         return SceneFrame::FILE;
     }
@@ -178,8 +178,8 @@ fn world_from_camera(raw: &RawPose) -> [f64; 16] {
 /// The pinhole of a view: of the intrinsics' own size, or of a photograph that may be a resampled copy of such an image.
 ///
 /// # Errors
-/// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale, [`SceneError::Orientation`] if
-/// it cannot be told whether the camera is that of the stored or of the upright picture.
+/// [`SceneError::SizeMismatch`] if the photograph cannot be the whole image at another scale,
+/// [`SceneError::Orientation`] if it is ambiguous whether the camera is that of the stored or of the upright picture.
 fn pinhole_of(raw: &RawIntrinsics, image: Option<&ImageFile>) -> Result<Pinhole, SceneError> {
     let RawIntrinsics { focal, principal, size: stated, lens: _, path, place, size_place } = raw;
     let image_size = match image {
@@ -206,7 +206,8 @@ fn pinhole_of(raw: &RawIntrinsics, image: Option<&ImageFile>) -> Result<Pinhole,
     pinhole(path, size_place, scaled(focal), scaled(principal), image_size)
 }
 
-/// The size of the picture that the camera is of: the stored one, or the upright one where the file says that it must be turned.
+/// The size of the camera's picture: the stored one, or the upright one if the file's orientation tag says that it must
+/// be turned.
 fn upright_size(image: &ImageFile, stated: Option<[u32; 2]>) -> Result<[u32; 2], SceneError> {
     let stored = image.size();
     if image.orientation() == Orientation::NoTransforms {
@@ -252,7 +253,7 @@ pub(super) fn size(path: &Path, place: Place, width: f64, height: f64) -> Result
 
 /// Whether one size is the other at another scale, each side rounded to a whole pixel up or down.
 ///
-/// An image that keeps one side and changes the other is a crop, however small the change.
+/// An image that keeps one side and changes the other is a crop, for any change.
 pub(super) fn same_shape(a: [u32; 2], b: [u32; 2]) -> bool {
     if a[0] == b[0] || a[1] == b[1] {
         return a == b;

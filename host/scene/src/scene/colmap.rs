@@ -1,10 +1,11 @@
-//! COLMAP's sparse models, binary and text: `cameras`, `images` and, if there, `points3D`.
+//! COLMAP's sparse models, binary and text: `cameras`, `images` and, if present, `points3D`.
 //!
-//! A model is looked for in `sparse/0`, `sparse`, `dense/0/sparse`, `dense/sparse`, `colmap/sparse/0` and in the folder itself,
-//! which may stand beside the photographs or hold them. Photographs are looked for from the model's folder upwards, in `images`,
-//! `images_2`, `images_4`, `images_8`, `input`, `image`, `rgb` and in the folder itself; the first folder that has any of them
-//! is taken. They may be smaller than the model says, by one scale: intrinsics scale with them. Photographs that are missing are
-//! left out, with one warning that counts them. Views are in natural order of the names.
+//! A model is searched in `sparse/0`, `sparse`, `dense/0/sparse`, `dense/sparse`, `colmap/sparse/0` and in the folder
+//! itself, which may be next to the photographs or contain them. Photographs are searched from the model's folder
+//! upwards, in `images`, `images_2`, `images_4`, `images_8`, `input`, `image`, `rgb` and in the folder itself; the
+//! first folder that has any of them is used. They may be smaller than in the model, by one scale: intrinsics scale
+//! with them. Photographs that are missing are left out, with one warning that counts them. Views are in natural order
+//! of the names.
 //!
 //! Image coordinates are as ours, with pixel centres at halves. Poses are world-to-camera in OpenCV axes.
 
@@ -24,11 +25,11 @@ use super::files;
 use super::missing::Missing;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
 
-/// Where models are, in the order in which they are looked for.
+/// Folders of models, in the order in which they are searched.
 const MODEL_FOLDERS: [&str; 6] = ["sparse/0", "sparse", "dense/0/sparse", "dense/sparse", "colmap/sparse/0", ""];
-/// How far above the model photographs are looked for.
+/// Number of parent folders of the model in which photographs are searched.
 const HIGHEST: usize = 4;
-/// Norms of quaternions that rounding in a text file explains.
+/// Range of a quaternion's norm that rounding in a text file can cause.
 const UNIT_NORMS: std::ops::RangeInclusive<f64> = 0.99..=1.01;
 
 /// COLMAP: `sparse/0/cameras.bin` or `.txt`, `images/`.
@@ -79,14 +80,14 @@ impl Form {
         })
     }
 
-    /// The form of the model in a folder, the binary one where both are there.
+    /// The form of the model in a folder, the binary one if both exist.
     fn of(folder: &Path) -> Option<Form> {
         let is_there = |form: &Form| ["cameras", "images"].iter().all(|stem| form.file(folder, stem).is_file());
         [Form::Binary, Form::Text].into_iter().find(is_there)
     }
 }
 
-/// What a layout that was made from a model takes from it.
+/// The data of a model used by layouts that were made from it.
 pub(super) struct Origin {
     /// World-to-camera matrices of its images, which are in the order of their names by character.
     pub(super) cameras_from_world: Vec<[f64; 16]>,
@@ -94,7 +95,7 @@ pub(super) struct Origin {
     pub(super) points: Vec<RawPoint>,
 }
 
-/// The model with points that stands in a scene's folder, if there is one.
+/// The model with points in a scene's folder, if there is one.
 pub(super) fn beside(root: &Path) -> Result<Option<Origin>, SceneError> {
     let Some(folder) = MODEL_FOLDERS.iter().map(|name| root.join(name)).find(|folder| Form::of(folder).is_some())
     else {
@@ -244,12 +245,12 @@ fn photograph_folder(model: &Path, images: &[ModelImage]) -> PathBuf {
             }
         }
     }
-    // Where people look first, for the message.
+    // The most common place, for the message.
     let root = model.ancestors().find(|folder| folder.join("images").is_dir());
     root.unwrap_or(model).join("images")
 }
 
-/// The photograph of a name, whose extension may have changed when it was made smaller.
+/// The photograph with this name. Its extension may have changed when it was downscaled.
 fn present(folder: &Path, name: &str) -> Option<PathBuf> {
     let path: PathBuf = folder.join(name).components().collect();
     if path.is_file() {
@@ -258,7 +259,8 @@ fn present(folder: &Path, name: &str) -> Option<PathBuf> {
     files::IMAGE_EXTENSIONS.iter().map(|extension| path.with_extension(extension)).find(|path| path.is_file())
 }
 
-/// `[R | t]` of an image. A quaternion that is not of length 1, but for rounding, gives a matrix that is not rigid.
+/// `[R | t]` of an image. A quaternion whose length differs from 1 by more than rounding gives a matrix that is not
+/// rigid.
 fn camera_from_world(image: &ModelImage) -> [f64; 16] {
     let [w, x, y, z] = image.rotation;
     let [a, b, c] = image.translation;
@@ -309,7 +311,7 @@ fn camera(
     Ok(ModelCamera { size, parameters, place })
 }
 
-/// The model, if it is one that is read.
+/// The model, if it is supported.
 fn known(path: &Path, place: &Place, model: Result<CameraModel, String>) -> Result<CameraModel, SceneError> {
     model.map_err(|model| SceneError::CameraModel {
         path: path.to_path_buf(),

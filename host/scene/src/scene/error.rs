@@ -1,6 +1,6 @@
-//! What can be wrong with a scene on disk.
+//! Errors of scenes on disk.
 //!
-//! Every message is one line and begins with the path that a person must open, followed by the line or the key in it.
+//! Every message is one line and begins with the path of the faulty file, followed by the line or the key in it.
 
 use std::path::PathBuf;
 
@@ -14,13 +14,13 @@ use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
 pub enum SceneError {
-    /// A file or folder that must be there is not.
+    /// A required file or folder does not exist.
     #[error("{path}: no such file or folder")]
     Missing {
-        /// What was looked for.
+        /// The path that was searched.
         path: PathBuf,
     },
-    /// The operating system did not let us read it, or it is not text.
+    /// The operating system reported an error, or the file is not text.
     #[error("{path}: cannot be read: {cause}")]
     Read {
         /// The file or folder.
@@ -31,9 +31,9 @@ pub enum SceneError {
     /// No known layout.
     #[error("{path}: no scene here; looked for {looked_for}")]
     UnknownLayout {
-        /// The folder or file that was to be opened.
+        /// The folder or file to open.
         path: PathBuf,
-        /// What the readers look for.
+        /// The layouts that the readers recognise.
         looked_for: String,
     },
     /// More than one list of cameras in a folder.
@@ -46,12 +46,12 @@ pub enum SceneError {
         /// Name of another.
         second: String,
     },
-    /// The layout is there and lists nothing.
+    /// The layout was recognised but lists no views.
     #[error("{path}: the scene has no photographs ({looked_for})")]
     NoViews {
         /// The folder or file that lists the views.
         path: PathBuf,
-        /// What would have been a view.
+        /// The expected form of a view.
         looked_for: &'static str,
     },
     /// A pose whose photograph is missing.
@@ -59,9 +59,9 @@ pub enum SceneError {
     PoseWithoutImage {
         /// The file with the pose.
         path: PathBuf,
-        /// Where the pose stands in it.
+        /// The pose's place in it.
         place: Place,
-        /// The photograph that was looked for (where the name has no extension: with any of those that we read).
+        /// The expected photograph (if the name has no extension: with any supported one).
         image: PathBuf,
     },
     /// A mask that is named and missing.
@@ -69,9 +69,9 @@ pub enum SceneError {
     NoMask {
         /// The file that names it.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
-        /// The mask that was looked for.
+        /// The expected mask.
         mask: PathBuf,
     },
     /// A photograph whose pose is missing.
@@ -79,7 +79,7 @@ pub enum SceneError {
     ImageWithoutPose {
         /// The photograph.
         path: PathBuf,
-        /// The file that was looked for.
+        /// The expected file.
         pose: PathBuf,
     },
     /// A view's name cannot be that of a file.
@@ -103,7 +103,7 @@ pub enum SceneError {
     NotANumber {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
         /// The word, shortened if it is long.
         word: String,
@@ -113,7 +113,7 @@ pub enum SceneError {
     NotFinite {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
         /// The word.
         word: String,
@@ -123,13 +123,13 @@ pub enum SceneError {
     WrongCount {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
-        /// What is counted.
+        /// The counted items.
         of: &'static str,
-        /// How many there must be.
+        /// The expected count.
         expected: usize,
-        /// How many there are.
+        /// The count found.
         found: usize,
     },
     /// The matrix is not a camera pose.
@@ -137,9 +137,9 @@ pub enum SceneError {
     Pose {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
-        /// What core's check says.
+        /// The message of core's check.
         reason: PoseError,
     },
     /// The numbers are not a pinhole camera.
@@ -147,7 +147,7 @@ pub enum SceneError {
     Intrinsics {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
         /// What is wrong with them.
         fault: IntrinsicsFault,
@@ -160,7 +160,7 @@ pub enum SceneError {
     Distorted {
         /// The JSON file.
         path: PathBuf,
-        /// The key that says so.
+        /// The key that states the lens.
         key: String,
         /// Its value.
         value: String,
@@ -177,7 +177,7 @@ pub enum SceneError {
         /// What the parser says.
         reason: String,
     },
-    /// A key that must be there is not.
+    /// A required key is missing.
     #[error("{path}: {key} is missing")]
     MissingKey {
         /// The JSON file.
@@ -192,7 +192,7 @@ pub enum SceneError {
         path: PathBuf,
         /// The key.
         key: String,
-        /// What it must hold.
+        /// The expected type.
         expected: &'static str,
     },
     /// An image file that cannot be decoded.
@@ -203,7 +203,7 @@ pub enum SceneError {
         /// What the decoder says.
         cause: image::ImageError,
     },
-    /// An image header that promises too much.
+    /// An image header with too large a size.
     #[error("{path}: the image is {width} x {height}; at most {LARGEST_SIDE} pixels are allowed on a side")]
     TooLarge {
         /// The image file.
@@ -213,7 +213,7 @@ pub enum SceneError {
         /// Height in the header.
         height: u32,
     },
-    /// The photograph does not have the size that the cameras are for.
+    /// The photograph's size differs from that of its camera.
     #[error("{path}: the image is {width} x {height}, but {declared_in} is for {declared_width} x {declared_height}")]
     SizeMismatch {
         /// The image file.
@@ -222,33 +222,33 @@ pub enum SceneError {
         width: u32,
         /// Height of the image.
         height: u32,
-        /// What states the other size: a file, with the line or key.
+        /// The source of the other size: a file, with the line or key.
         declared_in: String,
-        /// Width that the cameras are for.
+        /// Width of the camera's image.
         declared_width: u32,
-        /// Height that the cameras are for.
+        /// Height of the camera's image.
         declared_height: u32,
     },
-    /// A file is damaged, or refers to what it does not hold.
+    /// A file is damaged, or refers to an entry that it does not contain.
     #[error("{path}{place}: {fault}")]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
         /// What is wrong.
         fault: FileFault,
     },
-    /// A camera model that is not read.
+    /// A camera model that is not supported.
     #[error("{path}{place}: camera model {model} is not supported; the models are {supported}")]
     CameraModel {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
         /// Its name or number.
         model: String,
-        /// The names of those that are.
+        /// The names of the supported ones.
         supported: String,
     },
     /// The numbers are not a lens.
@@ -256,9 +256,9 @@ pub enum SceneError {
     Lens {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
-        /// What core's check says.
+        /// The message of core's check.
         reason: LensError,
     },
     /// Not an array as NumPy writes them.
@@ -279,7 +279,8 @@ pub enum SceneError {
         /// What the reader says.
         cause: zip::result::ZipError,
     },
-    /// A photograph that must be turned to be upright, and cameras that do not say whether they are of it or of the stored one.
+    /// A photograph that must be turned to be upright, where it is ambiguous whether the cameras are for the upright or
+    /// the stored picture.
     #[error(
         "{path}: the file says that its pixels must be turned to be upright (EXIF orientation {tag}, {orientation:?}), and the \
          size that the cameras are for does not tell whether they are those of the stored or of the upright picture; save \
@@ -293,12 +294,12 @@ pub enum SceneError {
         /// What it means.
         orientation: image::metadata::Orientation,
     },
-    /// Near and far depth of a view do not bound anything.
+    /// Near and far bound of a view are not an interval.
     #[error("{path}{place}: near {near} and far {far} are not two positive depths, the near one first")]
     Depths {
         /// The file.
         path: PathBuf,
-        /// Where in it.
+        /// The place in it.
         place: Place,
         /// The near depth.
         near: f64,
@@ -317,7 +318,7 @@ pub enum SceneError {
         /// Its third.
         z: f64,
     },
-    /// The pixels of a view without a photograph were asked for.
+    /// The pixels of a view without a photograph were requested.
     #[error("{path}: view {name:?} is a pose without a photograph")]
     NoPhotograph {
         /// The scene.
@@ -330,9 +331,9 @@ pub enum SceneError {
     NoSuchView {
         /// The scene.
         path: PathBuf,
-        /// The index asked for, from 0.
+        /// The requested index, from 0.
         view: usize,
-        /// How many views there are.
+        /// Number of views.
         view_count: usize,
     },
 }

@@ -1,11 +1,11 @@
-//! Parts of [`super::SceneError`]: the place in a file, and what makes intrinsics, a file or an array unusable.
+//! Parts of [`super::SceneError`]: the place in a file, and faults of intrinsics, files and arrays.
 
 use std::fmt;
 
 use thiserror::Error;
 use viewfuse_core::camera::PinholeError;
 
-/// Where in a file something is wrong.
+/// The place of a fault in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
@@ -19,7 +19,7 @@ pub enum Place {
 }
 
 impl fmt::Display for Place {
-    /// What follows the path: nothing, `:12`, or `: frames[3].fl_x`.
+    /// The text after the path: nothing, `:12`, or `: frames[3].fl_x`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Place::File => Ok(()),
@@ -41,7 +41,7 @@ pub enum IntrinsicsFault {
         /// Focal length along y.
         y: f64,
     },
-    /// A coordinate of the principal point does not fit.
+    /// A coordinate of the principal point is out of range.
     #[error("principal point ({x}, {y}) is out of range")]
     Principal {
         /// Coordinate to the right.
@@ -52,15 +52,15 @@ pub enum IntrinsicsFault {
     /// A width or height is not a whole number of pixels from 1 to 2^20.
     #[error("image size {width} x {height} is not two whole numbers from 1 to 1048576")]
     Size {
-        /// Width as it stands in the file.
+        /// Width as stated in the file.
         width: f64,
-        /// Height as it stands in the file.
+        /// Height as stated in the file.
         height: f64,
     },
     /// An opening angle is not between 0 and pi.
     #[error("opening angle {angle} is not between 0 and pi radians")]
     Angle {
-        /// The angle as it stands in the file.
+        /// The angle as stated in the file.
         angle: f64,
     },
     /// The image axes are not at right angles.
@@ -78,7 +78,7 @@ pub enum IntrinsicsFault {
 }
 
 impl IntrinsicsFault {
-    /// The fault that core found in these numbers, with the values it refers to.
+    /// The fault that core reports for these numbers, with their values.
     pub(super) fn from_pinhole(error: PinholeError, focal: [f64; 2], principal: [f64; 2], size: [u32; 2]) -> Self {
         match error {
             PinholeError::Focal => IntrinsicsFault::Focal { x: focal[0], y: focal[1] },
@@ -99,23 +99,23 @@ pub enum FileFault {
         /// What is cut off.
         of: &'static str,
     },
-    /// It goes on behind its end.
+    /// Data follows its expected end.
     #[error("{left} bytes are left over")]
     LeftOver {
         /// How many bytes.
         left: usize,
     },
-    /// It announces more than it holds.
+    /// Its header states more entries than the file can hold.
     #[error("announces {count} {of}; the file has room for {most}")]
     NoRoom {
         /// What is counted.
         of: &'static str,
-        /// How many it says there are.
+        /// The stated count.
         count: u64,
-        /// How many there can be.
+        /// The largest possible count.
         most: usize,
     },
-    /// A text in a binary file is none.
+    /// A text in a binary file is not UTF-8.
     #[error("{of} is not UTF-8 text")]
     NotText {
         /// What it should be.
@@ -135,7 +135,7 @@ pub enum FileFault {
         /// The number.
         id: u64,
     },
-    /// An entry is referred to that is not there.
+    /// A reference to an entry that does not exist.
     #[error("there is no {of} with the number {id}")]
     NoSuchId {
         /// What is referred to.
@@ -148,10 +148,10 @@ pub enum FileFault {
 /// Why bytes are not an array of NumPy's.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NumpyFault {
-    /// They do not begin as such a file does.
+    /// The magic number is missing.
     #[error("it does not begin with \\x93NUMPY")]
     Magic,
-    /// A version that did not exist when this was written.
+    /// An unknown version of the format.
     #[error("its format has version {0}; 1 to 3 are read")]
     Version(u8),
     /// The header or the numbers are cut off.
@@ -171,7 +171,7 @@ pub enum NumpyFault {
         /// The number.
         value: f64,
     },
-    /// An array of an archive that is too large for cameras.
+    /// An array of an archive is too large for cameras.
     #[error("it is larger than 16 MiB")]
     TooLarge,
     /// Two arrays of one name.

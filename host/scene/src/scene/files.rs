@@ -11,14 +11,14 @@ use super::fault::Place;
 /// Extensions of photographs, compared without regard to case.
 pub(super) const IMAGE_EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "JPG", "JPEG", "PNG"];
 
-/// Folders that photographs stand in, in the order in which they are looked for: the largest first.
+/// Folders of photographs, in the order in which they are searched: the largest photographs first.
 pub(super) const IMAGE_FOLDERS: [&str; 8] =
     ["images", "images_1", "images_2", "images_4", "images_8", "input", "image", "rgb"];
 
-/// Longest part of a wrong word that an error repeats: a binary file's first "word" may be the whole file.
+/// Longest part of a wrong word that an error quotes: a binary file's first "word" may be the whole file.
 const LONGEST_EXCERPT: usize = 40;
 
-/// The error for a file or folder that the operating system did not open.
+/// The error for a file or folder that the operating system could not open.
 pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
     let path = path.to_path_buf();
     if cause.kind() == io::ErrorKind::NotFound {
@@ -31,7 +31,7 @@ pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
 /// A text file's contents, without the byte order mark that some editors put in front.
 ///
 /// # Errors
-/// [`SceneError::Missing`], or [`SceneError::Read`] where it cannot be read or is no text.
+/// [`SceneError::Missing`], or [`SceneError::Read`] if it cannot be read or is not text.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
     let text = fs::read_to_string(path).map_err(|cause| unreadable(path, cause))?;
     Ok(match text.strip_prefix('\u{feff}') {
@@ -40,8 +40,8 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     })
 }
 
-/// The files in a folder for whose name `wanted` holds, in natural order. Hidden files are left out: archives made on
-/// a Mac hold a `._000000.png` beside each `000000.png`.
+/// The files in a folder for whose name `wanted` holds, in natural order. Hidden files are left out: archives made on a
+/// Mac contain a `._000000.png` next to each `000000.png`.
 ///
 /// # Errors
 /// [`SceneError::Missing`] or [`SceneError::Read`] for a folder that cannot be listed.
@@ -59,11 +59,11 @@ pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf
     Ok(paths)
 }
 
-/// `images` and, by rising N, `images_N`, as far as they are there: photographs at full size and N times smaller.
+/// The existing ones of `images` and, by increasing N, `images_N`: photographs at full size and N times smaller.
 pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
     let failed = |cause| unreadable(root, cause);
     let mut folders: Vec<(u64, PathBuf)> = Vec::new();
-    // Of a relative path that is a lone file name the folder is the current one.
+    // The folder of a bare file name is the current one.
     let here = if root.as_os_str().is_empty() { Path::new(".") } else { root };
     for entry in std::fs::read_dir(here).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
@@ -132,8 +132,8 @@ pub(super) fn excerpt(word: &str) -> String {
     short
 }
 
-/// Compares names as people count: runs of digits by their value, so that `2` comes before `10`; the rest by
-/// character. Names that differ only in leading zeros are told apart by their characters: the order is total.
+/// Natural order of names: runs of digits are compared by their value, so that `2` comes before `10`; the rest by
+/// character. Names that differ only in leading zeros are compared by character, so that the order is total.
 pub(super) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut rest_a, mut rest_b) = (a, b);
     loop {

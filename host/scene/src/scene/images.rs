@@ -1,8 +1,8 @@
 //! Image files: their headers when a scene is opened, their pixels when a view is needed.
 //!
-//! A tag that says how the pixels must be turned to be upright (EXIF) is read with the header. Whether the poses are those of the
-//! pixels as stored or of the upright picture follows from the size that the cameras are for
-//! ([`super::check`]); where that cannot tell, the photograph is refused.
+//! The orientation tag (EXIF), which states how the pixels must be turned to be upright, is read with the header. The
+//! size of the cameras' images decides whether the poses are those of the stored or of the upright picture
+//! ([`super::check`]); if it is ambiguous, the photograph is refused.
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read};
@@ -18,14 +18,14 @@ use super::{LARGEST_SIDE, Photograph};
 /// Most bytes of a decoded pixel: four channels of 16 bits.
 const LARGEST_PIXEL: u64 = 8;
 
-/// What a decoder may need beside the pixels: its rows, tables, colour profiles.
+/// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles.
 const DECODER_ALLOWANCE: u64 = 64 << 20;
 
-/// So much of a JPEG file is read for its header at first: the tags with their small picture, colour profiles. The decoder
+/// Bytes of a JPEG file that are read first for its header: the tags with their thumbnail, colour profiles. The decoder
 /// would read the whole file.
 const JPEG_HEADER: u64 = 256 << 10;
 
-/// What an image file says about itself.
+/// The properties in an image file's header.
 pub(super) struct Header {
     /// Width and height as stored.
     pub(super) size: [u32; 2],
@@ -48,7 +48,7 @@ pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     Ok(Header { size: [width, height], orientation })
 }
 
-/// What the first bytes of a JPEG file say; `None` for other files, and where more bytes are needed.
+/// The header in the first bytes of a JPEG file; `None` for other files, and if more bytes are needed.
 fn beginning_of_jpeg(path: &Path) -> Result<Option<(u32, u32, Orientation)>, SceneError> {
     let failed = |cause| unreadable(path, cause);
     let mut first = Vec::new();
@@ -66,11 +66,12 @@ fn described<R: std::io::BufRead + std::io::Seek>(
 ) -> Result<(u32, u32, Orientation), image::ImageError> {
     let mut decoder = reader.into_decoder()?;
     let (width, height) = decoder.dimensions();
-    // A tag that cannot be read says nothing.
+    // An unreadable tag is ignored.
     Ok((width, height, decoder.orientation().unwrap_or(Orientation::NoTransforms)))
 }
 
-/// The pixels of a photograph as straight 8-bit RGBA, of this width and height: turned upright where only that fits.
+/// The pixels of a photograph as straight 8-bit RGBA, of this width and height: turned upright if only that has this
+/// size.
 ///
 /// # Errors
 /// [`SceneError::SizeMismatch`] if the file has another size.
@@ -93,7 +94,7 @@ pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<Photograph, SceneErr
     }
     let has_channel = decoded.color().has_alpha();
     let pixels = decoded.into_rgba8();
-    // SRN's photographs carry an alpha channel that is 255 everywhere: it says nothing.
+    // SRN's photographs have an alpha channel that is 255 everywhere: it is ignored.
     let has_alpha = has_channel && pixels.pixels().any(|pixel| pixel[3] < u8::MAX);
     Ok(Photograph { pixels, has_alpha, seen: None })
 }
@@ -109,7 +110,7 @@ pub(super) fn turned(size: [u32; 2], orientation: Orientation) -> [u32; 2] {
 
 /// All pixels of an image file, as stored.
 ///
-/// The header is checked first, and the decoder may allocate no more than an image of that size can need.
+/// The header is checked first, and the decoder may allocate no more than an image of that size needs.
 pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneError> {
     let Header { size: [width, height], orientation } = header(path)?;
     let mut limits = Limits::default();
@@ -125,7 +126,7 @@ fn undecodable(path: &Path, cause: image::ImageError) -> SceneError {
     SceneError::Image { path: path.to_path_buf(), cause }
 }
 
-/// A reader whose format is that of the content, whatever the file's extension says.
+/// A reader for the format of the content, independent of the file's extension.
 fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, SceneError> {
     let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
     reader.map_err(|cause| unreadable(path, cause))

@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use super::error::SceneError;
 use super::fault::Place;
 
-/// An object of a JSON file and where it stands.
+/// An object of a JSON file and its place.
 #[derive(Clone, Debug)]
 pub(super) struct Object<'a> {
     path: &'a Path,
@@ -20,7 +20,7 @@ pub(super) struct Object<'a> {
 pub(super) fn parse(path: &Path, text: &str) -> Result<Value, SceneError> {
     serde_json::from_str(text).map_err(|error| {
         let (line, column) = (error.line(), error.column());
-        // The parser appends the place, which our message has in front where editors look for it.
+        // The parser appends the place, which our message has in front, where editors expect it.
         let said = error.to_string();
         let reason = said.strip_suffix(&format!(" at line {line} column {column}")).unwrap_or(&said).to_string();
         SceneError::Json { path: path.to_path_buf(), line, column, reason }
@@ -48,7 +48,7 @@ impl<'a> Object<'a> {
         self.entries.get(key).filter(|value| !value.is_null())
     }
 
-    /// A value that must be there.
+    /// A required value.
     pub(super) fn required(&self, key: &str) -> Result<&'a Value, SceneError> {
         self.get(key).ok_or_else(|| SceneError::MissingKey { path: self.path.to_path_buf(), key: self.full(key) })
     }
@@ -58,18 +58,18 @@ impl<'a> Object<'a> {
         self.get(key).map(|value| number(self.path, &self.full(key), value)).transpose()
     }
 
-    /// A text that must be there.
+    /// A required text.
     pub(super) fn text(&self, key: &str) -> Result<&'a str, SceneError> {
         let value = self.required(key)?;
         value.as_str().ok_or_else(|| wrong_type(self.path, self.full(key), "a text"))
     }
 
-    /// An array that must be there.
+    /// A required array.
     pub(super) fn array(&self, key: &str) -> Result<&'a [Value], SceneError> {
         array(self.path, &self.full(key), self.required(key)?)
     }
 
-    /// The 16 numbers of an array of 4 rows of 4 numbers that must be there.
+    /// The 16 numbers of a required array of 4 rows of 4 numbers.
     pub(super) fn matrix(&self, key: &str) -> Result<[f64; 16], SceneError> {
         let name = self.full(key);
         let rows = of_length(self.path, &name, self.array(key)?, "rows")?;

@@ -1,14 +1,14 @@
-//! The layout of Local Light Field Fusion (Mildenhall et al. 2019): `poses_bounds.npy` beside the photographs.
+//! The layout of Local Light Field Fusion (Mildenhall et al. 2019): `poses_bounds.npy` next to the photographs.
 //!
 //! A row for each photograph, in the order of the photographs' names: 15 numbers are a 3x5 matrix, row-major, whose first
 //! three columns are the camera's axes in the world (down, right, backwards), whose fourth is its centre and whose fifth holds
-//! height, width and focal length of the full photograph in pixels; two numbers are the nearest and the furthest depth of
-//! what the photograph shows. The principal point is the centre of the photograph.
+//! height, width and focal length of the full photograph in pixels; two numbers are the near and the far bound of the
+//! photograph. The principal point is the centre of the photograph.
 //!
 //! Photographs are those of `images`, or without it of `images_2`, `images_4`, `images_8` and so on: of the folders with as
 //! many photographs as there are rows, the one with the largest photographs. Intrinsics scale with them.
 //!
-//! The poses are made from a COLMAP model. Where that stands beside them, its points are the scene's.
+//! The poses are made from a COLMAP model. If the model is in the same folder, its points are the scene's.
 
 use std::path::{Path, PathBuf};
 
@@ -68,7 +68,7 @@ impl Reader for Llff {
     }
 }
 
-/// The points of the COLMAP model that the poses were made from, where it stands beside them.
+/// The points of the COLMAP model that the poses were made from, if it is in the same folder.
 fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
     let root = file.with_file_name("");
     let Some(Origin { cameras_from_world, points }) = colmap::beside(&root).map_err(|error| error.to_string())? else {
@@ -79,7 +79,7 @@ fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
         let c = &view.pose.matrix;
         let offset = |axis: usize| -(m[axis] * m[3] + m[4 + axis] * m[7] + m[8 + axis] * m[11]) - c[4 * axis + 3];
         let size = 1.0 + [3, 7, 11].map(|entry| m[entry].abs()).into_iter().fold(0.0, f64::max);
-        // A NaN differs, too.
+        // A NaN counts as different.
         !((0..3).all(|axis| offset(axis).abs() <= SAME_CENTRE * size))
     };
     if cameras_from_world.len() != views.len() || cameras_from_world.iter().zip(views).any(differs) {

@@ -1,10 +1,10 @@
-//! Masks: images beside the photographs that say what of them counts.
+//! Masks: images that state which pixels of the photographs count.
 //!
-//! A mask is 0 where the photograph does not count and greatest where it does: white objects before black in NeuS's data,
-//! black what is to be ignored in COLMAP's and nerfstudio's. Values between are fractions of a pixel. It has the photograph's size,
-//! or another of the same shape.
+//! A mask is 0 where the photograph does not count and has the greatest value where it does: in NeuS's data objects are
+//! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Values between are fractions of a pixel. It
+//! has the photograph's size, or another of the same shape.
 //!
-//! A layout may name masks itself. Otherwise they are looked for in a folder `mask` or `masks` in the scene, beside the
+//! A layout may name masks itself. Otherwise they are searched in a folder `mask` or `masks` in the scene, beside the
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
 //! (nerfstudio), or one of another extension.
 
@@ -22,8 +22,8 @@ use super::images;
 /// Folders of masks.
 const FOLDERS: [&str; 2] = ["mask", "masks"];
 
-/// Gives views without a mask the one that stands in a folder beside; `root` is the scene's folder or a file in it. The
-/// warning counts photographs without a mask where others have one.
+/// Gives views without a mask the one in a folder of masks; `root` is the scene's folder or a file in it. The warning
+/// counts photographs without a mask if others have one.
 pub(super) fn find(root: &Path, views: &mut [View]) -> Option<String> {
     let root = if root.is_dir() { root } else { root.parent()? };
     // Two photographs of one name in two folders may not share a mask.
@@ -73,7 +73,7 @@ pub(super) fn apply(path: &Path, photograph: &mut Photograph) -> Result<(), Scen
         let path = path.to_path_buf();
         return Err(SceneError::SizeMismatch { path, width, height, declared_in, declared_width, declared_height });
     }
-    // Cut-outs used as masks say it in their alpha channel, over colours of no meaning.
+    // Cut-outs used as masks have the mask in their alpha channel; their colours are ignored.
     let has_alpha = decoded.color().has_alpha();
     let rgba = decoded.to_rgba8();
     let speaks = has_alpha && rgba.pixels().any(|pixel| pixel[3] < u8::MAX);

@@ -1,8 +1,8 @@
 //! The layout of the Middlebury multi-view stereo data sets (Seitz et al. 2006).
 //!
-//! `NAME_par.txt` lists the photographs beside it: first their count, then a line each of
+//! `NAME_par.txt` lists the photographs in its folder: first their count, then a line each of
 //! `name K(9) R(9) t(3)`, row-major, with `x ~ K [R|t] X` in OpenCV axes. Files in the folder that the list does not
-//! name are no part of the scene.
+//! name are not part of the scene.
 //!
 //! In these files pixel `(0, 0)` is the centre of the top left pixel; in our image coordinates that is `(0.5, 0.5)`,
 //! so half a pixel is added to the principal point.
@@ -14,7 +14,7 @@ use super::fault::{IntrinsicsFault, Place};
 use super::files;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
-/// How the name of a list ends.
+/// The suffix of a list's name.
 const SUFFIX: &str = "_par.txt";
 
 /// Numbers after the name: K, R and t.

@@ -1,4 +1,4 @@
-//! Photographs that a list names and that are not there: left out and counted, with one warning for all of them.
+//! Photographs that a list names and that do not exist: they are skipped and counted, with one warning for all.
 
 use std::path::{Path, PathBuf};
 
@@ -14,12 +14,12 @@ pub(super) struct Missing {
 }
 
 impl Missing {
-    /// Counts a photograph of the list that is there.
+    /// Counts a photograph of the list that exists.
     pub(super) fn found(&mut self) {
         self.listed += 1;
     }
 
-    /// Counts a photograph of the list that is not there; `place` is where the list names it.
+    /// Counts a photograph of the list that does not exist; `place` is its place in the list.
     pub(super) fn missed(&mut self, place: Place, image: PathBuf) {
         self.listed += 1;
         self.count += 1;

@@ -2,8 +2,8 @@
 //!
 //! For each photograph the archive has `world_mat_N`, a 4x4 matrix whose first three rows project world points to pixels, and
 //! mostly `scale_mat_N`, which places the unit sphere around the object in that world. The scene's world is the unit sphere's: the
-//! projection is `P = world_mat_N scale_mat_N`, taken apart in f64 into `K [R | t]` by an RQ decomposition. Near and far
-//! depth are those of the sphere where the archive has one and the camera stands outside of it.
+//! projection is `P = world_mat_N scale_mat_N`, decomposed in f64 into `K [R | t]` by an RQ decomposition. The near and
+//! far bounds are those of the sphere, if the archive has one and the camera is outside of it.
 //!
 //! A photograph belongs to the matrix with the number that its name ends in, if all have one; otherwise to that of its
 //! position. `mask/` holds masks of the same numbers. Pixel `(0, 0)` is the centre of the top left pixel there; here that is
@@ -21,17 +21,17 @@ use super::missing::Missing;
 use super::numpy::{self, Array};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
-/// Names of the archive, in the order in which they are looked for; then any other `cameras*.npz`.
+/// Names of the archive, in the order in which they are searched; then any other `cameras*.npz`.
 const FILE_NAMES: [&str; 3] = ["cameras_sphere.npz", "cameras.npz", "cameras_large.npz"];
 /// Folders of photographs.
 const IMAGE_FOLDERS: [&str; 3] = ["image", "images", "rgb"];
 /// Folders of masks.
 const MASK_FOLDERS: [&str; 2] = ["mask", "masks"];
-/// What the projections are called, before their number.
+/// Prefix of the projections' names, before their number.
 const WORLD: &str = "world_mat_";
-/// What the spheres are called.
+/// Prefix of the spheres' names.
 const SCALE: &str = "scale_mat_";
-/// Largest skew that rounding of 32-bit matrices may leave, in pixels.
+/// Largest skew that rounding of 32-bit matrices may cause, in pixels.
 const LARGEST_SKEW: f64 = 0.05;
 
 /// NeuS and IDR: `cameras*.npz`, `image/`, `mask/`.
@@ -102,7 +102,7 @@ fn numbered(name: &str, prefix: &str) -> Option<u64> {
     name.strip_prefix(prefix)?.parse().ok()
 }
 
-/// Which matrix each photograph belongs to.
+/// The matrix of each photograph.
 fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -> Result<Vec<u64>, SceneError> {
     let by_name: Option<Vec<u64>> = images.iter().map(|image| files::trailing_number(&files::stem(image))).collect();
     if let Some(numbers) = by_name.filter(|numbers| numbers.iter().all(|number| worlds.contains_key(number))) {
@@ -218,7 +218,7 @@ fn take_apart(projection: &[[f64; 4]; 4]) -> Option<Parts> {
     })
 }
 
-/// The unit vector along what of `vector` is orthogonal to unit vectors.
+/// The unit vector along the component of `vector` that is orthogonal to these unit vectors.
 fn orthogonal(vector: DVec3, to: &[DVec3]) -> Option<DVec3> {
     let mut rest = vector;
     for _ in 0..2 {

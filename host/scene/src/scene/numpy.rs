@@ -1,7 +1,7 @@
 //! NumPy's files: arrays (`.npy`, versions 1 to 3) and zip archives of them (`.npz`, stored or deflated).
 //!
-//! Read are little-endian floating point numbers of 32 and 64 bits, in C and in Fortran order. The header is a Python literal;
-//! only the three keys that NumPy writes are looked for, nothing is evaluated.
+//! Little-endian floating point numbers of 32 and 64 bits are supported, in C and in Fortran order. The header is a
+//! Python literal; only the three keys that NumPy writes are parsed, nothing is evaluated.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -16,7 +16,7 @@ use super::error::SceneError;
 use super::fault::NumpyFault;
 use super::files::unreadable;
 
-/// What a file begins with.
+/// The magic number of a file.
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// Most bytes of a header.
 const LONGEST_HEADER: usize = 1 << 16;
@@ -107,7 +107,7 @@ fn split(bytes: &[u8], length: usize) -> Result<(&str, &[u8]), NumpyFault> {
     Ok((std::str::from_utf8(header).map_err(|_| NumpyFault::Header("its text"))?, data))
 }
 
-/// What follows a key of the header.
+/// The text after a key of the header.
 fn value_of<'a>(header: &'a str, key: &'static str) -> Result<&'a str, NumpyFault> {
     let at = ['\'', '"'].iter().find_map(|quote| {
         let quoted = format!("{quote}{key}{quote}");
@@ -123,7 +123,7 @@ fn quoted(text: &str) -> &str {
     quote.and_then(|quote| text[1..].split(quote).next()).unwrap_or_default()
 }
 
-/// The sides in `(20, 17)`.
+/// The dimensions in a text like `(20, 17)`.
 fn shape(text: &str) -> Result<Vec<usize>, NumpyFault> {
     let fault = || NumpyFault::Header("shape");
     let inside = text.strip_prefix('(').and_then(|rest| rest.split_once(')')).ok_or_else(fault)?.0;

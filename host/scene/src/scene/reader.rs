@@ -1,7 +1,7 @@
-//! What a reader of a layout is: it tells whether a path is laid out its way, and hands over what stands there as it is.
+//! The interface of a layout's reader: it recognises a path with its layout, and returns the unchecked contents.
 //!
-//! Numbers become poses and pinholes in one place, whatever the reader ([`crate::Scene::open_with`]): poses must be finite
-//! and rigid, intrinsics a pinhole's, sizes those of the photographs, names different. A crate outside adds a layout by
+//! Numbers become poses and pinholes in one place for all readers ([`crate::Scene::open_with`]): poses must be finite
+//! and rigid, intrinsics a pinhole's, sizes those of the photographs, names unique. Another crate adds a layout by
 //! implementing [`Reader`].
 
 use std::path::{Path, PathBuf};
@@ -18,33 +18,33 @@ pub use super::files::{has_extension, list, number_lines, read_text, stem};
 
 /// A layout of scenes on disk.
 pub trait Reader {
-    /// What people call the layout: `srn`.
+    /// The layout's name: `srn`.
     fn name(&self) -> &'static str;
 
-    /// What is looked for, for help texts and for the error where no reader fits: `a folder with rgb/, pose/ and
-    /// intrinsics.txt (SRN)`.
+    /// A description of the layout, for help texts and for the error if no reader recognises a path:
+    /// `a folder with rgb/, pose/ and intrinsics.txt (SRN)`.
     fn form(&self) -> &'static str;
 
-    /// What to read if there is a scene of this layout at a path that exists: the path itself, or a file in it. Looks at
-    /// names only.
+    /// The path to read if there is a scene of this layout at an existing path: the path itself, or a file in it.
+    /// Checks names only.
     ///
     /// # Errors
-    /// [`SceneError`] if the path cannot be read, or where the layout is there and it is unclear what is meant.
+    /// [`SceneError`] if the path cannot be read, or if the layout is recognised but ambiguous.
     fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError>;
 
-    /// What stands in what [`Reader::recognise`] found; views in the order in which the scene has them.
+    /// The contents of the path that [`Reader::recognise`] returned; views in the order of the scene.
     ///
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
     fn read(&self, found: &Path) -> Result<RawScene, SceneError>;
 }
 
-/// A scene as it stands on disk. A list of views alone becomes one by `RawScene::from`.
+/// An unchecked scene, as on disk. A list of views alone becomes one by `RawScene::from`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RawScene {
     /// The views.
     pub views: Vec<RawView>,
-    /// Points of the world that were reconstructed with the cameras.
+    /// Sparse points that were reconstructed with the cameras.
     pub points: Vec<RawPoint>,
     /// What was left out or ignored, a line each.
     pub warnings: Vec<String>,
@@ -56,12 +56,12 @@ impl From<Vec<RawView>> for RawScene {
     }
 }
 
-/// A reconstructed point as it stands on disk.
+/// An unchecked reconstructed point, as on disk.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawPoint {
     /// World coordinates of the file.
     pub position: [f64; 3],
-    /// Mean reprojection error in pixels; negative where the file does not say.
+    /// Mean reprojection error in pixels; negative if the file does not state it.
     pub error: f64,
     /// Red, green, blue.
     pub colour: [u8; 3],
@@ -69,28 +69,27 @@ pub struct RawPoint {
     pub views: Vec<u32>,
 }
 
-/// A view as it stands on disk. Not checked yet, but for the photograph's header.
+/// An unchecked view, as on disk. Only the photograph's header has been checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawView {
-    /// What people call it; without separators of folders.
+    /// Its name, without path separators.
     pub name: String,
     /// The photograph, if there is one.
     pub image: Option<ImageFile>,
-    /// Where the camera was.
+    /// The camera's pose.
     pub pose: RawPose,
-    /// How it maps the world to its image. `None` for a target pose: the camera of the scene's first photograph, at that
-    /// one's size.
+    /// The camera's intrinsics. `None` for a target pose: those of the scene's first photograph, at its size.
     pub intrinsics: Option<RawIntrinsics>,
-    /// An image of the photograph's shape that says what counts: 0 where nothing does.
+    /// The mask, an image of the photograph's shape: 0 where the photograph does not count.
     pub mask: Option<PathBuf>,
-    /// Nearest and furthest depth of what the view shows, along the principal axis, in the file's units.
+    /// Near and far bound of the view, along the principal axis, in the file's units.
     pub near_far: Option<[f64; 2]>,
-    /// Which part of the scene it belongs to.
+    /// The split of the scene that it belongs to.
     pub split: Option<Split>,
 }
 
 impl RawView {
-    /// A view of which the layout knows no more than this.
+    /// A view with only these properties.
     pub fn new(name: String, image: Option<ImageFile>, pose: RawPose, intrinsics: Option<RawIntrinsics>) -> RawView {
         RawView { name, image, pose, intrinsics, mask: None, near_far: None, split: None }
     }
@@ -108,7 +107,7 @@ impl ImageFile {
     /// Reads the header.
     ///
     /// # Errors
-    /// [`SceneError`] if it cannot be read, is no image, or states a side above [`crate::LARGEST_SIDE`].
+    /// [`SceneError`] if it cannot be read, is not an image, or states a side above [`crate::LARGEST_SIDE`].
     pub fn open(path: &Path) -> Result<ImageFile, SceneError> {
         let images::Header { size, orientation } = images::header(path)?;
         Ok(ImageFile { path: path.to_path_buf(), size, orientation })
@@ -124,13 +123,13 @@ impl ImageFile {
         self.size
     }
 
-    /// How the file says that its pixels must be turned to be upright (EXIF).
+    /// The orientation tag: how the pixels must be turned to be upright (EXIF).
     pub fn orientation(&self) -> Orientation {
         self.orientation
     }
 }
 
-/// What the 16 numbers of a pose are.
+/// The convention of a pose's 16 numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PoseForm {
     /// Camera-to-world, camera axes x right, y down, z forward.
@@ -146,11 +145,11 @@ pub enum PoseForm {
 pub struct RawPose {
     /// The 4x4 matrix, row-major.
     pub matrix: [f64; 16],
-    /// What it is.
+    /// Its convention.
     pub form: PoseForm,
-    /// The file that it stands in.
+    /// The file that contains it.
     pub path: PathBuf,
-    /// Where in the file.
+    /// The place in the file.
     pub place: Place,
 }
 
@@ -161,15 +160,15 @@ pub struct RawIntrinsics {
     pub focal: [f64; 2],
     /// Principal point, x and y, in pixels.
     pub principal: [f64; 2],
-    /// Width and height of the images that they are for; `None` where nothing says so but the photograph itself. A
-    /// photograph may be a resampled copy of such an image: focal lengths and principal point then scale with their axis.
+    /// Width and height of the images that they are for; `None` if only the photograph itself states it. A photograph
+    /// may be a resampled copy of such an image: focal lengths and principal point then scale with their axis.
     pub size: Option<[u32; 2]>,
-    /// What the lens does to the pinhole's image. A photograph is undistorted when it is read.
+    /// The lens distortion. A photograph is undistorted when it is read.
     pub lens: Option<Lens>,
-    /// The file that they stand in.
+    /// The file that contains them.
     pub path: PathBuf,
-    /// Where in the file focal lengths and principal point stand.
+    /// The place of focal lengths and principal point in the file.
     pub place: Place,
-    /// Where in the file the size stands.
+    /// The place of the size in the file.
     pub size_place: Place,
 }

@@ -1,26 +1,26 @@
-//! The parts that data is split into: of a data set its scenes, of a scene its views.
+//! Splits: of a data set's scenes, or of a scene's views.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// Which of the scenes of a data set, or of the views of a scene.
+/// A split of the scenes of a data set, or of the views of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Split {
-    /// To learn from.
+    /// For training.
     Train,
-    /// To watch the learning with.
+    /// For validation during training.
     Validation,
-    /// To measure the result with.
+    /// For testing the result.
     Test,
 }
 
-/// The name is none of a split.
+/// The name is not that of a split.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("'{0}' is not a split of a data set: train, val or test")]
 pub struct UnknownSplit(String);
 
 impl fmt::Display for Split {
-    /// As folders end: `train`, `val`, `test`.
+    /// As in the folders' suffixes: `train`, `val`, `test`.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
             Split::Train => "train",

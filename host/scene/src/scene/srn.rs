@@ -7,8 +7,8 @@
 //! intrinsics.txt           focal cx cy 0 / origin / [near plane /] scale / height width [/ 0 or 1]
 //! ```
 //!
-//! Origin, near plane and scale place the original authors' voxel grid; no pose depends on them. The number that may
-//! follow the size says whether the poses are world-to-camera (1) instead, as in the authors' own reader.
+//! Origin, near plane and scale place the original authors' voxel grid; no pose depends on them. An optional number
+//! after the size states whether the poses are world-to-camera (1) instead, as in the authors' own reader.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -19,8 +19,8 @@ use super::fault::Place;
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
-/// Put before the name of a view from `target_pose/`, which often counts from 1 like the photographs do. A name
-/// without a separator of folders can be the name of an output file.
+/// Put before the name of a view from `target_pose/`, which often counts from 1 like the photographs do. A name without
+/// a path separator can be the name of an output file.
 const TARGET_PREFIX: &str = "target_";
 
 /// ShapeNet scenes of Scene Representation Networks: `rgb/`, `pose/`, `intrinsics.txt`, and `target_pose/`.
@@ -36,7 +36,7 @@ impl Reader for Srn {
     }
 
     fn recognise(&self, path: &Path) -> Result<Option<PathBuf>, SceneError> {
-        // One of the two folders is enough, so that a scene with the other one missing is told which.
+        // One of the two folders is enough, so that the error names the other one if it is missing.
         let is_there = path.join("rgb").is_dir() || path.join("pose").is_dir();
         Ok(is_there.then(|| path.to_path_buf()))
     }
@@ -70,8 +70,8 @@ fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
         for path in list_poses(&target_folder)? {
             let pose = read_pose(&path, list.form)?;
             let name = format!("{TARGET_PREFIX}{}", files::stem(&path));
-            // A target is rendered at the size of the photographs; where these are smaller than `intrinsics.txt` says, so
-            // is it.
+            // A target is rendered at the size of the photographs; if these are smaller than in `intrinsics.txt`, so is
+            // it.
             views.push(RawView::new(name, None, pose, None));
         }
     }
@@ -82,7 +82,7 @@ fn list_poses(folder: &Path) -> Result<Vec<PathBuf>, SceneError> {
     files::list(folder, |path| path.extension().is_some_and(|extension| extension == "txt"))
 }
 
-/// Every photograph must have the pose of its name and the other way round.
+/// Every photograph must have the pose of its name, and every pose its photograph.
 fn check_partners(
     photographs: &[PathBuf],
     poses: &[PathBuf],
@@ -116,10 +116,10 @@ fn read_pose(path: &Path, form: PoseForm) -> Result<RawPose, SceneError> {
     Ok(RawPose { matrix, form, path: path.to_path_buf(), place: Place::File })
 }
 
-/// What `intrinsics.txt` says.
+/// The contents of `intrinsics.txt`.
 struct IntrinsicsFile {
     intrinsics: RawIntrinsics,
-    /// What the poses are.
+    /// The convention of the poses.
     form: PoseForm,
 }
 

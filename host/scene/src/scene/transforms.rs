@@ -1,19 +1,20 @@
 //! NeRF's `transforms.json`, as the Blender scenes, instant-ngp and nerfstudio write it.
 //!
 //! `frames[]` holds for each photograph `file_path` (relative to the JSON file; Blender's without extension) and
-//! `transform_matrix`, camera-to-world in OpenGL axes. Intrinsics stand at the top or in a frame, where they win:
-//! `fl_x fl_y cx cy w h`, or `camera_angle_x`/`camera_angle_y`, the full opening angles in radians. A missing `fl_y`
-//! is `fl_x`, a missing `cx`, `cy` the centre of the image, missing `w`, `h` the photograph's size. Their image
-//! coordinates are COLMAP's, with pixel centres at halves, as ours.
+//! `transform_matrix`, camera-to-world in OpenGL axes. Intrinsics are at the top level or in a frame, which takes
+//! precedence: `fl_x fl_y cx cy w h`, or `camera_angle_x`/`camera_angle_y`, the full opening angles in radians. A
+//! missing `fl_y` is `fl_x`, a missing `cx`, `cy` the centre of the image, missing `w`, `h` the photograph's size.
+//! Their image coordinates are COLMAP's, with pixel centres at halves, as ours.
 //!
 //! The lens is `camera_model` (or `is_fisheye`) with `k1 .. k6 p1 p2` in OpenCV's meaning; other lenses are refused. `mask_path`
-//! names a frame's mask, `train_filenames` and the like the parts of the scene. Without `transforms.json`,
-//! `transforms_train.json`, `transforms_val.json` and `transforms_test.json` are one scene that knows its parts; where there
-//! are several of them, each view has its part's name in front. A photograph of `images` that is missing is looked for in `images_2`,
-//! `images_4` and so on. Frames whose photograph is missing are left out, with one warning.
+//! names a frame's mask, `train_filenames` and the like the splits of the scene. Without `transforms.json`,
+//! `transforms_train.json`, `transforms_val.json` and `transforms_test.json` are one scene with splits; if there are
+//! several of them, each view's name begins with its split. A missing photograph of `images` is searched in `images_2`,
+//! `images_4` and so on. Frames whose photograph is missing are skipped, with one warning.
 //!
-//! `applied_transform`, `applied_scale`, `scale`, `offset` and `aabb_scale` say what was done to the world or what
-//! a particular trainer should do; the poses stand as they are written. `depth_file_path` is ignored, with a warning.
+//! `applied_transform`, `applied_scale`, `scale`, `offset` and `aabb_scale` describe transformations that were applied
+//! or settings of a particular trainer; the poses are read as they are written. `depth_file_path` is ignored, with a
+//! warning.
 
 mod frame;
 
@@ -30,7 +31,7 @@ use frame::{Frame, Listed};
 /// Name of the file of a whole scene.
 const FILE_NAME: &str = "transforms.json";
 
-/// Files of the parts of a scene.
+/// Files of the splits of a scene.
 const PARTS: [(&str, Split); 3] = [
     ("transforms_train.json", Split::Train),
     ("transforms_val.json", Split::Validation),
@@ -80,7 +81,7 @@ impl Reader for Transforms {
     }
 }
 
-/// The files of a scene's parts that are there.
+/// The existing files of a scene's splits.
 fn parts(folder: &Path) -> Vec<(PathBuf, Split)> {
     PARTS.map(|(name, split)| (folder.join(name), split)).into_iter().filter(|(file, _)| file.is_file()).collect()
 }

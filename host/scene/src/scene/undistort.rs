@@ -1,8 +1,8 @@
-//! Photographs taken through a lens, as the pinhole camera of the same focal length would have taken them.
+//! Undistortion: a photograph with lens distortion becomes that of a pinhole camera with the same focal length.
 //!
-//! Each pixel of the result is looked up where the lens shows it, in f64, and interpolated between the four nearest
-//! (premultiplied by alpha). What lies outside the photograph, or where the lens's polynomials fold the image over, is marked
-//! as not seen.
+//! Each pixel of the result is mapped through the lens in f64, and interpolated between the four nearest pixels
+//! (premultiplied by alpha). Pixels outside the photograph, or where the lens's polynomials fold the image over, are
+//! marked as not seen.
 
 use image::{GrayImage, Rgba, RgbaImage};
 use rayon::prelude::*;
@@ -11,7 +11,7 @@ use viewfuse_core::lens::Lens;
 
 use super::Photograph;
 
-/// The photograph of the pinhole camera, at the size that the photograph has.
+/// The photograph of the pinhole camera, at the same size.
 pub(super) fn undistorted(photograph: &Photograph, lens: &Lens, pinhole: &Pinhole) -> Photograph {
     let (width, height) = photograph.pixels.dimensions();
     let scale = [f64::from(width) / f64::from(pinhole.width()), f64::from(height) / f64::from(pinhole.height())];
@@ -62,7 +62,7 @@ fn interpolated(image: &RgbaImage, x: f64, y: f64) -> Rgba<u8> {
         (image.get_pixel(right, bottom), across * below),
     ];
     let alpha: f32 = corners.iter().map(|(pixel, share)| share * f32::from(pixel[3])).sum();
-    // Under no alpha at all the colours are mixed as they are.
+    // With zero alpha everywhere the colours are interpolated without it.
     let inverse = if alpha > 0.0 { 1.0 / alpha } else { 0.0 };
     let weights = corners.map(|(pixel, share)| match alpha > 0.0 {
         true => share * f32::from(pixel[3]) * inverse,

@@ -1,4 +1,4 @@
-//! COLMAP's text model: a camera an image, points with what saw them.
+//! COLMAP's text model: one camera for each image, points with the images that saw them.
 
 use std::fmt::Write;
 
@@ -48,7 +48,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     Ok(scene.views.len())
 }
 
-/// Of each view the points that it saw, in their order, and where in the stored photograph they are.
+/// For each view the points that it saw, in their order, with their image coordinates in the stored photograph.
 fn observations(scene: &Scene) -> Vec<Vec<(usize, [f64; 2])>> {
     let mut seen = vec![Vec::new(); scene.views.len()];
     for (index, point) in scene.points.iter().enumerate() {
@@ -70,8 +70,8 @@ fn observations(scene: &Scene) -> Vec<Vec<(usize, [f64; 2])>> {
     seen
 }
 
-/// World-to-camera rotation and translation. The translation is for the rotation as it is written, so that the centre stays
-/// where it is.
+/// World-to-camera rotation and translation. The translation is computed for the rotation as written, so that the
+/// centre is unchanged.
 fn rigid(scene: &Scene, view: &View) -> (DQuat, DVec3) {
     let rows = camera_from_world(scene, view);
     let [x, y, z] = rows.map(|row| DVec3::new(row[0], row[1], row[2]));

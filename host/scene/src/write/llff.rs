@@ -1,9 +1,9 @@
-//! LLFF's `poses_bounds.npy`: one focal length a view, the principal point in the centre, near and far.
+//! LLFF's `poses_bounds.npy`: one focal length for each view, the principal point in the centre, near and far.
 
 use super::{Draft, WriteSceneError, world_from_camera};
 use crate::Scene;
 
-/// How far from the centre of the photograph a principal point may be, in pixels.
+/// Largest distance of a principal point from the centre of the photograph, in pixels.
 const CENTRED: f32 = 1.0e-3;
 
 pub(super) fn fits(scene: &Scene) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! The photographs of a scene that is written.
+//! Writing the photographs of a scene.
 
 use std::fs;
 
@@ -8,8 +8,8 @@ use super::{Draft, WriteSceneError};
 use crate::Photograph;
 
 impl Draft<'_> {
-    /// Writes the stored photograph of a view, before any lens is undone, as `FOLDER/NAME.EXTENSION`; gives its name in
-    /// the folder. A file is copied as it is, but for one that has to be turned.
+    /// Writes the stored photograph of a view, not undistorted, as `FOLDER/NAME.EXTENSION`; returns its name in the
+    /// folder. A file is copied unchanged, unless it must be turned.
     pub(super) fn stored_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
         self.progress.check()?;
         let name = &self.scene.views[view].name;
@@ -27,7 +27,8 @@ impl Draft<'_> {
         Ok(written)
     }
 
-    /// Copies the mask of a view as `masks/` and the name of the photograph with `.png` behind; gives the name in the folder.
+    /// Copies the mask of a view to `masks/`, named after the photograph with `.png` appended; returns the name in the
+    /// folder.
     pub(super) fn mask(&self, view: usize, photograph: &str) -> Result<Option<String>, WriteSceneError> {
         let Some(source) = &self.scene.views[view].mask else { return Ok(None) };
         let extension = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -37,7 +38,7 @@ impl Draft<'_> {
         Ok(Some(name))
     }
 
-    /// Writes the pinhole's picture of a view: the file as it is where nothing is done to it, otherwise a PNG.
+    /// Writes the undistorted picture of a view: the unchanged file if possible, otherwise a PNG.
     pub(super) fn pinhole_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
         let changed = &self.scene.views[view];
         if changed.lens.is_none() && changed.mask.is_none() {

@@ -28,7 +28,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
             out.put(&format!("pose/{name}.txt"), pose + "\n")?;
             photograph_count += 1;
         } else {
-            // The reader puts the prefix in front.
+            // The reader adds the prefix.
             out.put(&format!("target_pose/{}.txt", name.strip_prefix("target_").unwrap_or(name)), pose + "\n")?;
         }
     }

@@ -1,4 +1,4 @@
-//! `transforms.json`: intrinsics and lens of each frame, masks, parts.
+//! `transforms.json`: intrinsics and lens of each frame, masks, splits.
 
 use serde_json::{Map, Value, json};
 use viewfuse_core::lens::{Lens, Projection};
@@ -14,7 +14,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
         let file_path = format!("images/{photograph}");
         let mut matrix = world_from_camera(out.scene, view);
         for row in &mut matrix[..3] {
-            // OpenGL axes; no -0, which would only puzzle people.
+            // OpenGL axes; -0 is written as 0.
             (row[1], row[2]) = (0.0 - row[1], 0.0 - row[2]);
         }
         let pinhole = &view.camera.pinhole;

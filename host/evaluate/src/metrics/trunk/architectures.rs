@@ -22,9 +22,10 @@ pub enum Pooling {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InceptionKind {
     /// The one that FID is defined with, `pt_inception-2015-12-05` of pytorch-fid: average pools do not count the border,
-    /// the last block has a max pool instead, and it knows 1008 classes.
+    /// the last block has a max pool instead, and it has 1008 classes.
     Fid,
-    /// Torchvision's, of 1000 classes: average pools count zeros outside of the image. Distances are not those of tables.
+    /// Torchvision's, of 1000 classes: average pools count zeros outside of the image. Distances differ from those of
+    /// published tables.
     Torchvision,
 }
 

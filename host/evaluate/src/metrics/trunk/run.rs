@@ -14,7 +14,7 @@ use viewfuse_nn::resample::concatenate;
 use viewfuse_nn::scratch::Scratch;
 use viewfuse_nn::weights::ConvolutionWeights;
 
-/// What Inception's batch norms add to variances.
+/// Added to variances by Inception's batch norms.
 const BATCH_NORM_EPSILON: f64 = 1.0e-3;
 
 /// A trunk with its parameters on a device.
@@ -48,7 +48,7 @@ impl<D: Device> Trunk<D> {
     /// The images at the taps, in order.
     ///
     /// # Errors
-    /// [`MetricError::Small`] if a window is larger than what it is to slide over; [`MetricError::NotFinite`];
+    /// [`MetricError::Small`] if a window is larger than its image; [`MetricError::NotFinite`];
     /// [`MetricError::Device`].
     pub fn taps(&self, device: &D, input: &HostImage) -> Result<Vec<HostImage>, MetricError> {
         let mut run = Run { scratch: Scratch::new(device), input, taps: Vec::new() };
@@ -58,7 +58,7 @@ impl<D: Device> Trunk<D> {
     }
 }
 
-/// Takes steps to a device.
+/// Uploads the parameters of steps to a device.
 fn load<D: Device>(
     device: &D,
     checkpoint: &Checkpoint,
@@ -93,7 +93,7 @@ impl<D: Device> LoadedConvolution<D> {
         debug_assert_eq!(padding, convolution.padding[1] + left, "{}", convolution.name);
         let (stride, padding) = (convolution.stride as u32, Some(padding as u32));
         let options = ConvolutionOptions { stride, padding, ..ConvolutionOptions::RELU };
-        // Scores are to be exact: no device may take another way for large images.
+        // Scores must be exact: no device may use another algorithm for large images.
         let layer = weights.load(device, 0)?;
         Ok(LoadedConvolution { layer, options })
     }
@@ -108,10 +108,10 @@ fn weights(checkpoint: &Checkpoint, convolution: &Convolution) -> Result<Convolu
     tensors.convolution_with_norm(&format!("{name}.conv"), &format!("{name}.bn"), BATCH_NORM_EPSILON)
 }
 
-/// One picture on its way.
+/// The state of one picture.
 struct Run<'a, D: Device> {
-    /// No image is handed back to it: those at the taps are downloaded with their whole buffers, and a buffer that is used
-    /// again may be twice as long as its image.
+    /// Images are not returned to it: those at the taps are downloaded with their whole buffers, and a reused buffer
+    /// may be twice as long as its image.
     scratch: Scratch<'a, D>,
     input: &'a HostImage,
     taps: Vec<HostImage>,

@@ -1,11 +1,11 @@
-//! What the axes reach over, and where their lines are. The coordinates are the decimal logarithm of the time in seconds,
+//! The ranges of the axes, and their grid lines. The coordinates are the decimal logarithm of the time in seconds,
 //! and decibels.
 
 use super::super::record::{DeviceRecord, DifferenceRecord, PointRecord};
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use std::ops::Range;
 
-/// From the nearest pictures that differ up to the line of those that do not, at least, decibels.
+/// Least distance from the nearest pictures that differ to the line of equal pictures, decibels.
 const EQUAL_ABOVE: f64 = 10.0;
 
 /// Both axes.
@@ -14,7 +14,7 @@ pub(super) struct Scale {
     times: Range<f64>,
     /// Decibels.
     heights: Range<f64>,
-    /// Where pictures stand that are equal to the exact ones.
+    /// The height of pictures that are equal to the exact ones.
     equal: f64,
 }
 
@@ -28,12 +28,12 @@ impl Scale {
         let lowest = tens(ratios().fold(equal - 20.0, f64::min) - 1.0);
         let shortest = points().map(|point| point.seconds).fold(f64::INFINITY, f64::min);
         let longest = points().map(|point| point.seconds).fold(0.0, f64::max);
-        // Room for labels at both ends.
+        // Margins for labels at both ends.
         let times = if shortest <= longest { 0.7 * shortest..1.5 * longest } else { 0.1..10.0 };
         Scale { times, heights: lowest..equal + 0.5 * EQUAL_ABOVE, equal }
     }
 
-    /// Where a point stands; `None` if its time or its difference is NaN.
+    /// The position of a point; `None` if its time or its difference is NaN.
     pub(super) fn place(&self, point: &PointRecord) -> Option<(f64, f64)> {
         let DifferenceRecord { root_mean_square, psnr, .. } = point.versus_exact;
         root_mean_square.filter(|_| point.seconds > 0.0).map(|_| (point.seconds.log10(), psnr.unwrap_or(self.equal)))
@@ -47,7 +47,7 @@ impl Scale {
         Axis { lines: lines.filter(|line| ends.contains(line)).collect(), ends }
     }
 
-    /// What is written at a line of the times.
+    /// The label of a time's grid line.
     pub(super) fn time_label(line: &f64) -> String {
         let places = (-line.floor()).max(0.0) as usize;
         format!("{:.places$}", 10.0_f64.powf(*line))
@@ -62,7 +62,7 @@ impl Scale {
         Axis { lines: below.chain([self.equal]).collect(), ends: self.heights.clone() }
     }
 
-    /// What is written at a line of the heights.
+    /// The label of a height's grid line.
     pub(super) fn height_label(&self, line: f64) -> String {
         if line == self.equal { "equal".to_owned() } else { format!("{line}") }
     }

@@ -1,4 +1,4 @@
-//! Labels beside points: each takes the first place around its point where it covers nothing.
+//! Labels next to points: each is at the first place around its point where it covers nothing.
 
 /// A rectangle in pixels, its ends included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,7 @@ impl Space {
         Space { left: x - reach, right: x + reach, top: y - reach, bottom: y + reach }
     }
 
-    /// What a line of text takes, about: letters of a common font are 0.56 as wide as high on the mean.
+    /// The approximate size of a line of text: letters of a common font are on average 0.56 as wide as high.
     pub(super) fn of_text([left, top]: [i32; 2], words: &str, size: i32) -> Space {
         let width = (0.56 * f64::from(size) * words.chars().count() as f64).ceil() as i32;
         Space { left, right: left + width, top, bottom: top + size }
@@ -30,13 +30,13 @@ impl Space {
         (x.clamp(self.left, self.right), y.clamp(self.top, self.bottom))
     }
 
-    /// Whether it is so far from its point that a line must lead there.
+    /// Whether it is so far from its point that it needs a leader line.
     pub(super) fn is_far(&self, at: [i32; 2], ring: i32) -> bool {
         let (x, y) = self.nearest(at);
         (x - at[0]).abs().max((y - at[1]).abs()) > 2 * ring
     }
 
-    /// Area of what two have in common.
+    /// Area of the intersection of two rectangles.
     fn common(&self, other: &Space) -> i64 {
         let width = self.right.min(other.right) - self.left.max(other.left) + 1;
         let height = self.bottom.min(other.bottom) - self.top.max(other.top) + 1;
@@ -48,7 +48,7 @@ impl Space {
     }
 }
 
-/// What is taken of an area.
+/// The occupied parts of an area.
 pub(super) struct Labels {
     area: Space,
     taken: Vec<Space>,
@@ -65,7 +65,7 @@ impl Labels {
         self.taken.push(space);
     }
 
-    /// Finds a place for words near a point that has a ring around it. Where none is free, the one that covers least.
+    /// Finds a place for words near a point that has a ring around it. If none is free, the one that covers least.
     pub(super) fn place(&mut self, at: [i32; 2], words: &str, size: i32, ring: i32) -> Space {
         let text = Space::of_text([0, 0], words, size);
         let (width, height) = (text.right, text.bottom);

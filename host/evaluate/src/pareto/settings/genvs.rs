@@ -1,4 +1,4 @@
-//! What is tried of GeNVS.
+//! The settings tried for GeNVS.
 
 use super::super::Setting;
 use super::{ALL, EXACT};
@@ -18,18 +18,18 @@ const HEUN: [u32; 2] = [12, 8];
 const LEVELS: [u32; 5] = [6, 8, 10, 12, 18];
 /// Weight of the views that are left out.
 const LEAST: [f32; 2] = [0.05, 0.2];
-/// Levels with all left out.
+/// Levels with everything skipped.
 const FAST: [u32; 2] = [6, 18];
-/// Errors of steps, where levels are chosen on the way.
+/// Error tolerances of a step, where levels are chosen adaptively.
 const TOLERANCES: [f32; 2] = [0.01, 0.03];
 /// The exact picture's samples on a ray are divided by this.
 const FEWER: [u32; 2] = [2, 4];
 /// Levels at which a picture starts from the one before.
 const REUSED: [f32; 2] = [20.0, 2.0];
 
-/// The settings of a GeNVS, for so many targets. Calls of the denoiser cost nearly all of the time: what else can be left out
-/// is tried with as few of them as a run makes unless told otherwise. Of `field` the rays, the levels' ends and the seed are taken, of `options`
-/// how much weight `all` leaves out, besides the size and the background; what the field itself leaves out does not matter.
+/// The settings of a GeNVS for this many targets. Calls of the denoiser take nearly all of the time: other omissions
+/// are tried with the default number of calls. `field` gives the rays, the first and last level and the seed; `options`
+/// give the weight that `all` leaves out, the size and the background. What the field itself skips is ignored.
 pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usize) -> Vec<Setting> {
     let GenvsOptions { rays, plan: own, .. } = field.options();
     let exact = Plan { schedule: own.schedule, ..Plan::published(own.seed) };

@@ -1,4 +1,4 @@
-//! A box around the object that the silhouettes show.
+//! The bounding box of the visual hull.
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
@@ -16,7 +16,7 @@ const SILHOUETTE_ALPHA: f32 = 0.3;
 /// The first box is larger than the largest silhouette by this factor.
 const ALLOWANCE: f32 = 1.2;
 
-/// The box around every point that all silhouettes allow, or `None` if there is none.
+/// The box around every point that is inside all silhouettes, or `None` if there is none.
 pub(super) fn find(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<ObjectBlock> {
     let view_count = cameras.len() as u32;
     let (middle, radius) = first_guess(cameras, texels)?;
@@ -27,7 +27,7 @@ pub(super) fn find(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<Objec
         let cell = (high - low) / side as f32;
         let boxes = map(side, 1, |slice| occupied_box(&object, cameras, texels, low, cell, side, slice));
         let inside = boxes.into_iter().flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
-        // Centres of cells were asked: matter may reach up to a cell beyond them.
+        // Only centres of cells were tested: the object may reach up to a cell beyond them.
         object = ObjectBlock::new(inside.0 - cell, inside.1 + cell, view_count);
     }
     Some(object)

@@ -28,7 +28,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
     Ok(all)
 }
 
-/// `images.bin`: number, rotation, translation, camera, name, then what was found in the image, which is passed over.
+/// `images.bin`: number, rotation, translation, camera, name, then the points found in the image, which are skipped.
 pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, SceneError> {
     let contents = bytes::read(path)?;
     let mut bytes = Bytes::new(path, &contents);

@@ -45,8 +45,8 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
     Ok(all)
 }
 
-/// `images.txt`: of each image `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then a line of what was found in it, which is
-/// passed over. Files without these second lines are read, too.
+/// `images.txt`: of each image `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then a line of the points found in it,
+/// which is skipped. Files without these second lines are read, too.
 pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, SceneError> {
     let text = read_text(path)?;
     let mut all = Vec::new();
@@ -86,7 +86,7 @@ fn image(path: &Path, line: usize, content: &str) -> Result<ModelImage, SceneErr
     })
 }
 
-/// What stands behind so many words: a name may hold blanks.
+/// The rest of a line after this many words: a name may contain spaces.
 fn behind(content: &str, words: usize) -> &str {
     let mut rest = content.trim();
     for _ in 0..words {

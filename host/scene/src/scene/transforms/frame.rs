@@ -15,16 +15,16 @@ use super::super::json::Object;
 use super::super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
 use super::super::split::Split;
 
-/// The coefficients that are read, in the order of [`Lens::new`].
+/// The supported coefficients, in the order of [`Lens::new`].
 const COEFFICIENTS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
 /// Coefficients that must be 0: of thin prisms.
 const REFUSED_COEFFICIENTS: [&str; 4] = ["s1", "s2", "s3", "s4"];
 
-/// Flags of projections that are no lens of ours, whatever the coefficients.
+/// Flags of unsupported projections, with any coefficients.
 const REFUSED_FLAGS: [&str; 2] = ["equirectangular", "latlong"];
 
-/// Values of `camera_model`: the perspective ones, with whatever coefficients there are.
+/// Values of `camera_model`: the perspective ones, with any coefficients.
 const PERSPECTIVE_MODELS: [&str; 7] =
     ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV", "FULL_OPENCV", "PERSPECTIVE", "SIMPLE_RADIAL", "RADIAL"];
 
@@ -35,15 +35,15 @@ const FISHEYE_MODELS: [&str; 4] = ["OPENCV_FISHEYE", "SIMPLE_RADIAL_FISHEYE", "R
 const LISTS: [(&str, Split); 3] =
     [("train_filenames", Split::Train), ("val_filenames", Split::Validation), ("test_filenames", Split::Test)];
 
-/// What a frame is.
+/// A frame's view, or its missing photograph.
 pub(super) enum Listed {
     /// A view with its photograph.
     View(Box<RawView>),
-    /// A photograph that is not there, and where it is named.
+    /// A photograph that does not exist, and the place that names it.
     Missing(Place, PathBuf),
 }
 
-/// The parts of the scene that the lists at the top of a file put photographs in.
+/// The splits of photographs by the lists at the top level of a file.
 pub(super) fn lists(top: &Object) -> Result<HashMap<String, Split>, SceneError> {
     let mut parts = HashMap::new();
     for (key, split) in LISTS {
@@ -105,8 +105,8 @@ impl<'a> Frame<'a> {
         Err(SceneError::NoMask { path, place, mask })
     }
 
-    /// A path relative to the JSON file. Components without `.`, so that `./train/r_0` is named as people name it; with `/`
-    /// between them, whatever the system that wrote the file has there.
+    /// A path relative to the JSON file. Components without `.`, so that `./train/r_0` is named `train/r_0`; joined
+    /// with `/`, for any separator of the system that wrote the file.
     fn beside(&self, path: &str) -> PathBuf {
         self.path.with_file_name("").join(path.replace('\\', "/")).components().collect()
     }
@@ -140,7 +140,7 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// A focal length: what the frame says in either form, otherwise what the top of the file says.
+    /// A focal length: from the frame in either form, otherwise from the top level of the file.
     fn focal(&self, length_key: &str, angle_key: &str, side: u32) -> Result<Option<f64>, SceneError> {
         for scope in &self.scopes {
             if let Some(focal) = scope.number(length_key)? {
@@ -240,7 +240,7 @@ fn photograph(given: &Path) -> Option<PathBuf> {
     candidates.find(|candidate| candidate.is_file())
 }
 
-/// The photograph of a path in `images` that is not there, at a smaller size: from `images_2`, `images_4` and so on.
+/// The downscaled photograph for a missing one in `images`: from `images_2`, `images_4` and so on.
 fn smaller(given: &Path) -> Option<PathBuf> {
     let folder = given.ancestors().find(|folder| folder.file_name().is_some_and(|name| name == "images"))?;
     let (inside, root) = (given.strip_prefix(folder).ok()?, folder.parent()?);
