@@ -50,7 +50,7 @@ fn refusals() {
     let folder = training();
     let before = files_below(folder.path());
     let refused = |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder.path(), arguments, parts);
-    refused("convert training.pth out.pth", &["out.pth: only safetensors are written"]);
+    refused("convert training.pth out.pth", &["out.pth: output formats are safetensors"]);
     refused("convert none.pth out.safetensors", &["none.pth: cannot be read: No such file"]);
     std::fs::write(folder.path().join("page.pth"), "<html>").expect("a file");
     refused("convert page.pth out.safetensors", &["page.pth: not a checkpoint: a web page"]);

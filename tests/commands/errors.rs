@@ -107,7 +107,13 @@ fn photographs_that_are_none() {
 fn nothing_but_background() {
     let folder = toy();
     folder.image("toy/rgb/000003.png", 128, 128);
-    assert_scene_refused(&folder, &["toy/rgb/000003.png: shows no object in front of the background", "--background"]);
+    let arguments = "render toy --targets 20 --size 32x32 -o out --background 10,20,30";
+    let parts = ["toy/rgb/000003.png: shows no object in front of the background", "--background"];
+    command::assert_refused(BINARY, folder.path(), arguments, &parts);
+    // Where nobody said that there is a background, photographs are used as they are.
+    let outcome = command::run(BINARY, folder.path(), "render toy --targets 20 --size 32x32 -o out");
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("nothing is cut out, whole pictures are used"), "{}", outcome.stderr);
 }
 
 fn silhouettes_with_nothing_in_common() {
@@ -243,7 +249,7 @@ fn wrong_arguments_of_genvs() {
     wrong("--sampler plms", &["'plms'", "unknown sampler; there are: euler, heun, dpm++2m, dpm++3m, unipc, ipndm"]);
     wrong("--steps 0", &["--steps", "1..=1000"]);
     for tolerance in ["0", "1.5", "nan", "small"] {
-        wrong(&format!("--tolerance {tolerance}"), &["--tolerance", "above 0, at most 1"]);
+        wrong(&format!("--tolerance {tolerance}"), &["--tolerance", "above 0 and at most 1"]);
     }
     for other in ["--sampler heun", "--steps 3", "--churn 1"] {
         wrong(&format!("--tolerance 0.1 {other}"), &["--tolerance", other.split(' ').next().unwrap_or(other)]);

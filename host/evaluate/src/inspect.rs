@@ -80,7 +80,12 @@ pub fn inspect(
     let mut warnings = scene.warnings.clone();
     warnings.extend(rig_warnings(scene, &rig));
     let object = match object_of(scene, background, progress, &mut warnings) {
-        Ok(object) => Some(object),
+        Ok(object) => {
+            if object.is_none() {
+                warnings.extend(gap_warning(&cameras, &rig));
+            }
+            object
+        }
         Err(reason) => {
             warnings.push(reason);
             None
@@ -117,6 +122,9 @@ pub fn inspect(
         warnings,
     })
 }
+
+/// Angle between neighbouring views, as seen from the focus, beyond which depths are no longer found in whole photographs.
+const MOST_GAP_DEGREES: f32 = 15.0;
 
 /// Warnings about the cameras.
 fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
@@ -163,13 +171,32 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
     warnings
 }
 
+/// Whether neighbouring views are too far apart to find depths in whole photographs.
+fn gap_warning(cameras: &[Camera], rig: &Rig) -> Option<String> {
+    let directions: Vec<Vec3> =
+        cameras.iter().map(|c| (c.pose.centre_world() - rig.focus).normalize_or_zero()).collect();
+    let nearest = |own: usize| {
+        let others = directions.iter().enumerate().filter(|(other, _)| *other != own);
+        others.map(|(_, other)| other.dot(directions[own]).clamp(-1.0, 1.0).acos().to_degrees()).fold(180.0, f32::min)
+    };
+    let mut gaps: Vec<f32> = (0..cameras.len()).map(nearest).collect();
+    gaps.sort_by(f32::total_cmp);
+    let gap = *gaps.get(gaps.len() / 2)?;
+    (gap > MOST_GAP_DEGREES).then(|| {
+        format!(
+            "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
+             reliably up to about {MOST_GAP_DEGREES:.0} degrees; take photographs between them"
+        )
+    })
+}
+
 /// The bounding box of the visual hull, or why there is none.
 fn object_of(
     scene: &Scene,
     background: BackgroundChoice,
     progress: &dyn Progress,
     warnings: &mut Vec<String>,
-) -> Result<ObjectBlock, String> {
+) -> Result<Option<ObjectBlock>, String> {
     let views: Vec<usize> =
         (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).take(MOST_SOURCES).collect();
     if views.len() < 2 {
@@ -178,9 +205,11 @@ fn object_of(
     let album = Album::open_at(scene, views.iter().copied(), LOOK_SIDE, progress).map_err(|error| error.to_string())?;
     let images = album.sources(&views, LOOK_SIDE, background, progress).map_err(|error| error.to_string())?;
     warnings.extend(images.warning.clone());
-    find_object(&images).ok_or_else(|| {
-        "the silhouettes have no common object: wrong poses, or a background that is not of one colour".to_owned()
-    })
+    if !images.has_silhouettes {
+        return Ok(None);
+    }
+    let nothing = "the silhouettes have no common object: wrong poses, or a background that is not of one colour";
+    find_object(&images).map(Some).ok_or_else(|| nothing.to_owned())
 }
 
 /// Least and greatest depth of the object's box, or of the rig's ball, over the cameras.

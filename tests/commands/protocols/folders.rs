@@ -142,10 +142,7 @@ fn other_settings_are_refused() {
     let refused =
         |arguments: &str, parts: &[&str]| assert_refused(BINARY, folder, &format!("{arguments} -o out"), parts);
     let beginning = "out/run.json: is of an evaluation with other settings (";
-    refused(
-        &first.replace("--trials 1", "--trials 2"),
-        &[beginning, "trials: 2 here, 1 there)", "use another folder"],
-    );
+    refused(&first.replace("--trials 1", "--trials 2"), &[beginning, "trials: 2 here, 1 there)", "use another folder"]);
     refused(&first.replace("24x24", "16x16"), &["size: 16x16 here, 24x24 there"]);
     refused(&first.replace("random", "random:sources=4"), &["protocol: random:sources=4 here, random:sources=3 there"]);
     refused(&format!("{first} --seed 3"), &["seed: 3 here, 0 there"]);
