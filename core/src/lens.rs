@@ -14,11 +14,11 @@
 //!                                                            OPENCV_FISHEYE (k1 .. k4)
 //! ```
 //!
-//! One source serves `f32` ([`LensBlock`], for kernels and firmware) and `f64` ([`Lens`], for whoever undistorts a
-//! photograph): the functions are generic over [`Real`].
+//! One source serves `f32` ([`LensBlock`], for kernels and firmware) and `f64` ([`Lens`], for undistorting
+//! photographs): the functions are generic over [`Real`].
 //!
-//! Limits: a lens's polynomials are fitted to its image and may fold over outside it. [`Undistorted::residual`] tells a point
-//! that no ideal point maps to; [`Lens::reach`] is the radius up to which the map is one to one.
+//! Limits: a lens's polynomials are fitted to its image and may fold over outside it. [`Undistorted::residual`] detects
+//! a point that no ideal point maps to; [`Lens::reach`] is the radius up to which the map is one to one.
 
 use crate::math;
 use bytemuck::{Pod, Zeroable};
@@ -27,7 +27,7 @@ use core::ops::{Add, Div, Mul, Sub};
 
 /// Steps of Newton's method at most. Lenses of cameras take 3 to 6 in either precision.
 const MOST_STEPS: u32 = 24;
-/// Halvings of a step that does not come nearer, at most.
+/// Halvings of a step that does not reduce the residual, at most.
 const MOST_HALVINGS: u32 = 12;
 /// Greatest magnitude of a coefficient: powers of eight of them stay finite in `f32`.
 pub const LARGEST_COEFFICIENT: f64 = 1.0e4;
@@ -120,7 +120,7 @@ pub struct Lens {
     coefficients: [f64; 8],
 }
 
-/// An ideal point, and how well it explains the photograph's.
+/// An ideal point and its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Undistorted<T> {
     /// The ideal point, normalised.
@@ -130,7 +130,7 @@ pub struct Undistorted<T> {
 }
 
 impl Lens {
-    /// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2]`; a fisheye has no use for the last four.
+    /// Coefficients `[k1, k2, k3, k4, k5, k6, p1, p2]`; a fisheye ignores the last four.
     ///
     /// # Errors
     /// [`LensError`] names the first one that is not usable.
@@ -234,14 +234,14 @@ impl LensBlock {
 }
 
 /// Where an ideal point appears in the photograph. `coefficients` are `[k1, k2, k3, k4, k5, k6, p1, p2]`. Total: a
-/// denominator of 0 and points that are not finite give what arithmetic gives.
+/// denominator of 0 and points that are not finite give the result of IEEE arithmetic.
 #[inline]
 pub fn distort<T: Real>(is_fisheye: bool, coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
     let [x, y] = point;
     let squared = x * x + y * y;
     if is_fisheye {
         let radius = squared.root();
-        // The centre stays where it is: there the factor is 1.
+        // The centre is a fixed point: there the factor is 1.
         if !(radius > T::of(1.0e-12)) {
             return point;
         }
@@ -303,8 +303,8 @@ fn radial_slope(is_fisheye: bool, coefficients: &[f64; 8], radius: f64) -> f64 {
 }
 
 /// The ideal point that appears at a point of the photograph: Newton's method from the point itself, each step halved
-/// until it comes nearer. Ends where no step does, after 24 steps at most. Total: where no ideal point maps to the given
-/// one, or it is not finite, the residual says so.
+/// until it reduces the residual. It ends if no step does, after 24 steps at most. Total: if no ideal point maps to the
+/// given one, or it is not finite, the residual is large or not finite.
 ///
 /// Inside [`Lens::reach`] the residual is a few units in the last place of the point (in `f64` below 1e-14 for points up
 /// to 10; in `f32` below 2e-6).

@@ -4,7 +4,7 @@
 //! The frustum is the target's, for a picture, or a source's, for its disparities. Stages, each a data-parallel kernel:
 //!
 //! ```text
-//! frustum     the planes, and where a view sees a point on them   FrustumBlock, SweptView, Track
+//! frustum     the planes, and their points' image coordinates     FrustumBlock, SweptView, Track
 //! evidence    what the views show there, compared by colour       Evidence
 //! census      ... and by its structure: soft census                census_cost
 //! window      means over windows of three sizes                    row_sums, window_cost
@@ -37,5 +37,5 @@ pub const MOST_GROUPS: usize = MOST_PLANES / PLANES;
 /// Most views that are compared in a frustum.
 pub const MOST_MATCHED: usize = 8;
 
-/// A number for each of some neighbouring planes.
+/// A number for each plane of a group.
 pub type Planes = [f32; PLANES];

@@ -17,9 +17,9 @@
 //! weights enter twice: a source's depth comes from the views most relevant *to that source*, and a target's point is
 //! shaped and coloured by the views most relevant *to the target*.
 //!
-//! Images are premultiplied RGBA in `[0, 1]`, `texels[row][column]` of each view behind one another; maps of depths
-//! have the same order. Depths are along the principal axis. Lengths scale with the scene: a *footprint* is the side of
-//! a pixel of a view at the middle of the object.
+//! Images are premultiplied RGBA in `[0, 1]`, `texels[row][column]` of each view, concatenated; depth maps have the
+//! same order. Depths are along the principal axis. Lengths scale with the scene: a *footprint* is the side of a pixel
+//! of a view at the middle of the object.
 
 pub mod hull;
 pub mod ray_marching;
@@ -32,8 +32,9 @@ use glam::Vec3;
 /// The depth of a pixel without a surface: larger than every depth, but finite.
 pub const NO_SURFACE: f32 = 1.0e30;
 
-/// Visibility of what lies behind a surface: 1 at the surface, falling like a bell with the distance behind it in units
-/// of the bell's width, 0 from two widths on. `(1 - b^2 / 4)^4` follows `exp(-b^2)` to 0.075 and costs a quarter of it.
+/// Visibility of what lies behind a surface: 1 at the surface, falling in a bell curve with the distance behind it in
+/// units of the curve's width, 0 from two widths on. `(1 - b^2 / 4)^4` follows `exp(-b^2)` to 0.075 and costs a quarter
+/// of it.
 #[inline]
 pub fn fade(behind: f32) -> f32 {
     let rest = crate::math::max(1.0 - 0.25 * behind * behind, 0.0);
@@ -49,7 +50,7 @@ pub struct ObjectBlock {
     pub low: [f32; 4],
     /// Greatest corner of the box.
     pub high: [f32; 4],
-    /// How many views there are.
+    /// Number of views.
     pub view_count: u32,
     /// A point must lie inside the images of at least this many views to belong to the object.
     pub least_containing: u32,
@@ -63,7 +64,7 @@ const _: () = assert!(size_of::<ObjectBlock>() == 48);
 
 impl ObjectBlock {
     /// An object inside the box from `low` to `high`, seen by `view_count` views. Half of the views, and at least two,
-    /// must contain a point: some photographs crop the object, but what most do not show is unknown.
+    /// must contain a point: some photographs crop the object, but points that most do not show are unknown.
     pub fn new(low: Vec3, high: Vec3, view_count: u32) -> ObjectBlock {
         ObjectBlock {
             low: [low.x, low.y, low.z, 0.0],

@@ -1,4 +1,4 @@
-//! A target's pixel: a softmax over planes of what the views that see the point show there.
+//! A target's pixel: a softmax over planes of the colours of the views that see the point.
 
 use super::evidence::planes_behind;
 use super::frustum::{SweptView, Track};
@@ -11,10 +11,11 @@ use crate::pages::Fetch;
 use crate::visual_hull::fade;
 use bytemuck::{Pod, Zeroable};
 
-/// Planes whose share is below `e^-CUTOFF` of the best one's are left out: together they change no channel by more than
+/// Planes whose share is below `e^-CUTOFF` of the best one's are left out: together they change a channel by at most
 /// their number times that.
 pub const CUTOFF: f32 = 8.0;
-/// Share of a view that does not see a point, so that a point seen by none gets the colour at the edge of what is seen.
+/// Share of a view that does not see a point, so that a point seen by none gets the colour at the edge of the seen
+/// surface.
 pub const HIDDEN_SHARE: f32 = 1.0e-4;
 
 /// A target and its planes, as plain data.
@@ -48,13 +49,13 @@ const _: () = assert!(size_of::<BlendBlock>() == 112);
 pub struct Blended {
     /// Red, green, blue, premultiplied, and opacity.
     pub colour: [f32; 4],
-    /// Depth along the principal axis in world units, 0 where nothing is met.
+    /// Depth along the principal axis in world units, 0 where there is no surface.
     pub depth: f32,
-    /// How far the pixel can be relied on, in `[0, 1]`.
+    /// Confidence in the pixel, in `[0, 1]`.
     pub confidence: f32,
 }
 
-/// How far a view sees a point of this disparity, by its own map: 1 at what it sees or in front of that.
+/// Visibility of a point of this disparity in a view, by its own map: 1 at the surface it sees or in front of that.
 #[inline]
 pub fn visibility(
     view: &SweptView,

@@ -1,4 +1,4 @@
-//! Soft census: whether a pixel is lighter or darker than those around it, in all views alike.
+//! Soft census: whether a pixel is lighter or darker than its neighbours, compared across all views.
 
 use super::evidence::{UNSEEN, ViewPair};
 use super::frustum::FrustumBlock;
@@ -7,15 +7,15 @@ use crate::math::{abs, clamp, max, min};
 
 /// Reach of the census window, in pixels to each side.
 pub const REACH: u32 = 2;
-/// Differences of grey that count as lighter or darker without doubt.
+/// Difference of grey from which on a pixel counts fully as lighter or darker.
 pub const CONTRAST: f32 = 0.04;
 /// Share of the difference of colours in the cost.
 pub const COLOUR_SHARE: f32 = 0.2;
 /// Share of the census, a number in `[0, 1]`, in the cost.
 pub const CENSUS_SHARE: f32 = 0.2;
-/// Least weight of a place without any texture.
+/// Weight of a pixel without texture.
 pub const LEAST_TOLD: f32 = 0.1;
-/// Mean contrast, in [`CONTRAST`], from which on a place counts fully.
+/// Mean contrast, in [`CONTRAST`], from which on a pixel has its full weight.
 pub const FULL_TEXTURE: f32 = 0.3;
 /// The cost of a point that some silhouette does not contain.
 pub const OUTSIDE_COST: f32 = 0.5;
@@ -41,7 +41,7 @@ pub fn census_cost(
     let mut sum = [0.0; PLANES];
     let mut count = [0.0; PLANES];
     let mut texture = [0.0; PLANES];
-    // The half of the window that comes before the pixel: the other half says the same with the opposite sign.
+    // The half of the window before the pixel: the other half gives the same comparisons with the opposite sign.
     let mut offset = 0;
     while offset < 12 {
         let (x, y) = (column + offset % 5 - REACH as i32, row + offset / 5 - REACH as i32);

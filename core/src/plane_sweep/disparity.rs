@@ -1,4 +1,4 @@
-//! A source pixel's disparity: the plane of least cost, and how sure that is.
+//! A source pixel's disparity: the plane of least cost, and its confidence.
 
 use super::frustum::FrustumBlock;
 use super::{MOST_GROUPS, PLANES, Planes};
@@ -6,11 +6,11 @@ use crate::math::{clamp, exp, max, min};
 
 /// Temperature of the softmax over planes.
 pub const TEMPERATURE: f32 = 0.008;
-/// Planes to each side of the best one that mean the same disparity.
+/// Planes to each side of the best one that count as the same disparity.
 pub const NEAR_PLANES: usize = 3;
 /// A cost at which a match is as likely wrong as right.
 pub const DOUBTFUL_COST: f32 = 0.12;
-/// Width of the step from sure to doubtful.
+/// Width of the logistic step of the confidence, in cost.
 pub const DOUBT_WIDTH: f32 = 0.02;
 
 /// Disparity and confidence in `[0, 1]` of a pixel, from `costs[row][column][group]`. The disparity is that of the plane of

@@ -1,4 +1,4 @@
-//! What the views show on the planes, and how far their colours agree.
+//! The views' colours on the planes, and how far they agree.
 
 use super::frustum::{FrustumBlock, SweptView};
 use super::{MOST_MATCHED, PLANES, Planes};
@@ -8,11 +8,11 @@ use crate::pages::Fetch;
 use crate::visual_hull::fade;
 use bytemuck::{Pod, Zeroable};
 
-/// A mean difference of colour beyond which a pixel is simply another thing.
+/// A mean difference of colour at which the cost saturates.
 pub const MOST_DIFFERENCE: f32 = 0.25;
-/// Alpha from which on a pixel shows something.
+/// Least alpha of a visible pixel.
 pub const LEAST_ALPHA: f32 = 0.3;
-/// The grey of what a view does not see.
+/// The grey of a point that a view does not see.
 pub const UNSEEN: f32 = -1.0;
 
 /// Two views that are compared, as plain data.
@@ -29,10 +29,10 @@ pub struct ViewPair {
     pub padding: u32,
 }
 
-/// What is known of a group of planes at a pixel.
+/// The evidence for a group of planes at a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evidence {
-    /// What each view shows, as the mean of red, green and blue; [`UNSEEN`] where it sees nothing.
+    /// Each view's colour, as the mean of red, green and blue; [`UNSEEN`] where it does not see the point.
     pub grey: [Planes; MOST_MATCHED],
     /// Differences of the pairs that see the point, weighted and summed...
     pub difference: Planes,
@@ -44,14 +44,15 @@ pub struct Evidence {
     pub hull: Planes,
 }
 
-/// How far a point lies behind what a view sees, in planes of the view's own sweep; negative in front of it.
+/// How far a point lies behind the surface that a view sees, in planes of the view's own sweep; negative in front of
+/// it.
 #[inline]
 pub fn planes_behind(surface: f32, disparity: f32, step: f32) -> f32 {
     (surface - disparity) / step
 }
 
-/// Looks at a group of planes of a pixel. `disparities[view's map][row][column]` are disparity and confidence; the views'
-/// texels are premultiplied.
+/// The evidence for a group of planes at a pixel. `disparities[view's map][row][column]` are disparity and confidence;
+/// the views' texels are premultiplied.
 #[inline]
 pub fn evidence(
     frustum: &FrustumBlock,

@@ -1,4 +1,4 @@
-//! A camera's frustum with its planes, and where other views see points on them.
+//! A camera's frustum with its planes, and the projection of their points into other views.
 
 use crate::camera::CameraBlock;
 use crate::math::max;
@@ -28,7 +28,7 @@ pub struct FrustumBlock {
     pub has_silhouettes: u32,
     /// Cost of contradicting the views' own disparities.
     pub dissent_share: f32,
-    /// First row of the band that is worked on.
+    /// First row of the current band.
     pub first_row: u32,
     /// Rows of the band.
     pub row_count: u32,
@@ -43,7 +43,7 @@ impl FrustumBlock {
         self.far_disparity + plane as f32 * self.disparity_step
     }
 
-    /// Where a pixel's points lie in a view: `pixel` is counted row by row in the whole image.
+    /// The track of a pixel's points in a view: `pixel` is counted row by row in the whole image.
     #[inline]
     pub fn track(&self, view: &CameraBlock, pixel: u32) -> Track {
         let (column, row) = (pixel % self.camera.width, pixel / self.camera.width);
@@ -51,19 +51,19 @@ impl FrustumBlock {
     }
 }
 
-/// A source view as it takes part in a frustum, as plain data.
+/// A source view in a frustum, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SweptView {
-    /// Its camera, with the place of its texels.
+    /// Its camera, with the offset of its texels.
     pub camera: CameraBlock,
     /// Factors on red, green and blue that make exposures equal; the fourth number is unused.
     pub gain: [f32; 4],
     /// The camera weight for this frustum.
     pub weight: f32,
-    /// From a disparity of its map to the next plane's; 0 where it has no map yet.
+    /// From a disparity of its map to the next plane's; 0 if it has no map yet.
     pub disparity_step: f32,
-    /// Where its map begins.
+    /// Offset of its map.
     pub first_disparity: u32,
     /// Columns of its map.
     pub map_width: u32,
@@ -78,15 +78,15 @@ const _: () = assert!(size_of::<SweptView>() == 128);
 /// Where a ray's points lie in a view: a line through its camera coordinates, by disparity.
 #[derive(Clone, Copy, Debug)]
 pub struct Track {
-    /// The point infinitely far away, and what a unit of disparity adds; both in the view's axes, scaled such that the depth
-    /// in the frustum is 1.
+    /// The point at infinity, and the change for each unit of disparity; both in the view's axes, scaled such that the
+    /// depth in the frustum is 1.
     far: Vec3,
     slope: Vec3,
     intrinsics: [f32; 4],
     size: [f32; 2],
 }
 
-/// Where a point appears in a view.
+/// A point's projection into a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
     /// Image coordinate to the right, in pixels.
@@ -111,7 +111,8 @@ impl Track {
         }
     }
 
-    /// The ray's point of this disparity. Behind the view, the coordinates are those of a point just in front of it.
+    /// The ray's point of this disparity. For a point behind the view, the coordinates are those of a point just in
+    /// front of it.
     #[inline]
     pub fn at(&self, disparity: f32) -> Sight {
         let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;

@@ -1,5 +1,5 @@
-//! Semi-global regularisation: a pixel's cost is joined with that of the pixels before it along a line, where a change of
-//! disparity costs.
+//! Semi-global regularisation: a pixel's cost is aggregated with that of the previous pixels along a line, with a
+//! penalty for changes of disparity.
 
 use super::{MOST_GROUPS, PLANES, Planes};
 use crate::math::min;
@@ -29,7 +29,7 @@ pub struct CostBlock {
 const _: () = assert!(size_of::<CostBlock>() == 16);
 
 impl CostBlock {
-    /// How many lines there are in all directions.
+    /// Number of lines in all directions.
     #[inline]
     pub fn line_count(&self) -> u32 {
         2 * (self.width + self.height)
@@ -57,7 +57,7 @@ impl CostBlock {
         }
     }
 
-    /// Where the groups of a pixel begin in `paths[direction][line][step][group]`.
+    /// Offset of a pixel's groups in `paths[direction][line][step][group]`.
     #[inline]
     pub fn place(&self, direction: u32, column: u32, row: u32) -> usize {
         let (width, height) = (self.width, self.height);
@@ -82,7 +82,7 @@ impl Line {
     /// Before the first pixel.
     pub const START: Line = Line { costs: [[0.0; PLANES]; MOST_GROUPS], least: 0.0 };
 
-    /// Goes on to a pixel with these costs, `costs[first..][group]`; the joined ones are [`Line::costs`].
+    /// Advances to a pixel with these costs, `costs[first..][group]`; the aggregated ones are [`Line::costs`].
     #[inline]
     pub fn advance(&mut self, costs: &[Planes], first: usize, group_count: usize) {
         let jump = self.least + JUMP_COST;

@@ -1,4 +1,4 @@
-//! Costs averaged over square windows of three sizes, each mean over what is seen.
+//! Costs averaged over square windows of three sizes, each mean over the points that are seen.
 
 use super::frustum::FrustumBlock;
 use super::{PLANES, Planes};
@@ -16,7 +16,7 @@ pub struct WindowBlock {
     pub group_count: u32,
     /// Reaches of the windows, in pixels to each side, from the smallest to the largest.
     pub reach: [u32; 3],
-    /// Cost of the nearest plane beside the farthest one.
+    /// Cost of the nearest plane relative to the farthest one.
     pub near_cost: f32,
     /// Zero.
     pub padding: u32,
@@ -24,13 +24,13 @@ pub struct WindowBlock {
 
 const _: () = assert!(size_of::<WindowBlock>() == 32);
 
-/// Reaches of the windows in an image of 250 pixels' width.
+/// Reaches of the windows in an image 250 pixels wide.
 pub const REACH: [f32; 3] = [1.0, 5.0, 12.0];
 /// Shares of the windows.
 pub const SHARE: [f32; 3] = [0.4, 0.3, 0.3];
-/// The cost of what no two views see...
+/// The cost of a point that no two views see...
 pub const PRIOR_COST: f32 = 0.15;
-/// ... and its weight beside that of all pairs, 1.
+/// ... and its weight, where that of all pairs together is 1.
 pub const PRIOR_WEIGHT: f32 = 0.02;
 
 impl WindowBlock {

@@ -1,4 +1,4 @@
-//! The visual hull: where the silhouettes of all views allow matter.
+//! The visual hull: the points inside the silhouettes of all views.
 
 use super::{NO_SURFACE, ObjectBlock};
 use crate::camera::CameraBlock;
@@ -15,17 +15,17 @@ pub const SWEPT_ALPHA: f32 = 0.3;
 pub const ENTRY_ALPHA: f32 = 0.6 * SWEPT_ALPHA;
 /// Step of the search for the entry, in footprints.
 pub const ENTRY_STEP: f32 = 2.0;
-/// Most steps of that search. Only a view of a sliver of the object, at an enormous focal length, asks for more: its steps
-/// are longer.
+/// Most steps of that search. Only a view of a sliver of the object, at a very long focal length, would need more: its
+/// steps are longer.
 pub const MOST_ENTRY_STEPS: f32 = 8192.0;
 
-/// Premultiplied colour and alpha that a view shows at an image coordinate.
+/// A view's premultiplied colour and alpha at an image coordinate.
 #[inline]
 pub fn look_up(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized), x: f32, y: f32) -> [f32; 4] {
     bilinear_from(texels, view.first_texel as usize, view.width, view.height, x, y)
 }
 
-/// Only the alpha that a view shows at an image coordinate.
+/// A view's alpha alone at an image coordinate.
 #[inline]
 pub fn look_up_alpha(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized), x: f32, y: f32) -> f32 {
     bilinear_channel_from(texels, view.first_texel as usize, view.width, view.height, x, y, 3)
@@ -87,7 +87,7 @@ pub fn hull_entry(
         if hull_alpha(object, views, texels, origin + direction * depth, ENTRY_ALPHA) > 0.0 {
             return depth;
         }
-        // So far away that a step is less than a rounding of the depth: nothing can be found there.
+        // So far away that a step is below the rounding error of the depth: nothing can be found there.
         if !(depth + step > depth) {
             break;
         }

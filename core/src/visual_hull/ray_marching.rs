@@ -19,7 +19,7 @@ pub const MOST_STEPS: u32 = 1024;
 pub struct MarchBlock {
     /// The target camera.
     pub target: CameraBlock,
-    /// What is behind everything, red green blue in `[0, 1]`.
+    /// The background's colour, red green blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Transmittance at which a ray may end early.
     pub termination: f32,
@@ -31,7 +31,7 @@ const _: () = assert!(size_of::<MarchBlock>() == 96);
 ///
 /// The ray is marched through the object's box in equal steps of at most a footprint; it ends where the transmittance
 /// is at most `block.termination` (early termination), which changes no channel by more than that. The depth of a ray that
-/// is less than half hidden is 0: that of what little it meets means nothing.
+/// is less than half hidden is 0: its mean depth is not meaningful.
 #[inline]
 #[allow(clippy::too_many_arguments)]
 pub fn march_ray(

@@ -1,4 +1,4 @@
-//! A point in, occupancy and colour out.
+//! Occupancy and colour at a point.
 
 use super::hull::look_up;
 use super::{NO_SURFACE, ObjectBlock, fade};
@@ -9,12 +9,12 @@ use crate::math::{abs, exp, max, min};
 use crate::pages::Fetch;
 use glam::Vec3;
 
-/// Below this hull alpha a point is empty and no more views are asked.
+/// Below this hull alpha a point is empty and no more views are evaluated.
 pub const EMPTY_ALPHA: f32 = 0.02;
-/// Signed distances are cut off at this many footprints to either side of a surface.
+/// Signed distances are truncated at this many footprints to either side of a surface.
 pub const TRUNCATION: f32 = 5.0;
-/// The surface is put this many footprints in front of the depths: hulls cut off a little, and sweeps prefer depth to
-/// be missing rather than wrong.
+/// The surface is put this many footprints in front of the depths: hulls are slightly too small, and for the sweep a
+/// missing depth is better than a wrong one.
 pub const SURFACE_OFFSET: f32 = 0.5;
 /// Width of the logistic step from empty to full, in footprints.
 pub const SURFACE_WIDTH: f32 = 0.5;
@@ -27,13 +27,13 @@ pub const FULL_ALPHA: f32 = 0.85;
 pub const SEEN_BEHIND: f32 = 3.0;
 /// Neighbouring depths that differ by more than this many footprints belong to different surfaces and are not mixed.
 pub const JUMP: f32 = 4.0;
-/// Share of a view that does not see a point, so that a point seen by none still gets the colour nearest to the truth.
+/// Share of a view that does not see a point, so that a point seen by none still gets a colour close to the truth.
 pub const HIDDEN_SHARE: f32 = 1.0e-4;
 
-/// What the field is at a point.
+/// The field's value at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// How much of the point's surroundings is matter, in `[0, 1]`.
+    /// The occupancy, in `[0, 1]`.
     pub occupancy: f32,
     /// Its colour, red green blue in `[0, 1]`.
     pub colour: [f32; 3],
@@ -94,8 +94,8 @@ pub fn depth_at(view: &CameraBlock, depths: &(impl Fetch<f32> + ?Sized), x: f32,
 /// The field at a point, for a target whose relevance weights are `weights[view]`. `depths` are the maps of all views.
 ///
 /// Occupancy is the hull's alpha times a logistic step of the weighted mean of truncated signed distances to the views'
-/// surfaces (views far behind whose surface the point lies say nothing about it). Colour is the weighted mean over the
-/// views that see the point, soft in how far it lies behind their surfaces.
+/// surfaces (a view is ignored if the point lies far behind its surface). Colour is the weighted mean over the
+/// views that see the point, with soft visibility by the distance behind their surfaces.
 #[inline]
 pub fn sample(
     object: &ObjectBlock,
@@ -136,7 +136,7 @@ pub fn sample(
                 }
                 let visibility = fade(behind / SEEN_BEHIND);
                 let hidden = HIDDEN_SHARE / (1.0 + behind * behind);
-                // Towards a silhouette's edge a view's colour is less its own.
+                // Near a silhouette's edge a view's colour is mixed with the background.
                 let share = weight * alpha * alpha * (visibility + hidden);
                 fusion.add(&[colour[0] / alpha, colour[1] / alpha, colour[2] / alpha], share);
             }

@@ -11,9 +11,9 @@ use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-/// Largest difference that counts: beyond it, a pixel is simply another thing.
+/// Largest difference: larger ones are clamped to it.
 pub const MOST_DIFFERENCE: f32 = 0.2;
-/// Weight of an imaginary view that mismatches: what no other view can confirm is no match.
+/// Weight of an imaginary view that mismatches, so that a point that no other view confirms is not a match.
 pub const NO_WITNESS: f32 = 0.02;
 /// Spacing of the planes, in footprints of the source.
 pub const PLANE_STEP: f32 = 2.0;
@@ -40,7 +40,7 @@ pub const OUTSIDE: f32 = -1.0;
 pub struct SweepBlock {
     /// The source view.
     pub view: u32,
-    /// How many planes there are.
+    /// Number of planes.
     pub plane_count: u32,
     /// First row of the band.
     pub first_row: u32,
@@ -70,7 +70,7 @@ impl SweepBlock {
             far = max(depth, far);
             corner += 1;
         }
-        // A camera inside the box starts a hundredth of the object ahead of itself.
+        // For a camera inside the box, planes start a hundredth of the object in front of it.
         near = max(near, 0.01 * object.radius);
         far = max(far, near + 0.01 * object.radius);
         let footprint = 0.5 * (near + far) / camera.intrinsics[0];
@@ -146,15 +146,16 @@ impl SweptPixel {
         }
     }
 
-    /// The first plane that may lie inside the hull, and one behind the last: all others are [`OUTSIDE`]. Half a plane more
-    /// at either end, and as many as the roundings of a depth are worth, so that none matters.
+    /// The first plane that may lie inside the hull, and one behind the last: all others are [`OUTSIDE`]. There is a
+    /// margin of half a plane at either end, plus the planes within the rounding error of a depth, so that none is
+    /// missed.
     #[inline]
     pub fn planes(&self, object: &ObjectBlock, sweep: &SweepBlock) -> (u32, u32) {
         let most = sweep.plane_count as f32;
         let margin = 0.5 + 4.0e-7 * (sweep.near / sweep.plane_step + most);
         let first = (self.entry - sweep.near) / sweep.plane_step - 1.0 - margin;
         let end = (self.entry + SWEPT_BEHIND_ENTRY * object.radius - sweep.near) / sweep.plane_step + 0.5 + margin;
-        // Planes without a distance give no number: then all of them.
+        // Planes without spacing give NaN: then all of them.
         let end = if end < most { max(end, 0.0) } else { most };
         (clamp(first, 0.0, most) as u32, end as u32)
     }
@@ -199,7 +200,7 @@ impl SweptPixel {
                 let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
                 let entry = entries.fetch(views[other as usize].texel_at(seen.x, seen.y));
                 let share = weight * fade(max(seen.depth - entry, 0.0) * reach);
-                // Of a view that does not see the place only the silhouette counts.
+                // For a view that does not see the point only the silhouette counts.
                 if share > 0.0 {
                     sum += share * min(mean_difference(&straight(&colour), &self.own), MOST_DIFFERENCE);
                     share_sum += share;
@@ -279,9 +280,10 @@ const NEIGHBOURS: [[i32; 2]; 8] = [[-1, 0], [1, 0], [0, -1], [0, 1], [-2, -2], [
 
 /// Depth of a pixel of the band: of least cost, refined between planes by a parabola.
 ///
-/// To the window's mean cost is added a little for lying behind the entry into the hull and, where `guess` holds depths
-/// of the band from an earlier pass (an entry of [`NO_SURFACE`]: none), for differing from the neighbours. `entries` are
-/// those of the band. A pixel that no plane of the hull covers keeps its entry; one without an entry has none.
+/// The window's mean cost gets a small penalty for lying behind the entry into the hull and, where `guess` holds depths
+/// of the band from an earlier pass (an entry of [`NO_SURFACE`]: none), one for differing from the neighbours.
+/// `entries` are those of the band. A pixel that no plane of the hull covers keeps its entry; one without an entry has
+/// none.
 #[inline]
 pub fn pick_depth(
     object: &ObjectBlock,
