@@ -6,6 +6,7 @@ use crate::metrics::masked::MaskedTruth;
 use crate::metrics::{MetricError, Scorer};
 use image::RgbImage;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::Renderer;
@@ -129,8 +130,8 @@ impl Evaluator<'_> {
             let (shot, mask) = (shot_of(scene, &stage, target)?, self.mask(masked, &stage, target)?);
             let nearest = nearest_sources(scene, sources, target, BLENDED);
             for &source in &nearest {
-                if !shots.contains_key(&source) {
-                    shots.insert(source, shot_of(scene, &stage, source)?);
+                if let Entry::Vacant(place) = shots.entry(source) {
+                    place.insert(shot_of(scene, &stage, source)?);
                 }
             }
             let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
