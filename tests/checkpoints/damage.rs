@@ -67,7 +67,7 @@ fn no_state_dict() {
     let claims = pair();
     let wrapped = |pickle: Pickle| archive(&pickle.end(), &claims);
     let elsewhere = Pickle::new().raw(b"}(").text("weights").state_dict(&claims).text("epoch").int(1).raw(b"u");
-    assert_refused(&wrapped(elsewhere), &["holds no tensors where they are looked for", "(it has 'weights', 'epoch')"]);
+    assert_refused(&wrapped(elsewhere), &["holds no tensors in the expected places", "(it has 'weights', 'epoch')"]);
     assert_refused(&wrapped(Pickle::new().raw(b"]")), &["holds no table of named tensors"]);
     let whole = Pickle::new().global("nets", "Net").raw(b")\x81}(").text("training").raw(b"\x88ub");
     assert_refused(
@@ -116,13 +116,13 @@ fn storages_that_are_not_there_or_too_short() {
 #[test]
 fn headers_of_safetensors() {
     let header = |entry: &str| format!(r#"{{"a":{{"dtype":"F32","shape":[2],"data_offsets":{entry}}}}}"#);
-    assert_refused(&safetensors(&header("[0,7]"), &[0; 7]), &["no header of safetensors"]);
-    assert_refused(&safetensors(&header("[8,16]"), &[0; 16]), &["no header of safetensors"]);
-    assert_refused(&safetensors(&header("[8,0]"), &[0; 8]), &["no header of safetensors"]);
-    assert_refused(&safetensors("{\"a\":1}", &[]), &["no header of safetensors"]);
+    assert_refused(&safetensors(&header("[0,7]"), &[0; 7]), &["its header is not one of safetensors"]);
+    assert_refused(&safetensors(&header("[8,16]"), &[0; 16]), &["its header is not one of safetensors"]);
+    assert_refused(&safetensors(&header("[8,0]"), &[0; 8]), &["its header is not one of safetensors"]);
+    assert_refused(&safetensors("{\"a\":1}", &[]), &["its header is not one of safetensors"]);
     let overlapping = r#"{"a":{"dtype":"F32","shape":[2],"data_offsets":[0,8]},
         "b":{"dtype":"F32","shape":[2],"data_offsets":[4,12]}}"#;
-    assert_refused(&safetensors(overlapping, &[0; 12]), &["no header of safetensors"]);
+    assert_refused(&safetensors(overlapping, &[0; 12]), &["its header is not one of safetensors"]);
     let claim = Claim::new("a", &[1], &[1.0]);
     read(&archive(&state_dict(std::slice::from_ref(&claim)), &[claim])).expect("and a right file is read");
 }

@@ -318,7 +318,7 @@ fn what_is_no_member_is_refused() {
         .refused("has the size 0 on axis 1; sizes from 1 to 16384 are supported");
     small()
         .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 7])
-        .refused("makes 512 channels, which are no voxels of 7 features");
+        .refused("has 512 output channels, not whole voxels of 7 features");
     small()
         .with("pixel_nerf_net.mlp.layers.0.weight", &[32, 8])
         .refused("the denoiser takes 19 channels, not 3 colours and the 8 features");

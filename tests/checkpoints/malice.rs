@@ -78,13 +78,13 @@ fn absurd_headers_of_safetensors() {
     file[..8].copy_from_slice(&u64::MAX.to_le_bytes());
     assert_refused(&file, &["its header is to take 18446744073709551615 bytes"]);
     let header = r#"{"a":{"dtype":"F32","shape":[4294967296,4294967296],"data_offsets":[0,0]}}"#;
-    assert_refused(&safetensors(header, &[]), &["no header of safetensors"]);
+    assert_refused(&safetensors(header, &[]), &["its header is not one of safetensors"]);
     let header = r#"{"a":{"dtype":"F32","shape":[100000000000],"data_offsets":[0,400000000000]}}"#;
     assert_refused(&safetensors(header, &[]), &["its tensors take 400000000000 bytes"]);
     let header = r#"{"a":{"dtype":"F32","shape":[0,18446744073709551615],"data_offsets":[0,0]}}"#;
     assert_refused(&safetensors(header, &[]), &["bytes of memory"]);
     let nested = format!("{{\"a\":{}{}}}", "[".repeat(100_000), "]".repeat(100_000));
-    assert_refused(&safetensors(&nested, &[]), &["no header of safetensors"]);
+    assert_refused(&safetensors(&nested, &[]), &["its header is not one of safetensors"]);
 }
 
 #[test]

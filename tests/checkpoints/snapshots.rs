@@ -84,7 +84,7 @@ fn something_else() {
     let numbers = Pickle::new().raw(b"}").text("ema").global("numpy", "ndarray").raw(b")Rs").end();
     assert_refused(&numbers, &["not a checkpoint: a pickle that torch.save did not write and that holds no tensors"]);
     let elsewhere = Pickle::new().raw(b"}").text("G").module(&pair(), &[]).raw(b"s").end();
-    assert_refused(&elsewhere, &["holds no tensors where they are looked for", "'ema'", "(it has 'G')"]);
+    assert_refused(&elsewhere, &["holds no tensors in the expected places", "'ema'", "(it has 'G')"]);
     let strange = Pickle::default().global("nets", "Strange").raw(b")R");
     let module = Pickle::default().module(&pair(), &[("odd", strange)]);
     assert_refused(&holding(module), &["module 'odd' (nets.Strange) has no tables of parameters, buffers and modules"]);

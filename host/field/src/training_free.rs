@@ -36,12 +36,7 @@ pub struct TrainingFree {
 impl Default for TrainingFree {
     /// Sources at the size of the pictures.
     fn default() -> TrainingFree {
-        TrainingFree {
-            hull: hull::Hull::default(),
-            sweep: Sweep::default(),
-            source_share: 1.0,
-            always_sweep: std::env::var("VF_SWEEP").is_ok(),
-        }
+        TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0, always_sweep: false }
     }
 }
 

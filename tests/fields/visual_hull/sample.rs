@@ -142,11 +142,15 @@ fn a_photograph_of_nothing_is_named() {
     let scene = Scene::open(folder.path()).expect("a scene");
     let album = Album::open(&scene, 0..20, &Silent).expect("photographs");
     let sources: Vec<usize> = (0..20).collect();
-    match album.sources(&sources, 128, BackgroundChoice::Auto, &Silent) {
+    match album.sources(&sources, 128, BackgroundChoice::Colour([1.0; 3]), &Silent) {
         Err(PhotographsError::NoSilhouette { path, colour }) => {
             assert!(path.ends_with("000007.png"), "{path}");
             assert!(colour.contains("255,255,255"), "{colour}");
         }
         other => panic!("{:?}", other.map(|sources| sources.background)),
     }
+    // Where nobody said that there is a background, nothing is cut out, and a warning says why.
+    let whole = album.sources(&sources, 128, BackgroundChoice::Auto, &Silent).expect("whole photographs");
+    assert!(!whole.has_silhouettes);
+    assert!(whole.warning.is_some_and(|warning| warning.contains("000007.png")));
 }
