@@ -129,7 +129,7 @@ impl Protocol {
     /// from it; other views replace it.
     ///
     /// # Errors
-    /// [`ProtocolError`] if no job is left or the field needs more sources; [`SelectionError`] for a list that does not
+    /// [`ProtocolError`] if no job is left or the field needs more sources; [`viewfuse_scene::few_shot::SelectionError`] for a list that does not
     /// fit a scene.
     pub fn plan(&self, scenes: &[Scene], draws: Draws, least_sources: usize) -> Result<Plan, ProtocolError> {
         let fewest = match self {
