@@ -76,7 +76,7 @@ fn cameras_without_a_common_point() {
 
 fn a_scene_in_other_units() {
     let scene = toy();
-    change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e6));
+    change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e3));
     assert_warns(&scene, "the cameras are 1.300e3 units from what they look at", 0);
 }
 
