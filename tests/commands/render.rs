@@ -57,7 +57,11 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
     let record = record(folder, "out/deeper");
     assert_eq!((&record["seed"], &record["scene"], &record["size"]), (&7.into(), &"toy".into(), &[64, 64][..].into()));
     assert!(record["device"].as_str().is_some_and(|device| device.starts_with("cpu")), "{record}");
-    assert_eq!(record["weighting"], "error:alpha=1");
+    // The default is the choice for the scene: six sources were left out, and the best scheme is used.
+    assert_eq!(record["chosen"]["left_out"].as_array().map(Vec::len), Some(6), "{}", record["chosen"]);
+    let candidates = record["chosen"]["candidates"].as_array().expect("what was tried");
+    assert!(candidates.iter().any(|candidate| candidate["weighting"] == record["weighting"]), "{record}");
+    assert!(record["frames"][0]["expected"]["psnr"].is_number(), "{record}");
     let expected: Vec<String> = (0..24).filter(|view| *view != 20).map(|view| format!("{view:06}")).collect();
     assert_eq!(texts(&record["sources"]), expected);
     let time = |name: &str| record["times"][name].as_f64().expect("a time in seconds");
@@ -83,8 +87,9 @@ fn writes_a_picture_a_depth_map_a_sheet_and_a_record() {
 
 fn leaves_out_what_counts_little() {
     let scene = toy();
-    done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 -o out");
+    done(scene.path(), "render toy --targets 20 --size 32x32 --leave-out 0.2 --weights error:alpha=1 -o out");
     let record = record(scene.path(), "out");
+    assert_eq!((&record["weighting"], &record["chosen"]), (&"error:alpha=1".into(), &Value::Null));
     let frame = &record["frames"][0];
     let (used, before) = (numbers(&frame["weights"]), numbers(&frame["weights_before"]));
     let (sources, left_out) = (texts(&record["sources"]), texts(&frame["left_out"]));

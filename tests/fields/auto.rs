@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::auto::{self, Chosen, MOST_LEFT_OUT, choose, schemes};
@@ -108,6 +109,33 @@ fn two_sources_give_the_default_and_no_expectation() -> Result<(), Box<dyn Error
     let (frames, chosen) = automatic(&scene)?;
     assert!(chosen.candidates.is_empty() && chosen.settings.is_empty() && chosen.left_out.is_empty());
     assert_eq!(chosen.expected(&frames[0]), None);
+    Ok(())
+}
+
+/// Remembers the warnings.
+#[derive(Default)]
+struct Warnings(Mutex<Vec<String>>);
+
+impl Progress for Warnings {
+    fn warn(&self, warning: &str) {
+        self.0.lock().expect("a list").push(warning.to_owned());
+    }
+}
+
+#[test]
+fn a_scene_on_which_copies_are_better_is_told() -> Result<(), Box<dyn Error>> {
+    let folder = tempfile::tempdir()?;
+    let scene = room(folder.path(), 5);
+    let warnings = Warnings::default();
+    let chosen_here = chosen(&scene, &[0, 1, 2, 3, 4], &TrainingFree::default(), &warnings)?;
+    assert!(chosen_here.left_out.iter().all(|source| source.copy_psnr > 5.0));
+    assert_eq!(*warnings.0.lock().expect("a list"), [""; 0]);
+    // An untrained network shows nothing of the room.
+    let network = test_networks::body(&Architecture::small(16));
+    let untrained = PixelNerf::new(&network, PixelNerfOptions::default())?;
+    chosen(&scene, &[0, 1, 2, 3, 4], &untrained, &warnings)?;
+    let warnings = warnings.0.into_inner()?;
+    assert!(warnings.iter().any(|warning| warning.contains("pictures may be worse than a copy")), "{warnings:?}");
     Ok(())
 }
 

@@ -115,6 +115,35 @@ fn exposures_are_made_equal() {
     assert!(error < 0.03, "{error}");
 }
 
+/// A source of which neither the weights nor a used source's neighbours know anything, whatever it shows.
+#[test]
+fn sources_without_a_weight_change_no_bit() {
+    let target = camera(Vec3::ZERO, 72, 54);
+    let with_fourth = |gain: f32| {
+        let mut sources = wall([0.8, 1.0, 1.25]);
+        sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), gain));
+        let (field, count) = (TrainingFree::default(), 4);
+        let renderer = On { device: &Cpu, field: &field };
+        let mut session = Session::open(&renderer, &sources, &Silent).expect("a session");
+        let among_three = |own: usize| {
+            let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+            (0..3).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
+            Weights::from_scores(&scores, count)
+        };
+        session.weigh(&(0..4).map(among_three).collect::<Vec<_>>(), &Silent).expect("a weighting");
+        let picture = session.render(&target, &among_three(3), 0.0, &Silent).expect("a picture");
+        let [line] = &session.record().left_out[..] else { panic!("one line") };
+        assert_eq!((line.what, line.left_out, line.of), ("encoded views", 1, 4));
+        // A later target that uses all four does not change what an earlier one would give.
+        session.render(&target, &Weights::mean(count), 0.0, &Silent).expect("a picture");
+        assert_eq!(session.render(&target, &among_three(3), 0.0, &Silent).expect("a picture"), picture);
+        picture
+    };
+    let (alone, beside) = (with_fourth(0.0), with_fourth(0.6));
+    assert_eq!(alone, beside, "bit for bit");
+    assert!(inner_error(&alone.colours, &photograph(target, 1.0).texels, 72) < 0.03);
+}
+
 #[test]
 fn pictures_do_not_depend_on_the_number_of_threads() {
     let (sources, target) = (wall([1.0, 0.9, 1.1]), camera(Vec3::new(0.1, 0.1, 0.0), 72, 54));

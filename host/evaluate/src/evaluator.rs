@@ -10,7 +10,7 @@ use std::collections::hash_map::Entry;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::Renderer;
-use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage};
+use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
@@ -191,8 +191,8 @@ impl Evaluator<'_> {
         target: usize,
     ) -> Result<Option<MaskedTruth>, EvaluateError> {
         let Some(scene) = masked else { return Ok(None) };
-        let (album, size) =
-            (Album::open(scene, [target], self.progress).map_err(RenderError::from)?, stage.picture_size(target)?);
+        let album = open_album(scene, [target], self.renderer, self.options, self.progress)?;
+        let size = stage.picture_size(target)?;
         let over = |level: f32| album.truth(target, size, Some([level; 3])).map_err(RenderError::from);
         Ok(MaskedTruth::of(over(1.0)?, &over(0.0)?))
     }
@@ -205,7 +205,7 @@ impl Evaluator<'_> {
     pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError> {
         let groups = source_groups(scene, selection, self.renderer.about().least_sources)?;
         let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
-        let album = Album::open(scene, used, self.progress).map_err(RenderError::from)?;
+        let album = open_album(scene, used, self.renderer, self.options, self.progress)?;
         let mut scores = Vec::new();
         for (sources, targets) in &groups {
             let subject = Subject { scene, album: &album, masked: None };

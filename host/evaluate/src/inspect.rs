@@ -5,7 +5,7 @@ use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::visual_hull::ObjectBlock;
-use viewfuse_field::training_free::find_object;
+use viewfuse_field::training_free::{find_object, gap_warning};
 use viewfuse_job::progress::Interrupted;
 use viewfuse_job::progress::Progress;
 use viewfuse_output::canvas::{BLUE, Canvas, GREY, INK, LINE_HEIGHT, RED};
@@ -82,7 +82,7 @@ pub fn inspect(
     let object = match object_of(scene, background, progress, &mut warnings) {
         Ok(object) => {
             if object.is_none() {
-                warnings.extend(gap_warning(&cameras, &rig));
+                warnings.extend(gap_warning(&cameras));
             }
             object
         }
@@ -122,9 +122,6 @@ pub fn inspect(
         warnings,
     })
 }
-
-/// Angle between neighbouring views, as seen from the focus, beyond which depths are no longer found in whole photographs.
-const MOST_GAP_DEGREES: f32 = 15.0;
 
 /// Warnings about the cameras.
 fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
@@ -169,25 +166,6 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
         warnings.push(format!("view '{}' has another size than the first", view.name));
     }
     warnings
-}
-
-/// Whether neighbouring views are too far apart to find depths in whole photographs.
-fn gap_warning(cameras: &[Camera], rig: &Rig) -> Option<String> {
-    let directions: Vec<Vec3> =
-        cameras.iter().map(|c| (c.pose.centre_world() - rig.focus).normalize_or_zero()).collect();
-    let nearest = |own: usize| {
-        let others = directions.iter().enumerate().filter(|(other, _)| *other != own);
-        others.map(|(_, other)| other.dot(directions[own]).clamp(-1.0, 1.0).acos().to_degrees()).fold(180.0, f32::min)
-    };
-    let mut gaps: Vec<f32> = (0..cameras.len()).map(nearest).collect();
-    gaps.sort_by(f32::total_cmp);
-    let gap = *gaps.get(gaps.len() / 2)?;
-    (gap > MOST_GAP_DEGREES).then(|| {
-        format!(
-            "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
-             reliably up to about {MOST_GAP_DEGREES:.0} degrees; take photographs between them"
-        )
-    })
 }
 
 /// The bounding box of the visual hull, or why there is none.

@@ -21,7 +21,7 @@ pub use expectation::{Basis, Expected, TERMS};
 pub use geometry::Standing;
 pub use leave_out::{MOST_LEFT_OUT, MOST_NEIGHBOURS, SIDE};
 
-use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage};
+use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, open_album};
 use crate::{Renderer, Setting};
 use geometry::Measure;
 use leave_out::{Outcome, Trials, coarse, mean};
@@ -31,7 +31,7 @@ use viewfuse_core::weighting::{Formula, Scheme};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
-use viewfuse_scene::photographs::{Album, SourceImages};
+use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
 
 /// The schemes that are tried. The first is the baseline of the others: on left-out sources, the inverse square of the
@@ -67,6 +67,8 @@ pub struct LeftOutSource {
     pub source: String,
     /// Its score, decibels.
     pub psnr: f64,
+    /// The score of a copy of the nearest other source.
+    pub copy_psnr: f64,
     /// Its geometry among the others.
     pub standing: Standing,
     /// Mean confidence of its pixels; null for fields that do not estimate it.
@@ -94,6 +96,20 @@ impl Chosen {
     /// The geometry of a target among the sources.
     pub fn standing(&self, frame: &Frame) -> Standing {
         self.measure.standing(&frame.target.camera.pose, self.poses.iter())
+    }
+
+    /// A warning if the sources that were left out are no better than copies of the nearest other ones.
+    fn copy_warning(&self) -> Option<String> {
+        let count = self.left_out.len().max(1) as f64;
+        let mean = |value: fn(&LeftOutSource) -> f64| self.left_out.iter().map(value).sum::<f64>() / count;
+        let (own, copy) = (mean(|source| source.psnr), mean(|source| source.copy_psnr));
+        (own < copy).then(|| {
+            format!(
+                "sources that were left out and rendered from the others have a PSNR of {own:.1} dB, copies of the nearest \
+                 photographs {copy:.1} dB: pictures may be worse than a copy; take photographs nearer to one another, and \
+                 check the camera poses"
+            )
+        })
     }
 
     /// The expected score of a target's picture; `None` if nothing could be left out.
@@ -159,13 +175,17 @@ pub fn choose(
     let name = |source: usize| stage.scene().views[stage.views[source]].name.clone();
     chosen.left_out = best
         .iter()
-        .map(|&Outcome { source, psnr, standing, confidence }| LeftOutSource {
+        .map(|&Outcome { source, psnr, standing, confidence, copy }| LeftOutSource {
             source: name(source),
             psnr,
+            copy_psnr: copy,
             standing,
             confidence,
         })
         .collect();
+    if let Some(warning) = chosen.copy_warning() {
+        progress.warn(&format!("{}: {warning}", stage.scene().path.display()));
+    }
     Ok(chosen)
 }
 
@@ -210,7 +230,7 @@ pub fn render<X: From<RenderError>>(
 ) -> Result<(Finished, Chosen), X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
-    let album = Album::open(scene, shown, progress).map_err(RenderError::from)?;
+    let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
     let chosen = choose(&stage, renderer, options, progress)?;
     stage.tune(&chosen.settings);

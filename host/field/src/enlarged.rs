@@ -1,6 +1,6 @@
 //! Previews: a field's pictures rendered smaller and enlarged.
 
-use super::{About, Field, FieldError, Prepared, Record, Rendered, Request};
+use super::{About, Encoding, Field, FieldError, Prepared, Record, Rendered, Request, Setting, Surfaces, Tunable};
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -38,6 +38,14 @@ impl<F: Field> Field for Enlarged<F> {
 }
 
 impl Prepared for Views<'_> {
+    fn encoding(&self) -> Encoding {
+        self.inner.encoding()
+    }
+
+    fn depends_on_weighting(&self) -> bool {
+        self.inner.depends_on_weighting()
+    }
+
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.inner.weigh(relevance)
     }
@@ -54,6 +62,22 @@ impl Prepared for Views<'_> {
         let small = Camera { pinhole: pinhole.unwrap_or(target.pinhole), ..*target };
         let rendered = self.inner.render(&Request { camera: &small, ..*request }, progress)?;
         Ok(enlarged(rendered, [width, height]))
+    }
+
+    fn tunables(&self) -> &'static [Tunable] {
+        self.inner.tunables()
+    }
+
+    fn tune(&mut self, settings: &[Setting]) {
+        self.inner.tune(settings);
+    }
+
+    fn simplify(&mut self) {
+        self.inner.simplify();
+    }
+
+    fn surfaces(&self) -> Surfaces {
+        self.inner.surfaces()
     }
 
     fn record(&self) -> Record {

@@ -33,8 +33,19 @@ pub trait Field {
 
 /// Source views on a device, with their encodings so far.
 pub trait Prepared {
-    /// Begins a weighting. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0. Only
-    /// fields with [`Encoding::EachWeighting`] implement it.
+    /// Which views are encoded.
+    fn encoding(&self) -> Encoding {
+        Encoding::Used
+    }
+
+    /// Whether a view's encoding depends on how relevant the others are to it: views are then encoded again for each
+    /// weighting, after [`Prepared::weigh`].
+    fn depends_on_weighting(&self) -> bool {
+        false
+    }
+
+    /// Begins a weighting. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0. Called
+    /// only if [`Prepared::depends_on_weighting`].
     ///
     /// # Errors
     /// [`FieldError`].
@@ -118,22 +129,18 @@ pub struct About {
     pub source_side: SourceSide,
     /// The default limit of its pictures' longest side.
     pub longest_side: u32,
-    /// When views are encoded.
-    pub encoding: Encoding,
     /// Whether it supports early termination of rays ([`Request::early_termination`]).
     pub ends_rays: bool,
 }
 
 impl About {
-    /// A field of this name that uses any number of sources at the pictures' size, encodes them at their first use, and has
-    /// no early termination.
+    /// A field of this name that uses any number of sources at the pictures' size and has no early termination.
     pub const fn new(name: &'static str) -> About {
         About {
             name,
             least_sources: 1,
             source_side: SourceSide::Share(1.0),
             longest_side: LONGEST_DEFAULT_SIDE,
-            encoding: Encoding::WhenUsed,
             ends_rays: false,
         }
     }
@@ -158,15 +165,13 @@ impl SourceSide {
     }
 }
 
-/// When a source view is encoded.
+/// Which source views are encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// All views, again for each weighting: a view's encoding depends on how relevant the others are to it.
-    EachWeighting,
-    /// All views, once, before the first target.
-    AllFirst,
-    /// Once, when a target first gives the view a weight. Views without a weight do not contribute to a picture.
-    WhenUsed,
+    /// All, before the first target: all of them contribute to each picture.
+    All,
+    /// Each when a target first gives it a weight. Views without a weight do not contribute to a picture.
+    Used,
 }
 
 /// A picture to render.
@@ -176,7 +181,7 @@ pub struct Request<'a> {
     pub camera: &'a Camera,
     /// The weights of all sources; they sum to 1.
     pub weights: &'a SourceWeights,
-    /// The contributing views, in ascending order: with [`Encoding::WhenUsed`] those with a weight, otherwise all.
+    /// The contributing views, in ascending order: with [`Encoding::Used`] those with a weight, otherwise all.
     pub views: &'a [usize],
     /// Early termination: the transmittance below which samples are left out; no channel changes by more than that.
     pub early_termination: f32,

@@ -29,7 +29,7 @@ pub use open::{COMPUTABLE, open};
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{NoDepths, default_near_far};
-use super::{About, Encoding, Field, FieldError, Prepared, SourceSide};
+use super::{About, Field, FieldError, Prepared, SourceSide};
 use encoder::SIDE_STEP;
 use parts::Parts;
 use std::sync::Arc;
@@ -112,8 +112,7 @@ impl Genvs {
 impl Field for Genvs {
     fn about(&self) -> About {
         let side = self.architecture.image_side as u32;
-        let encoding = if self.options.omissions.unused_views { Encoding::WhenUsed } else { Encoding::AllFirst };
-        About { source_side: SourceSide::Pixels(side), longest_side: side, encoding, ..About::new("genvs") }
+        About { source_side: SourceSide::Pixels(side), longest_side: side, ..About::new("genvs") }
     }
 
     fn prepare<'a, D: Device>(

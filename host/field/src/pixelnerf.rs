@@ -123,8 +123,7 @@ impl PixelNerf {
 
 impl Field for PixelNerf {
     fn about(&self) -> About {
-        let encoding = if self.options.omissions.unused_views { Encoding::WhenUsed } else { Encoding::AllFirst };
-        About { source_side: SourceSide::Pixels(SOURCE_SIDE), encoding, ends_rays: true, ..About::new("pixelnerf") }
+        About { source_side: SourceSide::Pixels(SOURCE_SIDE), ends_rays: true, ..About::new("pixelnerf") }
     }
 
     fn prepare<'a, D: Device>(
@@ -168,6 +167,10 @@ impl<D: Device> Views<'_, D> {
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
+    fn encoding(&self) -> Encoding {
+        if self.field.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
+    }
+
     fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
         Ok(self.encode_view(view)?)
     }

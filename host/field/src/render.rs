@@ -199,6 +199,22 @@ pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Res
     Ok(width.max(height))
 }
 
+/// The photographs of these views, decoded no larger than a render with these options needs them.
+///
+/// # Errors
+/// [`RenderError`].
+pub fn open_album<'a>(
+    scene: &'a Scene,
+    views: impl IntoIterator<Item = usize>,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Album<'a>, RenderError> {
+    let about = renderer.about();
+    let side = working_side(scene, options, about.longest_side)?;
+    Ok(Album::open_at(scene, views, side.max(about.source_side.of(side)), progress)?)
+}
+
 /// A set of sources on a device: the state that depends on no weighting and no target.
 pub struct Stage<'a> {
     scene: &'a Scene,
@@ -276,6 +292,16 @@ impl<'a> Stage<'a> {
         let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
         let session = &mut self.session;
         timed(&mut self.costs.encode, || session.weigh(&relevance, progress))
+            .map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// Encodes all sources that are not encoded yet, so that what follows does not change how they are.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
+        let session = &mut self.session;
+        timed(&mut self.costs.encode, || session.encode_all(progress))
             .map_err(|error| RenderError::of(error, self.scene))
     }
 
@@ -438,7 +464,7 @@ pub fn render<X: From<RenderError>>(
 ) -> Result<Finished, X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
-    let album = Album::open(scene, shown, progress).map_err(RenderError::from)?;
+    let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
     stage.weigh(weighting, progress)?;
     for target in &job.targets {

@@ -1,7 +1,7 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{About, Encoding, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
+use super::field::{Encoding, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use super::record::{LeftOut, Record};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
@@ -14,7 +14,6 @@ use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
 /// it).
 pub struct Session<'a> {
     renderer: &'a dyn Renderer,
-    about: About,
     prepared: Box<dyn Prepared + 'a>,
     /// `[view]`.
     encoded: Vec<bool>,
@@ -33,24 +32,31 @@ impl<'a> Session<'a> {
     ) -> Result<Session<'a>, FieldError> {
         let prepared = renderer.prepare(sources, progress)?;
         let encoded = vec![false; sources.images.len()];
-        Ok(Session { renderer, about: renderer.about(), prepared, encoded, is_weighed: false })
+        Ok(Session { renderer, prepared, encoded, is_weighed: false })
     }
 
-    /// Begins a weighting: encodes views, if the field does so before the targets. `relevance[view]` are the weights of all
-    /// sources for source `view` as a target, its own 0.
+    /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the weights of
+    /// all sources for source `view` as a target, its own 0.
     ///
     /// # Errors
     /// [`FieldError`].
     pub fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
-        match self.about.encoding {
-            Encoding::WhenUsed => return Ok(()),
-            Encoding::AllFirst => {}
-            Encoding::EachWeighting => {
-                self.encoded.fill(false);
-                self.prepared.weigh(relevance)?;
-                self.is_weighed = true;
-            }
+        if self.prepared.depends_on_weighting() {
+            self.encoded.fill(false);
+            self.prepared.weigh(relevance)?;
+            self.is_weighed = true;
         }
+        match self.prepared.encoding() {
+            Encoding::All => self.encode_all(progress),
+            Encoding::Used => Ok(()),
+        }
+    }
+
+    /// Encodes the views that are not encoded yet.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
         progress.expect(self.encoded.iter().filter(|encoded| !**encoded).count());
         for view in 0..self.encoded.len() {
             if self.encode_view(view, progress)? {
@@ -67,7 +73,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// [`FieldError`].
     pub fn encode(&mut self, weights: &SourceWeights, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.about.encoding == Encoding::EachWeighting && !self.is_weighed {
+        if self.prepared.depends_on_weighting() && !self.is_weighed {
             self.weigh(&even(self.encoded.len()), progress)?;
         }
         let mut is_new = false;
@@ -120,11 +126,10 @@ impl<'a> Session<'a> {
     /// The record of the work so far.
     pub fn record(&self) -> Record {
         let mut record = self.prepared.record();
-        let skips_unused = match self.about.encoding {
-            Encoding::EachWeighting => return record,
-            Encoding::AllFirst => false,
-            Encoding::WhenUsed => true,
-        };
+        let skips_unused = self.prepared.encoding() == Encoding::Used;
+        if !skips_unused && self.prepared.depends_on_weighting() {
+            return record;
+        }
         let count = |views: usize| views as u64;
         let line = LeftOut {
             what: "encoded views",
@@ -139,7 +144,7 @@ impl<'a> Session<'a> {
 
     /// The views that contribute to a picture.
     fn views(&self, weights: &SourceWeights) -> Vec<usize> {
-        let all = self.about.encoding != Encoding::WhenUsed;
+        let all = self.prepared.encoding() == Encoding::All;
         (0..self.encoded.len()).filter(|view| all || weights.get(*view as u32) > 0.0).collect()
     }
 

@@ -12,10 +12,12 @@ pub mod hull;
 mod space;
 mod sweep;
 
-use super::{About, Encoding, Field, FieldError, Prepared, SourceSide};
+use super::{About, Field, FieldError, Prepared, SourceSide};
+use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
+use viewfuse_scene::rig::Rig;
 
 pub use hull::{NoObject, find_object};
 pub use sweep::Sweep;
@@ -40,13 +42,25 @@ impl Default for TrainingFree {
     }
 }
 
+/// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
+/// photographs.
+const MOST_GAP_DEGREES: f32 = 15.0;
+
+/// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
+pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
+    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MOST_GAP_DEGREES)?;
+    Some(format!(
+        "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
+         reliably up to about {MOST_GAP_DEGREES:.0} degrees; take photographs between them"
+    ))
+}
+
 impl Field for TrainingFree {
     fn about(&self) -> About {
         About {
             // Depth needs at least two views.
             least_sources: 2,
             source_side: SourceSide::Share(self.source_share),
-            encoding: Encoding::EachWeighting,
             ends_rays: true,
             ..About::new("training-free")
         }
@@ -61,6 +75,8 @@ impl Field for TrainingFree {
         if sources.has_silhouettes && !self.always_sweep {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
+            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+            gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
             Ok(Box::new(self.sweep.views(device, sources, progress)?))
         }
     }

@@ -4,7 +4,7 @@
 //! included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
 //! either to take every `STEP`-th.
 
-use crate::rig::Rig;
+use crate::rig::{Rig, spread};
 use crate::{Scene, Split, View};
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::PoseError;
@@ -171,7 +171,9 @@ impl Selection {
                 .collect(),
         };
         if let Some(count) = self.view_count {
-            sources = spread(scene, &sources, count);
+            let centres: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose.centre_world()).collect();
+            sources = spread(&centres, count).into_iter().map(|at| sources[at]).collect();
+            sources.sort_unstable();
         }
         if sources.len() < least_sources {
             return Err(SelectionError::TooFewSources {
@@ -252,27 +254,6 @@ fn part_named(scene: &Scene, text: &str) -> Option<Vec<usize>> {
     let is_in = |view: &View| view.image.is_some() && view.split == Some(part);
     let views: Vec<usize> = (0..scene.views.len()).filter(|&view| is_in(&scene.views[view])).collect();
     (!views.is_empty()).then_some(views)
-}
-
-/// `count` of the candidates, each next one as far from those before as possible (farthest-point sampling of the
-/// centres, starting with the first candidate), in the order of the scene.
-fn spread(scene: &Scene, candidates: &[usize], count: usize) -> Vec<usize> {
-    let centre = |view: usize| scene.views[view].camera.pose.centre_world();
-    let mut chosen: Vec<usize> = candidates.iter().copied().take(count.min(1)).collect();
-    while chosen.len() < count.min(candidates.len()) {
-        let gap = |view: usize| {
-            chosen.iter().map(|&other| centre(view).distance(centre(other))).fold(f32::INFINITY, f32::min)
-        };
-        let mut rest = candidates.iter().copied().filter(|view| !chosen.contains(view));
-        let Some(first) = rest.next() else { break };
-        let next = rest.fold((first, gap(first)), |best, view| {
-            let gap = gap(view);
-            if gap > best.1 { (view, gap) } else { best }
-        });
-        chosen.push(next.0);
-    }
-    chosen.sort_unstable();
-    chosen
 }
 
 fn orbit(scene: &Scene, sources: &[usize], count: usize) -> Result<Vec<Target>, SelectionError> {

@@ -50,6 +50,20 @@ impl Rig {
         }
     }
 
+    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: the median over the cameras;
+    /// `None` for fewer than two.
+    pub fn median_gap(&self, cameras: &[Camera]) -> Option<f32> {
+        let directions: Vec<Vec3> =
+            cameras.iter().map(|c| (c.pose.centre_world() - self.focus).normalize_or_zero()).collect();
+        let nearest = |own: usize| {
+            let others = directions.iter().enumerate().filter(|(other, _)| *other != own);
+            others.map(|(_, other)| other.dot(directions[own]).clamp(-1.0, 1.0).acos().to_degrees()).reduce(f32::min)
+        };
+        let mut gaps: Vec<f32> = (0..cameras.len()).filter_map(nearest).collect();
+        gaps.sort_by(f32::total_cmp);
+        gaps.get(gaps.len() / 2).copied()
+    }
+
     /// `count` cameras on a full circle around the focus, at the mean height and distance of the given ones, all
     /// looking at the focus with the rig's up direction; frame 0 is on the side of the first camera.
     ///
@@ -71,6 +85,21 @@ impl Rig {
             })
             .collect()
     }
+}
+
+/// `count` of the points, each next one as far from those before as possible (farthest-point sampling, starting with the
+/// first point; of equally far ones the first), as ascending indices. All of them if there are fewer.
+pub fn spread(points: &[Vec3], count: usize) -> Vec<usize> {
+    let mut chosen: Vec<usize> = Vec::new();
+    let mut gaps = vec![f32::INFINITY; points.len()];
+    while chosen.len() < count.min(points.len()) {
+        let rest = (0..points.len()).filter(|own| !chosen.contains(own));
+        let Some(next) = rest.rev().max_by(|a, b| gaps[*a].total_cmp(&gaps[*b])) else { break };
+        gaps.iter_mut().zip(points).for_each(|(gap, point)| *gap = gap.min(point.distance(points[next])));
+        chosen.push(next);
+    }
+    chosen.sort_unstable();
+    chosen
 }
 
 /// Half the image's diagonal over the focal length: the slope of the ray through a corner.

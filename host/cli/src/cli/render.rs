@@ -19,7 +19,7 @@ use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{READERS, Scene, looked_for};
-use viewfuse_weighting::{Weighting, WeightingChoice, WeightingSpec};
+use viewfuse_weighting::{Weighting, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -39,8 +39,8 @@ pub(crate) struct Arguments {
     orbit: Option<usize>,
     #[command(flatten)]
     sources: SourceOptions,
-    #[arg(long, value_name = "SCHEME", default_value_t = WeightingChoice::Given(WeightingSpec::default()), help = choice_help())]
-    weights: WeightingChoice,
+    #[arg(long, value_name = "SCHEME", help = choice_help())]
+    weights: Option<WeightingChoice>,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -66,8 +66,10 @@ fn scene_help() -> String {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
     let weighting = match &arguments.weights {
-        WeightingChoice::Auto => None,
-        WeightingChoice::Given(spec) => Some(spec.open()?),
+        Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
+        // A network's pictures take too long to try out schemes unasked.
+        None if arguments.model.label().is_some() => Some(Weighting::default_scheme()),
+        Some(WeightingChoice::Auto) | None => None,
     };
     let scene = Scene::open(&arguments.scene)?;
     let open_time = start.elapsed();

@@ -5,7 +5,8 @@ use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec, choice_gramma
 
 /// Help of an option that takes one scheme, or none to choose the best.
 pub(crate) fn choice_help() -> String {
-    format!("Weighting scheme: {}", choice_grammar())
+    let network = Weighting::default_scheme();
+    format!("Weighting scheme: {} [default: auto; {network} with --model]", choice_grammar())
 }
 
 /// Help of an option that can be given several times.

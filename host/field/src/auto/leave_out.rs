@@ -5,6 +5,8 @@ use crate::Setting;
 use crate::render::{RenderError, RenderOptions, Stage};
 use crate::renderer::Renderer;
 use image::RgbImage;
+use image::imageops::{self, FilterType};
+use std::borrow::Cow;
 use std::sync::Arc;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::PinholeError;
@@ -14,6 +16,7 @@ use viewfuse_job::progress::{Interrupted, Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, scaled_size};
+use viewfuse_scene::rig::spread;
 use viewfuse_weighting::Weighting;
 
 /// Most sources that are left out, one at a time.
@@ -38,6 +41,8 @@ struct Trial<'a> {
     target: Target,
     truth: RgbImage,
     standing: Standing,
+    /// The score of a copy of the nearest of the others.
+    copy: f64,
 }
 
 /// The result of a source that was left out.
@@ -51,6 +56,8 @@ pub(super) struct Outcome {
     pub(super) confidence: Option<f64>,
     /// Its geometry among the others.
     pub(super) standing: Standing,
+    /// The score of a copy of the nearest of the others.
+    pub(super) copy: f64,
 }
 
 /// The options of pictures of sources that are left out.
@@ -87,7 +94,8 @@ impl<'a> Trials<'a> {
             .map(|image| small(image, about.source_side.of(side), scene))
             .collect::<Result<_, _>>()?;
         let surfaces = stage.surfaces();
-        let chosen = spread(&poses, MOST_LEFT_OUT);
+        let centres: Vec<Vec3> = poses.iter().map(Pose::centre_world).collect();
+        let chosen = spread(&centres, MOST_LEFT_OUT);
         progress.expect(chosen.len());
         for source in chosen {
             progress.check().map_err(stopped)?;
@@ -106,6 +114,7 @@ impl<'a> Trials<'a> {
                 Stage::of_images(scene, album, &views, images, renderer, options, quiet).and_then(|mut own| {
                     own.simplify();
                     own.weigh(weighting, quiet)?;
+                    own.encode_all(quiet)?;
                     Ok(own)
                 });
             progress.step();
@@ -121,7 +130,12 @@ impl<'a> Trials<'a> {
                 continue;
             }
             let standing = measure.standing(&poses[source], others.iter().map(|&other| &poses[other]));
-            trials.push(Trial { source, stage: own, target, truth, standing });
+            let nearest = (0..others.len()).min_by(|&a, &b| {
+                let distance = |other: usize| poses[others[other]].distance(&poses[source]);
+                distance(a).total_cmp(&distance(b))
+            });
+            let copy = nearest.map_or(0.0, |nearest| copy_score(&own.images.picture(nearest), &truth));
+            trials.push(Trial { source, stage: own, target, truth, standing, copy });
         }
         Ok(Trials { trials })
     }
@@ -144,7 +158,7 @@ impl<'a> Trials<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
         let mut outcomes = Vec::with_capacity(self.trials.len());
-        for Trial { source, stage, target, truth, standing } in &mut self.trials {
+        for Trial { source, stage, target, truth, standing, copy } in &mut self.trials {
             progress.check().map_err(stopped)?;
             stage.tune(settings);
             let frame = stage.frame(weighting, target, &Quiet(progress))?;
@@ -153,11 +167,22 @@ impl<'a> Trials<'a> {
                 psnr: psnr(&frame.picture, truth).min(MOST_PSNR),
                 confidence: mean(&frame.confidences),
                 standing: *standing,
+                copy: *copy,
             });
             progress.step();
         }
         Ok(outcomes)
     }
+}
+
+/// The score of a picture that is resampled to the truth's size.
+fn copy_score(picture: &RgbImage, truth: &RgbImage) -> f64 {
+    let (width, height) = truth.dimensions();
+    let copy = match picture.dimensions() == (width, height) {
+        true => Cow::Borrowed(picture),
+        false => Cow::Owned(imageops::resize(picture, width, height, FilterType::Triangle)),
+    };
+    psnr(&copy, truth).min(MOST_PSNR)
 }
 
 /// A source with a longest side of at most `side` pixels.
@@ -175,23 +200,6 @@ pub(super) fn mean(confidences: &[f32]) -> Option<f64> {
 
 fn stopped(interrupted: Interrupted) -> RenderError {
     RenderError::Field(interrupted.into())
-}
-
-/// Up to `count` of the cameras, each next one as far from those before as possible, ascending.
-fn spread(poses: &[Pose], count: usize) -> Vec<usize> {
-    let centres: Vec<Vec3> = poses.iter().map(Pose::centre_world).collect();
-    let mut chosen: Vec<usize> = Vec::new();
-    while chosen.len() < count.min(centres.len()) {
-        let gap = |own: usize| {
-            chosen.iter().map(|&other| centres[own].distance(centres[other])).fold(f32::INFINITY, f32::min)
-        };
-        let rest = (0..centres.len()).filter(|own| !chosen.contains(own));
-        // The first of equal ones.
-        let Some(next) = rest.rev().max_by(|a, b| gap(*a).total_cmp(&gap(*b))) else { break };
-        chosen.push(next);
-    }
-    chosen.sort_unstable();
-    chosen
 }
 
 /// Up to `count` of the other cameras, the nearest ones, ascending.

@@ -8,7 +8,7 @@ use super::sampling::Start;
 use super::volume::Volume;
 use super::{COLOUR_CHANNELS, Genvs, Omissions, Rays};
 use crate::learned::over_white;
-use crate::{FieldError, LeftOut, Prepared, Record, Rendered, Request};
+use crate::{Encoding, FieldError, LeftOut, Prepared, Record, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, DeviceError};
@@ -120,6 +120,10 @@ impl<D: Device> Views<'_, D> {
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
+    fn encoding(&self) -> Encoding {
+        if self.field.options.omissions.unused_views { Encoding::Used } else { Encoding::All }
+    }
+
     fn encode(&mut self, view: usize, _progress: &dyn Progress) -> Result<(), FieldError> {
         self.encode_view(view)
     }

@@ -29,7 +29,7 @@ struct Ratio {
 }
 
 /// The gain of each source: red, green, blue, 1. `maps[texel]` are disparity and confidence, `steps[view]` from a plane's disparity to the
-/// next one's. The gains' logarithms solve the pairs' equations `g(first) - g(second) = ratio` in the sense of least squares and
+/// next one's, or 0 for a view that is not used. The gains' logarithms solve the pairs' equations `g(first) - g(second) = ratio` in the sense of least squares and
 /// are 0 in the mean. All are 1 where sources differ by less than 3 %.
 pub(super) fn gains(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 2]], steps: &[f32]) -> Vec<[f32; 4]> {
     let ratios = ratios(cameras, texels, maps, steps);
@@ -51,7 +51,9 @@ pub(super) fn gains(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 
                 logarithms[view] = sum / count;
             }
         }
-        let mean = logarithms.iter().sum::<f64>() / logarithms.len().max(1) as f64;
+        let used = logarithms.iter().zip(steps).filter(|(_, step)| **step > 0.0);
+        let (count, sum) = used.fold((0_usize, 0.0), |(count, sum), (logarithm, _)| (count + 1, sum + logarithm));
+        let mean = sum / count.max(1) as f64;
         for (gain, logarithm) in gains.iter_mut().zip(&logarithms) {
             let logarithm = logarithm - mean;
             if logarithm.abs() > GAINS.0 {

@@ -3,7 +3,7 @@
 
 mod bounds;
 
-use crate::{FieldError, Prepared, Rendered, Request};
+use crate::{Encoding, FieldError, Prepared, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::visual_hull::ray_marching::MarchBlock;
@@ -132,6 +132,14 @@ impl Hull {
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
+    fn encoding(&self) -> Encoding {
+        Encoding::All
+    }
+
+    fn depends_on_weighting(&self) -> bool {
+        true
+    }
+
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         let (device, texel_count) = (self.device, self.texel_count);
         let view_count = self.scene.object.view_count as usize;

@@ -9,10 +9,9 @@ use viewfuse_evaluate::protocol::{Job, Plan, Protocol};
 use viewfuse_evaluate::run_folder::{Finished, FolderError, RunFolder, Settings, Shard};
 use viewfuse_evaluate::{Evaluator, Subject, without_masks};
 use viewfuse_field::AnyField;
-use viewfuse_field::render::RenderOptions;
+use viewfuse_field::render::{RenderOptions, open_album};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
-use viewfuse_scene::photographs::Album;
 use viewfuse_weighting::Weighting;
 
 /// The jobs of a shard that are not finished.
@@ -64,7 +63,8 @@ impl Jobs<'_> {
             let (scene, options) = (&shown[job.scene], &self.options[job.scene]);
             let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
             let sources = names(scene, &job.sources);
-            let album = Album::open(scene, job.sources.iter().chain(&job.targets).copied(), progress)?;
+            let views = job.sources.iter().chain(&job.targets).copied();
+            let album = open_album(scene, views, renderer, options, progress)?;
             let masked = self.protocol.is_masked().then(|| &scenes[job.scene]);
             let mut gallery = Gallery::default();
             let first = job.targets.first().map_or("", |&target| &scene.views[target].name);

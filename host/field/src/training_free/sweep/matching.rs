@@ -1,0 +1,144 @@
+//! The costs of the planes in a camera's frustum, from the views that are compared on them.
+
+use crate::FieldError;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::plane_sweep::census::REACH;
+use viewfuse_core::plane_sweep::evidence::ViewPair;
+use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_core::plane_sweep::path::{CostBlock, DIRECTIONS};
+use viewfuse_core::plane_sweep::window::WindowBlock;
+use viewfuse_core::plane_sweep::{MOST_MATCHED, PLANES, Planes};
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::SourceImage;
+
+/// Most pairs that are compared, for each view.
+const PAIRS_PER_VIEW: usize = 3;
+/// Rows that are compared at once, which bounds the memory of colours and evidence.
+const BAND_ROWS: u32 = 32;
+
+/// The sources at one size, on a device.
+pub(super) struct Images<D: Device> {
+    /// With the offset of each one's texels.
+    pub(super) cameras: Vec<CameraBlock>,
+    /// `[view][row][column]`.
+    pub(super) texels: D::Buffer<[f32; 4]>,
+}
+
+impl<D: Device> Images<D> {
+    pub(super) fn upload(device: &D, images: &[SourceImage]) -> Result<Images<D>, FieldError> {
+        let (cameras, texels) = super::super::hull::joined(images);
+        Ok(Images { cameras, texels: device.upload(&texels)? })
+    }
+}
+
+/// A camera's planes.
+#[derive(Clone, Copy)]
+pub(super) struct Range {
+    /// Disparity of the farthest plane.
+    pub(super) far_disparity: f32,
+    /// From a plane's disparity to the next one's.
+    pub(super) step: f32,
+    /// Groups of planes.
+    pub(super) group_count: u32,
+}
+
+impl Range {
+    /// At least `plane_count` planes between two disparities.
+    pub(super) fn new([least, greatest]: [f32; 2], plane_count: u32) -> Range {
+        let group_count = plane_count.div_ceil(PLANES as u32);
+        let intervals = (group_count * PLANES as u32 - 1) as f32;
+        Range { far_disparity: least, step: (greatest - least) / intervals, group_count }
+    }
+}
+
+/// What is the same for every frustum.
+#[derive(Clone, Copy)]
+pub(super) struct Matching<'d, D: Device> {
+    pub(super) device: &'d D,
+    pub(super) has_silhouettes: bool,
+    /// Cost of the nearest plane relative to the farthest one.
+    pub(super) near_cost: f32,
+    /// Cost of contradicting the views' own disparities.
+    pub(super) dissent_share: f32,
+}
+
+impl<D: Device> Matching<'_, D> {
+    /// The frustum of a camera whose planes `swept` are compared on; only the first [`MOST_MATCHED`] of them are.
+    pub(super) fn frustum(&self, camera: CameraBlock, range: Range, swept: &[SweptView]) -> FrustumBlock {
+        FrustumBlock {
+            camera,
+            far_disparity: range.far_disparity,
+            disparity_step: range.step,
+            group_count: range.group_count,
+            view_count: swept.len().min(MOST_MATCHED) as u32,
+            pair_count: pairs(swept).len() as u32,
+            has_silhouettes: u32::from(self.has_silhouettes),
+            dissent_share: self.dissent_share,
+            first_row: 0,
+            row_count: camera.height,
+        }
+    }
+
+    /// The costs of all planes in a frustum: `costs[row][column][group]`. `texels` are those of the views' cameras, `maps`
+    /// their disparities and confidences.
+    pub(super) fn costs(
+        &self,
+        whole: FrustumBlock,
+        swept: &[SweptView],
+        texels: &D::Buffer<[f32; 4]>,
+        maps: &D::Buffer<[f32; 2]>,
+        progress: &dyn Progress,
+    ) -> Result<D::Buffer<Planes>, FieldError> {
+        let device = self.device;
+        let FrustumBlock { camera: CameraBlock { width, height, .. }, group_count, .. } = whole;
+        let matched = &swept[..whole.view_count as usize];
+        let row_len = (width * group_count) as usize;
+        let volume = row_len * height as usize;
+        let (views, pairs) = (device.upload(matched)?, device.upload(&pairs(swept))?);
+        let mut costs = device.zeros::<Planes>(2 * volume)?;
+        let band_rows = BAND_ROWS.min(height);
+        let rows = (band_rows + REACH).min(height) as usize;
+        let mut grey = device.zeros::<Planes>(rows * row_len * matched.len())?;
+        let mut evidence = device.zeros::<Planes>(4 * rows * row_len)?;
+        for first in (0..height).step_by(band_rows as usize) {
+            progress.check()?;
+            let halo = first.min(REACH);
+            let kept = band_rows.min(height - first);
+            let band = FrustumBlock { first_row: first - halo, row_count: halo + kept, ..whole };
+            device.compare_views(&band, &views, &pairs, texels, maps, &mut grey, &mut evidence)?;
+            device.census_cost(&band, halo, kept, &pairs, &grey, &evidence, &mut costs)?;
+        }
+        let window = WindowBlock::new(&whole, self.near_cost);
+        let mut sums = device.zeros::<Planes>(6 * volume)?;
+        device.row_sums(&window, &costs, &mut sums)?;
+        drop(costs);
+        let mut means = device.zeros::<Planes>(volume)?;
+        device.window_cost(&window, &sums, &mut means)?;
+        drop(sums);
+        let block = CostBlock { width, height, group_count, padding: 0 };
+        let mut paths = device.zeros::<Planes>(DIRECTIONS as usize * volume)?;
+        device.follow_paths(&block, &means, &mut paths)?;
+        device.join_paths(&block, &paths, &mut means)?;
+        Ok(means)
+    }
+}
+
+/// The pairs that are compared, of the greatest products of weights.
+fn pairs(swept: &[SweptView]) -> Vec<ViewPair> {
+    let count = swept.len().min(MOST_MATCHED);
+    let mut pairs: Vec<ViewPair> = (0..count)
+        .flat_map(|first| (first + 1..count).map(move |second| (first, second)))
+        .map(|(first, second)| ViewPair {
+            first: first as u32,
+            second: second as u32,
+            weight: swept[first].weight * swept[second].weight,
+            padding: 0,
+        })
+        .collect();
+    pairs.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    pairs.truncate((PAIRS_PER_VIEW * count).max(1));
+    let sum: f32 = pairs.iter().map(|pair| pair.weight).sum();
+    pairs.iter_mut().for_each(|pair| pair.weight /= sum.max(1.0e-30));
+    pairs
+}
