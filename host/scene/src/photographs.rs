@@ -243,11 +243,12 @@ impl<'a> Album<'a> {
             BackgroundChoice::Auto => !backdrop.can_be_told(),
         };
         if choice == BackgroundChoice::Auto && whole_pictures {
+            // The same text for any choice of sources, so that it is shown once.
             warning = Some(format!(
-                "the photographs' borders are not of one colour (they deviate by {:.0} of 255 from {backdrop}): nothing is cut \
-                 out, whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG \
-                 with alpha)",
-                backdrop.noise_level()
+                "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): nothing is cut out, \
+                 whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG with \
+                 alpha)",
+                matte::MOST_NOISE_LEVEL
             ));
         }
         let (points, near_far) = self.space(views);

@@ -101,6 +101,9 @@ pub(super) struct Backdrop {
     noise: f32,
 }
 
+/// The largest deviation of the typical border from one colour with which an object can be separated, of 255.
+pub(super) const MOST_NOISE_LEVEL: f32 = THRESHOLD.1 / NOISE_FACTOR * 255.0;
+
 impl Backdrop {
     /// Estimates the background from the borders of all photographs: the colour is their median, and the threshold is
     /// proportional to the median noise.
@@ -120,11 +123,6 @@ impl Backdrop {
     /// Whether an object can be separated from it: the noise of the borders is small enough for a threshold.
     pub(super) fn can_be_told(&self) -> bool {
         NOISE_FACTOR * self.noise <= THRESHOLD.1
-    }
-
-    /// The deviation of the typical border from one colour, of 255.
-    pub(super) fn noise_level(&self) -> f32 {
-        self.noise * 255.0
     }
 
     /// Red, green, blue in `[0, 1]`.
