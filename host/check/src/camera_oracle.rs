@@ -63,21 +63,27 @@ pub fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
     // In homogeneous coordinates: the intrinsics first, then one division.
     let x = (focal_x * dot(right, offset) + middle_x * depth) / depth;
     let y = (focal_y * dot(down, offset) + middle_y * depth) / depth;
+    let in_image = inside(camera, Bounded::ZERO.below(depth), x, y);
+    Seen { x, y, depth, in_image }
+}
+
+/// Whether a point that is projected to these image coordinates is in front of the camera and inside its image; the border
+/// counts. `None` if an error of a number may change the answer.
+pub fn inside(camera: &CameraBlock, in_front: Option<bool>, x: Bounded, y: Bounded) -> Option<bool> {
     let answers = [
-        Bounded::ZERO.below(depth),
+        in_front,
         x.below(Bounded::ZERO).map(|out| !out),
         y.below(Bounded::ZERO).map(|out| !out),
         Bounded::from(camera.width).below(x).map(|out| !out),
         Bounded::from(camera.height).below(y).map(|out| !out),
     ];
-    let in_image = if answers.contains(&Some(false)) {
+    if answers.contains(&Some(false)) {
         Some(false)
     } else if answers.contains(&None) {
         None
     } else {
         Some(true)
-    };
-    Seen { x, y, depth, in_image }
+    }
 }
 
 /// Nodes of one axis of a grid around a coordinate, within its error.

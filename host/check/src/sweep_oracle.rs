@@ -16,7 +16,7 @@ pub use paths::{follow_path, joined_cost};
 pub use picked::pick_disparity;
 
 use crate::bounded::{Bounded, ROUNDING};
-use crate::camera_oracle::{Tents, Vector, along, axes, centre, dot, tents, towards};
+use crate::camera_oracle::{Tents, Vector, along, axes, centre, dot, inside, tents, towards};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::plane_sweep::frustum::LEAST_DEPTH;
 use viewfuse_core::plane_sweep::{PLANES, Planes};
@@ -57,21 +57,7 @@ fn sight(camera: &CameraBlock, view: &CameraBlock, at: [f32; 2], disparity: Boun
     let inverse = Bounded::ONE / depth_ratio;
     let x = focal_x * (place[0] * inverse) + principal_x;
     let y = focal_y * (place[1] * inverse) + principal_y;
-    let answers = [
-        least.below(place[2]),
-        x.below(Bounded::ZERO).map(|out| !out),
-        y.below(Bounded::ZERO).map(|out| !out),
-        Bounded::from(view.width).below(x).map(|out| !out),
-        Bounded::from(view.height).below(y).map(|out| !out),
-    ];
-    let in_image = if answers.contains(&Some(false)) {
-        Some(false)
-    } else if answers.contains(&None) {
-        None
-    } else {
-        Some(true)
-    };
-    Sight { x, y, depth_ratio, in_image }
+    Sight { x, y, depth_ratio, in_image: inside(view, least.below(place[2]), x, y) }
 }
 
 /// Bilinear mixture of numbers that have errors themselves, however it is written: by differences or by shares.

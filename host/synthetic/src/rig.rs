@@ -17,7 +17,7 @@ use viewfuse_core::random::uniform_from;
 pub enum Rig {
     /// On an arc in front of the subject, about 6 degrees from one view to the next, at most 120 degrees in all.
     Arc,
-    /// Side by side in rows, all looking about the same way: a wall of cameras.
+    /// Forward-facing: side by side in rows, with almost parallel principal axes.
     Forward,
     /// All around, at two heights.
     Turntable,
@@ -116,7 +116,7 @@ impl Rig {
         Ok(Camera { pose: Pose::look_at(centre, aim, roll)?, pinhole })
     }
 
-    /// A camera of a wall of cameras: `x` from -0.5 to 0.5 across it.
+    /// A camera of a forward-facing rig: `x` from -0.5 to 0.5 along its row.
     fn side_by_side(
         self,
         walk: &Walk,
@@ -128,7 +128,7 @@ impl Rig {
         let d = walk.distance;
         let centre = walk.subject + Vec3::new(0.75 * d * x, -d * (1.0 + 0.03 * hand.shake()), 0.0);
         let centre = Vec3::new(centre.x, centre.y, up);
-        // Looking at something far behind the subject makes the axes almost parallel.
+        // Principal axes that meet far behind the subject are almost parallel.
         let far = Vec3::new(walk.subject.x, walk.subject.y + 1.5 * d, walk.subject.z - 0.2 * up);
         let aim = far + Vec3::new(hand.shake(), 0.0, hand.shake()) * (0.03 * d);
         Ok(Camera { pose: Pose::look_at(centre, aim, Vec3::Z)?, pinhole })

@@ -44,16 +44,7 @@ fn view(list: &Path, index: usize, line: usize, numbers: &[f64]) -> Result<RawVi
     matrix[15] = 1.0;
     let name = format!("photograph_{index}");
     let image = ImageFile::open(&list.with_file_name(format!("{name}.png")))?;
-    let size = image.size();
-    let intrinsics = RawIntrinsics {
-        focal: [focal; 2],
-        principal: size.map(|side| f64::from(side) / 2.0),
-        size: Some(size),
-        lens: None,
-        path: path.clone(),
-        place: place.clone(),
-        size_place: place.clone(),
-    };
+    let intrinsics = RawIntrinsics::centred(focal, image.size(), path.clone(), place.clone());
     let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
     Ok(RawView::new(name, Some(image), pose, Some(intrinsics)))
 }

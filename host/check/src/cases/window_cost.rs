@@ -44,6 +44,12 @@ impl Inputs {
     fn element_count(&self) -> usize {
         self.costs.len() / 2
     }
+
+    /// An evaluation for each pixel and group of planes, on all cores.
+    fn for_each<T: Send>(&self, evaluate: impl Fn(u32, u32) -> T + Sync) -> Vec<T> {
+        let elements: Vec<(u32, u32)> = elements(&self.block).collect();
+        map(elements.len(), 8, |at| evaluate(elements[at].0, elements[at].1))
+    }
 }
 
 /// Pixels and groups of planes, in the order of the volume.
@@ -88,10 +94,7 @@ impl Case for RowSums {
     }
 
     fn expected(inputs: &Inputs) -> Vec<Option<Bounded>> {
-        let elements: Vec<_> = elements(&inputs.block).collect();
-        let sums = map(elements.len(), 8, |at| {
-            sweep_oracle::row_sums(&inputs.block, &inputs.costs, elements[at].0, elements[at].1)
-        });
+        let sums = inputs.for_each(|pixel, group| sweep_oracle::row_sums(&inputs.block, &inputs.costs, pixel, group));
         sums.into_iter().flatten().flatten().map(Some).collect()
     }
 }
@@ -134,10 +137,8 @@ impl Case for WindowCost {
     }
 
     fn expected(inputs: &Inputs) -> Vec<Option<Bounded>> {
-        let elements: Vec<_> = elements(&inputs.block).collect();
-        let means = map(elements.len(), 8, |at| {
-            sweep_oracle::window_cost(&inputs.block, &inputs.sums, elements[at].0, elements[at].1)
-        });
+        let means =
+            inputs.for_each(|pixel, group| sweep_oracle::window_cost(&inputs.block, &inputs.sums, pixel, group));
         means.into_iter().flatten().map(Some).collect()
     }
 }

@@ -120,15 +120,7 @@ fn view(file: &Path, row: usize, numbers: &[f64], image: &Path) -> Result<RawVie
     }
     matrix[15] = 1.0;
     let size = check::size(file, place.clone(), at(1, 4), at(0, 4))?;
-    let intrinsics = RawIntrinsics {
-        focal: [at(2, 4); 2],
-        principal: size.map(|side| f64::from(side) / 2.0),
-        size: Some(size),
-        lens: None,
-        path: path.clone(),
-        place: place.clone(),
-        size_place: place.clone(),
-    };
+    let intrinsics = RawIntrinsics::centred(at(2, 4), size, path.clone(), place.clone());
     let pose = RawPose { matrix, form: PoseForm::WorldFromOpenCv, path, place };
     let mut view = RawView::new(files::stem(image), Some(ImageFile::open(image)?), pose, Some(intrinsics));
     view.near_far = Some([numbers[15], numbers[16]]);

@@ -172,3 +172,18 @@ pub struct RawIntrinsics {
     /// The place of the size in the file.
     pub size_place: Place,
 }
+
+impl RawIntrinsics {
+    /// One focal length for both axes, the principal point in the centre of images of this size, no lens distortion.
+    pub fn centred(focal: f64, size: [u32; 2], path: PathBuf, place: Place) -> RawIntrinsics {
+        RawIntrinsics {
+            focal: [focal; 2],
+            principal: size.map(|side| f64::from(side) / 2.0),
+            size: Some(size),
+            lens: None,
+            path,
+            place: place.clone(),
+            size_place: place,
+        }
+    }
+}
