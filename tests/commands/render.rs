@@ -5,12 +5,13 @@ use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{names_in, toy};
+use viewfuse_tests::command::{change_poses, names_in, toy};
 
 viewfuse_tests::trials![
     writes_a_picture_a_depth_map_a_sheet_and_a_record,
     leaves_out_what_counts_little,
     orbits,
+    cameras_of_a_map_stay_in_its_coordinates,
     the_same_run_makes_the_same_pictures,
     chooses_sources,
     a_second_run_replaces_the_first,
@@ -123,6 +124,28 @@ fn orbits() {
         // Three places on a circle are as far from each other.
         let gap = |other: usize| (0..3).map(|k| (centres[frame][k] - centres[other][k]).powi(2)).sum::<f64>().sqrt();
         assert_near(gap((frame + 1) % 3), gap((frame + 2) % 3), 1.0e-3);
+    }
+}
+
+fn cameras_of_a_map_stay_in_its_coordinates() {
+    let (scene, origin) = (toy(), [4_468_123.37, -5_333_987.91, 512.253]);
+    done(scene.path(), "render toy --orbit 2 --targets 20 --size 32x32 -o near");
+    change_poses(&scene, |_, matrix| (0..3).for_each(|axis| matrix[4 * axis + 3] += origin[axis]));
+    let said = done(scene.path(), "inspect toy");
+    assert!(
+        said.contains("\nframe      the file's (44681") && said.contains(") is the origin, its 1 the unit\n"),
+        "{said}"
+    );
+    done(scene.path(), "render toy --orbit 2 --targets 20 --size 32x32 -o far");
+    let [near, far] = ["near", "far"].map(|folder| record(scene.path(), folder));
+    assert_eq!(near["frames"].as_array().map(Vec::len), Some(3));
+    for frame in 0..3 {
+        for (axis, offset) in origin.iter().enumerate() {
+            let row = |record: &Value| numbers(&record["frames"][frame]["world_from_camera"][axis]);
+            let (near, far) = (row(&near), row(&far));
+            (0..3).for_each(|column| assert_near(far[column], near[column], 1.0e-5));
+            assert_near(far[3] - offset, near[3], 1.0e-5);
+        }
     }
 }
 

@@ -5,4 +5,5 @@ mod genvs;
 mod pixelnerf;
 mod plane_sweep;
 mod sampling;
+mod surveyed;
 mod visual_hull;

@@ -106,7 +106,7 @@ fn numbers_that_are_none() {
     assert_srn_refused("pose/2.txt", "", "pose/2.txt: found 0 numbers instead of 16", &[]);
     let folder = scenes::srn();
     folder.write("pose/2.txt", [0xff, 0xfe, 0x00]);
-    assert_refused(&folder, "pose/2.txt: cannot be read", &["UTF-8"]);
+    assert_refused(&folder, "pose/2.txt:1: this line is not UTF-8 text", &["UTF-8"]);
 }
 
 #[test]
@@ -252,4 +252,77 @@ fn images_that_cannot_be_read() {
 
     folder.write("rgb/2.png", scenes::huge_png());
     assert_refused(&folder, "rgb/2.png: the image is 100000 x 100000; at most 16384", &[]);
+}
+
+#[test]
+fn numbers_out_of_range_and_keys_that_stand_twice_are_told() {
+    let range = "not both from 0.001 to 1e9 pixels";
+    assert_transforms_refused("", "fl_x", json!(1.0e30), &["frames[0]: focal lengths 1e30 and 24 are", range]);
+    assert_transforms_refused("/frames/0", "fl_y", json!(-3), &["focal lengths 20 and -3 are", range]);
+    assert_transforms_refused(
+        "",
+        "cx",
+        json!(-2.5e9),
+        &["principal point (-2500000000, 6.5) is further than 1e9 pixels"],
+    );
+    assert_srn_refused(
+        "intrinsics.txt",
+        "1e30 8 6 0\n0 0 0\n1\n12 16\n",
+        "intrinsics.txt:1: focal lengths 1e30",
+        &[range],
+    );
+    let text = scenes::transforms().to_string();
+    for (given, twice, key) in [
+        ("\"fl_y\"", "\"fl_y\": 24,\n\"fl_y\"", "fl_y"),
+        ("\"file_path\"", "\"file_path\": \"other.png\",\n\"file_path\"", "file_path"),
+    ] {
+        let folder = scenes::transforms_folder(&Value::Null);
+        folder.write("transforms.json", text.replacen(given, twice, 1));
+        let message = format!("not valid JSON: the key \"{key}\" stands twice in one object");
+        assert_refused(&folder, "transforms.json:2:", &[&message]);
+    }
+}
+
+#[test]
+fn coordinates_that_overflow_are_told_with_their_place() {
+    for (value, part) in [("1e39", "32-bit number"), ("1e31", "further than 1e30"), ("1e400", "not a finite number")] {
+        let text = words(&POSE).replacen("1 1 0 0 2", &format!("{value} 1 0 0 2"), 1);
+        assert!(text.contains(value), "{text}");
+        assert_srn_refused("pose/2.txt", &text, "pose/2.txt:", &[part]);
+    }
+    let mut transforms = scenes::transforms();
+    transforms["frames"][0]["transform_matrix"][1][3] = json!(1.0e31);
+    let part = "frames[0].transform_matrix: not a camera pose: the camera's centre is further than 1e30";
+    assert_refused(&scenes::transforms_folder(&transforms), "transforms.json: ", &[part]);
+    let folder = scenes::transforms_folder(&Value::Null);
+    folder.write("transforms.json", scenes::transforms().to_string().replacen("\"fl_x\":20.0", "\"fl_x\":1e400", 1));
+    assert_refused(&folder, "transforms.json:1:", &["number out of range"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn names_that_are_no_text_work_and_stay_different() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+    let folder = scenes::srn();
+    for name in [&b"caf\xe9"[..], &b"caf\xe8"[..]] {
+        let file = |folder_name: &str, extension: &str| {
+            let name = [name, b".", extension.as_bytes()].concat();
+            folder.path().join(folder_name).join(OsStr::from_bytes(&name))
+        };
+        fs::copy(folder.path().join("rgb/2.png"), file("rgb", "png")).expect("a photograph");
+        fs::copy(folder.path().join("pose/2.txt"), file("pose", "txt")).expect("a pose");
+        fs::create_dir_all(folder.path().join("masks")).expect("a folder");
+        fs::copy(folder.path().join("rgb/2.png"), file("masks", "png")).expect("a mask");
+    }
+    let scene = Scene::open(folder.path()).expect("a scene");
+    let names: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
+    assert_eq!(names, ["2", "10", "caf%E8", "caf%E9", "target_1"]);
+    assert_eq!(scene.views.iter().filter(|view| view.mask.is_some()).count(), 2);
+    assert!(scene.photograph(3).is_ok_and(|photograph| photograph.has_alpha));
+    // A list that is no text is named with its line.
+    let list = [&b"1\n\n"[..], b"caf\xe9.png", b" 1 0"].concat();
+    let folder = Folder::new();
+    folder.write("toy_par.txt", list);
+    assert_refused(&folder, "toy_par.txt:3: this line is not UTF-8 text", &[]);
 }

@@ -1,9 +1,13 @@
 //! Photographs as cameras and programs save them: WebP and TIFF, and JPEGs that say they must be turned.
 
 use super::made::{assert_refused, open};
-use image::{DynamicImage, ImageFormat, Rgb, RgbImage};
+use image::metadata::Orientation;
+use image::{DynamicImage, GrayImage, ImageFormat, Luma, Rgb, RgbImage};
 use serde_json::json;
 use std::io::Cursor;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::write::{Layout, write};
 use viewfuse_tests::scenes::{self, Folder};
 
 /// A picture whose left half is red: turned, another half is.
@@ -14,8 +18,12 @@ fn half_red(width: u32, height: u32) -> DynamicImage {
 
 /// A JPEG whose tag says how it must be turned to be upright.
 fn tagged(width: u32, height: u32, orientation: u8) -> Vec<u8> {
+    with_tag(&half_red(width, height), orientation)
+}
+
+fn with_tag(picture: &DynamicImage, orientation: u8) -> Vec<u8> {
     let mut jpeg = Cursor::new(Vec::new());
-    half_red(width, height).write_to(&mut jpeg, ImageFormat::Jpeg).expect("a JPEG");
+    picture.write_to(&mut jpeg, ImageFormat::Jpeg).expect("a JPEG");
     let mut exif = b"Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".to_vec();
     exif.extend([orientation, 0, 0, 0, 0, 0, 0, 0]);
     let mut bytes = jpeg.into_inner();
@@ -116,4 +124,87 @@ fn a_header_behind_many_tags_is_found() {
         bytes.splice(2..2, segment);
     }
     assert!(is_red(&folder(Some([24, 32]), &bytes), [24, 32], [0.5, 0.2]));
+}
+
+/// A mask whose left half counts.
+fn left_half(width: u32, height: u32) -> DynamicImage {
+    GrayImage::from_fn(width, height, |x, _| Luma([if 2 * x < width { 255 } else { 0 }])).into()
+}
+
+/// A mask as photograph editors write it for the stored or the upright picture.
+fn png(picture: &DynamicImage) -> Vec<u8> {
+    let mut bytes = Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png).expect("a PNG");
+    bytes.into_inner()
+}
+
+/// The half of the photograph that is red is the one that its mask says counts.
+#[track_caller]
+fn assert_masked(folder: &Folder, size: [u32; 2]) {
+    let photograph = open(folder).photograph(0).expect("a photograph");
+    assert_eq!(photograph.pixels.dimensions(), size.into());
+    let fits = |pixel: &image::Rgba<u8>| (pixel[0] > 100) == (pixel[3] > 128);
+    let wrong = photograph.pixels.pixels().filter(|pixel| !fits(pixel)).count();
+    // Compression blurs the line between the halves.
+    assert!(wrong <= size[0].max(size[1]) as usize, "{wrong} pixels");
+    assert!(photograph.pixels.pixels().any(|pixel| pixel[3] == 0) && photograph.pixels.pixels().any(|p| p[3] == 255));
+}
+
+#[test]
+fn a_mask_is_turned_like_its_photograph() {
+    for orientation in [5, 6, 7, 8] {
+        let upright = {
+            let mut mask = left_half(32, 24);
+            mask.apply_orientation(Orientation::from_exif(orientation).expect("an orientation"));
+            mask
+        };
+        assert_eq!((upright.width(), upright.height()), (24, 32));
+        // Cameras of the upright and of the stored picture; masks of each, of another size, and with a tag of their own.
+        for size in [[24, 32], [32, 24]] {
+            for mask in [
+                png(&left_half(32, 24)),
+                png(&upright),
+                png(&left_half(64, 48)),
+                with_tag(&left_half(32, 24), orientation),
+            ] {
+                let folder = folder(Some(size), &tagged(32, 24, orientation));
+                folder.write("masks/1.png", mask);
+                assert_masked(&folder, size);
+                let scene = open(&folder);
+                let out = Folder::new();
+                for layout in [Layout::Transforms, Layout::Colmap, Layout::Neus] {
+                    let path = out.path().join(layout.to_string());
+                    write(&scene, layout, &path, &Silent).expect("written");
+                    let read = Scene::open(&path).expect("a scene");
+                    assert_eq!(scene.photograph(0).expect("one"), read.photograph(0).expect("the other"));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_shape_and_the_tag_of_a_mask_tell_which_picture_it_is_of() {
+    // Almost square: the shape tells still.
+    let folder = folder(Some([99, 100]), &tagged(100, 99, 6));
+    let mut upright = left_half(100, 99);
+    upright.apply_orientation(Orientation::Rotate90);
+    for mask in [png(&left_half(100, 99)), png(&upright), with_tag(&left_half(100, 99), 6)] {
+        folder.write("masks/1.png", mask);
+        assert_masked(&folder, [99, 100]);
+    }
+    // A shape that fits neither is refused by its name, with or without a tag.
+    for mask in [png(&left_half(50, 50)), png(&left_half(60, 30)), with_tag(&left_half(60, 30), 6)] {
+        folder.write("masks/1.png", mask);
+        let message = open(&folder).photograph(0).expect_err("another shape").to_string();
+        assert!(message.contains("masks/1.png: the image is ") && message.contains("for 99 x 100"), "{message}");
+    }
+    // Of a square photograph with a tag nothing tells: it is refused, whatever mask it has.
+    let square = self::folder(Some([32, 32]), &tagged(32, 32, 6));
+    square.write("masks/1.png", with_tag(&left_half(32, 32), 6));
+    assert_refused(&square, "images/1.jpg: the file says that its pixels must be turned", &["Rotate90"]);
+    // A mask's own tag counts also for a photograph without one.
+    let folder = self::folder(Some([24, 32]), &png(&half_red(32, 24).rotate90()));
+    folder.write("masks/1.png", with_tag(&left_half(32, 24), 6));
+    assert_masked(&folder, [24, 32]);
 }

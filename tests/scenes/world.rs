@@ -53,6 +53,43 @@ fn surveyed_coordinates_keep_their_millimetres() {
 }
 
 #[test]
+fn the_origin_is_what_the_cameras_look_at() {
+    // A ring of cameras around a point of a map, looking at it; the point is no centroid of theirs.
+    let subject = DVec3::new(4_468_123.37, -5_333_987.91, 512.253);
+    let folder = at([[0.0; 3]; 3]);
+    for index in 0..3 {
+        let (sine, cosine) = (2.0 * f64::from(index)).sin_cos();
+        let forward = -DVec3::new(0.8 * cosine, 0.8 * sine, 0.6);
+        let right = forward.cross(DVec3::Z).normalize();
+        let down = forward.cross(right);
+        let centre = subject - 1.3 * forward;
+        let rows = [0, 1, 2].map(|row| [right[row], down[row], forward[row], centre[row]]);
+        folder.write(&format!("pose/{index}.txt"), words(&[rows.as_flattened(), &[0.0, 0.0, 0.0, 1.0]].concat()));
+    }
+    let scene = open(&folder);
+    assert!(scene.frame.origin.distance(subject) < 1e-8, "{:?}", scene.frame);
+    assert!(centres(&scene).into_iter().all(|centre| (centre.length() - 1.3).abs() < 1e-6));
+}
+
+#[test]
+fn a_single_place_far_away_is_the_origin() {
+    for (place, is_moved) in [(1.0e6, true), (1.0e3, false)] {
+        let scene = open(&at([[place, 0.5, 0.25]; 3]));
+        assert_eq!(scene.frame.origin.length() > 1.0, is_moved);
+        assert!(scene.frame.file(centres(&scene)[1].as_dvec3()).distance(DVec3::new(place, 0.5, 0.25)) < 1e-9);
+    }
+}
+
+#[test]
+fn numbers_that_cannot_hold_the_distances_are_told() {
+    let warned = |far: f64| {
+        let scene = open(&at([[far, 0.0, 0.0], [far, 1.0, 0.0], [far, 0.0, 1.0]]));
+        scene.warnings.iter().any(|warning| warning.contains("of their distances; subtract the offset"))
+    };
+    assert_eq!([1.0e3, 1.0e7, 1.0e11].map(warned), [false, false, true]);
+}
+
+#[test]
 fn extreme_units_become_usual_ones() {
     for factor in [1e-9, 1e12] {
         let scene = open(&at([[factor, 0.0, 0.0], [0.0, factor, 0.0], [0.0, 0.0, factor]]));
@@ -98,5 +135,5 @@ fn points_and_depths_move_with_the_cameras() {
 fn what_overflows_is_refused() {
     let folder = colmap_text();
     folder.write("sparse/0/points3D.txt", "1 1e35 0 0 1 2 3 0.5 11 0\n");
-    assert_refused(&folder, "sparse/0: the point (1000000", &["further than 1e30"]);
+    assert_refused(&folder, "sparse/0/points3D.txt:1: the point (1e35, 0, 0) is not finite", &["further than 1e30"]);
 }

@@ -1,7 +1,9 @@
 //! Scenes written out in every layout that can hold them, and read back the same.
 
 use super::made::*;
+use glam::DVec3;
 use serde_json::json;
+use std::path::Path;
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::write::{Layout, WriteSceneError, Written, write};
 use viewfuse::scene::{Scene, Split, View};
@@ -12,7 +14,7 @@ fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
     let path = folder.path().join("out");
     let written = write(scene, layout, &path, &Silent).unwrap_or_else(|error| panic!("{error}"));
     let read = Scene::open(&path).unwrap_or_else(|error| panic!("{layout}: {error}"));
-    assert_eq!(read.layout, layout.to_string());
+    assert_eq!(read.layout, layout.reader());
     assert_eq!(read.warnings, Vec::<String>::new());
     (folder, read, written)
 }
@@ -21,7 +23,8 @@ fn written(scene: &Scene, layout: Layout) -> (Folder, Scene, Written) {
 #[track_caller]
 fn assert_same(layout: Layout, scene: &Scene, read: &Scene) {
     assert_eq!(names(read), names(scene), "{layout}");
-    for (index, (a, b)) in scene.views.iter().zip(&read.views).enumerate() {
+    assert_same_photographs(layout, scene, read);
+    for (a, b) in scene.views.iter().zip(&read.views) {
         let numbers = |view: &View| {
             let pinhole = view.camera.pinhole;
             let pose = view.camera.pose.to_opencv().into_iter().flatten();
@@ -30,9 +33,48 @@ fn assert_same(layout: Layout, scene: &Scene, read: &Scene) {
         for (a, b) in numbers(a).into_iter().zip(numbers(b)) {
             assert!((a - b).abs() <= 2e-7 * (1.0 + a.abs()), "{layout}: {a} and {b}");
         }
+    }
+}
+
+#[track_caller]
+fn assert_same_photographs(layout: Layout, scene: &Scene, read: &Scene) {
+    for (index, (a, b)) in scene.views.iter().zip(&read.views).enumerate() {
         assert_eq!(a.image.is_some(), b.image.is_some(), "{layout}");
         if a.image.is_some() {
             assert_eq!(scene.photograph(index).expect("one"), read.photograph(index).expect("the other"), "{layout}");
+        }
+    }
+}
+
+/// Centre and radius of the unit sphere of a NeuS scene in the coordinates of the files that it was written from.
+fn sphere(folder: &Path) -> (DVec3, f64) {
+    let file = std::fs::File::open(folder.join("cameras_sphere.npz")).expect("an archive");
+    let mut archive = zip::ZipArchive::new(file).expect("an archive");
+    let index = (0..archive.len())
+        .find(|index| archive.by_index(*index).expect("an entry").name().expect("a name").starts_with("scale_mat_"));
+    let mut bytes = Vec::new();
+    std::io::copy(&mut archive.by_index(index.expect("a sphere")).expect("an entry"), &mut bytes).expect("bytes");
+    let numbers: Vec<f64> =
+        bytes[bytes.len() - 128..].as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+    assert_eq!((numbers[0], numbers[1], numbers[15]), (numbers[5], 0.0, 1.0));
+    (DVec3::new(numbers[3], numbers[7], numbers[11]), numbers[0])
+}
+
+/// Every view sees points of the world where it saw them before, in the coordinates of the unit sphere, and the sphere
+/// is where the cameras look.
+#[track_caller]
+fn assert_same_in_the_sphere(scene: &Scene, read: &Scene) {
+    assert_eq!(names(read), names(scene));
+    assert_same_photographs(Layout::Neus, scene, read);
+    let (centre, radius) = sphere(&read.path);
+    for (a, b) in scene.views.iter().zip(&read.views) {
+        for offset in [DVec3::ZERO, DVec3::new(0.4, -0.3, 0.2), DVec3::new(-0.1, 0.5, 0.6)] {
+            let before = a.camera.project(scene.frame.world(centre + radius * offset).as_vec3());
+            let after = b.camera.project(read.frame.world(offset).as_vec3());
+            let pixels = [before.x - after.x, before.y - after.y].map(f32::abs);
+            assert!(pixels.into_iter().all(|error| error < 1e-3), "{before:?} {after:?}");
+            let depths = [before.depth * scene.frame.scale as f32, after.depth * (radius * read.frame.scale) as f32];
+            assert!((depths[0] - depths[1]).abs() < 1e-5 * depths[0].abs(), "{depths:?}");
         }
     }
 }
@@ -47,7 +89,10 @@ fn every_layout_that_can_hold_a_scene_gives_it_back() {
     let scene = open(&folder);
     for layout in Layout::ALL {
         let (_folder, read, written) = written(&scene, layout);
-        assert_same(layout, &scene, &read);
+        match layout {
+            Layout::Neus => assert_same_in_the_sphere(&scene, &read),
+            _ => assert_same(layout, &scene, &read),
+        }
         assert_eq!(written.photograph_count, 2);
         let kept = read.views[1].near_far == Some([0.5, 9.5]);
         assert_eq!(kept, layout == Layout::Llff);
@@ -59,9 +104,13 @@ fn every_layout_that_can_hold_a_scene_gives_it_back() {
 fn points_and_poses_without_photographs() {
     let folder = colmap_text();
     let scene = open(&folder);
-    let (_folder, read, written) = self::written(&scene, Layout::Colmap);
-    assert_same(Layout::Colmap, &scene, &read);
-    assert_eq!((&read.points, written.left_out), (&scene.points, vec![]));
+    for layout in [Layout::Colmap, Layout::ColmapBinary] {
+        let (folder, read, written) = self::written(&scene, layout);
+        assert_same(layout, &scene, &read);
+        assert_eq!((&read.points, written.left_out), (&scene.points, vec![]));
+        let is_binary = folder.path().join("out/sparse/0/cameras.bin").exists();
+        assert_eq!(is_binary, layout == Layout::ColmapBinary);
+    }
     let (_folder, read, written) = self::written(&scene, Layout::Transforms);
     assert_same(Layout::Transforms, &scene, &read);
     assert_eq!((read.points.len(), written.left_out), (0, vec!["2 reconstructed points".to_owned()]));
@@ -94,7 +143,7 @@ fn lenses_and_masks() {
         let folder = through_a_lens(model, coefficient);
         let scene = open(&folder);
         assert!(scene.views[0].lens.is_some() && scene.views[0].mask.is_some());
-        for layout in [Layout::Transforms, Layout::Colmap] {
+        for layout in [Layout::Transforms, Layout::Colmap, Layout::ColmapBinary] {
             let (_folder, read, written) = written(&scene, layout);
             assert_same(layout, &scene, &read);
             assert_eq!(read.views[0].lens, scene.views[0].lens);
@@ -104,8 +153,13 @@ fn lenses_and_masks() {
         // Others hold the pinhole's picture.
         let (_folder, read, written) = written(&scene, Layout::Srn);
         let (before, after) = (scene.photograph(0).expect("one"), read.photograph(0).expect("the other"));
-        assert_eq!((before.pixels, before.has_alpha), (after.pixels, after.has_alpha));
+        assert_eq!((&before.pixels, before.has_alpha), (&after.pixels, after.has_alpha));
         assert!(read.views[0].lens.is_none() && read.views[0].mask.is_none());
+        // NeuS has its masks beside the photographs.
+        let (folder, read, _) = self::written(&scene, Layout::Neus);
+        let after = read.photograph(0).expect("the other");
+        assert!(before.pixels == after.pixels && after.has_alpha && read.views[0].lens.is_none());
+        assert_eq!(read.views[0].mask, Some(folder.path().join("out/mask/1.png")));
         assert!(written.left_out.iter().any(|line| line.contains("the lens of 1 photographs")));
     }
 }
@@ -122,7 +176,7 @@ fn what_a_layout_cannot_hold_is_refused_and_leaves_nothing() {
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
     };
     let (srn, colmap) = (scenes::srn(), colmap_text());
-    for layout in [Layout::Transforms, Layout::Colmap, Layout::Middlebury, Layout::Llff] {
+    for layout in Layout::ALL.into_iter().filter(|layout| *layout != Layout::Srn) {
         refused(&open(&srn), layout, "view \"target_1\" is a pose without a photograph");
     }
     refused(&open(&colmap), Layout::Srn, "two focal lengths, 20 and 24");
@@ -151,5 +205,84 @@ fn what_a_layout_cannot_hold_is_refused_and_leaves_nothing() {
     for layout in Layout::ALL {
         assert_eq!(layout.to_string().parse(), Ok(layout));
     }
-    assert!("nerf".parse::<Layout>().expect_err("none").to_string().contains("transforms, colmap, srn"));
+    assert!("nerf".parse::<Layout>().expect_err("none").to_string().contains("transforms, colmap, colmap-binary, srn"));
+}
+
+#[test]
+fn a_scene_of_a_unit_sphere_keeps_it() {
+    let folder = neus();
+    folder.remove("mask/03.png");
+    let scene = open(&folder);
+    let out = Folder::new();
+    write(&scene, Layout::Neus, &out.path().join("out"), &Silent).expect("written");
+    let read = Scene::open(out.path().join("out")).expect("a scene");
+    assert_same(Layout::Neus, &scene, &read);
+    assert_eq!(sphere(&read.path), (DVec3::ZERO, 1.0));
+    assert_eq!((read.views[0].near_far, read.views.len()), (scene.views[0].near_far, 2));
+}
+
+#[test]
+fn names_without_numbers_of_their_own_find_their_cameras_and_masks() {
+    // Two cameras count alike, a third view has no number; one of them has no mask.
+    let mut frames = Vec::new();
+    let folder = Folder::new();
+    for (index, name) in ["left/1", "right/1", "b"].into_iter().enumerate() {
+        let mut matrix = scenes::opengl_matrix();
+        matrix[0][3] = json!(index as f64);
+        frames.push(json!({ "file_path": format!("{name}.png"), "transform_matrix": matrix }));
+        let level = 40 * index as u8;
+        image::RgbImage::from_pixel(16, 12, image::Rgb([level; 3]))
+            .save(folder.file(&format!("{name}.png")))
+            .expect("one");
+        if name != "b" {
+            let mask = image::GrayImage::from_pixel(16, 12, image::Luma([200 + level]));
+            mask.save(folder.file(&format!("masks/{name}.png"))).expect("a mask");
+        }
+    }
+    folder.write("transforms.json", json!({ "fl_x": 20, "frames": frames }).to_string());
+    let scene = open(&folder);
+    assert_eq!(names(&scene), ["left_1", "right_1", "b"]);
+    assert_eq!(scene.views.iter().filter(|view| view.mask.is_some()).count(), 2);
+    let out = Folder::new();
+    write(&scene, Layout::Neus, &out.path().join("out"), &Silent).expect("written");
+    let read = Scene::open(out.path().join("out")).expect("a scene");
+    let (centre, radius) = sphere(&read.path);
+    for (index, view) in scene.views.iter().enumerate() {
+        let other = read.view_named(&view.name).expect("the same view");
+        assert_eq!(scene.photograph(index).expect("one"), read.photograph(other).expect("the other"), "{}", view.name);
+        let centre_world = read.views[other].camera.pose.centre_world().as_dvec3();
+        let error =
+            (centre + radius * read.frame.file(centre_world)).distance(view.camera.pose.centre_world().as_dvec3());
+        assert!(error < 1e-5, "{}: {error}", view.name);
+    }
+}
+
+#[test]
+fn a_scene_far_from_the_origin_is_written_in_its_own_coordinates() {
+    let centres = [[0.001, 0.0, 0.0], [0.0, 1.002, 0.0], [0.0, 0.0, 1.003]]
+        .map(|near| DVec3::new(4_468_123.0, 5_333_987.0, 512.0) + DVec3::from_array(near));
+    let folder = llff();
+    folder.image("images_8/c.png", 16, 12);
+    let rows = centres.map(|centre| {
+        let mut row = llff_row();
+        (row[3], row[8], row[13]) = (centre.x, centre.y, centre.z);
+        row
+    });
+    folder.write("poses_bounds.npy", npy(&[3, 17], rows.as_flattened()));
+    let scene = open(&folder);
+    assert!(scene.frame.origin.distance(centres[0]) < 2.0);
+    for layout in Layout::ALL {
+        let (_folder, read, _) = written(&scene, layout);
+        let (centre, radius) = if layout == Layout::Neus { sphere(&read.path) } else { (DVec3::ZERO, 1.0) };
+        for (view, expected) in read.views.iter().zip(centres) {
+            let file = centre + radius * read.frame.file(view.camera.pose.centre_world().as_dvec3());
+            assert!(file.distance(expected) < 1e-6, "{layout}: {file} {expected}");
+        }
+        // As f32 sees it: the same scene as before.
+        let distance = |scene: &Scene| {
+            let [a, b] = [0, 2].map(|view| scene.views[view].camera.pose.centre_world());
+            f64::from(a.distance(b)) * scene.frame.scale
+        };
+        assert!((radius * distance(&read) - distance(&scene)).abs() < 1e-6, "{layout}");
+    }
 }

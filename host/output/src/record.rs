@@ -6,8 +6,8 @@ use viewfuse_device::{KernelTime, Transfers};
 use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
 use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Setting};
-use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
+use viewfuse_scene::{Scene, SceneFrame};
 
 /// A run as written to `run.json`. Times are in seconds.
 #[derive(Clone, Debug, Serialize)]
@@ -50,7 +50,7 @@ pub struct RunRecord {
     pub sources: Vec<String>,
     /// Estimated memory beside photographs and pictures, in bytes; null for fields without an estimate.
     pub memory_estimate: Option<u64>,
-    /// Near and far bounds of rays, world units; null for fields without such bounds.
+    /// Near and far bounds of rays, in units of the scene's files; null for fields without such bounds.
     pub near_far: Option<[f32; 2]>,
     /// Times of the stages that all frames share.
     pub times: TimesRecord,
@@ -157,8 +157,8 @@ pub fn kernel_records(times: &[KernelTime]) -> Vec<KernelRecord> {
 pub struct FrameRecord {
     /// The target's name.
     pub target: String,
-    /// Its camera-to-world matrix, OpenCV axes, row-major.
-    pub world_from_camera: [[f32; 4]; 4],
+    /// Its camera-to-world matrix in the coordinates of the scene's files, OpenCV axes, row-major.
+    pub world_from_camera: [[f64; 4]; 4],
     /// Weight of each source as used, in the order of `sources`; 0 where it was left out.
     pub weights: Vec<f32>,
     /// Weights before views were left out.
@@ -174,8 +174,8 @@ pub struct FrameRecord {
     pub expected: Option<Expected>,
     /// Structural similarity with the ground truth.
     pub ssim: Option<f64>,
-    /// World units of depth in one step of the 16-bit depth map, in which 0 means no surface; null for fields without
-    /// depths.
+    /// Depth in one step of the 16-bit depth map, in units of the scene's files; 0 in the map means no surface. Null for
+    /// fields without depths.
     pub depth_step: Option<f32>,
     /// Time for this frame alone.
     pub seconds: f64,
@@ -184,14 +184,14 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
-    /// The record of a frame whose sources have these names.
-    pub fn of(frame: &Frame, source_names: &[String]) -> FrameRecord {
+    /// The record of a frame whose sources have these names; `space` is the scene's frame.
+    pub fn of(frame: &Frame, source_names: &[String], space: &SceneFrame) -> FrameRecord {
         let count = source_names.len();
         let used = &frame.omission.weights.values()[..count];
         let before = &frame.weights.values()[..count];
         FrameRecord {
             target: frame.target.name.clone(),
-            world_from_camera: frame.target.camera.pose.to_opencv(),
+            world_from_camera: space.file_from_camera(&frame.target.camera.pose),
             weights: used.to_vec(),
             weights_before: before.to_vec(),
             left_out: source_names
@@ -204,7 +204,7 @@ impl FrameRecord {
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
             expected: None,
             ssim: frame.truth.as_ref().and_then(|truth| truth.ssim),
-            depth_step: (!frame.depths.is_empty()).then(|| depth_step(&frame.depths)),
+            depth_step: (!frame.depths.is_empty()).then(|| space.file_length(depth_step(&frame.depths))),
             seconds: frame.time.as_secs_f64(),
             encode_seconds: frame.encode.as_secs_f64(),
         }

@@ -13,9 +13,9 @@ use viewfuse_field::Renderer;
 use viewfuse_field::auto::Chosen;
 use viewfuse_field::render::{Finished, Frame, RenderOptions};
 use viewfuse_job::files::{WriteError, remove_if_there, write_whole};
-use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
+use viewfuse_scene::{Scene, SceneFrame};
 use viewfuse_weighting::Weighting;
 
 /// Name of the run record.
@@ -28,6 +28,8 @@ pub struct RunWriter {
     scene: String,
     /// The last part of it.
     scene_name: String,
+    /// The scene's frame: what is recorded is in the coordinates of its files.
+    space: SceneFrame,
     weighting: String,
     source_names: Vec<String>,
     frames: Vec<FrameRecord>,
@@ -64,6 +66,7 @@ impl RunWriter {
             folder: folder.to_path_buf(),
             scene: scene_label,
             scene_name: scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
+            space: scene.frame,
             weighting: weighting.to_string(),
             source_names: source_names(scene, job),
             frames: Vec::new(),
@@ -110,7 +113,7 @@ impl RunWriter {
         self.background = sources.background;
         self.warning.clone_from(&sources.warning);
         let expected = self.chosen.as_ref().and_then(|chosen| chosen.expected(frame));
-        self.frames.push(FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names) });
+        self.frames.push(FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.space) });
         Ok(())
     }
 
@@ -148,7 +151,7 @@ impl RunWriter {
             warnings: self.warning.into_iter().collect(),
             sources: self.source_names,
             memory_estimate: record.memory_estimate,
-            near_far: record.near_far,
+            near_far: record.near_far.map(|bounds| bounds.map(|depth| self.space.file_length(depth))),
             times: times_record(open_time, costs, self.frame_time, total_time),
             kernels: kernel_records(&renderer.kernel_times()),
             transfers: renderer.transfers().into(),

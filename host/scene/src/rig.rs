@@ -1,5 +1,6 @@
 //! The cameras of a scene as a whole: their focus, their distance from it, and the up direction.
 
+use crate::scene::frame;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::{Pose, PoseError};
@@ -111,22 +112,8 @@ fn half_diagonal_slope(pinhole: &Pinhole) -> f32 {
 /// The point nearest to lines given by a point and a unit direction each, in the sense of least squares, or `None`
 /// where they are too nearly parallel.
 pub fn nearest_point_to_lines(lines: &[(Vec3, Vec3)]) -> Option<Vec3> {
-    let count = lines.len() as f64;
-    let centroid = lines.iter().map(|(point, _)| point.as_dvec3()).sum::<glam::DVec3>() / count.max(1.0);
-    // Sum over lines of (I - d d^T) (p - c) = 0, in f64 because the matrix is nearly singular for narrow rigs.
-    let mut matrix = glam::DMat3::ZERO;
-    let mut right = glam::DVec3::ZERO;
-    for (point, direction) in lines {
-        let d = direction.as_dvec3();
-        let across = glam::DMat3::IDENTITY - glam::DMat3::from_cols(d * d.x, d * d.y, d * d.z);
-        matrix += across;
-        right += across * (point.as_dvec3() - centroid);
-    }
-    // Of perfectly parallel lines the determinant is 0, of perpendicular ones about count^3 / 4.
-    if !(matrix.determinant() / (count * count * count) > 1.0e-6) {
-        return None;
-    }
-    Some((centroid + matrix.inverse() * right).as_vec3())
+    let lines: Vec<_> = lines.iter().map(|(point, direction)| (point.as_dvec3(), direction.as_dvec3())).collect();
+    frame::nearest_point_to_lines(&lines).map(|point| point.as_vec3())
 }
 
 /// Mean up direction of the cameras; where rolled cameras cancel it, the axis of least variance of their centres, on

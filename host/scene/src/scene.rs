@@ -9,10 +9,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
+use image::GrayImage;
 use image::metadata::Orientation;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::lens::Lens;
+use viewfuse_core::pose::Pose;
 
 mod bytes;
 mod camera_models;
@@ -20,7 +22,8 @@ mod check;
 mod colmap;
 mod error;
 mod fault;
-mod files;
+pub(crate) mod files;
+pub(crate) mod frame;
 mod images;
 mod json;
 mod llff;
@@ -38,6 +41,7 @@ mod undistort;
 use check::Checked;
 pub use error::SceneError;
 pub use fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
+use images::Turn;
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 
@@ -93,10 +97,11 @@ pub struct ScenePoint {
 /// The world's place in the coordinates of the scene's files: `point_file = origin + scale * point_world`.
 ///
 /// Rounding to `f32` would lose the distances between cameras far from the origin (surveyed coordinates). The origin is
-/// therefore moved to the centroid of their centres before rounding, if that is more than 16 times their spread (root
-/// mean square distance from it) away from the origin. The scale is a power of two, other than 1 only where that spread
-/// is below 1e-3 or above 1e4. An ordinary scene keeps its numbers bit for bit, because learned fields depend on the
-/// unit.
+/// therefore moved before rounding, if the centroid of their centres is more than 16 times their spread (root mean square
+/// distance from it) away from the origin: to the point nearest to their principal axes, or to the centroid if these are
+/// parallel or meet further off. Cameras in one place are moved if it is further than 1e4 from the origin. The scale is a
+/// power of two, other than 1 only where the spread is below 1e-3 or above 1e4. An ordinary scene keeps its numbers bit for
+/// bit, because learned fields depend on the unit and on the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneFrame {
     /// The world's origin in the file's coordinates.
@@ -117,6 +122,21 @@ impl SceneFrame {
     /// A point of the world in the file's coordinates.
     pub fn file(&self, point_world: DVec3) -> DVec3 {
         self.origin + self.scale * point_world
+    }
+
+    /// A length of the world in the file's units.
+    pub fn file_length(&self, length_world: f32) -> f32 {
+        (f64::from(length_world) * self.scale) as f32
+    }
+
+    /// The camera-to-world matrix of a pose in the file's coordinates: OpenCV axes, row-major.
+    pub fn file_from_camera(&self, pose: &Pose) -> [[f64; 4]; 4] {
+        let mut matrix = pose.to_opencv().map(|row| row.map(f64::from));
+        let centre = self.file(pose.centre_world().as_dvec3());
+        for (row, coordinate) in matrix.iter_mut().zip(centre.to_array()) {
+            row[3] = coordinate;
+        }
+        matrix
     }
 }
 
@@ -190,7 +210,7 @@ impl Scene {
         let whole = fs::canonicalize(&self.path).unwrap_or_else(|_| self.path.clone());
         let folder = if whole.is_file() { whole.parent().map(Path::to_path_buf) } else { Some(whole) };
         let name = folder.as_deref().and_then(Path::file_name);
-        name.map_or_else(|| self.path.display().to_string(), |name| name.to_string_lossy().into_owned())
+        name.map_or_else(|| self.path.display().to_string(), files::exact)
     }
 
     /// Decodes the photograph of the view with this index: turned upright where the cameras are those of the upright
@@ -209,10 +229,10 @@ impl Scene {
         view: usize,
         reduce: impl FnOnce(Photograph) -> Photograph,
     ) -> Result<Photograph, SceneError> {
-        let mut photograph = self.stored_photograph(view)?;
+        let (mut photograph, turn) = images::decode(self.photograph_file(view)?, self.size(view)?)?;
         let View { camera, lens, mask, .. } = self.view(view)?;
         if let Some(mask) = mask {
-            masks::apply(mask, &mut photograph)?;
+            masks::apply(mask, &mut photograph, &turn)?;
         }
         let photograph = reduce(photograph);
         Ok(match lens {
@@ -223,14 +243,31 @@ impl Scene {
 
     /// The photograph of a view upright, and otherwise as it is stored: without its mask, not undistorted.
     pub(crate) fn stored_photograph(&self, view: usize) -> Result<Photograph, SceneError> {
-        let pinhole = self.view(view)?.camera.pinhole;
-        images::decode(self.photograph_file(view)?, [pinhole.width(), pinhole.height()])
+        let (photograph, _) = images::decode(self.photograph_file(view)?, self.size(view)?)?;
+        Ok(photograph)
+    }
+
+    /// The mask of a view for the photograph of [`Scene::stored_photograph`], at the mask's own size; `None` without a mask,
+    /// or if the mask's file is that already.
+    pub(crate) fn stored_mask(&self, view: usize) -> Result<Option<GrayImage>, SceneError> {
+        let Some(mask) = &self.view(view)?.mask else { return Ok(None) };
+        let turn = Turn::of(&images::header(self.photograph_file(view)?)?, self.size(view)?);
+        if masks::is_as_stored(mask, &turn)? {
+            return Ok(None);
+        }
+        masks::read(mask, &turn).map(Some)
     }
 
     /// The file of a view's photograph if its pixels are upright as they are stored.
     pub(crate) fn upright_file(&self, view: usize) -> Result<Option<&Path>, SceneError> {
         let file = self.photograph_file(view)?;
         Ok((images::header(file)?.orientation == Orientation::NoTransforms).then_some(file))
+    }
+
+    /// Width and height of a view's picture.
+    fn size(&self, view: usize) -> Result<[u32; 2], SceneError> {
+        let pinhole = &self.view(view)?.camera.pinhole;
+        Ok([pinhole.width(), pinhole.height()])
     }
 
     fn view(&self, view: usize) -> Result<&View, SceneError> {
@@ -282,7 +319,7 @@ fn distinguish(views: &mut [View]) {
         let all = &folders[&view.name];
         let differ = all.iter().collect::<HashSet<_>>().len() == all.len();
         if let Some(folder) = folder_of(view).as_deref().and_then(Path::file_name).filter(|_| all.len() > 1 && differ) {
-            view.name = format!("{}_{}", folder.to_string_lossy(), view.name);
+            view.name = format!("{}_{}", files::exact(folder), view.name);
         }
     }
 }

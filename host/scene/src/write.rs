@@ -10,6 +10,8 @@
 mod colmap;
 mod llff;
 mod middlebury;
+mod neus;
+mod numpy;
 mod photographs;
 mod srn;
 mod transforms;
@@ -30,35 +32,61 @@ pub enum Layout {
     Transforms,
     /// `sparse/0/*.txt`, `images/`, `masks/`.
     Colmap,
+    /// `sparse/0/*.bin`, `images/`, `masks/`.
+    ColmapBinary,
     /// `rgb/`, `pose/`, `target_pose/`, `intrinsics.txt`.
     Srn,
     /// `scene_par.txt` next to the photographs.
     Middlebury,
     /// `poses_bounds.npy`, `images/`.
     Llff,
+    /// `cameras_sphere.npz`, `image/`, `mask/`, as NeuS reads DTU.
+    Neus,
 }
 
 impl Layout {
     /// All of them.
-    pub const ALL: [Layout; 5] = [Layout::Transforms, Layout::Colmap, Layout::Srn, Layout::Middlebury, Layout::Llff];
-}
+    pub const ALL: [Layout; 7] = [
+        Layout::Transforms,
+        Layout::Colmap,
+        Layout::ColmapBinary,
+        Layout::Srn,
+        Layout::Middlebury,
+        Layout::Llff,
+        Layout::Neus,
+    ];
 
-impl fmt::Display for Layout {
-    /// The name of the layout's reader.
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(match self {
+    /// The name of the reader that reads it ([`Scene::layout`]).
+    pub const fn reader(self) -> &'static str {
+        match self {
             Layout::Transforms => "transforms",
-            Layout::Colmap => "colmap",
+            Layout::Colmap | Layout::ColmapBinary => "colmap",
             Layout::Srn => "srn",
             Layout::Middlebury => "middlebury",
             Layout::Llff => "llff",
+            Layout::Neus => "neus",
+        }
+    }
+
+    /// Whether it keeps reconstructed points and the photographs' lenses.
+    const fn is_colmap(self) -> bool {
+        matches!(self, Layout::Colmap | Layout::ColmapBinary)
+    }
+}
+
+impl fmt::Display for Layout {
+    /// The name of the layout's reader; `colmap-binary` for the binary form of `colmap`.
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Layout::ColmapBinary => "colmap-binary",
+            text => text.reader(),
         })
     }
 }
 
 /// The name is not that of a layout that can be written.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a layout that is written: transforms, colmap, srn, middlebury or llff")]
+#[error("'{0}' is not a layout that is written: transforms, colmap, colmap-binary, srn, middlebury, llff or neus")]
 pub struct UnknownLayout(String);
 
 impl FromStr for Layout {
@@ -141,7 +169,7 @@ pub fn write(
     let unfit = |reason| WriteSceneError::Unfit { scene: scene.path.clone(), layout, reason };
     match layout {
         Layout::Transforms => all_photographed(scene),
-        Layout::Colmap => all_photographed(scene),
+        Layout::Colmap | Layout::ColmapBinary | Layout::Neus => all_photographed(scene),
         Layout::Srn => srn::fits(scene),
         Layout::Middlebury => all_photographed(scene).and_then(|()| middlebury::fits(scene)),
         Layout::Llff => all_photographed(scene).and_then(|()| llff::fits(scene)),
@@ -155,10 +183,12 @@ pub fn write(
     progress.expect(scene.views.iter().filter(|view| view.image.is_some()).count());
     let photograph_count = match layout {
         Layout::Transforms => transforms::write(&mut out)?,
-        Layout::Colmap => colmap::write(&mut out)?,
+        Layout::Colmap => colmap::write(&mut out, colmap::Form::Text)?,
+        Layout::ColmapBinary => colmap::write(&mut out, colmap::Form::Binary)?,
         Layout::Srn => srn::write(&mut out)?,
         Layout::Middlebury => middlebury::write(&mut out)?,
         Layout::Llff => llff::write(&mut out)?,
+        Layout::Neus => neus::write(&mut out)?,
     };
     open_to_all(draft.path()).map_err(failed)?;
     if folder.exists() {
@@ -214,11 +244,11 @@ fn all_photographed(scene: &Scene) -> Result<(), String> {
 fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
     let views = |has: fn(&View) -> bool| scene.views.iter().filter(|view| has(view)).count();
     let mut lines = Vec::new();
-    if layout != Layout::Colmap && !scene.points.is_empty() {
+    if !layout.is_colmap() && !scene.points.is_empty() {
         lines.push(format!("{} reconstructed points", scene.points.len()));
     }
     let depths = views(|view| view.near_far.is_some());
-    if layout != Layout::Llff && depths > 0 {
+    if layout != Layout::Llff && !(layout == Layout::Neus && neus::is_own(scene)) && depths > 0 {
         lines.push(format!("near and far depths of {depths} views"));
     }
     let parts = views(|view| view.split.is_some());
@@ -226,7 +256,7 @@ fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
         lines.push(format!("the part of the scene that {parts} views belong to"));
     }
     let lenses = views(|view| view.lens.is_some());
-    if !matches!(layout, Layout::Transforms | Layout::Colmap) && lenses > 0 {
+    if layout != Layout::Transforms && !layout.is_colmap() && lenses > 0 {
         lines.push(format!(
             "the lens of {lenses} photographs: they are undistorted, and what the lens did not see is not marked"
         ));
@@ -234,19 +264,9 @@ fn left_out(scene: &Scene, layout: Layout) -> Vec<String> {
     lines
 }
 
-/// A view's world-from-camera matrix in OpenCV axes, row-major, in the coordinates of the scene's files.
-fn world_from_camera(scene: &Scene, view: &View) -> [[f64; 4]; 4] {
-    let mut matrix = view.camera.pose.to_opencv().map(|row| row.map(f64::from));
-    let centre = scene.frame.file(view.camera.pose.centre_world().as_dvec3());
-    for (row, coordinate) in matrix.iter_mut().zip(centre.to_array()) {
-        row[3] = coordinate;
-    }
-    matrix
-}
-
 /// `[R | t]` of the inverse: world-to-camera, row-major.
 fn camera_from_world(scene: &Scene, view: &View) -> [[f64; 4]; 3] {
-    let m = world_from_camera(scene, view);
+    let m = scene.frame.file_from_camera(&view.camera.pose);
     let row = |row: usize| {
         let [a, b, c] = [m[0][row], m[1][row], m[2][row]];
         [a, b, c, -(a * m[0][3] + b * m[1][3] + c * m[2][3])]

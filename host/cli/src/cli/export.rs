@@ -16,7 +16,7 @@ use viewfuse_scene::write::{Layout, write};
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
-    /// How to lay it out: transforms, colmap, srn, middlebury or llff
+    /// How to lay it out: transforms, colmap, colmap-binary, srn, middlebury, llff or neus
     #[arg(long)]
     layout: Layout,
     /// Folder to write; must not be there yet, or be empty

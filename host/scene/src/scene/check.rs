@@ -11,18 +11,10 @@ use viewfuse_core::pose::{LARGEST_COORDINATE, Pose, PoseError};
 
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
+use super::frame;
 use super::images;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView};
 use super::{SceneFrame, ScenePoint, View};
-
-/// Largest distance of the cameras' centroid from the origin, as a multiple of their spread.
-const FAR_FROM_ORIGIN: f64 = 16.0;
-
-/// Spreads of cameras below this share of their distance from the origin are rounding errors of f64.
-const LEAST_SPREAD: f64 = 1.0e-12;
-
-/// Range of the cameras' spread, in units of the file, for which the unit is kept.
-const USUAL_SPREADS: std::ops::RangeInclusive<f64> = 1.0e-3..=1.0e4;
 
 /// A scene whose numbers were checked.
 pub(super) struct Checked {
@@ -34,7 +26,7 @@ pub(super) struct Checked {
 
 /// The scene, its views with photographs first.
 pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<Checked, SceneError> {
-    let RawScene { views: raw_views, points, warnings } = raw;
+    let RawScene { views: raw_views, points, points_path, mut warnings } = raw;
     let mut order: Vec<usize> = (0..raw_views.len()).collect();
     // Stable: photographs first, otherwise in their order.
     order.sort_by_key(|&view| raw_views[view].image.is_none());
@@ -64,7 +56,9 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
         return Err(no_views());
     }
 
-    let frame = frame_of(&raw_views);
+    let axes: Vec<_> = raw_views.iter().map(|view| axis(&world_from_camera(&view.pose))).collect();
+    let (frame, warning) = frame::of(&axes);
+    warnings.extend(warning.map(|warning| format!("{}: {warning}", found.display())));
     for (view, raw) in views.iter_mut().zip(order.iter().map(|&view| &raw_views[view])) {
         if frame != SceneFrame::FILE {
             view.camera.pose = pose(&raw.pose, &frame)?;
@@ -75,24 +69,8 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
     for (now, &before) in order.iter().enumerate() {
         place[before] = now as u32;
     }
-    let points = points.into_iter().map(|raw| point(found, raw, &frame, &place)).collect::<Result<_, _>>()?;
+    let points = points.into_iter().map(|raw| point(&points_path, raw, &frame, &place)).collect::<Result<_, _>>()?;
     Ok(Checked { views, points, warnings, frame })
-}
-
-/// The world's place, chosen so that `f32` can represent the distances between the cameras; see [`SceneFrame`].
-fn frame_of(views: &[RawView]) -> SceneFrame {
-    let centres: Vec<DVec3> = views.iter().map(|view| centre(&world_from_camera(&view.pose))).collect();
-    let count = centres.len().max(1) as f64;
-    let centroid = centres.iter().map(|centre| *centre / count).sum::<DVec3>();
-    let spread = (centres.iter().map(|centre| centre.distance_squared(centroid) / count).sum::<f64>()).sqrt();
-    // One camera, or several in one place except for rounding: there are no distances to preserve.
-    if !(spread > LEAST_SPREAD * centroid.length() && spread.is_finite()) {
-        return SceneFrame::FILE;
-    }
-    SceneFrame {
-        origin: if centroid.length() > FAR_FROM_ORIGIN * spread { centroid } else { DVec3::ZERO },
-        scale: if USUAL_SPREADS.contains(&spread) { 1.0 } else { spread.log2().floor().exp2() },
-    }
 }
 
 /// Depths of a view in world units.
@@ -106,11 +84,11 @@ fn near_far(raw: &RawView, frame: &SceneFrame) -> Result<Option<[f32; 2]>, Scene
     Err(SceneError::Depths { path: path.clone(), place: place.clone(), near, far })
 }
 
-fn point(found: &Path, raw: RawPoint, frame: &SceneFrame, place: &[u32]) -> Result<ScenePoint, SceneError> {
+fn point(path: &Path, raw: RawPoint, frame: &SceneFrame, place: &[u32]) -> Result<ScenePoint, SceneError> {
     let [x, y, z] = raw.position;
     let position_world = frame.world(DVec3::from_array(raw.position)).as_vec3();
     if !(position_world.abs().max_element() <= LARGEST_COORDINATE) || position_world.is_nan() {
-        return Err(SceneError::Point { path: found.to_path_buf(), x, y, z });
+        return Err(SceneError::Point { path: path.to_path_buf(), place: raw.place, x, y, z });
     }
     let mut views: Vec<u32> = raw.views.iter().filter_map(|&view| place.get(view as usize).copied()).collect();
     views.sort_unstable();
@@ -147,6 +125,12 @@ fn rows(matrix: &[f64; 16]) -> [[f32; 4]; 4] {
 /// The camera's centre from a camera-to-world matrix.
 fn centre(world_from_camera: &[f64; 16]) -> DVec3 {
     DVec3::new(world_from_camera[3], world_from_camera[7], world_from_camera[11])
+}
+
+/// The camera's centre and its principal axis.
+fn axis(world_from_camera: &[f64; 16]) -> (DVec3, DVec3) {
+    let m = world_from_camera;
+    (centre(m), DVec3::new(m[2], m[6], m[10]).normalize_or_zero())
 }
 
 /// The camera-to-world matrix in OpenCV axes; of a world-to-camera one, `[R^T | -R^T t]`.

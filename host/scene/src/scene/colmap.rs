@@ -63,6 +63,7 @@ struct ModelPoint {
     colour: [u8; 3],
     error: f64,
     images: Vec<u32>,
+    place: Place,
 }
 
 /// The two forms of a model's files.
@@ -93,6 +94,8 @@ pub(super) struct Origin {
     pub(super) cameras_from_world: Vec<[f64; 16]>,
     /// Its points; their views are indices into these images.
     pub(super) points: Vec<RawPoint>,
+    /// The file of the points.
+    pub(super) points_path: PathBuf,
 }
 
 /// The model with points in a scene's folder, if there is one.
@@ -113,7 +116,7 @@ pub(super) fn beside(root: &Path) -> Result<Option<Origin>, SceneError> {
     images.sort_by(|a, b| a.name.cmp(&b.name));
     let view_of = images.iter().enumerate().map(|(view, image)| (image.id, view as u32)).collect();
     let cameras_from_world = images.iter().map(camera_from_world).collect();
-    Ok(Some(Origin { cameras_from_world, points: raw_points(points, &view_of) }))
+    Ok(Some(Origin { cameras_from_world, points: raw_points(points, &view_of), points_path }))
 }
 
 /// Points with their views as [`RawScene`] counts them; images without a view are left out.
@@ -123,6 +126,7 @@ fn raw_points(points: Vec<ModelPoint>, view_of: &HashMap<u32, u32>) -> Vec<RawPo
         error: point.error,
         colour: point.colour,
         views: point.images.iter().filter_map(|image| view_of.get(image).copied()).collect(),
+        place: point.place,
     };
     points.into_iter().map(raw).collect()
 }
@@ -155,7 +159,8 @@ impl Reader for Colmap {
             Form::Binary => binary::points(&points_path)?,
             Form::Text => text::points(&points_path)?,
         };
-        assemble(folder, [&cameras_path, &images_path], &by_id(&cameras_path, cameras)?, images, points)
+        let scene = assemble(folder, [&cameras_path, &images_path], &by_id(&cameras_path, cameras)?, images, points)?;
+        Ok(RawScene { points_path, ..scene })
     }
 }
 
@@ -232,7 +237,8 @@ fn assemble(
         views.push(RawView::new(name, Some(ImageFile::open(&photograph)?), pose, Some(intrinsics)));
     }
     let points = raw_points(points, &view_of);
-    Ok(RawScene { views, points, warnings: missing.warning(images_path)?.into_iter().collect() })
+    let warnings = missing.warning(images_path)?.into_iter().collect();
+    Ok(RawScene { views, points, warnings, ..RawScene::default() })
 }
 
 /// The folder that has the photographs: the first, from the model's upwards, that has any of them.

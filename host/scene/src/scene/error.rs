@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 use viewfuse_core::lens::LensError;
-use viewfuse_core::pose::PoseError;
+use viewfuse_core::pose::{LARGEST_COORDINATE, PoseError};
 
 use super::LARGEST_SIDE;
-use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
+use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place, Short};
 
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
@@ -307,10 +307,15 @@ pub enum SceneError {
         far: f64,
     },
     /// A reconstructed point is not finite, or too far away.
-    #[error("{path}: the point ({x}, {y}, {z}) is not finite, or further than 1e30 from the origin")]
+    #[error(
+        "{path}{place}: the point ({}, {}, {}) is not finite, or further than {LARGEST_COORDINATE:e} from the origin",
+        Short(*x), Short(*y), Short(*z)
+    )]
     Point {
-        /// The file or folder.
+        /// The file.
         path: PathBuf,
+        /// The place in it.
+        place: Place,
         /// Its first coordinate.
         x: f64,
         /// Its second.

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use thiserror::Error;
-use viewfuse_core::camera::PinholeError;
+use viewfuse_core::camera::{LONGEST_FOCAL, PinholeError, SHORTEST_FOCAL};
 
 /// The place of a fault in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,11 +30,23 @@ impl fmt::Display for Place {
     }
 }
 
+/// Shows a number as it is, or with an exponent if it would have many zeros.
+pub(super) struct Short(pub(super) f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0.abs() {
+            0.0 | 1.0e-4..1.0e12 => write!(f, "{}", self.0),
+            _ => write!(f, "{:e}", self.0),
+        }
+    }
+}
+
 /// Why numbers from a file are not a pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum IntrinsicsFault {
-    /// A focal length is not a finite positive number.
-    #[error("focal lengths {x} and {y} are not both positive numbers of pixels")]
+    /// A focal length is out of range.
+    #[error("focal lengths {} and {} are not both from {SHORTEST_FOCAL} to {LONGEST_FOCAL:e} pixels", Short(*x), Short(*y))]
     Focal {
         /// Focal length along x.
         x: f64,
@@ -42,7 +54,9 @@ pub enum IntrinsicsFault {
         y: f64,
     },
     /// A coordinate of the principal point is out of range.
-    #[error("principal point ({x}, {y}) is out of range")]
+    #[error(
+        "principal point ({}, {}) is further than {LONGEST_FOCAL:e} pixels from the corner of the image", Short(*x), Short(*y)
+    )]
     Principal {
         /// Coordinate to the right.
         x: f64,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::{FileFault, Place};
 
 /// Extensions of photographs, compared without regard to case.
 pub(super) const IMAGE_EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "JPG", "JPEG", "PNG"];
@@ -31,9 +31,15 @@ pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
 /// A text file's contents, without the byte order mark that some editors put in front.
 ///
 /// # Errors
-/// [`SceneError::Missing`], or [`SceneError::Read`] if it cannot be read or is not text.
+/// [`SceneError::Missing`], [`SceneError::Read`] if it cannot be read, or [`SceneError::Damaged`] with the line if it is
+/// not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
-    let text = fs::read_to_string(path).map_err(|cause| unreadable(path, cause))?;
+    let bytes = fs::read(path).map_err(|cause| unreadable(path, cause))?;
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let place = Place::Line(1 + before.iter().filter(|byte| **byte == b'\n').count());
+        SceneError::Damaged { path: path.to_path_buf(), place, fault: FileFault::NotText { of: "this line" } }
+    })?;
     Ok(match text.strip_prefix('\u{feff}') {
         Some(rest) => rest.to_string(),
         None => text,
@@ -55,7 +61,8 @@ pub fn list(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf
             paths.push(path);
         }
     }
-    paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
+    // Names that are equal as text are not equal as names.
+    paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
     Ok(paths)
 }
 
@@ -82,7 +89,7 @@ pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
 }
 
 /// The number that a name ends in.
-pub(super) fn trailing_number(name: &str) -> Option<u64> {
+pub(crate) fn trailing_number(name: &str) -> Option<u64> {
     name[name.trim_end_matches(|c: char| c.is_ascii_digit()).len()..].parse().ok()
 }
 
@@ -92,9 +99,28 @@ pub fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     extension.is_some_and(|extension| extensions.iter().any(|wanted| extension.eq_ignore_ascii_case(wanted)))
 }
 
-/// The file's name without folder and extension.
+/// The file's name without folder and extension. Bytes that are not UTF-8 are written as `%E9`, so that different names
+/// stay different.
 pub fn stem(path: &Path) -> String {
-    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+    exact(path.file_stem().unwrap_or_default())
+}
+
+/// A name of the file system as text; bytes that are not UTF-8 are written as `%E9`.
+pub(super) fn exact(name: &OsStr) -> String {
+    let mut text = String::new();
+    for chunk in name.as_encoded_bytes().utf8_chunks() {
+        text.push_str(chunk.valid());
+        text.extend(chunk.invalid().iter().map(|byte| format!("%{byte:02X}")));
+    }
+    text
+}
+
+/// The path with an extension behind the one it has.
+pub(super) fn appended(path: &Path, extension: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(extension);
+    name.into()
 }
 
 /// The numbers of each line that is not blank, with the line's number from 1; `path` is the text's file.
@@ -134,7 +160,7 @@ pub(super) fn excerpt(word: &str) -> String {
 
 /// Natural order of names: runs of digits are compared by their value, so that `2` comes before `10`; the rest by
 /// character. Names that differ only in leading zeros are compared by character, so that the order is total.
-pub(super) fn natural_order(a: &str, b: &str) -> Ordering {
+pub(crate) fn natural_order(a: &str, b: &str) -> Ordering {
     let (mut rest_a, mut rest_b) = (a, b);
     loop {
         let (digits_a, digits_b) = (leading_digits(rest_a), leading_digits(rest_b));

@@ -70,15 +70,44 @@ fn described<R: std::io::BufRead + std::io::Seek>(
     Ok((width, height, decoder.orientation().unwrap_or(Orientation::NoTransforms)))
 }
 
+/// How a photograph's pixels in memory were made from the stored ones.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Turn {
+    /// Width and height as stored.
+    pub(super) stored: [u32; 2],
+    /// How the stored pixels must be turned to be upright.
+    pub(super) orientation: Orientation,
+    /// Whether they were: the cameras are those of the upright picture.
+    pub(super) is_applied: bool,
+}
+
+impl Turn {
+    /// Of a photograph whose cameras are for pictures of this width and height.
+    pub(super) fn of(header: &Header, size: [u32; 2]) -> Turn {
+        let Header { size: stored, orientation } = *header;
+        Turn { stored, orientation, is_applied: stored != size && turned(stored, orientation) == size }
+    }
+
+    /// Width and height of the upright picture.
+    pub(super) fn upright(&self) -> [u32; 2] {
+        turned(self.stored, self.orientation)
+    }
+
+    /// Width and height of the pixels in memory.
+    pub(super) fn size(&self) -> [u32; 2] {
+        if self.is_applied { self.upright() } else { self.stored }
+    }
+}
+
 /// The pixels of a photograph as straight 8-bit RGBA, of this width and height: turned upright if only that has this
 /// size.
 ///
 /// # Errors
 /// [`SceneError::SizeMismatch`] if the file has another size.
-pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<Photograph, SceneError> {
+pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<(Photograph, Turn), SceneError> {
     let (mut decoded, orientation) = pixels(path)?;
-    let stored = [decoded.width(), decoded.height()];
-    if stored != size && turned(stored, orientation) == size {
+    let turn = Turn::of(&Header { size: [decoded.width(), decoded.height()], orientation }, size);
+    if turn.is_applied {
         decoded.apply_orientation(orientation);
     }
     let (width, height) = (decoded.width(), decoded.height());
@@ -96,7 +125,17 @@ pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<Photograph, SceneErr
     let pixels = decoded.into_rgba8();
     // SRN's photographs have an alpha channel that is 255 everywhere: it is ignored.
     let has_alpha = has_channel && pixels.pixels().any(|pixel| pixel[3] < u8::MAX);
-    Ok(Photograph { pixels, has_alpha, seen: None })
+    Ok((Photograph { pixels, has_alpha, seen: None }, turn))
+}
+
+/// The orientation that undoes this one.
+pub(super) fn inverse(orientation: Orientation) -> Orientation {
+    match orientation {
+        Orientation::Rotate90 => Orientation::Rotate270,
+        Orientation::Rotate270 => Orientation::Rotate90,
+        // Flips and the turn by 180 degrees undo themselves.
+        own => own,
+    }
 }
 
 /// The size of an image when it is upright.

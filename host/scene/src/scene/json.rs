@@ -1,7 +1,9 @@
 //! Looking keys up in a JSON file, with the full name of the key in every error.
 
+use std::fmt;
 use std::path::Path;
 
+use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
 use super::error::SceneError;
@@ -16,9 +18,10 @@ pub(super) struct Object<'a> {
     entries: &'a Map<String, Value>,
 }
 
-/// Parses a file's text.
+/// Parses a file's text. A key that stands in an object twice is an error.
 pub(super) fn parse(path: &Path, text: &str) -> Result<Value, SceneError> {
-    serde_json::from_str(text).map_err(|error| {
+    let parsed = serde_json::from_str::<Unrepeated>(text).map(|Unrepeated(value)| value);
+    parsed.map_err(|error| {
         let (line, column) = (error.line(), error.column());
         // The parser appends the place, which our message has in front, where editors expect it.
         let said = error.to_string();
@@ -106,4 +109,67 @@ fn of_length<'a>(path: &Path, key: &str, values: &'a [Value], of: &'static str) 
 
 fn wrong_type(path: &Path, key: String, expected: &'static str) -> SceneError {
     SceneError::WrongType { path: path.to_path_buf(), key, expected }
+}
+
+/// A value in whose objects no key stands twice: parsers keep one of the two, not all the same one.
+struct Unrepeated(Value);
+
+impl<'de> Deserialize<'de> for Unrepeated {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Unrepeated, D::Error> {
+        deserializer.deserialize_any(UnrepeatedVisitor).map(Unrepeated)
+    }
+}
+
+struct UnrepeatedVisitor;
+
+impl<'de> Visitor<'de> for UnrepeatedVisitor {
+    type Value = Value;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("a JSON value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_str<E>(self, value: &str) -> Result<Value, E> {
+        Ok(value.into())
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut sequence: A) -> Result<Value, A::Error> {
+        let mut values = Vec::new();
+        while let Some(Unrepeated(value)) = sequence.next_element()? {
+            values.push(value);
+        }
+        Ok(Value::Array(values))
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut entries: A) -> Result<Value, A::Error> {
+        let mut object = Map::new();
+        while let Some(key) = entries.next_key::<String>()? {
+            if object.contains_key(&key) {
+                return Err(A::Error::custom(format_args!("the key {key:?} stands twice in one object")));
+            }
+            let Unrepeated(value) = entries.next_value()?;
+            object.insert(key, value);
+        }
+        Ok(Value::Object(object))
+    }
 }

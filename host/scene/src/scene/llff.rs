@@ -61,19 +61,18 @@ impl Reader for Llff {
         let views = rows.iter().enumerate().zip(images).map(|((row, numbers), image)| view(file, row, numbers, &image));
         let mut scene = RawScene::from(views.collect::<Result<Vec<_>, _>>()?);
         match points(file, &scene.views) {
-            Ok(points) => scene.points = points,
+            Ok((points, path)) => (scene.points, scene.points_path) = (points, path),
             Err(reason) => scene.warnings.push(format!("{reason}; the scene is read without its points")),
         }
         Ok(scene)
     }
 }
 
-/// The points of the COLMAP model that the poses were made from, if it is in the same folder.
-fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
+/// The points of the COLMAP model that the poses were made from, if it is in the same folder, and their file.
+fn points(file: &Path, views: &[RawView]) -> Result<(Vec<RawPoint>, PathBuf), String> {
     let root = file.with_file_name("");
-    let Some(Origin { cameras_from_world, points }) = colmap::beside(&root).map_err(|error| error.to_string())? else {
-        return Ok(Vec::new());
-    };
+    let origin = colmap::beside(&root).map_err(|error| error.to_string())?;
+    let Some(Origin { cameras_from_world, points, points_path }) = origin else { return Ok(Default::default()) };
     // Each centre, from `[R | t]` and from the row: -R^T t.
     let differs = |(m, view): (&[f64; 16], &RawView)| {
         let c = &view.pose.matrix;
@@ -85,7 +84,7 @@ fn points(file: &Path, views: &[RawView]) -> Result<Vec<RawPoint>, String> {
     if cameras_from_world.len() != views.len() || cameras_from_world.iter().zip(views).any(differs) {
         return Err(format!("{}: its rows are not the images of the COLMAP model beside it", file.display()));
     }
-    Ok(points)
+    Ok((points, points_path))
 }
 
 /// The photographs in the order of their names (by character, as the authors' code sorts them).

@@ -2,7 +2,8 @@
 //!
 //! A mask is 0 where the photograph does not count and has the greatest value where it does: in NeuS's data objects are
 //! white on black, in COLMAP's and nerfstudio's ignored pixels are black. Values between are fractions of a pixel. It
-//! has the photograph's size, or another of the same shape.
+//! has the photograph's size, or another of the same shape; of a photograph that carries an orientation (EXIF), it may be
+//! a mask of the stored or of the upright picture.
 //!
 //! A layout may name masks itself. Otherwise they are searched in a folder `mask` or `masks` in the scene, beside the
 //! photograph's folder or one above it: `images/left/1.jpg` has `masks/left/1.jpg.png` (COLMAP) or `masks/left/1.png`
@@ -10,14 +11,16 @@
 
 use std::path::{Path, PathBuf};
 
+use image::GrayImage;
 use image::imageops::{FilterType, resize};
+use image::metadata::Orientation;
 
 use super::Photograph;
 use super::View;
 use super::check::same_shape;
 use super::error::SceneError;
-use super::files::IMAGE_EXTENSIONS;
-use super::images;
+use super::files::{self, IMAGE_EXTENSIONS};
+use super::images::{self, Turn};
 
 /// Folders of masks.
 const FOLDERS: [&str; 2] = ["mask", "masks"];
@@ -48,7 +51,7 @@ fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
         let names = [without_first.as_path(), inside];
         for name in names.into_iter().filter(|name| !name.as_os_str().is_empty()) {
             for masks in FOLDERS.map(|masks| folder.join(masks)).into_iter().filter(|masks| masks.is_dir()) {
-                let appended = |extension: &&str| PathBuf::from(format!("{}.{extension}", masks.join(name).display()));
+                let appended = |extension: &&str| files::appended(&masks.join(name), extension);
                 let replaced = |extension: &&str| masks.join(name).with_extension(extension);
                 let mut candidates = IMAGE_EXTENSIONS.iter().map(appended).chain(IMAGE_EXTENSIONS.iter().map(replaced));
                 if let Some(mask) = candidates.find(|mask| mask.is_file()) {
@@ -60,30 +63,69 @@ fn beside(root: &Path, image: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Multiplies the photograph's alpha channel by the mask.
+/// A mask at its own size, turned like the pixels of its photograph in memory: 255 where they count.
+///
+/// A mask with an orientation of its own is turned by it if it then has the upright photograph's shape. Otherwise its
+/// stored size decides whether it is a mask of the stored or of the upright photograph.
 ///
 /// # Errors
-/// [`SceneError`] if the mask cannot be decoded, or does not have the photograph's shape.
-pub(super) fn apply(path: &Path, photograph: &mut Photograph) -> Result<(), SceneError> {
-    let (decoded, _) = images::pixels(path)?;
-    let (declared_width, declared_height) = photograph.pixels.dimensions();
-    let (width, height) = (decoded.width(), decoded.height());
-    if !same_shape([width, height], [declared_width, declared_height]) {
-        let declared_in = "the photograph that it is for".to_string();
-        let path = path.to_path_buf();
-        return Err(SceneError::SizeMismatch { path, width, height, declared_in, declared_width, declared_height });
+/// [`SceneError`] if it cannot be decoded or does not have the photograph's shape.
+pub(super) fn read(path: &Path, photograph: &Turn) -> Result<GrayImage, SceneError> {
+    let (mut decoded, own) = images::pixels(path)?;
+    let stored = [decoded.width(), decoded.height()];
+    let Turn { orientation, is_applied, .. } = *photograph;
+    let is_upright =
+        if own != Orientation::NoTransforms && same_shape(images::turned(stored, own), photograph.upright()) {
+            decoded.apply_orientation(own);
+            true
+        } else {
+            // Of photographs with an orientation not both: those that have one shape either way are refused.
+            match (same_shape(stored, photograph.upright()), same_shape(stored, photograph.stored)) {
+                (false, false) => {
+                    let ([width, height], [declared_width, declared_height]) = (stored, photograph.size());
+                    let (path, declared_in) = (path.to_path_buf(), "the photograph that it is for".to_string());
+                    return Err(SceneError::SizeMismatch {
+                        path,
+                        width,
+                        height,
+                        declared_in,
+                        declared_width,
+                        declared_height,
+                    });
+                }
+                (is_upright, _) => is_upright,
+            }
+        };
+    match (is_upright, is_applied) {
+        (false, true) => decoded.apply_orientation(orientation),
+        (true, false) => decoded.apply_orientation(images::inverse(orientation)),
+        _ => {}
     }
     // Cut-outs used as masks have the mask in their alpha channel; their colours are ignored.
     let has_alpha = decoded.color().has_alpha();
     let rgba = decoded.to_rgba8();
     let speaks = has_alpha && rgba.pixels().any(|pixel| pixel[3] < u8::MAX);
-    let mut mask = if speaks {
-        image::GrayImage::from_fn(width, height, |x, y| image::Luma([rgba.get_pixel(x, y)[3]]))
-    } else {
-        decoded.into_luma8()
-    };
-    if (width, height) != (declared_width, declared_height) {
-        mask = resize(&mask, declared_width, declared_height, FilterType::Triangle);
+    Ok(match speaks {
+        true => GrayImage::from_fn(rgba.width(), rgba.height(), |x, y| image::Luma([rgba.get_pixel(x, y)[3]])),
+        false => decoded.into_luma8(),
+    })
+}
+
+/// Whether a mask's file is one of the photograph's pixels in memory as it is stored: neither carries an orientation.
+pub(super) fn is_as_stored(path: &Path, photograph: &Turn) -> Result<bool, SceneError> {
+    let none = Orientation::NoTransforms;
+    Ok(photograph.orientation == none && images::header(path)?.orientation == none)
+}
+
+/// Multiplies the photograph's alpha channel by the mask.
+///
+/// # Errors
+/// As [`read`].
+pub(super) fn apply(path: &Path, photograph: &mut Photograph, turn: &Turn) -> Result<(), SceneError> {
+    let mut mask = read(path, turn)?;
+    let (width, height) = photograph.pixels.dimensions();
+    if mask.dimensions() != (width, height) {
+        mask = resize(&mask, width, height, FilterType::Triangle);
     }
     for (pixel, share) in photograph.pixels.pixels_mut().zip(mask.pixels()) {
         let product = u32::from(pixel[3]) * u32::from(share[0]);

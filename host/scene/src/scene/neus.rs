@@ -5,11 +5,11 @@
 //! projection is `P = world_mat_N scale_mat_N`, decomposed in f64 into `K [R | t]` by an RQ decomposition. The near and
 //! far bounds are those of the sphere, if the archive has one and the camera is outside of it.
 //!
-//! A photograph belongs to the matrix with the number that its name ends in, if all have one; otherwise to that of its
-//! position. `mask/` holds masks of the same numbers. Pixel `(0, 0)` is the centre of the top left pixel there; here that is
+//! A photograph belongs to the matrix with the number that its name ends in, if all have one and these differ; otherwise
+//! to that of its position. `mask/` holds masks of the same names or numbers. Pixel `(0, 0)` is the centre of the top left pixel there; here that is
 //! `(0.5, 0.5)`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
@@ -77,7 +77,7 @@ impl Reader for Neus {
             return Err(SceneError::NoViews { path, looked_for: "photographs in image/, world_mat_0 in the archive" });
         }
         let numbers = numbers_of(file, &images, &worlds)?;
-        let masks = masks(&root)?;
+        let masks = masks(&root, &images)?;
         let mut missing = Missing::default();
         for number in worlds.keys() {
             match numbers.contains(number) {
@@ -102,10 +102,14 @@ fn numbered(name: &str, prefix: &str) -> Option<u64> {
     name.strip_prefix(prefix)?.parse().ok()
 }
 
-/// The matrix of each photograph.
+/// The matrix of each photograph: those of different numbers in their names, if the archive has all of them.
 fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -> Result<Vec<u64>, SceneError> {
     let by_name: Option<Vec<u64>> = images.iter().map(|image| files::trailing_number(&files::stem(image))).collect();
-    if let Some(numbers) = by_name.filter(|numbers| numbers.iter().all(|number| worlds.contains_key(number))) {
+    let fit = |numbers: &Vec<u64>| {
+        let mut seen = HashSet::new();
+        numbers.iter().all(|number| worlds.contains_key(number) && seen.insert(*number))
+    };
+    if let Some(numbers) = by_name.filter(fit) {
         return Ok(numbers);
     }
     if images.len() == worlds.len() {
@@ -115,12 +119,14 @@ fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -
     Err(SceneError::WrongCount { path, place, of, expected: images.len(), found: worlds.len() })
 }
 
-/// Masks by the number that their names end in.
-fn masks(root: &Path) -> Result<BTreeMap<u64, PathBuf>, SceneError> {
+/// Masks by the number that their names end in; those with a photograph's name are found by it ([`super::masks`]).
+fn masks(root: &Path, images: &[PathBuf]) -> Result<BTreeMap<u64, PathBuf>, SceneError> {
     let Some(folder) = MASK_FOLDERS.iter().map(|name| root.join(name)).find(|folder| folder.is_dir()) else {
         return Ok(BTreeMap::new());
     };
-    let masks = files::list(&folder, |path| files::has_extension(path, &IMAGE_EXTENSIONS))?;
+    let names: HashSet<_> = images.iter().map(|image| image.file_stem()).collect();
+    let is_numbered = |path: &Path| files::has_extension(path, &IMAGE_EXTENSIONS) && !names.contains(&path.file_stem());
+    let masks = files::list(&folder, is_numbered)?;
     Ok(masks.into_iter().filter_map(|mask| Some((files::trailing_number(&files::stem(&mask))?, mask))).collect())
 }
 

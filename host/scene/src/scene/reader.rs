@@ -46,6 +46,8 @@ pub struct RawScene {
     pub views: Vec<RawView>,
     /// Sparse points that were reconstructed with the cameras.
     pub points: Vec<RawPoint>,
+    /// The file that contains the points; empty without any.
+    pub points_path: PathBuf,
     /// What was left out or ignored, a line each.
     pub warnings: Vec<String>,
 }
@@ -67,6 +69,8 @@ pub struct RawPoint {
     pub colour: [u8; 3],
     /// The views that saw it, as indices into [`RawScene::views`].
     pub views: Vec<u32>,
+    /// Its place in [`RawScene::points_path`].
+    pub place: Place,
 }
 
 /// An unchecked view, as on disk. Only the photograph's header has been checked.

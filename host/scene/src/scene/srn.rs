@@ -11,6 +11,7 @@
 //! after the size states whether the poses are world-to-camera (1) instead, as in the authors' own reader.
 
 use std::collections::HashSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::check;
@@ -60,10 +61,13 @@ fn read(folder: &Path) -> Result<Vec<RawView>, SceneError> {
 
     let mut views = Vec::new();
     for image in photographs {
-        let name = files::stem(&image);
-        let image = Some(ImageFile::open(&image)?);
-        let pose = read_pose(&pose_folder.join(format!("{name}.txt")), list.form)?;
-        views.push(RawView::new(name, image, pose, Some(list.intrinsics.clone())));
+        let pose = read_pose(&partner(&image, &pose_folder, "txt"), list.form)?;
+        views.push(RawView::new(
+            files::stem(&image),
+            Some(ImageFile::open(&image)?),
+            pose,
+            Some(list.intrinsics.clone()),
+        ));
     }
     let target_folder = folder.join("target_pose");
     if target_folder.is_dir() {
@@ -89,21 +93,22 @@ fn check_partners(
     image_folder: &Path,
     pose_folder: &Path,
 ) -> Result<(), SceneError> {
-    let posed: HashSet<String> = poses.iter().map(|path| files::stem(path)).collect();
-    let pictured: HashSet<String> = photographs.iter().map(|path| files::stem(path)).collect();
-    for (path, name) in photographs.iter().map(|path| (path, files::stem(path))) {
-        if !posed.contains(&name) {
-            let pose = pose_folder.join(format!("{name}.txt"));
-            return Err(SceneError::ImageWithoutPose { path: path.clone(), pose });
-        }
+    let posed: HashSet<&OsStr> = poses.iter().filter_map(|path| path.file_stem()).collect();
+    let pictured: HashSet<&OsStr> = photographs.iter().filter_map(|path| path.file_stem()).collect();
+    let lacks = |names: &HashSet<&OsStr>, path: &Path| path.file_stem().is_none_or(|name| !names.contains(name));
+    if let Some(path) = photographs.iter().find(|path| lacks(&posed, path)) {
+        return Err(SceneError::ImageWithoutPose { path: path.clone(), pose: partner(path, pose_folder, "txt") });
     }
-    for (path, name) in poses.iter().map(|path| (path, files::stem(path))) {
-        if !pictured.contains(&name) {
-            let image = image_folder.join(format!("{name}.png"));
-            return Err(SceneError::PoseWithoutImage { path: path.clone(), place: Place::File, image });
-        }
+    if let Some(path) = poses.iter().find(|path| lacks(&pictured, path)) {
+        let image = partner(path, image_folder, "png");
+        return Err(SceneError::PoseWithoutImage { path: path.clone(), place: Place::File, image });
     }
     Ok(())
+}
+
+/// The file of the same name in another folder.
+fn partner(path: &Path, folder: &Path, extension: &str) -> PathBuf {
+    files::appended(&folder.join(path.file_stem().unwrap_or_default()), extension)
 }
 
 fn read_pose(path: &Path, form: PoseForm) -> Result<RawPose, SceneError> {

@@ -1,55 +1,115 @@
-//! COLMAP's text model: one camera for each image, points with the images that saw them.
+//! COLMAP's model, as text or binary: one camera for each image, points with the images that saw them.
+//!
+//! Numbers of cameras and images are one more than the view's index, those of points one more than the point's.
 
-use std::fmt::Write;
+mod binary;
+mod text;
 
 use glam::{DMat3, DQuat, DVec3};
 use viewfuse_core::lens::{Lens, Projection};
 
-use super::{Draft, WriteSceneError, camera_from_world, words};
+use super::{Draft, WriteSceneError, camera_from_world};
 use crate::{Scene, View};
 
-pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
-    let scene = out.scene;
-    let mut cameras = String::from("# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n");
-    let mut images = String::from("# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# X Y POINT3D_ID of each point\n");
-    let mut points = String::from("# POINT3D_ID X Y Z R G B ERROR TRACK[] as (IMAGE_ID POINT2D_IDX)\n");
-    let seen = observations(scene);
+/// The two forms of a model's files.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Form {
+    Text,
+    Binary,
+}
+
+/// A view as a camera and an image of the model.
+struct ModelView {
+    /// Number of the camera and of the image.
+    id: u32,
+    model: Model,
+    size: [u32; 2],
+    parameters: Vec<f64>,
+    /// World to camera, `w x y z`.
+    rotation: [f64; 4],
+    translation: [f64; 3],
+    /// The photograph in `images`.
+    name: String,
+    /// What it saw: image coordinates and the point's number.
+    observations: Vec<([f64; 2], u64)>,
+}
+
+/// A reconstructed point of the model.
+struct ModelPoint {
+    id: u64,
+    position: [f64; 3],
+    colour: [u8; 3],
+    /// -1 if it is not known.
+    error: f64,
+    /// Numbers of the images that saw it, and which of the image's observations it is.
+    track: Vec<[u32; 2]>,
+}
+
+/// A camera model: COLMAP's name and number.
+struct Model(&'static str, u32);
+
+pub(super) fn write(out: &mut Draft, form: Form) -> Result<usize, WriteSceneError> {
+    let (scene, mut seen) = (out.scene, observations(out.scene));
+    let mut views = Vec::with_capacity(scene.views.len());
     for (index, view) in scene.views.iter().enumerate() {
-        let id = index + 1;
-        let photograph = out.stored_photograph(index, "images")?;
-        out.mask(index, &photograph)?;
+        let name = out.stored_photograph(index, "images")?;
+        out.mask(index, "masks", &name)?;
         let pinhole = &view.camera.pinhole;
         let (model, parameters) = parameters(view);
-        // Writing to a text cannot fail.
-        let _ = writeln!(cameras, "{id} {model} {} {} {}", pinhole.width(), pinhole.height(), words(parameters));
         let (rotation, translation) = rigid(scene, view);
         let [x, y, z, w] = rotation.to_array();
-        let pose = words([w, x, y, z].into_iter().chain(translation.to_array()));
-        let _ = writeln!(images, "{id} {pose} {id} {photograph}");
-        let line = seen[index].iter().map(|&(point, [x, y])| format!("{x} {y} {}", point + 1)).collect::<Vec<_>>();
-        let _ = writeln!(images, "{}", line.join(" "));
+        views.push(ModelView {
+            id: index as u32 + 1,
+            model,
+            size: [pinhole.width(), pinhole.height()],
+            parameters,
+            rotation: [w, x, y, z],
+            translation: translation.to_array(),
+            name,
+            observations: std::mem::take(&mut seen[index]),
+        });
     }
+    let points = points(scene);
+    let files = match form {
+        Form::Text => [
+            ("cameras.txt", text::cameras(&views).into_bytes()),
+            ("images.txt", text::images(&views).into_bytes()),
+            ("points3D.txt", text::points(&points).into_bytes()),
+        ],
+        Form::Binary => [
+            ("cameras.bin", binary::cameras(&views)),
+            ("images.bin", binary::images(&views)),
+            ("points3D.bin", binary::points(&points)),
+        ],
+    };
+    for (name, contents) in files {
+        out.put(&format!("sparse/0/{name}"), contents)?;
+    }
+    Ok(views.len())
+}
+
+/// The scene's points in the coordinates of its files.
+fn points(scene: &Scene) -> Vec<ModelPoint> {
     let mut next = vec![0; scene.views.len()];
-    for (index, point) in scene.points.iter().enumerate() {
-        let position = scene.frame.file(point.position_world.as_dvec3());
-        let [red, green, blue] = point.colour;
-        let error = point.error.map_or(-1.0, f64::from);
-        let _ = write!(points, "{} {} {red} {green} {blue} {error}", index + 1, words(position.to_array()));
-        for &view in &point.views {
-            let place: &mut usize = &mut next[view as usize];
-            let _ = write!(points, " {} {place}", view + 1);
-            *place += 1;
+    let point = |(index, point): (usize, &crate::ScenePoint)| {
+        let place = |&view: &u32| {
+            let place = next[view as usize];
+            next[view as usize] += 1;
+            [view + 1, place]
+        };
+        ModelPoint {
+            id: index as u64 + 1,
+            position: scene.frame.file(point.position_world.as_dvec3()).to_array(),
+            colour: point.colour,
+            error: point.error.map_or(-1.0, f64::from),
+            track: point.views.iter().map(place).collect(),
         }
-        points.push('\n');
-    }
-    out.put("sparse/0/cameras.txt", cameras)?;
-    out.put("sparse/0/images.txt", images)?;
-    out.put("sparse/0/points3D.txt", points)?;
-    Ok(scene.views.len())
+    };
+    scene.points.iter().enumerate().map(point).collect()
 }
 
 /// For each view the points that it saw, in their order, with their image coordinates in the stored photograph.
-fn observations(scene: &Scene) -> Vec<Vec<(usize, [f64; 2])>> {
+fn observations(scene: &Scene) -> Vec<Vec<([f64; 2], u64)>> {
     let mut seen = vec![Vec::new(); scene.views.len()];
     for (index, point) in scene.points.iter().enumerate() {
         for &view in &point.views {
@@ -64,7 +124,7 @@ fn observations(scene: &Scene) -> Vec<Vec<(usize, [f64; 2])>> {
                     [x * focal[0] + principal[0], y * focal[1] + principal[1]]
                 }
             };
-            seen[view as usize].push((index, pixel));
+            seen[view as usize].push((pixel, index as u64 + 1));
         }
     }
     seen
@@ -81,14 +141,16 @@ fn rigid(scene: &Scene, view: &View) -> (DQuat, DVec3) {
 }
 
 /// Model and parameters of a view's camera.
-fn parameters(view: &View) -> (&'static str, Vec<f64>) {
+fn parameters(view: &View) -> (Model, Vec<f64>) {
     let pinhole = &view.camera.pinhole;
     let ([fx, fy], [cx, cy]) = (pinhole.focal().map(f64::from), pinhole.principal().map(f64::from));
-    let Some(lens) = &view.lens else { return ("PINHOLE", vec![fx, fy, cx, cy]) };
+    let Some(lens) = &view.lens else { return (Model("PINHOLE", 1), vec![fx, fy, cx, cy]) };
     let [k1, k2, k3, k4, k5, k6, p1, p2] = Lens::coefficients(lens);
     match (lens.projection(), [k3, k4, k5, k6] == [0.0; 4]) {
-        (Projection::Fisheye, _) => ("OPENCV_FISHEYE", vec![fx, fy, cx, cy, k1, k2, k3, k4]),
-        (Projection::Perspective, true) => ("OPENCV", vec![fx, fy, cx, cy, k1, k2, p1, p2]),
-        (Projection::Perspective, false) => ("FULL_OPENCV", vec![fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6]),
+        (Projection::Fisheye, _) => (Model("OPENCV_FISHEYE", 5), vec![fx, fy, cx, cy, k1, k2, k3, k4]),
+        (Projection::Perspective, true) => (Model("OPENCV", 4), vec![fx, fy, cx, cy, k1, k2, p1, p2]),
+        (Projection::Perspective, false) => {
+            (Model("FULL_OPENCV", 6), vec![fx, fy, cx, cy, k1, k2, p1, p2, k3, k4, k5, k6])
+        }
     }
 }

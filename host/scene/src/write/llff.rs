@@ -1,6 +1,7 @@
 //! LLFF's `poses_bounds.npy`: one focal length for each view, the principal point in the centre, near and far.
 
-use super::{Draft, WriteSceneError, world_from_camera};
+use super::numpy::npy;
+use super::{Draft, WriteSceneError};
 use crate::Scene;
 
 /// Largest distance of a principal point from the centre of the photograph, in pixels.
@@ -35,7 +36,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let mut numbers: Vec<f64> = Vec::with_capacity(17 * count);
     for (index, view) in out.scene.views.iter().enumerate() {
         out.pinhole_photograph(index, "images")?;
-        let matrix = world_from_camera(out.scene, view);
+        let matrix = out.scene.frame.file_from_camera(&view.camera.pose);
         let pinhole = &view.camera.pinhole;
         let size_and_focal = [pinhole.height().into(), pinhole.width().into(), pinhole.focal()[0].into()];
         for (row, last) in matrix.iter().zip(size_and_focal) {
@@ -45,13 +46,6 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
         let [near, far] = view.near_far.unwrap_or_default();
         numbers.extend([near, far].map(|depth| f64::from(depth) * out.scene.frame.scale));
     }
-    let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({count}, 17), }}");
-    // Magic, version and length take 10 bytes; with a line's end the header fills a multiple of 64.
-    let length = (10 + header.len() + 1).next_multiple_of(64) - 10;
-    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-    bytes.extend((length as u16).to_le_bytes());
-    bytes.extend(format!("{header:<width$}\n", width = length - 1).into_bytes());
-    bytes.extend(numbers.into_iter().flat_map(f64::to_le_bytes));
-    out.put("poses_bounds.npy", bytes)?;
+    out.put("poses_bounds.npy", npy(&[count, 17], &numbers))?;
     Ok(count)
 }

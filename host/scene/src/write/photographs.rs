@@ -1,64 +1,87 @@
-//! Writing the photographs of a scene.
+//! Writing the photographs of a scene and their masks.
 
 use std::fs;
+use std::path::Path;
 
-use image::RgbaImage;
+use image::{DynamicImage, GrayImage};
 
 use super::{Draft, WriteSceneError};
 use crate::Photograph;
 
 impl Draft<'_> {
     /// Writes the stored photograph of a view, not undistorted, as `FOLDER/NAME.EXTENSION`; returns its name in the
-    /// folder. A file is copied unchanged, unless it must be turned.
+    /// folder. A file is copied unchanged, unless it carries an orientation.
     pub(super) fn stored_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
         self.progress.check()?;
         let name = &self.scene.views[view].name;
         let written = match self.scene.upright_file(view)? {
-            Some(source) => {
-                let extension = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-                let file = format!("{name}.{extension}");
-                let path = self.file(&format!("{folder}/{file}"))?;
-                fs::copy(source, &path).map_err(|cause| WriteSceneError::Io { path, cause })?;
-                file
-            }
-            None => self.png(folder, name, &self.scene.stored_photograph(view)?)?,
+            Some(source) => self.copied(source, folder, name)?,
+            None => self.png(folder, name, rgb_or_rgba(self.scene.stored_photograph(view)?))?,
         };
         self.progress.step();
         Ok(written)
     }
 
-    /// Copies the mask of a view to `masks/`, named after the photograph with `.png` appended; returns the name in the
-    /// folder.
-    pub(super) fn mask(&self, view: usize, photograph: &str) -> Result<Option<String>, WriteSceneError> {
+    /// Writes the mask of a view, if it has one, for its stored photograph as [`Draft::stored_photograph`] writes it;
+    /// returns its name in the folder: `name` with the mask's extension. A file is copied unchanged, unless it or the
+    /// photograph carries an orientation.
+    pub(super) fn mask(&self, view: usize, folder: &str, name: &str) -> Result<Option<String>, WriteSceneError> {
         let Some(source) = &self.scene.views[view].mask else { return Ok(None) };
-        let extension = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let name = format!("{photograph}.{extension}");
-        let path = self.file(&format!("masks/{name}"))?;
-        fs::copy(source, &path).map_err(|cause| WriteSceneError::Io { path, cause })?;
-        Ok(Some(name))
+        Ok(Some(match self.scene.stored_mask(view)? {
+            None => self.copied(source, folder, name)?,
+            Some(mask) => self.png(folder, name, mask.into())?,
+        }))
     }
 
-    /// Writes the undistorted picture of a view: the unchanged file if possible, otherwise a PNG.
+    /// Writes the undistorted picture of a view, its mask as the alpha channel: the unchanged file if possible,
+    /// otherwise a PNG.
     pub(super) fn pinhole_photograph(&self, view: usize, folder: &str) -> Result<String, WriteSceneError> {
         let changed = &self.scene.views[view];
         if changed.lens.is_none() && changed.mask.is_none() {
             return self.stored_photograph(view, folder);
         }
         self.progress.check()?;
-        let name = self.png(folder, &changed.name, &self.scene.photograph(view)?)?;
+        let name = self.png(folder, &changed.name, rgb_or_rgba(self.scene.photograph(view)?))?;
         self.progress.step();
         Ok(name)
     }
 
-    fn png(&self, folder: &str, name: &str, photograph: &Photograph) -> Result<String, WriteSceneError> {
-        let file = format!("{name}.png");
+    /// Writes the undistorted picture of a view and its undistorted mask as two PNGs; returns the first one's name.
+    pub(super) fn pinhole_photograph_and_mask(
+        &self,
+        view: usize,
+        folder: &str,
+        mask_folder: &str,
+    ) -> Result<String, WriteSceneError> {
+        self.progress.check()?;
+        let Photograph { pixels, .. } = self.scene.photograph(view)?;
+        let name = &self.scene.views[view].name;
+        let (width, height) = pixels.dimensions();
+        let mask = GrayImage::from_fn(width, height, |x, y| image::Luma([pixels.get_pixel(x, y)[3]]));
+        self.png(mask_folder, name, mask.into())?;
+        let written = self.png(folder, name, DynamicImage::ImageRgba8(pixels).into_rgb8().into())?;
+        self.progress.step();
+        Ok(written)
+    }
+
+    fn copied(&self, source: &Path, folder: &str, name: &str) -> Result<String, WriteSceneError> {
+        let extension = source.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        let file = format!("{name}.{extension}");
         let path = self.file(&format!("{folder}/{file}"))?;
-        let pixels: &RgbaImage = &photograph.pixels;
-        let saved = match photograph.has_alpha {
-            true => pixels.save(&path),
-            false => image::DynamicImage::ImageRgba8(pixels.clone()).into_rgb8().save(&path),
-        };
-        saved.map_err(|cause| WriteSceneError::Encode { path, cause })?;
+        fs::copy(source, &path).map_err(|cause| WriteSceneError::Io { path, cause })?;
         Ok(file)
     }
+
+    fn png(&self, folder: &str, name: &str, picture: DynamicImage) -> Result<String, WriteSceneError> {
+        let file = format!("{name}.png");
+        let path = self.file(&format!("{folder}/{file}"))?;
+        picture.save(&path).map_err(|cause| WriteSceneError::Encode { path, cause })?;
+        Ok(file)
+    }
+}
+
+/// Without the alpha channel where it says nothing.
+fn rgb_or_rgba(Photograph { pixels, has_alpha, .. }: Photograph) -> DynamicImage {
+    let picture = DynamicImage::ImageRgba8(pixels);
+    if has_alpha { picture } else { picture.into_rgb8().into() }
 }

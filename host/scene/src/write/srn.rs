@@ -1,6 +1,6 @@
 //! SRN's folders: one pinhole with one focal length for all views.
 
-use super::{Draft, WriteSceneError, words, world_from_camera};
+use super::{Draft, WriteSceneError, words};
 use crate::Scene;
 
 pub(super) fn fits(scene: &Scene) -> Result<(), String> {
@@ -21,7 +21,7 @@ pub(super) fn fits(scene: &Scene) -> Result<(), String> {
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     let mut photograph_count = 0;
     for (index, view) in out.scene.views.iter().enumerate() {
-        let pose = words(world_from_camera(out.scene, view).into_iter().flatten());
+        let pose = words(out.scene.frame.file_from_camera(&view.camera.pose).into_iter().flatten());
         let name = &view.name;
         if view.image.is_some() {
             out.pinhole_photograph(index, "rgb")?;

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 use viewfuse_core::lens::{Lens, Projection};
 
-use super::{Draft, WriteSceneError, world_from_camera};
+use super::{Draft, WriteSceneError};
 use crate::Split;
 
 pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
@@ -12,7 +12,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
     for (index, view) in out.scene.views.iter().enumerate() {
         let photograph = out.stored_photograph(index, "images")?;
         let file_path = format!("images/{photograph}");
-        let mut matrix = world_from_camera(out.scene, view);
+        let mut matrix = out.scene.frame.file_from_camera(&view.camera.pose);
         for row in &mut matrix[..3] {
             // OpenGL axes; -0 is written as 0.
             (row[1], row[2]) = (0.0 - row[1], 0.0 - row[2]);
@@ -30,7 +30,7 @@ pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
                 frame[name] = coefficient.into();
             }
         }
-        if let Some(mask) = out.mask(index, &photograph)? {
+        if let Some(mask) = out.mask(index, "masks", &photograph)? {
             frame["mask_path"] = format!("masks/{mask}").into();
         }
         let list = view.split.map(|split| match split {

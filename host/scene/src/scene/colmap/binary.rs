@@ -56,6 +56,7 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
     let count = bytes.count(51, "points")?;
     let mut all = Vec::with_capacity(count);
     for _ in 0..count {
+        let place = bytes.place();
         bytes.u64("a point")?;
         let position = bytes.f64s("the position of a point")?;
         let colour = [bytes.u8("a point")?, bytes.u8("a point")?, bytes.u8("a point")?];
@@ -66,7 +67,7 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
             images.push(bytes.u32("the images that saw a point")?);
             bytes.u32("the images that saw a point")?;
         }
-        all.push(ModelPoint { position, colour, error, images });
+        all.push(ModelPoint { position, colour, error, images, place });
     }
     bytes.end()?;
     Ok(all)

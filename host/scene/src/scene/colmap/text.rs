@@ -116,7 +116,8 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
             *level = whole(path, line, word)?.min(255) as u8;
         }
         let images = track.iter().step_by(2).map(|word| whole(path, line, word)).collect::<Result<Vec<_>, _>>()?;
-        all.push(ModelPoint { position, colour, error: number(path, line, error)?, images });
+        let (error, place) = (number(path, line, error)?, Place::Line(line));
+        all.push(ModelPoint { position, colour, error, images, place });
     }
     Ok(all)
 }

@@ -231,11 +231,7 @@ impl<'a> Frame<'a> {
 
 /// The photograph of a path, with the extension that the Blender flavour leaves out.
 fn photograph(given: &Path) -> Option<PathBuf> {
-    let with_extension = |extension: &&str| {
-        let mut name = given.to_path_buf().into_os_string();
-        name.push(format!(".{extension}"));
-        PathBuf::from(name)
-    };
+    let with_extension = |extension: &&str| files::appended(given, extension);
     let mut candidates = std::iter::once(given.to_path_buf()).chain(IMAGE_EXTENSIONS.iter().map(with_extension));
     candidates.find(|candidate| candidate.is_file())
 }

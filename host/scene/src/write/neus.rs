@@ -1,0 +1,104 @@
+//! NeuS's layout, as its preprocessed DTU scenes have it: `cameras_sphere.npz`, `image/`, `mask/`.
+//!
+//! `world_mat_N` is the projection `K [R | t]` from the coordinates of the scene's own files, with `(0, 0)` at the centre
+//! of the top left pixel. `scale_mat_N`, the same for all views, maps the unit sphere to what the cameras have in
+//! common: the ball around the point nearest to their principal axes ([`Rig::subject_radius`]). A scene that was read
+//! in this layout is in the sphere's coordinates already, and keeps them.
+//!
+//! `N` is the number that the view's name ends in, if these differ; otherwise its place in natural order. Photographs
+//! of a pinhole and their masks are copied; others are written undistorted, with the mask as a picture of its own.
+
+use std::collections::HashSet;
+use std::io::{Cursor, Write};
+
+use glam::DVec3;
+use viewfuse_core::camera::Camera;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use super::numpy::npy;
+use super::{Draft, Layout, WriteSceneError, camera_from_world};
+use crate::rig::Rig;
+use crate::scene::files::{natural_order, trailing_number};
+use crate::{Scene, View};
+
+/// Whether the scene is in the coordinates of a unit sphere that this layout gave it.
+pub(super) fn is_own(scene: &Scene) -> bool {
+    // Depths come from the sphere: an archive without one has none.
+    scene.layout == Layout::Neus.reader() && scene.views.iter().any(|view| view.near_far.is_some())
+}
+
+pub(super) fn write(out: &mut Draft) -> Result<usize, WriteSceneError> {
+    let count = out.scene.views.len();
+    let files = (0..count).map(|view| photograph(out, view)).collect::<Result<Vec<_>, _>>()?;
+    let numbers = numbers(&out.scene.views, &files);
+    let (centre, radius) = sphere(out.scene);
+    let scale = [
+        [radius, 0.0, 0.0, centre.x],
+        [0.0, radius, 0.0, centre.y],
+        [0.0, 0.0, radius, centre.z],
+        [0.0, 0.0, 0.0, 1.0],
+    ];
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let path = out.file("cameras_sphere.npz")?;
+    let failed = |cause: std::io::Error| WriteSceneError::Io { path: path.clone(), cause };
+    for (view, number) in out.scene.views.iter().zip(numbers) {
+        for (name, matrix) in [("world_mat", projection(out.scene, view)), ("scale_mat", scale)] {
+            let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
+            archive.start_file(format!("{name}_{number}.npy"), stored).map_err(|cause| failed(cause.into()))?;
+            archive.write_all(&npy(&[4, 4], matrix.as_flattened())).map_err(failed)?;
+        }
+    }
+    let bytes = archive.finish().map_err(|cause| failed(cause.into()))?.into_inner();
+    out.put("cameras_sphere.npz", bytes)?;
+    Ok(count)
+}
+
+/// Writes the photograph of a view and its mask; the photograph's name in its folder.
+fn photograph(out: &Draft, index: usize) -> Result<String, WriteSceneError> {
+    let view = &out.scene.views[index];
+    match (&view.lens, &view.mask) {
+        (None, _) => {
+            let file = out.stored_photograph(index, "image")?;
+            out.mask(index, "mask", &view.name)?;
+            Ok(file)
+        }
+        (Some(_), None) => out.pinhole_photograph(index, "image"),
+        (Some(_), Some(_)) => out.pinhole_photograph_and_mask(index, "image", "mask"),
+    }
+}
+
+/// The matrix of each view.
+fn numbers(views: &[View], files: &[String]) -> Vec<u64> {
+    let named: Option<Vec<u64>> = views.iter().map(|view| trailing_number(&view.name)).collect();
+    let differ = |numbers: &Vec<u64>| numbers.iter().collect::<HashSet<_>>().len() == numbers.len();
+    named.filter(differ).unwrap_or_else(|| {
+        let mut order: Vec<usize> = (0..files.len()).collect();
+        order.sort_by(|&a, &b| natural_order(&files[a], &files[b]));
+        let mut places = vec![0; files.len()];
+        order.into_iter().enumerate().for_each(|(place, view)| places[view] = place as u64);
+        places
+    })
+}
+
+/// Centre and radius of the sphere in the coordinates of the scene's files.
+fn sphere(scene: &Scene) -> (DVec3, f64) {
+    if is_own(scene) {
+        return (DVec3::ZERO, 1.0);
+    }
+    let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();
+    let Rig { focus, subject_radius, .. } = Rig::of(&cameras);
+    let radius = if subject_radius > 0.0 { f64::from(subject_radius) } else { 1.0 };
+    (scene.frame.file(focus.as_dvec3()), radius * scene.frame.scale)
+}
+
+/// `K [R | t]` with the last row `0 0 0 1`; pixel centres at whole numbers.
+fn projection(scene: &Scene, view: &View) -> [[f64; 4]; 4] {
+    let pinhole = &view.camera.pinhole;
+    let ([fx, fy], [cx, cy]) = (pinhole.focal().map(f64::from), pinhole.principal().map(f64::from));
+    let [right, down, forward] = camera_from_world(scene, view);
+    let row = |focal: f64, axis: [f64; 4], principal: f64| {
+        std::array::from_fn(|column| focal * axis[column] + (principal - 0.5) * forward[column])
+    };
+    [row(fx, right, cx), row(fy, down, cy), forward, [0.0, 0.0, 0.0, 1.0]]
+}
