@@ -43,7 +43,7 @@ fn scores<D: Device>(device: &D) -> Result<Vec<Scored>, Failed> {
         dists: Some(Dists::new(device, &made(&vgg16(Pooling::L2)), &published_dists()?)?),
         inception: None,
     };
-    Ok(metrics.compare(device, &picture(0), &picture(2))?)
+    Ok(metrics.compare(device, &picture(0), &picture(2), None)?)
 }
 
 fn metrics_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {

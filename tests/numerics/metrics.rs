@@ -217,7 +217,7 @@ fn conventions_decide_what_is_scored() {
         let metrics = Metrics { convention, lpips: vec![lpips(LpipsTrunk::Alex)], dists: None, inception: None };
         let features = metrics.features_of_truths(&Cpu, [&truth]).expect("no network, no features");
         assert!(features.is_none());
-        metrics.compare(&Cpu, &prediction, &truth).expect("scores")
+        metrics.compare(&Cpu, &prediction, &truth, None).expect("scores")
     };
     let plain = scores(Convention::Plain);
     let names: Vec<&str> = plain.iter().map(|score| score.name).collect();

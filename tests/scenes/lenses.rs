@@ -2,7 +2,13 @@
 //! pinhole sees it, and what the lens did not see is marked.
 
 use super::made::open;
+use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
+use viewfuse::device::cpu::Cpu;
+use viewfuse::evaluate::metrics::Metrics;
+use viewfuse::field::render::Truth;
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::photographs::{Album, GroundTruth};
 use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_tests::scenes::{self, Folder};
 
@@ -96,4 +102,49 @@ fn what_the_lens_did_not_see_is_marked_and_not_black() {
     let folded = Lens::new(Projection::Perspective, [-0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
     let seen = read(&folded).seen.expect("a fold");
     assert_eq!((seen.get_pixel(0, 0)[0], seen.get_pixel(47, 33)[0]), (0, 255));
+}
+
+#[test]
+fn what_the_lens_did_not_see_is_not_scored() {
+    let lens = Lens::new(Projection::Perspective, [0.6, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens");
+    let folder = folder("RADIAL", &lens);
+    let scene = open(&folder);
+    let album = Album::open(&scene, [0], &Silent).expect("the photograph");
+    for size in [SIZE, [48, 32]] {
+        let truth = album.truth(0, size, None).expect("the truth");
+        let seen = truth.seen.clone().expect("unseen corners");
+        let unseen = seen.as_raw().iter().filter(|seen| **seen == 0).count();
+        let pixel_count = (size[0] * size[1]) as usize;
+        assert!((pixel_count / 10..pixel_count / 2).contains(&unseen), "{unseen} of {pixel_count}");
+        // The pinhole's own picture, mean over the pixels that a smaller one covers.
+        let scale = SIZE[0] / size[0];
+        let exact = RgbImage::from_fn(size[0], size[1], |x, y| {
+            let covered = (0..scale).flat_map(|i| (0..scale).map(move |j| pixel_centre(x * scale + i, y * scale + j)));
+            let sum = covered.map(colour).fold([0.0; 3], |sum, own| [0, 1, 2].map(|c| sum[c] + own[c]));
+            Rgb(sum.map(|sum| (sum / f64::from(scale * scale)).round() as u8))
+        });
+        let mut wrong_outside = exact.clone();
+        for (pixel, _) in wrong_outside.pixels_mut().zip(seen.as_raw()).filter(|(_, seen)| **seen == 0) {
+            pixel.0 = [255, 0, 255];
+        }
+        let scores = |prediction: &RgbImage| {
+            let Truth { psnr, ssim, .. } = Truth::compare(prediction, truth.clone());
+            (psnr, ssim.expect("a window"))
+        };
+        let (psnr, ssim) = scores(&exact);
+        assert!(psnr > 45.0 && ssim > 0.99, "{psnr} {ssim}");
+        assert_eq!(scores(&wrong_outside), (psnr, ssim));
+        // Over all pixels, the exact picture itself would be wrong where the lens saw nothing.
+        let over_all = Truth::compare(&exact, GroundTruth { seen: None, ..truth.clone() }).psnr;
+        assert!(over_all < psnr - 10.0, "{over_all} {psnr}");
+        // The metrics of an evaluation agree.
+        let metrics = Metrics::<Cpu>::plain();
+        let of = |prediction: &RgbImage| {
+            let scored = metrics.compare(&Cpu, prediction, &truth.picture, truth.seen.as_ref()).expect("scores");
+            (scored[0].value, scored[1].value)
+        };
+        assert_eq!((of(&exact), of(&wrong_outside)), ((psnr, ssim), (psnr, ssim)));
+        let small = image::GrayImage::new(3, 3);
+        assert!(metrics.compare(&Cpu, &exact, &truth.picture, Some(&small)).is_err());
+    }
 }

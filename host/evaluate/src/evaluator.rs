@@ -4,7 +4,7 @@ use crate::baseline::plane::plane_depth;
 use crate::baseline::{BLENDED, Baseline, Shot};
 use crate::metrics::masked::MaskedTruth;
 use crate::metrics::{MetricError, Scorer};
-use image::RgbImage;
+use image::{GrayImage, RgbImage};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::time::{Duration, Instant};
@@ -14,7 +14,7 @@ use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_albu
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
-use viewfuse_scene::photographs::{Album, PhotographsError, SourceImages};
+use viewfuse_scene::photographs::{Album, GroundTruth, PhotographsError, SourceImages};
 use viewfuse_weighting::Weighting;
 
 /// Why an evaluation failed.
@@ -127,20 +127,21 @@ impl Evaluator<'_> {
         let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
         for &target in targets {
             progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
-            let (shot, mask) = (shot_of(scene, &stage, target)?, self.mask(masked, &stage, target)?);
+            let ((camera, truth), mask) = (shown_at(scene, &stage, target)?, self.mask(masked, &stage, target)?);
             let nearest = nearest_sources(scene, sources, target, BLENDED);
             for &source in &nearest {
                 if let Entry::Vacant(place) = shots.entry(source) {
-                    place.insert(shot_of(scene, &stage, source)?);
+                    let (camera, GroundTruth { picture, .. }) = shown_at(scene, &stage, source)?;
+                    place.insert(Shot { camera, picture });
                 }
             }
             let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
             let depth = depth_of(scene, target);
             for baseline in Baseline::ALL {
                 let start = Instant::now();
-                let picture = baseline.picture(&nearest, &shot.camera, depth);
+                let picture = baseline.picture(&nearest, &camera, depth);
                 let time = start.elapsed();
-                let values = self.values(&picture, &shot.picture, mask.as_ref())?;
+                let values = self.values(&picture, &truth.picture, truth.seen.as_ref(), mask.as_ref())?;
                 scores.push(score(baseline.name(), target, values, time));
             }
             masks.insert(target, mask);
@@ -158,7 +159,7 @@ impl Evaluator<'_> {
                     let time = encode_share + frame.time.saturating_sub(frame.encode);
                     shared += frame.encode;
                     let mask = masks.get(&target).and_then(Option::as_ref);
-                    let values = self.values(&frame.picture, &truth.picture, mask)?;
+                    let values = self.values(&frame.picture, &truth.picture, truth.seen.as_ref(), mask)?;
                     seen(weighting, &frame, &values, &stage.images);
                     scores.push(score(&weighting.to_string(), target, values, time));
                 }
@@ -174,9 +175,10 @@ impl Evaluator<'_> {
         &self,
         prediction: &RgbImage,
         truth: &RgbImage,
+        seen: Option<&GrayImage>,
         mask: Option<&MaskedTruth>,
     ) -> Result<Vec<(String, f64)>, MetricError> {
-        let scored = self.scorer.score(prediction, truth)?;
+        let scored = self.scorer.score(prediction, truth, seen)?;
         let mut values: Vec<(String, f64)> =
             scored.into_iter().map(|scored| (scored.name.to_owned(), scored.value)).collect();
         values.extend(mask.into_iter().flat_map(|mask| mask.score(prediction)));
@@ -257,13 +259,13 @@ fn nearest_sources(scene: &Scene, sources: &[usize], target: usize, count: usize
     nearest
 }
 
-/// A view's photograph at working size over the run's background, with the camera of these pixels.
-fn shot_of(scene: &Scene, stage: &Stage<'_>, view: usize) -> Result<Shot, EvaluateError> {
+/// A view's photograph at working size over the run's background, and the camera of these pixels.
+fn shown_at(scene: &Scene, stage: &Stage<'_>, view: usize) -> Result<(Camera, GroundTruth), EvaluateError> {
     let [width, height] = stage.picture_size(view)?;
     let camera = scene.views[view].camera;
     let resized = camera.pinhole.resized(width, height);
     let pinhole = resized.map_err(|error| RenderError::Size { width, height, error })?;
-    Ok(Shot { camera: Camera { pinhole, ..camera }, picture: stage.truth_at(view, [width, height])? })
+    Ok((Camera { pinhole, ..camera }, stage.truth_at(view, [width, height])?))
 }
 
 /// The depth of the plane that a target's baselines are warped by.

@@ -33,11 +33,11 @@ pub mod trunk;
 use convention::Convention;
 use dists::Dists;
 use features::{Features, Inception};
-use image::RgbImage;
+use image::{GrayImage, RgbImage};
 use lpips::Lpips;
-use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_field::finite::NotFinite;
+use viewfuse_field::scores::{psnr_of_seen, ssim_of_seen, with_truth_unseen};
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::image::HostImage;
 
@@ -103,16 +103,27 @@ impl<D: Device> Metrics<D> {
     /// Scores a prediction: PSNR, SSIM if the pictures are at least 7x7, and the metrics of the loaded networks, in the
     /// order of [`Scored::name`]'s list.
     ///
+    /// `seen` is 0 where the photograph shows nothing; without it all pixels are scored. PSNR and SSIM leave unseen pixels
+    /// out ([`viewfuse_field::scores`]); networks see the truth's pixels there in both pictures.
+    ///
     /// # Errors
     /// [`MetricError`].
-    pub fn compare(&self, device: &D, prediction: &RgbImage, truth: &RgbImage) -> Result<Vec<Scored>, MetricError> {
+    pub fn compare(
+        &self,
+        device: &D,
+        prediction: &RgbImage,
+        truth: &RgbImage,
+        seen: Option<&GrayImage>,
+    ) -> Result<Vec<Scored>, MetricError> {
         same_size(prediction, truth)?;
+        seen.map_or(Ok(()), |seen| equal(seen.dimensions(), truth.dimensions()))?;
         let (shown, shown_truth) = (self.convention.shown(prediction), self.convention.shown(truth));
-        let (width, height) = (truth.width() as usize, truth.height() as usize);
-        let mut scores = vec![Scored { name: "psnr", value: psnr(&shown, &shown_truth), more_is_better: true }];
-        if let Some(value) = ssim(&shown, &shown_truth, width, height, 3) {
+        let psnr = psnr_of_seen(&shown, &shown_truth, seen);
+        let mut scores = vec![Scored { name: "psnr", value: psnr, more_is_better: true }];
+        if let Some(value) = ssim_of_seen(&shown, &shown_truth, seen) {
             scores.push(Scored { name: "ssim", value, more_is_better: true });
         }
+        let shown = with_truth_unseen(&shown, truth, seen);
         // Networks see the prediction as it was saved and the photograph as it is.
         for lpips in &self.lpips {
             let value = lpips.distance(device, &shown, truth)?;
@@ -157,7 +168,12 @@ pub trait Scorer {
     ///
     /// # Errors
     /// [`MetricError`].
-    fn score(&self, prediction: &RgbImage, truth: &RgbImage) -> Result<Vec<Scored>, MetricError>;
+    fn score(
+        &self,
+        prediction: &RgbImage,
+        truth: &RgbImage,
+        seen: Option<&GrayImage>,
+    ) -> Result<Vec<Scored>, MetricError>;
 }
 
 /// Metrics with the device that holds their networks.
@@ -169,18 +185,25 @@ pub struct MetricsOn<'a, D: Device> {
 }
 
 impl<D: Device> Scorer for MetricsOn<'_, D> {
-    fn score(&self, prediction: &RgbImage, truth: &RgbImage) -> Result<Vec<Scored>, MetricError> {
-        self.metrics.compare(self.device, prediction, truth)
+    fn score(
+        &self,
+        prediction: &RgbImage,
+        truth: &RgbImage,
+        seen: Option<&GrayImage>,
+    ) -> Result<Vec<Scored>, MetricError> {
+        self.metrics.compare(self.device, prediction, truth, seen)
     }
 }
 
 /// Only pictures of one size can be compared.
 fn same_size(prediction: &RgbImage, truth: &RgbImage) -> Result<(), MetricError> {
-    match prediction.dimensions() == truth.dimensions() {
+    equal(prediction.dimensions(), truth.dimensions())
+}
+
+fn equal(prediction: (u32, u32), truth: (u32, u32)) -> Result<(), MetricError> {
+    match prediction == truth {
         true => Ok(()),
-        false => {
-            Err(MetricError::Sizes { prediction: prediction.dimensions().into(), truth: truth.dimensions().into() })
-        }
+        false => Err(MetricError::Sizes { prediction: prediction.into(), truth: truth.into() }),
     }
 }
 

@@ -14,6 +14,7 @@
 //! *                 the learned fields, a folder each
 //! family            one row a learned field
 //! enlarged          previews: small pictures, enlarged
+//! scores            PSNR and SSIM of what a photograph shows
 //! render            the render loop, from a scene to pictures
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
 //! ```
@@ -36,6 +37,7 @@ pub mod pixelnerf;
 pub mod record;
 pub mod render;
 pub mod renderer;
+pub mod scores;
 pub mod session;
 pub mod training_free;
 

@@ -1,17 +1,18 @@
 //! The render loop, from a scene to pictures.
 
+use crate::scores::{psnr_of_seen, ssim_of_seen};
 use crate::{FieldError, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
-use image::RgbImage;
+use image::{GrayImage, RgbImage};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::{Camera, PinholeError};
-use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_core::weights::{Omission, Weights};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{
-    Album, BackgroundChoice, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8,
+    Album, BackgroundChoice, GroundTruth, PhotographsError, SourceImages, longest_side, reduced_size, scaled_size,
+    to_rgb8,
 };
 use viewfuse_scene::{Scene, SceneError, View};
 use viewfuse_weighting::Weighting;
@@ -164,6 +165,8 @@ pub struct Frame {
 pub struct Truth {
     /// The photograph at the frame's size over the run's background.
     pub picture: RgbImage,
+    /// Where the photograph shows the whole pixel ([`GroundTruth::seen`]); only these pixels are scored.
+    pub seen: Option<GrayImage>,
     /// Peak signal to noise ratio in decibels, of 8-bit values.
     pub psnr: f64,
     /// Structural similarity (uniform 7x7 window), if the picture is large enough.
@@ -172,9 +175,11 @@ pub struct Truth {
 
 impl Truth {
     /// Compares a prediction with the truth.
-    pub fn compare(prediction: &RgbImage, truth: RgbImage) -> Truth {
-        let (width, height) = (truth.width() as usize, truth.height() as usize);
-        Truth { psnr: psnr(prediction, &truth), ssim: ssim(prediction, &truth, width, height, 3), picture: truth }
+    pub fn compare(prediction: &RgbImage, truth: GroundTruth) -> Truth {
+        let GroundTruth { picture, seen } = truth;
+        let psnr = psnr_of_seen(prediction, &picture, seen.as_ref());
+        let ssim = ssim_of_seen(prediction, &picture, seen.as_ref());
+        Truth { picture, seen, psnr, ssim }
     }
 }
 
@@ -379,7 +384,7 @@ impl<'a> Stage<'a> {
     ///
     /// # Errors
     /// [`RenderError::Scene`] if it cannot be read.
-    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<RgbImage, RenderError> {
+    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<GroundTruth, RenderError> {
         let background = self.images.has_silhouettes.then_some(self.images.background);
         Ok(self.album.truth(view, size, background)?)
     }

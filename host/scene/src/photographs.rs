@@ -1,8 +1,10 @@
 //! Photographs prepared for a field: at working size, premultiplied, with the background removed.
 
+mod ground_truth;
 mod matte;
 mod resample;
 
+pub use ground_truth::GroundTruth;
 pub use matte::BackgroundChoice;
 
 use crate::{Photograph, Scene, SceneError, View};
@@ -338,22 +340,6 @@ impl<'a> Album<'a> {
         let (own_width, own_height) = photograph.pixels.dimensions();
         let texels = resample::area_average(&premultiplied, [own_width, own_height], [width, height]);
         Ok(SourceImage { camera: Camera { pinhole, ..*camera }, texels })
-    }
-
-    /// The truth at a view, resampled to a size, rounded to 8 bits: composited over the background if there is one;
-    /// otherwise the whole photograph.
-    ///
-    /// # Errors
-    /// [`SceneError`] if it cannot be read.
-    pub fn truth(&self, view: usize, size: [u32; 2], background: Option<[f32; 3]>) -> Result<RgbImage, SceneError> {
-        let mut photograph = self.photograph(view)?;
-        if background.is_none() && self.scene.views[view].mask.is_some() {
-            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
-        }
-        let background = background.unwrap_or_default();
-        let own_size = photograph.pixels.dimensions();
-        let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
-        Ok(to_rgb8(&texels, size))
     }
 }
 

@@ -94,7 +94,7 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
     for pair in pairs {
         progress.check()?;
         let [prediction, truth] = [opened(&pair.prediction)?, opened(&pair.truth)?];
-        let scored = metrics.compare(device, &prediction, &truth);
+        let scored = metrics.compare(device, &prediction, &truth, None);
         scores.push(scored.with_context(|| pair.prediction.display().to_string())?);
         if metrics.inception.is_some() {
             pictures.push([prediction, truth]);

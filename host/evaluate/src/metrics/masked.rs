@@ -1,11 +1,12 @@
 //! PSNR and SSIM of the object alone, as few-shot papers report for DTU: prediction and truth are both composited over
 //! white with the mask of the *truth*, and compared over the whole picture.
 //!
-//! The prediction's own opacity is not used: its pixels inside the mask count, its pixels outside do not. Both pictures
-//! have 8 bits, under every convention of the other metrics.
+//! The prediction's own opacity is not used: its pixels inside the mask count, its pixels outside do not; what the
+//! photograph's lens did not see is outside. Both pictures have 8 bits, under every convention of the other metrics.
 
 use image::RgbImage;
 use viewfuse_core::metrics::{psnr, ssim};
+use viewfuse_scene::photographs::GroundTruth;
 
 /// Name of the masked peak signal to noise ratio in decibels.
 pub const PSNR_MASKED: &str = "psnr-masked";
@@ -23,7 +24,9 @@ pub struct MaskedTruth {
 impl MaskedTruth {
     /// From the same photograph composited over white and over black, of equal size; `None` where these are equal,
     /// because it then has no mask.
-    pub fn of(over_white: RgbImage, over_black: &RgbImage) -> Option<MaskedTruth> {
+    pub fn of(over_white: GroundTruth, over_black: &GroundTruth) -> Option<MaskedTruth> {
+        let GroundTruth { picture: mut over_white, seen } = over_white;
+        let over_black = &over_black.picture;
         if over_white == *over_black || over_white.dimensions() != over_black.dimensions() {
             return None;
         }
@@ -31,7 +34,13 @@ impl MaskedTruth {
             let behind: i32 = (0..3).map(|channel| i32::from(white[channel]) - i32::from(black[channel])).sum();
             (1.0 - behind as f32 / (3.0 * 255.0)).clamp(0.0, 1.0)
         };
-        let shares = over_white.pixels().zip(over_black.pixels()).map(share).collect();
+        let mut shares: Vec<f32> = over_white.pixels().zip(over_black.pixels()).map(share).collect();
+        if let Some(seen) = seen {
+            let places = shares.iter_mut().zip(over_white.pixels_mut()).zip(seen.as_raw());
+            for ((share, pixel), _) in places.filter(|(_, seen)| **seen == 0) {
+                (*share, pixel.0) = (0.0, [u8::MAX; 3]);
+            }
+        }
         Some(MaskedTruth { over_white, shares })
     }
 
@@ -62,12 +71,16 @@ impl MaskedTruth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use image::Rgb;
+    use image::{GrayImage, Luma, Rgb};
+
+    fn whole(picture: RgbImage) -> GroundTruth {
+        GroundTruth { picture, seen: None }
+    }
 
     /// The left half is an object of level 100, the right half background.
     fn halves() -> MaskedTruth {
         let over = |behind: u8| RgbImage::from_fn(16, 8, |x, _| Rgb(if x < 8 { [100; 3] } else { [behind; 3] }));
-        MaskedTruth::of(over(255), &over(0)).expect("a mask")
+        MaskedTruth::of(whole(over(255)), &whole(over(0))).expect("a mask")
     }
 
     #[test]
@@ -88,10 +101,22 @@ mod tests {
     #[test]
     fn fractions_and_photographs_without_a_mask() {
         // A quarter object of level 200: 50 over black, 241 over white.
-        let (white, black) = (RgbImage::from_pixel(2, 2, Rgb([241; 3])), RgbImage::from_pixel(2, 2, Rgb([50; 3])));
+        let [white, black] = [241, 50].map(|level| whole(RgbImage::from_pixel(2, 2, Rgb([level; 3]))));
         let truth = MaskedTruth::of(white.clone(), &black).expect("a mask");
         let level = truth.over_white(&RgbImage::from_pixel(2, 2, Rgb([200; 3]))).get_pixel(0, 0)[0];
         assert!(level.abs_diff(241) <= 1, "{level}");
         assert_eq!(MaskedTruth::of(white.clone(), &white), None);
+    }
+
+    #[test]
+    fn what_was_not_seen_is_no_object() {
+        let over = |behind: u8| {
+            let picture = RgbImage::from_fn(16, 8, |x, _| Rgb(if x < 8 { [100; 3] } else { [behind; 3] }));
+            GroundTruth { picture, seen: Some(GrayImage::from_fn(16, 8, |_, y| Luma([if y < 2 { 0 } else { 255 }]))) }
+        };
+        let truth = MaskedTruth::of(over(255), &over(0)).expect("a mask");
+        // Wrong only where the lens saw nothing and beside the object.
+        let prediction = RgbImage::from_fn(16, 8, |x, y| Rgb(if x < 8 && y >= 2 { [100; 3] } else { [7; 3] }));
+        assert_eq!(truth.score(&prediction)[0].1, f64::INFINITY);
     }
 }

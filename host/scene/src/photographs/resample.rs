@@ -41,15 +41,19 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
     });
     let at = |x: u32, y: u32| averaged[(y * width + x) as usize];
     let pixels = RgbaImage::from_fn(width, height, |x, y| Rgba(at(x, y)));
-    let seen = photograph.seen.as_ref().map(|seen| {
-        let is_seen = |x: u32, y: u32| {
-            let mut covered =
-                rows[y as usize].iter().flat_map(|(y, _)| columns[x as usize].iter().map(move |(x, _)| (*x, *y)));
-            covered.all(|(x, y)| seen.get_pixel(x as u32, y as u32)[0] > 0)
-        };
-        GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
-    });
+    let seen = photograph.seen.as_ref().map(|own| seen(own, (width, height)));
     Photograph { pixels, has_alpha: photograph.has_alpha, seen }
+}
+
+/// What is seen at another size: output pixels that are partly outside the seen area count as not seen.
+pub(super) fn seen(own: &GrayImage, (width, height): (u32, u32)) -> GrayImage {
+    let (columns, rows) = (spans(own.width(), width), spans(own.height(), height));
+    let is_seen = |x: u32, y: u32| {
+        let mut covered =
+            rows[y as usize].iter().flat_map(|(y, _)| columns[x as usize].iter().map(move |(x, _)| (*x, *y)));
+        covered.all(|(x, y)| own.get_pixel(x as u32, y as u32)[0] > 0)
+    };
+    GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
 }
 
 /// Adds a line of pixels, their colours multiplied by alpha (of 255).

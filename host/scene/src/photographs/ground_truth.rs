@@ -1,0 +1,38 @@
+//! Photographs at targets, to compare predictions with.
+
+use super::{Album, matte, resample, to_rgb8, without_alpha};
+use crate::SceneError;
+use image::{GrayImage, RgbImage};
+use std::borrow::Cow;
+
+/// A photograph at the size of a prediction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GroundTruth {
+    /// The picture, opaque.
+    pub picture: RgbImage,
+    /// 255 where the photograph shows the whole pixel, otherwise 0: the photograph's lens did not see the corners of the
+    /// pinhole's picture. `None` if it shows all of them.
+    pub seen: Option<GrayImage>,
+}
+
+impl Album<'_> {
+    /// The truth at a view, resampled to a size, rounded to 8 bits: composited over the background if there is one;
+    /// otherwise the whole photograph.
+    ///
+    /// # Errors
+    /// [`SceneError`] if it cannot be read.
+    pub fn truth(&self, view: usize, size: [u32; 2], background: Option<[f32; 3]>) -> Result<GroundTruth, SceneError> {
+        let mut photograph = self.photograph(view)?;
+        if background.is_none() && self.scene.views[view].mask.is_some() {
+            photograph = Cow::Owned(without_alpha(photograph.into_owned()));
+        }
+        let background = background.unwrap_or_default();
+        let own_size = photograph.pixels.dimensions();
+        let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
+        let seen = photograph.seen.as_ref().map(|seen| resample::seen(seen, size.into()));
+        Ok(GroundTruth {
+            picture: to_rgb8(&texels, size),
+            seen: seen.filter(|seen| seen.as_raw().iter().any(|seen| *seen == 0)),
+        })
+    }
+}
