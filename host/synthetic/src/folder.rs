@@ -141,7 +141,7 @@ pub(crate) fn create_whole(
     fs::rename(&unfinished, folder).map_err(io_error(folder))
 }
 
-fn shared_pinhole(folder: &Path, cameras: &[Camera]) -> Result<Pinhole, WriteError> {
+pub(crate) fn shared_pinhole(folder: &Path, cameras: &[Camera]) -> Result<Pinhole, WriteError> {
     let count = cameras.len();
     let Some(first) = cameras.first().filter(|_| count <= LARGEST_VIEW_COUNT) else {
         return Err(WriteError::ViewCount { path: folder.to_owned(), count });
@@ -177,7 +177,7 @@ pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
     fs::write(path, text).map_err(io_error(path))
 }
 
-fn write_picture(path: &Path, picture: &image::RgbaImage) -> Result<(), WriteError> {
+pub(crate) fn write_picture(path: &Path, picture: &image::RgbaImage) -> Result<(), WriteError> {
     let mut bytes = Vec::new();
     PngEncoder::new_with_quality(&mut bytes, CompressionType::Best, FilterType::Adaptive)
         .write_image(picture, picture.width(), picture.height(), image::ExtendedColorType::Rgba8)

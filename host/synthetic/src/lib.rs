@@ -32,6 +32,7 @@
 //! garden        the same table outdoors                        garden
 //! shoot         scenes by place, rig, seed and size            generate
 //! transforms    photographs and poses on disk, NeRF layout     write_shoot
+//! splits        an object cut out, NeRF's synthetic layout     write_splits
 //! ```
 //!
 //! Everything is computed in `f32` from additions, multiplications, divisions and square roots in one stated order,
@@ -62,6 +63,7 @@ pub mod scenery;
 pub mod shade;
 pub mod shape;
 pub mod shoot;
+pub mod splits;
 pub mod texture;
 pub mod toy;
 pub mod trace;
@@ -80,6 +82,7 @@ pub use rig::Rig;
 pub use scenery::Scenery;
 pub use shape::Shape;
 pub use shoot::{Place, Shoot, generate};
+pub use splits::write_splits;
 pub use texture::{Finish, Patch, Texture};
 pub use trace::{Hit, trace};
 pub use transforms::write_shoot;

@@ -108,7 +108,7 @@ fn transforms(cameras: &[Camera]) -> Option<Transforms> {
 }
 
 /// The same JSON with each row of a matrix on one line: lists of numbers are joined.
-fn with_short_rows(json: &str) -> String {
+pub(crate) fn with_short_rows(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     let mut in_row = false;
     for line in json.lines() {

@@ -6,14 +6,18 @@ use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use viewfuse::evaluate::protocol::{Draws, Job, Protocol};
+use viewfuse::job::progress::Silent;
 use viewfuse::scene::dataset::Split;
 use viewfuse::scene::{Scene, View};
+use viewfuse::synthetic::cameras::{random_views, sphere, spiral_views};
+use viewfuse::synthetic::{toy::lorry, write_splits};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, toy};
 
 viewfuse_tests::trials![
     llff_takes_every_eighth_view,
     dtu_takes_the_published_views,
     blender_takes_views_of_its_splits,
+    blender_on_a_scene_in_its_layout,
     nearest_takes_the_nearest_cameras,
     tables_without_a_folder,
     json_is_the_table,
@@ -109,6 +113,35 @@ fn blender_takes_views_of_its_splits() {
     );
     let half = scene(of(Split::Train, 100));
     assert!(refusal("blender:8", &half).contains("has no views of a test split"), "{}", refusal("blender:8", &half));
+}
+
+fn blender_on_a_scene_in_its_layout() {
+    let folder = viewfuse_tests::scenes::Folder::new();
+    let sphere = sphere(48).expect("a sphere");
+    let mut train: Vec<_> = (0..).zip(random_views(&sphere, 5, 0, 100).expect("cameras")).collect();
+    train.retain(|(view, _)| [2, 16, 26, 55, 73, 75, 86, 93].contains(view));
+    let mut test: Vec<_> = (0..).zip(spiral_views(&sphere, 200).expect("cameras")).collect();
+    test.retain(|(view, _)| [0, 3, 40, 104].contains(view));
+    let splits = [("train", train), ("val", test[1..2].to_vec()), ("test", test)];
+    write_splits(&folder.path().join("lorry"), &lorry().expect("a lorry"), &splits, 2, &Silent).expect("a scene");
+    let scene = Scene::open(folder.path().join("lorry")).expect("a scene");
+    let of = |split| scene.views.iter().filter(|view| view.split == Some(split)).count();
+    assert_eq!([Split::Train, Split::Validation, Split::Test].map(of), [8, 1, 4]);
+    assert!(scene.photograph(0).is_ok_and(|photograph| photograph.has_alpha));
+    let expected = sphere.pinhole;
+    assert!(scene.views.iter().all(|view| (view.camera.pinhole.focal()[0] - expected.focal()[0]).abs() < 1e-4));
+    let whole = json(folder.path(), "lorry --protocol blender:8");
+    assert_eq!(whole["jobs"][0]["targets"], serde_json::json!(["test_r_0", "test_r_40", "test_r_104"]));
+    assert_eq!(whole["settings"]["protocol"], "blender:8");
+    let rows = whole["tables"][0]["rows"].as_array().expect("rows");
+    let psnr = |row: usize| rows[row]["cells"][0]["value"]["mean"].as_f64().expect("a number");
+    // Of the object over white; a copy of a source is far worse.
+    assert!(psnr(3) > psnr(0) + 3.0 && psnr(3) > 18.0, "{rows:?}");
+    assert!(
+        whole["published"]["withheld"].as_str().is_some_and(|why| why.contains("400x400")),
+        "{}",
+        whole["published"]
+    );
 }
 
 fn nearest_takes_the_nearest_cameras() {
