@@ -30,9 +30,6 @@ impl Album<'_> {
         let own_size = photograph.pixels.dimensions();
         let texels = resample::area_average(&matte::laid_over(&photograph, background), own_size.into(), size);
         let seen = photograph.seen.as_ref().map(|seen| resample::seen(seen, size.into()));
-        Ok(GroundTruth {
-            picture: to_rgb8(&texels, size),
-            seen: seen.filter(|seen| seen.as_raw().iter().any(|seen| *seen == 0)),
-        })
+        Ok(GroundTruth { picture: to_rgb8(&texels, size), seen: seen.filter(|seen| seen.as_raw().contains(&0)) })
     }
 }
