@@ -46,6 +46,30 @@ fn large_photographs_are_reduced_once() {
     assert_eq!(sources(&Album::open_at(&scene, [], 64, &Silent).expect("none")), found);
 }
 
+/// What a mask hides is there all the same when a scene is used without its masks.
+#[test]
+fn what_a_mask_hides_is_kept() {
+    let folder = folder(100);
+    let whole_pictures = |scene: &viewfuse::scene::Scene, longest_side: u32| {
+        let album = Album::open_at(scene, [0, 1], longest_side, &Silent).expect("photographs");
+        album.sources(&[0, 1], 64, BackgroundChoice::None, &Silent).expect("sources").images[0].texels.clone()
+    };
+    let mut scene = open(&folder);
+    let opaque = |_, _| Rgba([200, 150, 40, 255]);
+    RgbaImage::from_fn(1600, 1200, opaque).save(folder.file("rgb/2.png")).expect("a photograph");
+    let mask = |x: u32, _| image::Luma([if x < 700 { 255 } else { 0 }]);
+    image::GrayImage::from_fn(1600, 1200, mask).save(folder.file("mask.png")).expect("a mask");
+    scene.views[0].mask = Some(folder.file("mask.png"));
+    // Kept at their own size, and reduced as soon as they are decoded.
+    for longest_side in [1600, 64] {
+        for texel in whole_pictures(&scene, longest_side) {
+            for (channel, level) in [200.0, 150.0, 40.0, 255.0].into_iter().enumerate() {
+                assert!((255.0 * texel[channel] - level).abs() < 1.01, "{texel:?} of {longest_side}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_lens_is_undone_after_the_reduction() {
     let folder = Folder::new();

@@ -4,13 +4,13 @@ use super::geometry::{Measure, Standing};
 use crate::Setting;
 use crate::render::{RenderError, RenderOptions, Stage};
 use crate::renderer::Renderer;
-use image::RgbImage;
+use crate::scores::psnr_of_seen;
 use image::imageops::{self, FilterType};
+use image::{GrayImage, RgbImage};
 use std::borrow::Cow;
 use std::sync::Arc;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::PinholeError;
-use viewfuse_core::metrics::psnr;
 use viewfuse_core::pose::Pose;
 use viewfuse_job::progress::{Interrupted, Progress, Quiet};
 use viewfuse_scene::Scene;
@@ -40,6 +40,8 @@ struct Trial<'a> {
     stage: Stage<'a>,
     target: Target,
     truth: RgbImage,
+    /// Where the source shows something; `None` if everywhere.
+    seen: Option<GrayImage>,
     standing: Standing,
     /// The score of a copy of the nearest of the others.
     copy: f64,
@@ -125,6 +127,7 @@ impl<'a> Trials<'a> {
             let shown = small(&stage.images.images[source], side, scene)?;
             let name = scene.views[stage.views[source]].name.clone();
             let target = Target { name, camera: shown.camera, truth: None };
+            let seen = if stage.images.has_silhouettes { None } else { shown_part(&shown) };
             let truth = SourceImages { images: vec![shown], ..own.images.as_ref().clone() }.picture(0);
             if own.size_at(&target.camera)? != [truth.width(), truth.height()] {
                 continue;
@@ -134,8 +137,8 @@ impl<'a> Trials<'a> {
                 let distance = |other: usize| poses[others[other]].distance(&poses[source]);
                 distance(a).total_cmp(&distance(b))
             });
-            let copy = nearest.map_or(0.0, |nearest| copy_score(&own.images.picture(nearest), &truth));
-            trials.push(Trial { source, stage: own, target, truth, standing, copy });
+            let copy = nearest.map_or(0.0, |nearest| copy_score(&own.images.picture(nearest), &truth, seen.as_ref()));
+            trials.push(Trial { source, stage: own, target, truth, seen, standing, copy });
         }
         Ok(Trials { trials })
     }
@@ -158,13 +161,13 @@ impl<'a> Trials<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
         let mut outcomes = Vec::with_capacity(self.trials.len());
-        for Trial { source, stage, target, truth, standing, copy } in &mut self.trials {
+        for Trial { source, stage, target, truth, seen, standing, copy } in &mut self.trials {
             progress.check().map_err(stopped)?;
             stage.tune(settings);
             let frame = stage.frame(weighting, target, &Quiet(progress))?;
             outcomes.push(Outcome {
                 source: *source,
-                psnr: psnr(&frame.picture, truth).min(MOST_PSNR),
+                psnr: psnr_of_seen(&frame.picture, truth, seen.as_ref()).min(MOST_PSNR),
                 confidence: mean(&frame.confidences),
                 standing: *standing,
                 copy: *copy,
@@ -176,13 +179,20 @@ impl<'a> Trials<'a> {
 }
 
 /// The score of a picture that is resampled to the truth's size.
-fn copy_score(picture: &RgbImage, truth: &RgbImage) -> f64 {
+fn copy_score(picture: &RgbImage, truth: &RgbImage, seen: Option<&GrayImage>) -> f64 {
     let (width, height) = truth.dimensions();
     let copy = match picture.dimensions() == (width, height) {
         true => Cow::Borrowed(picture),
         false => Cow::Owned(imageops::resize(picture, width, height, FilterType::Triangle)),
     };
-    psnr(&copy, truth).min(MOST_PSNR)
+    psnr_of_seen(&copy, truth, seen).min(MOST_PSNR)
+}
+
+/// The pixels that a whole photograph shows: those its lens did not see have alpha 0. `None` if it shows all of them.
+fn shown_part(SourceImage { camera, texels }: &SourceImage) -> Option<GrayImage> {
+    let levels: Vec<u8> = texels.iter().map(|texel| if texel[3] > 0.999 { u8::MAX } else { 0 }).collect();
+    GrayImage::from_raw(camera.pinhole.width(), camera.pinhole.height(), levels)
+        .filter(|seen| seen.as_raw().contains(&0))
 }
 
 /// A source with a longest side of at most `side` pixels.

@@ -5,8 +5,12 @@ use crate::Photograph;
 use image::{GrayImage, Luma, Rgba, RgbaImage};
 use rayon::prelude::*;
 
-/// A photograph at a smaller size, its colours weighted by their alpha. Output pixels that are partly outside the seen
-/// area count as not seen.
+/// Weight of a transparent pixel's colour beside opaque ones' 255. What a mask hides is kept: a scene can be used without its
+/// masks.
+const TRANSPARENT_WEIGHT: f32 = 1.0 / 64.0;
+
+/// A photograph at a smaller size, its colours weighted by their alpha; where all is transparent, their mean. Output pixels
+/// that are partly outside the seen area count as not seen.
 pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> Photograph {
     let (own_width, own_height) = photograph.pixels.dimensions();
     let (columns, rows) = (spans(own_width, width), spans(own_height, height));
@@ -31,11 +35,13 @@ pub(super) fn reduced(photograph: &Photograph, (width, height): (u32, u32)) -> P
                 sums.iter_mut().zip(&line[4 * x..]).for_each(|(sum, value)| *sum += share * value);
             }
             let level = |value: f32| (value + 0.5) as u8;
-            let [r, g, b, alpha] = sums;
+            let [r, g, b, weight] = sums;
             *pixel = match photograph.has_alpha {
                 false => [level(r), level(g), level(b), u8::MAX],
-                true if alpha > 0.0 => [level(r / alpha), level(g / alpha), level(b / alpha), level(alpha)],
-                true => [0; 4],
+                true => {
+                    let alpha = level(weight - TRANSPARENT_WEIGHT);
+                    [level(r / weight), level(g / weight), level(b / weight), alpha]
+                }
             };
         }
     });
@@ -56,14 +62,14 @@ pub(super) fn seen(own: &GrayImage, (width, height): (u32, u32)) -> GrayImage {
     GrayImage::from_fn(width, height, |x, y| Luma([if is_seen(x, y) { u8::MAX } else { 0 }]))
 }
 
-/// Adds a line of pixels, their colours multiplied by alpha (of 255).
+/// Adds a line of pixels, their colours multiplied by alpha (of 255) and [`TRANSPARENT_WEIGHT`], and these weights.
 fn add_weighted(line: &mut [f32], source: &[u8], share: f32) {
     for (sum, pixel) in line.as_chunks_mut::<4>().0.iter_mut().zip(source.as_chunks::<4>().0) {
-        let alpha = share * f32::from(pixel[3]);
+        let weight = share * (f32::from(pixel[3]) + TRANSPARENT_WEIGHT);
         for channel in 0..3 {
-            sum[channel] += alpha * f32::from(pixel[channel]);
+            sum[channel] += weight * f32::from(pixel[channel]);
         }
-        sum[3] += alpha;
+        sum[3] += weight;
     }
 }
 
