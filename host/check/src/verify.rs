@@ -13,6 +13,7 @@ mod weighting;
 use safetensors::SafeTensors;
 use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
+use viewfuse_job::files::read_at_most;
 use viewfuse_job::progress::Progress;
 
 /// Why a file could not be compared at all.
@@ -144,13 +145,17 @@ impl Report {
     }
 }
 
+/// Most bytes of a file of reference values.
+const LONGEST_FILE: u64 = 4 << 30;
+
 /// Compares this build with a file; kernels run on the given device.
 ///
 /// # Errors
 /// [`VerifyError`] if the file cannot be compared at all. An exceeded tolerance is not an error but part of the
 /// report.
 pub fn verify<D: Device>(path: &Path, device: &D, progress: &dyn Progress) -> Result<Report, VerifyError> {
-    let bytes = std::fs::read(path).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;
+    let bytes =
+        read_at_most(path, LONGEST_FILE).map_err(|cause| VerifyError::Io { path: path.to_path_buf(), cause })?;
     let report = match SafeTensors::deserialize(&bytes) {
         Ok(tensors) => {
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };

@@ -4,6 +4,7 @@ mod check;
 mod compare;
 mod convert;
 mod devices;
+mod ending;
 mod environment;
 mod evaluate;
 mod export;
@@ -13,6 +14,7 @@ mod left_out;
 mod metrics_options;
 mod model;
 mod options;
+mod outputs;
 #[cfg(feature = "pareto")]
 mod pareto;
 mod parse;
@@ -20,6 +22,7 @@ mod render;
 #[cfg(feature = "report")]
 mod report;
 mod scenes;
+mod shown;
 mod table;
 mod terminal;
 #[cfg(feature = "train")]
@@ -87,7 +90,9 @@ enum Command {
     Check(check::Arguments),
 }
 
-pub(crate) use hints::hint;
+pub(crate) use ending::INTERRUPTED;
+pub(crate) use hints::{hint, is_of_arguments};
+pub(crate) use terminal::{complain, complain_of_arguments};
 
 fn long_about() -> String {
     format!(
@@ -103,6 +108,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     let mut command = Arguments::command();
     let matches = command.get_matches_mut();
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
+    terminal::silence_caught_panics();
     terminal::listen()?;
     match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
@@ -128,9 +134,10 @@ fn wrong(message: impl Display) -> anyhow::Error {
         .into()
 }
 
-/// Prints a line. A closed pipe (`| head`) is ignored, because the files are still to be written.
+/// Prints a line, in which nothing from a file controls the terminal. A closed pipe (`| head`) is ignored, because the files
+/// are still to be written.
 fn say(text: impl Display) -> io::Result<()> {
-    match writeln!(io::stdout().lock(), "{text}") {
+    match writeln!(io::stdout().lock(), "{}", shown::shown(text)) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         outcome => outcome,
     }

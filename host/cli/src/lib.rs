@@ -12,16 +12,19 @@ pub fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             if let Some(interrupted) = error.chain().find_map(|cause| cause.downcast_ref::<Interrupted>()) {
-                eprintln!("viewfuse: {interrupted}");
-                return ExitCode::from(130);
+                cli::complain(interrupted);
+                return ExitCode::from(cli::INTERRUPTED);
             }
             if let Some(wrong) = error.downcast_ref::<clap::Error>() {
-                eprint!("{wrong}");
+                cli::complain_of_arguments(wrong);
                 return ExitCode::from(2);
             }
             match cli::hint(&error) {
-                Some(hint) => eprintln!("viewfuse: {error:#}; {hint}"),
-                None => eprintln!("viewfuse: {error:#}"),
+                Some(hint) => cli::complain(format_args!("{error:#}; {hint}")),
+                None => cli::complain(format_args!("{error:#}")),
+            }
+            if cli::is_of_arguments(&error) {
+                return ExitCode::from(2);
             }
             ExitCode::from(1)
         }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
 use viewfuse_field::render::Frame;
-use viewfuse_job::files::{WriteError, write_whole};
+use viewfuse_job::files::{WriteError, read_at_most, write_whole};
 use viewfuse_output::png::write_png;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::Weighting;
@@ -30,6 +30,20 @@ pub enum GalleryError {
         /// What the system said.
         cause: std::io::Error,
     },
+    /// A file names something that is no picture in its folder.
+    #[error("{}: names {file:?}, which is no picture in the folder of pictures; nothing of it is shown", path.display())]
+    Outside {
+        /// The file.
+        path: PathBuf,
+        /// The name.
+        file: String,
+    },
+    /// A file is not a PNG.
+    #[error("{}: is not a PNG", path.display())]
+    NoPicture {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file does not describe pictures.
     #[error("{}: does not describe pictures of an evaluation: {cause}", path.display())]
     Json {
@@ -39,6 +53,13 @@ pub enum GalleryError {
         cause: serde_json::Error,
     },
 }
+
+/// Most bytes of the description of a target's pictures.
+const LONGEST_DESCRIPTION: u64 = 16 << 20;
+/// Most bytes of a picture.
+const LONGEST_PICTURE: u64 = 256 << 20;
+/// What a PNG begins with.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// The pictures of a target. File names are relative to the folder of pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,6 +76,39 @@ pub struct Shown {
     pub sources: Vec<ShownSource>,
     /// The schemes in theirs.
     pub schemes: Vec<ShownScheme>,
+}
+
+impl Shown {
+    /// The names of all its pictures.
+    fn files(&self) -> impl Iterator<Item = &str> {
+        let sources = self.sources.iter().map(|source| source.file.as_str());
+        let schemes = self.schemes.iter().map(|scheme| scheme.file.as_str());
+        [self.truth.as_str()].into_iter().chain(sources).chain(schemes)
+    }
+}
+
+/// Whether a name is that of a picture in the folder itself.
+fn is_picture_name(name: &str) -> bool {
+    let path = Path::new(name);
+    path.file_name() == Some(path.as_os_str())
+        && !name.contains(['/', '\\', ':'])
+        && path.extension().is_some_and(|extension| extension == "png")
+}
+
+/// The bytes of a picture of an evaluation: a file in its folder of pictures, no link that leads out of it, and a PNG.
+///
+/// # Errors
+/// [`GalleryError`].
+pub fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, GalleryError> {
+    let folder = folder.join(PICTURES);
+    let path = folder.join(name);
+    let unreadable = |cause| GalleryError::Read { path: path.clone(), cause };
+    let is_inside = fs::canonicalize(&path).map_err(unreadable)?.parent() == fs::canonicalize(&folder).ok().as_deref();
+    if !(is_picture_name(name) && is_inside) {
+        return Err(GalleryError::Outside { path: folder, file: name.to_owned() });
+    }
+    let bytes = read_at_most(&path, LONGEST_PICTURE).map_err(unreadable)?;
+    if bytes.starts_with(PNG) { Ok(bytes) } else { Err(GalleryError::NoPicture { path: path.clone() }) }
 }
 
 /// A source.
@@ -169,8 +223,13 @@ pub fn shown(folder: &Path) -> Result<Vec<Shown>, GalleryError> {
     for entry in fs::read_dir(&folder).map_err(unreadable(&folder))? {
         let path = entry.map_err(unreadable(&folder))?.path();
         if path.extension().is_some_and(|extension| extension == "json") {
-            let text = fs::read(&path).map_err(unreadable(&path))?;
-            let shown: Shown = serde_json::from_slice(&text).map_err(|cause| GalleryError::Json { path, cause })?;
+            let text = read_at_most(&path, LONGEST_DESCRIPTION).map_err(unreadable(&path))?;
+            let shown: Shown =
+                serde_json::from_slice(&text).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
+            // A folder may come from somebody else: a page must not hold files of whoever makes it.
+            if let Some(file) = shown.files().find(|file| !is_picture_name(file)) {
+                return Err(GalleryError::Outside { path, file: file.to_owned() });
+            }
             all.push(shown);
         }
     }

@@ -33,6 +33,7 @@ use crate::run_folder::FolderError;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::{Path, PathBuf};
+use viewfuse_job::files::read_at_most;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +62,12 @@ pub enum ReportError {
         /// What is wrong with it.
         cause: serde_json::Error,
     },
+    /// A file is no curve of a training.
+    #[error("{}: is not the curve of a training", path.display())]
+    NoCurve {
+        /// The file.
+        path: PathBuf,
+    },
     /// A figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
@@ -82,8 +89,11 @@ pub struct Report {
     pub trainings: Vec<Training>,
 }
 
+/// Most bytes of a record or a curve.
+const LONGEST_RECORD: u64 = 256 << 20;
+
 fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
-    std::fs::read(path).map_err(|cause| ReportError::Read { path: path.to_path_buf(), cause })
+    read_at_most(path, LONGEST_RECORD).map_err(|cause| ReportError::Read { path: path.to_path_buf(), cause })
 }
 
 /// Bytes as a data URL.

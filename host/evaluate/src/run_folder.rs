@@ -17,12 +17,17 @@ pub use journal::{Finished, Journal, Shard};
 pub use settings::{SceneSettings, Settings};
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
-use viewfuse_job::files::{WriteError, write_whole};
+use viewfuse_job::files::{WriteError, read_at_most, write_whole};
 
 /// Name of the file of settings.
 pub const SETTINGS: &str = "run.json";
+
+/// Most jobs of an evaluation.
+pub const MOST_JOBS: usize = 10_000_000;
+
+/// Most bytes of the file of settings.
+const LONGEST_SETTINGS: u64 = 1 << 30;
 
 /// Why a folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +66,14 @@ pub enum FolderError {
         /// What differs, and how.
         differences: Vec<String>,
     },
+    /// The settings have more jobs than an evaluation can have.
+    #[error("{}: job_count is {count}; at most {MOST_JOBS} jobs are possible", path.display())]
+    JobCount {
+        /// The file of settings.
+        path: PathBuf,
+        /// Its number of jobs.
+        count: usize,
+    },
     /// A finished job does not belong to this evaluation, although the settings are the same.
     #[error("{}: job {job} has other views than this version of the program would use; use another folder", path.display())]
     OtherJob {
@@ -91,7 +104,8 @@ impl RunFolder {
     /// [`FolderError`]: above all, if the folder is that of an evaluation with other settings.
     pub fn begin(path: &Path, settings: Settings) -> Result<RunFolder, FolderError> {
         let file = path.join(SETTINGS);
-        if file.exists() {
+        // An empty file is of a machine that lost its power: as if the evaluation had not begun.
+        if file.metadata().is_ok_and(|file| file.len() > 0) {
             let found = RunFolder::open(path)?;
             let differences = settings.differences(&found.settings);
             if !differences.is_empty() {
@@ -112,10 +126,19 @@ impl RunFolder {
     /// [`FolderError`].
     pub fn open(path: &Path) -> Result<RunFolder, FolderError> {
         let file = path.join(SETTINGS);
-        let text =
-            fs::read(&file).map_err(|cause| FolderError::Io { path: file.clone(), doing: "cannot be read", cause })?;
-        let settings =
-            serde_json::from_slice(&text).map_err(|cause| FolderError::Json { path: file, line: None, cause })?;
+        let text = read_at_most(&file, LONGEST_SETTINGS).map_err(|cause| FolderError::Io {
+            path: file.clone(),
+            doing: "cannot be read",
+            cause,
+        })?;
+        let settings: Settings = serde_json::from_slice(&text).map_err(|cause| FolderError::Json {
+            path: file.clone(),
+            line: None,
+            cause,
+        })?;
+        if settings.job_count > MOST_JOBS {
+            return Err(FolderError::JobCount { path: file, count: settings.job_count });
+        }
         Ok(RunFolder { path: path.to_path_buf(), settings })
     }
 

@@ -1,8 +1,17 @@
-//! Output files that are written completely or not at all.
+//! Output files that are written completely or not at all, and what is known of files before they are read or written.
+
+mod bounded;
+mod folder;
+mod unfinished;
+
+pub use bounded::read_at_most;
+pub use folder::WholeFolder;
+pub use unfinished::remove_all;
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
+use unfinished::Own;
 
 /// Why an output could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +39,7 @@ pub enum WriteError {
 pub struct WholeFile {
     path: PathBuf,
     writer: BufWriter<NamedTempFile>,
+    own: Own,
 }
 
 impl WholeFile {
@@ -44,16 +54,17 @@ impl WholeFile {
             _ => Path::new("."),
         };
         std::fs::create_dir_all(folder).map_err(failed)?;
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".viewfuse-");
-        // The default is readable by the owner only, which is wrong for a result.
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            builder.permissions(std::fs::Permissions::from_mode(0o644));
-        }
-        let writer = BufWriter::new(builder.tempfile_in(folder).map_err(failed)?);
-        Ok(WholeFile { path: path.to_path_buf(), writer })
+        let make = |builder: &mut tempfile::Builder<'_, '_>| {
+            // The default is readable by the owner only, which is wrong for a result.
+            #[cfg(unix)]
+            {
+                use std::os::unix::fs::PermissionsExt;
+                builder.permissions(std::fs::Permissions::from_mode(0o644));
+            }
+            builder.tempfile_in(folder)
+        };
+        let (file, own) = Own::make(folder, make, |file| file.path().to_path_buf()).map_err(failed)?;
+        Ok(WholeFile { path: path.to_path_buf(), writer: BufWriter::new(file), own })
     }
 
     /// Appends bytes.
@@ -64,16 +75,17 @@ impl WholeFile {
         self.writer.write_all(bytes).map_err(|cause| WriteError::Io { path: self.path.clone(), cause })
     }
 
-    /// Renames it into place; an existing file is replaced.
+    /// Renames it into place; an existing file is replaced. What is written is on disk before that: a machine that loses
+    /// power keeps one of the two.
     ///
     /// # Errors
     /// [`WriteError::Io`]; then no temporary file remains.
     pub fn finish(self) -> Result<(), WriteError> {
-        let WholeFile { path, writer } = self;
-        let finished = writer
-            .into_inner()
-            .map_err(|error| error.into_error())
-            .and_then(|file| file.persist(&path).map_err(|error| error.error));
+        let WholeFile { path, writer, own } = self;
+        let finished = writer.into_inner().map_err(|error| error.into_error()).and_then(|file| {
+            file.as_file().sync_data()?;
+            own.finish(|| file.persist(&path).map_err(|error| error.error))
+        });
         finished.map(drop).map_err(|cause| WriteError::Io { path, cause })
     }
 }
@@ -88,13 +100,17 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     file.finish()
 }
 
-/// Checks, before long work, that `path` can be written: it is not a folder, and files can be created in the nearest
-/// existing folder above it. No file remains.
+/// Checks, before long work, that `path` can be written: it is not a folder, no part of it is a link to nothing, and files
+/// can be created in the nearest existing folder above it. No file remains.
 ///
 /// # Errors
 /// [`WriteError::Io`].
 pub fn check_writable(path: &Path) -> Result<(), WriteError> {
     let failed = |cause| WriteError::Io { path: path.to_path_buf(), cause };
+    let dangles = |part: &&Path| part.is_symlink() && !part.exists();
+    if let Some(link) = path.ancestors().find(dangles) {
+        return Err(failed(std::io::Error::other(format!("{} is a link to nothing", link.display()))));
+    }
     if path.is_dir() {
         return Err(failed(std::io::Error::other("it is a folder")));
     }

@@ -1,11 +1,12 @@
 //! Common parts of long jobs: progress and cancellation through one trait, output files that are written completely or not
-//! at all, digests of inputs.
+//! at all, panics of other libraries as errors, digests of inputs.
 //!
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted
-//! files      output files, completely or not at all           write_whole
+//! panics     panics of other libraries as errors              caught
+//! files      output files, completely or not at all           write_whole, WholeFile, WholeFolder
 //! digest     SHA-256 of inputs
 //! ```
 #![forbid(unsafe_code)]
@@ -13,6 +14,7 @@
 #[cfg(feature = "digest")]
 pub mod digest;
 pub mod files;
+pub mod panics;
 pub mod progress;
 
 /// The examples of the README, compiled and run.

@@ -8,10 +8,12 @@
 //! sheet    the contact sheet of a target
 //! record   the run record, as JSON
 //! run      all of it in a folder
+//! folder   checks of that folder before work begins
 //! ```
 #![forbid(unsafe_code)]
 
 pub mod canvas;
+pub mod folder;
 pub mod png;
 pub mod record;
 pub mod run;

@@ -21,6 +21,9 @@ use viewfuse_weighting::Weighting;
 /// Name of the run record.
 pub const RECORD: &str = "run.json";
 
+/// What stands behind a target's name in the names of its pictures.
+pub const SUFFIXES: [&str; 4] = ["", "_depth", "_confidence", "_sheet"];
+
 /// Writes a run's frames one by one, and the record after the last.
 pub struct RunWriter {
     folder: PathBuf,

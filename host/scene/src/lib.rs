@@ -22,7 +22,7 @@ pub mod write;
 
 pub use scene::{
     FileFault, IntrinsicsFault, LARGEST_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
-    ScenePoint, Split, View, looked_for, reader,
+    ScenePoint, Split, View, looked_for, read_picture, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -32,6 +32,7 @@ mod middlebury;
 mod missing;
 mod neus;
 mod numpy;
+mod own_files;
 pub mod reader;
 mod split;
 mod srn;
@@ -42,6 +43,7 @@ use check::Checked;
 pub use error::SceneError;
 pub use fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
 use images::Turn;
+pub use images::read_picture;
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 

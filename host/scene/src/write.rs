@@ -21,6 +21,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
 use crate::{Scene, SceneError, View};
@@ -176,10 +177,9 @@ pub fn write(
     }
     .map_err(unfit)?;
 
-    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(parent).map_err(failed)?;
-    let draft = tempfile::Builder::new().prefix(".viewfuse-").tempdir_in(parent).map_err(failed)?;
-    let mut out = Draft { folder: draft.path(), scene, progress };
+    let unfinished = WholeFolder::create(folder).map_err(failed)?;
+    let draft = unfinished.path();
+    let mut out = Draft { folder: &draft, scene, progress };
     progress.expect(scene.views.iter().filter(|view| view.image.is_some()).count());
     let photograph_count = match layout {
         Layout::Transforms => transforms::write(&mut out)?,
@@ -190,22 +190,8 @@ pub fn write(
         Layout::Llff => llff::write(&mut out)?,
         Layout::Neus => neus::write(&mut out)?,
     };
-    open_to_all(draft.path()).map_err(failed)?;
-    if folder.exists() {
-        fs::remove_dir(folder).map_err(failed)?;
-    }
-    fs::rename(draft.path(), folder).map_err(failed)?;
+    unfinished.finish().map_err(failed)?;
     Ok(Written { folder: folder.to_path_buf(), photograph_count, left_out: left_out(scene, layout) })
-}
-
-/// Temporary folders are accessible to their owner only, which is wrong for a result.
-fn open_to_all(folder: &Path) -> std::io::Result<()> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        fs::set_permissions(folder, fs::Permissions::from_mode(0o755))?;
-    }
-    Ok(())
 }
 
 /// A folder that is being filled.

@@ -16,7 +16,6 @@ use crate::kinds::Kind;
 use crate::object::ObjectError;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use viewfuse_core::camera::{Camera, PinholeError};
@@ -29,6 +28,9 @@ const MAKING: u32 = 2;
 
 /// Rays per pixel along each axis: fewer than the sample scene has, for there are many more pictures.
 pub const RAYS_PER_SIDE: u32 = 3;
+
+/// Most bytes of the file of settings.
+const LONGEST_SETTINGS: u64 = 1 << 20;
 
 /// Most objects in a folder: their names have six digits, and the folders' stretches of indices do not overlap.
 pub const LARGEST_OBJECT_COUNT: u32 = 1_000_000;
@@ -213,10 +215,14 @@ pub fn make(
 /// Checks that what is there was made with the same settings, or writes them down first of all.
 fn claim(path: &Path, settings: &Settings, folders: &[PathBuf]) -> Result<(), MakeError> {
     let in_words = |settings: &Settings| serde_json::to_string(settings).unwrap_or_default();
-    match fs::read_to_string(path) {
+    match files::read_at_most(path, LONGEST_SETTINGS) {
+        // An empty file is of a machine that lost its power, before the first scene.
+        Ok(text) if text.is_empty() && !folders.iter().any(|folder| folder.exists()) => {
+            Ok(files::write_whole(path, (in_words(settings) + "\n").as_bytes())?)
+        }
         Ok(text) => {
             let there: Settings =
-                serde_json::from_str(&text).map_err(|source| MakeError::Parse { path: path.to_owned(), source })?;
+                serde_json::from_slice(&text).map_err(|source| MakeError::Parse { path: path.to_owned(), source })?;
             if there == *settings {
                 return Ok(());
             }

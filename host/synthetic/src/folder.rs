@@ -17,6 +17,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
 /// Most views in a folder: their names have six digits.
@@ -123,22 +124,14 @@ pub(crate) fn create_whole(
     folder: &Path,
     fill: impl FnOnce(&Path) -> Result<(), WriteError>,
 ) -> Result<(), WriteError> {
-    let name = folder.file_name().ok_or_else(|| WriteError::NoName { path: folder.to_owned() })?;
+    folder.file_name().ok_or_else(|| WriteError::NoName { path: folder.to_owned() })?;
     // `symlink_metadata`: a dangling link is something that stands there, too.
     if folder.symlink_metadata().is_ok() {
         return Err(WriteError::Exists { path: folder.to_owned() });
     }
-    let parent = match folder.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
-    fs::create_dir_all(parent).map_err(io_error(parent))?;
-    let temporary = tempfile::Builder::new().prefix(".unfinished-").tempdir_in(parent).map_err(io_error(parent))?;
-    // A temporary folder is closed to others; the scene, a folder inside it, has the ordinary permissions.
-    let unfinished = temporary.path().join(name);
-    fs::create_dir(&unfinished).map_err(io_error(&unfinished))?;
-    fill(&unfinished)?;
-    fs::rename(&unfinished, folder).map_err(io_error(folder))
+    let unfinished = WholeFolder::create(folder).map_err(io_error(folder))?;
+    fill(&unfinished.path())?;
+    unfinished.finish().map_err(io_error(folder))
 }
 
 pub(crate) fn shared_pinhole(folder: &Path, cameras: &[Camera]) -> Result<Pinhole, WriteError> {

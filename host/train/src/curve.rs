@@ -7,6 +7,8 @@ use std::ops::Range;
 const SIZE: (u32, u32) = (900, 480);
 const LOSS: RGBColor = RGBColor(0, 114, 178);
 const SCORE: RGBColor = RGBColor(213, 94, 0);
+/// Scores beyond this are drawn as this.
+const LARGEST_SCORE: f64 = 1.0e6;
 const FONT: &str = "sans-serif";
 
 /// Draws the curves; a run without points has empty axes.
@@ -25,13 +27,16 @@ fn draw(picture: &mut String, so_far: &Progressed, score_name: &str) -> Result<(
     let last = so_far.steps.max(1);
     let logarithm = |(step, loss): &(u32, f64)| (*step, loss.max(1.0e-12).log10());
     let losses: Vec<(u32, f64)> = so_far.losses.iter().map(logarithm).collect();
+    // An axis has no steps between numbers that are so large.
+    let scores: Vec<(u32, f64)> =
+        so_far.scores.iter().map(|(step, score)| (*step, score.clamp(-LARGEST_SCORE, LARGEST_SCORE))).collect();
     let mut chart = ChartBuilder::on(&root)
         .margin(12)
         .x_label_area_size(40)
         .y_label_area_size(64)
         .right_y_label_area_size(60)
         .build_cartesian_2d(0..last, span(&losses))?
-        .set_secondary_coord(0..last, span(&so_far.scores));
+        .set_secondary_coord(0..last, span(&scores));
     chart
         .configure_mesh()
         .light_line_style(TRANSPARENT)
@@ -43,9 +48,8 @@ fn draw(picture: &mut String, so_far: &Progressed, score_name: &str) -> Result<(
     let style = (FONT, 14).into_font().color(&SCORE);
     chart.configure_secondary_axes().y_desc(score_name).axis_desc_style(style).draw()?;
     chart.draw_series(LineSeries::new(losses, LOSS))?;
-    let scores = so_far.scores.iter().copied();
-    chart.draw_secondary_series(LineSeries::new(scores.clone(), SCORE.stroke_width(2)))?;
-    chart.draw_secondary_series(scores.map(|at| Circle::new(at, 3, SCORE.filled())))?;
+    chart.draw_secondary_series(LineSeries::new(scores.iter().copied(), SCORE.stroke_width(2)))?;
+    chart.draw_secondary_series(scores.into_iter().map(|at| Circle::new(at, 3, SCORE.filled())))?;
     root.present()?;
     Ok(())
 }

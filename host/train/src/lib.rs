@@ -46,6 +46,7 @@ pub use attention::Embedding;
 pub use genvs_learner::{GenvsSettings, train_genvs};
 pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
+pub use state::check_state;
 pub use weighting_learner::{WeightingSettings, train_weighting};
 
 use std::path::PathBuf;
@@ -87,6 +88,16 @@ pub enum TrainError {
         view_count: usize,
         /// How many are needed.
         least_views: usize,
+    },
+    /// A setting is out of its range.
+    #[error("the setting {name} is {value}; {allowed}")]
+    Setting {
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The allowed values.
+        allowed: &'static str,
     },
     /// There are no scenes.
     #[error("there are no scenes to {purpose}")]

@@ -31,6 +31,37 @@ pub struct PixelNerfSettings {
     pub fine: usize,
 }
 
+/// Largest width, side and count of the settings.
+const LARGEST: usize = 1024;
+/// Most samples of a step times the width: so many numbers a layer has, of 4 bytes.
+const LARGEST_LAYER: usize = 1 << 28;
+
+impl PixelNerfSettings {
+    /// Refuses numbers with which nothing is computed, or that no memory holds.
+    fn check(&self) -> std::result::Result<(), TrainError> {
+        let PixelNerfSettings { width, side, objects, rays, coarse, fine } = *self;
+        let numbers = [
+            ("width", width, 1, "it must be from 1 to 1024"),
+            ("side", side as usize, 16, "it must be from 16 to 1024 pixels"),
+            ("objects", objects, 1, "it must be from 1 to 1024"),
+            ("rays", rays, 1, "it must be from 1 to 1024"),
+            ("coarse", coarse, 2, "it must be from 2 to 1024"),
+            ("fine", fine, 0, "it must be from 0 to 1024"),
+        ];
+        if let Some(&(name, value, _, allowed)) =
+            numbers.iter().find(|(_, value, least, _)| !(*least..=LARGEST).contains(value))
+        {
+            return Err(TrainError::Setting { name, value: value as f64, allowed });
+        }
+        let layer = objects * rays * (coarse + fine) * width;
+        if layer > LARGEST_LAYER {
+            let allowed = "objects times rays times samples times width must be at most 2^28";
+            return Err(TrainError::Setting { name: "objects", value: objects as f64, allowed });
+        }
+        Ok(())
+    }
+}
+
 /// The numbers of sources of a step, one of which is drawn: mostly three, so that the network works with few sources,
 /// sometimes one or more, so that it works with any weights.
 const SOURCE_COUNTS: [usize; 8] = [1, 2, 3, 3, 3, 3, 4, 6];
@@ -58,6 +89,7 @@ pub fn train_pixelnerf(
     folder: &Path,
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
+    settings.check()?;
     let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
     let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };

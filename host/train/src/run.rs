@@ -20,7 +20,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use viewfuse_job::digest::sha256_of;
-use viewfuse_job::files::write_whole;
+use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
 
@@ -41,6 +41,10 @@ pub struct Schedule {
     pub write_every: f64,
 }
 
+/// Names of files in the folder of a run.
+const CURVE: &str = "curve.svg";
+const RECORD: &str = "record.json";
+
 /// Steps over which the rate rises.
 const WARM_UP: u32 = 100;
 /// Share of the rate that the run ends with.
@@ -53,6 +57,19 @@ const MOST_GRADIENT: f64 = 1.0;
 const AVERAGING: f64 = 0.999;
 
 impl Schedule {
+    /// Refuses numbers with which nothing would be learned, or never written.
+    fn check(&self) -> Result<(), TrainError> {
+        let Schedule { rate, write_every, .. } = *self;
+        if !(0.0..=1.0).contains(&rate) {
+            return Err(TrainError::Setting { name: "rate", value: rate, allowed: "it must be from 0 to 1" });
+        }
+        if !(write_every >= 0.0) {
+            let allowed = "it must be at least 0 seconds";
+            return Err(TrainError::Setting { name: "write_every", value: write_every, allowed });
+        }
+        Ok(())
+    }
+
     /// Learning rate of a step.
     pub fn rate_at(&self, step: u32) -> f64 {
         let rising = f64::from(step + 1) / f64::from(WARM_UP);
@@ -126,7 +143,11 @@ pub(crate) fn run(
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<Outcome, TrainError> {
+    schedule.check()?;
     let run = Run { learner, schedule, settings, score_name, folder };
+    for file in [run.state(), run.model(), folder.join(CURVE), folder.join(RECORD)] {
+        check_writable(&file)?;
+    }
     let average = Average::new(learner.parameters(), AVERAGING)?;
     let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
     let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
@@ -187,13 +208,18 @@ impl Run<'_> {
     }
 
     fn status(&self, so_far: &Progressed, remark: &str) -> String {
-        let loss = so_far.losses.last().map_or(f64::NAN, |(_, loss)| *loss);
         let score = so_far.scores.last().map_or(f64::NAN, |(_, score)| *score);
+        // The mean since the last point of the curve, or that point.
+        let (sum, count) = so_far.pending;
+        let pending = (count > 0).then(|| sum / f64::from(count));
+        let loss = so_far
+            .losses
+            .last()
+            .map(|(_, loss)| *loss)
+            .or(pending)
+            .map_or(String::new(), |loss| format!("loss {loss:.5}, "));
         let remark = if remark.is_empty() { String::new() } else { format!(", {remark}") };
-        format!(
-            "step {}: loss {loss:.5}, {} {score:.3}{remark}, {:.0} s",
-            so_far.steps, self.score_name, so_far.seconds
-        )
+        format!("step {}: {loss}{} {score:.3}{remark}, {:.0} s", so_far.steps, self.score_name, so_far.seconds)
     }
 
     /// The state is written last, so that all other files exist when a run continues from it.
@@ -204,7 +230,7 @@ impl Run<'_> {
             Precision::Kept,
             &Silent,
         )?;
-        write_whole(&self.folder.join("curve.svg"), curve::svg(so_far, self.score_name).as_bytes())?;
+        write_whole(&self.folder.join(CURVE), curve::svg(so_far, self.score_name).as_bytes())?;
         let record = serde_json::json!({
             "program": concat!("viewfuse ", env!("CARGO_PKG_VERSION")),
             "settings": self.settings,
@@ -215,7 +241,7 @@ impl Run<'_> {
             "score": self.score_name,
             "scores": so_far.scores,
         });
-        write_whole(&self.folder.join("record.json"), format!("{record:#}\n").as_bytes())?;
+        write_whole(&self.folder.join(RECORD), format!("{record:#}\n").as_bytes())?;
         state::write(&self.state(), self.settings, so_far, learned)
     }
 }

@@ -11,7 +11,7 @@ use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
-use viewfuse_job::files::write_whole;
+use viewfuse_job::files::{read_at_most, write_whole};
 
 /// Progress of the run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,6 +26,27 @@ pub(crate) struct Progressed {
     pub(crate) pending: (f64, u32),
     /// Step and score in validation.
     pub(crate) scores: Vec<(u32, f64)>,
+}
+
+/// Most bytes of a state.
+const LONGEST_STATE: u64 = 16 << 30;
+/// Largest loss and score, up to the sign, and longest time in seconds, of a run.
+const LARGEST: f64 = 1.0e30;
+const LARGEST_SCORE: f64 = 1.0e9;
+
+impl Progressed {
+    /// What is wrong with its numbers, which a damaged file may hold.
+    fn check(&self) -> Result<(), String> {
+        let Progressed { steps, seconds, losses, pending, scores } = self;
+        let sound = |points: &[(u32, f64)], largest: f64| {
+            points.iter().all(|(step, value)| step <= steps && value.abs() <= largest)
+        };
+        let is_time = (0.0..=LARGEST).contains(seconds);
+        match is_time && sound(losses, LARGEST) && pending.0.abs() <= LARGEST && sound(scores, LARGEST_SCORE) {
+            true => Ok(()),
+            false => Err("its steps, times, losses or scores are out of range".to_owned()),
+        }
+    }
 }
 
 const SETTINGS: &str = "settings";
@@ -93,20 +114,17 @@ pub(crate) fn read(
     learned: &Learned<'_>,
 ) -> Result<Option<Progressed>, TrainError> {
     let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
-    let bytes = match std::fs::read(path) {
+    let bytes = match read_at_most(path, LONGEST_STATE) {
+        // An empty file is of a machine that lost its power: there is nothing to continue.
+        Ok(bytes) if bytes.is_empty() => return Ok(None),
         Ok(bytes) => bytes,
         Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(cause) => return Err(wrong(cause.to_string())),
     };
-    let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| wrong(error.to_string()))?;
-    let file = SafeTensors::deserialize(&bytes).map_err(|error| wrong(error.to_string()))?;
-    let metadata = header.metadata().as_ref();
-    let text = |key: &str| metadata.and_then(|all| all.get(key)).ok_or_else(|| wrong(format!("it has no {key}")));
-    let earlier: serde_json::Value = serde_json::from_str(text(SETTINGS)?).map_err(|error| wrong(error.to_string()))?;
+    let Saved { file, settings: earlier, progressed } = parse(path, &bytes)?;
     if let Some(difference) = difference(&earlier, settings) {
         return Err(TrainError::OtherRun { path: path.to_path_buf(), difference });
     }
-    let progressed = serde_json::from_str(text(PROGRESSED)?).map_err(|error| wrong(error.to_string()))?;
     let value = |name: String, like: &Tensor| -> Result<Tensor, TrainError> {
         let view = file.tensor(&name).map_err(|_| wrong(format!("it has no tensor '{name}'")))?;
         if view.dtype() != Dtype::F32 || view.shape() != like.dims() {
@@ -125,6 +143,36 @@ pub(crate) fn read(
         variable.set(&value(name, variable)?)?;
     }
     Ok(Some(progressed))
+}
+
+/// The content of a file with a state.
+struct Saved<'a> {
+    file: SafeTensors<'a>,
+    settings: serde_json::Value,
+    progressed: Progressed,
+}
+
+/// Parses a state; its tensors are not read yet.
+fn parse<'a>(path: &Path, bytes: &'a [u8]) -> Result<Saved<'a>, TrainError> {
+    let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
+    let (_, header) = SafeTensors::read_metadata(bytes).map_err(|error| wrong(error.to_string()))?;
+    let file = SafeTensors::deserialize(bytes).map_err(|error| wrong(error.to_string()))?;
+    let metadata = header.metadata().as_ref();
+    let text = |key: &str| metadata.and_then(|all| all.get(key)).ok_or_else(|| wrong(format!("it has no {key}")));
+    let settings = serde_json::from_str(text(SETTINGS)?).map_err(|error| wrong(error.to_string()))?;
+    let progressed: Progressed = serde_json::from_str(text(PROGRESSED)?).map_err(|error| wrong(error.to_string()))?;
+    progressed.check().map_err(wrong)?;
+    Ok(Saved { file, settings, progressed })
+}
+
+/// Checks that a file is the state of a training run, whatever its settings are; returns its number of steps.
+///
+/// # Errors
+/// [`TrainError::State`].
+pub fn check_state(path: &Path) -> Result<u32, TrainError> {
+    let bytes = read_at_most(path, LONGEST_STATE)
+        .map_err(|cause| TrainError::State { path: path.to_path_buf(), reason: cause.to_string() })?;
+    Ok(parse(path, &bytes)?.progressed.steps)
 }
 
 /// The first difference of the settings, as text.

@@ -22,6 +22,7 @@ use viewfuse_core::attention::{
     PoseSelfAttention, cross_attention, learned_cross_attention, pose_self_attention,
 };
 use viewfuse_core::pose::Pose;
+use viewfuse_job::files::read_at_most;
 
 /// Why attention parameters could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -97,6 +98,9 @@ pub enum AttentionModel {
     PoseSelf(PoseSelfAttention),
 }
 
+/// Most bytes of a file of parameters.
+const LONGEST_FILE: u64 = 1 << 30;
+
 /// Reads a model's tensors: from name and shape to values, row-major.
 pub type TensorSource<'a, E> = dyn FnMut(&str, &[usize]) -> Result<Vec<f32>, E> + 'a;
 
@@ -106,7 +110,8 @@ impl AttentionModel {
     /// # Errors
     /// [`AttentionError`], always with the file and the tensor.
     pub fn open(path: &Path) -> Result<AttentionModel, AttentionError> {
-        let bytes = std::fs::read(path).map_err(|cause| AttentionError::Io { path: path.to_path_buf(), cause })?;
+        let bytes =
+            read_at_most(path, LONGEST_FILE).map_err(|cause| AttentionError::Io { path: path.to_path_buf(), cause })?;
         let file = SafeTensors::deserialize(&bytes)
             .map_err(|cause| AttentionError::Format { path: path.to_path_buf(), cause })?;
         let has = |name: &str| file.tensor(name).is_ok();

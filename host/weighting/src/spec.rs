@@ -53,6 +53,14 @@ pub enum WeightingError {
         /// The given text.
         key: String,
     },
+    /// A parameter is given twice.
+    #[error("weighting scheme '{scheme}': {key} is given twice")]
+    Repeated {
+        /// The scheme.
+        scheme: String,
+        /// The parameter.
+        key: String,
+    },
     /// The parameter's value is invalid.
     #[error("weighting scheme '{scheme}': {key} must be {range}, not '{value}'")]
     BadValue {
@@ -131,6 +139,7 @@ impl FromStr for WeightingSpec {
             };
         }
         let mut pairs = Pairs::parse(name, rest);
+        pairs.check_keys()?;
         let kind = if name == CROSS_ATTENTION {
             Kind::CrossAttention
         } else {
@@ -153,6 +162,19 @@ impl<'a> Pairs<'a> {
     fn parse(scheme: &'a str, text: &'a str) -> Pairs<'a> {
         let pairs = text.split(',').filter(|pair| !pair.is_empty());
         Pairs { scheme, pairs: pairs.map(|pair| pair.split_once('=').unwrap_or((pair, ""))).collect() }
+    }
+
+    /// Refuses a key that is given twice: of two values, nobody knows which is meant.
+    fn check_keys(&self) -> Result<(), WeightingError> {
+        let is_repeated =
+            |(place, (key, _)): &(usize, &(&str, &str))| self.pairs[..*place].iter().any(|(earlier, _)| earlier == key);
+        match self.pairs.iter().enumerate().find(is_repeated) {
+            Some((_, (key, _))) => {
+                let [scheme, key] = [self.scheme, key].map(str::to_owned);
+                Err(WeightingError::Repeated { scheme, key })
+            }
+            None => Ok(()),
+        }
     }
 
     /// The scheme of a row with the choice and the parameter that are given, else with the defaults.

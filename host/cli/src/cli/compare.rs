@@ -5,7 +5,7 @@ use super::options::DeviceOptions;
 use super::say;
 use super::table::table;
 use super::terminal::Terminal;
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use image::RgbImage;
 use std::path::{Path, PathBuf};
@@ -16,6 +16,7 @@ use viewfuse_evaluate::metrics::features::Features;
 use viewfuse_evaluate::metrics::trunk::InceptionKind;
 use viewfuse_evaluate::metrics::{Metrics, Scored};
 use viewfuse_job::progress::Progress;
+use viewfuse_scene::read_picture;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -81,9 +82,7 @@ fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
 }
 
 fn opened(path: &Path) -> anyhow::Result<RgbImage> {
-    // The decoder's message holds its causes already.
-    let picture = image::open(path).map_err(|cause| anyhow!("{}: cannot be read: {cause}", path.display()))?;
-    Ok(picture.into_rgb8())
+    Ok(read_picture(path)?.into_rgb8())
 }
 
 fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyhow::Result<()> {

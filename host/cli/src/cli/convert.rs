@@ -1,5 +1,6 @@
 //! `viewfuse convert`.
 
+use super::outputs::keep_input;
 use super::say;
 use super::table::table;
 use super::terminal::Terminal;
@@ -45,6 +46,7 @@ fn header(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let output = &arguments.output;
+    keep_input(&arguments.input, output)?;
     let ends_in = |name: &str| output.extension().is_some_and(|extension| extension == name);
     if ends_in("h") && !arguments.half {
         return header(arguments);

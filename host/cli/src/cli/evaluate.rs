@@ -15,6 +15,7 @@ mod tables;
 use super::metrics_options::MetricOptions;
 use super::model::ModelOptions;
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::outputs::keep_file_apart;
 use super::terminal::Terminal;
 use super::weighting::{many_help, open_all, or_every_scheme};
 use super::{on_threads, say};
@@ -111,6 +112,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;
     let scenes: Vec<Scene> = paths.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart(&scenes, path))?;
     let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
     let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {
         let title = format!("{name}: {}", counted(results.target_count, "target"));

@@ -1,5 +1,6 @@
 //! `viewfuse export`.
 
+use super::outputs::keep_folder_apart;
 use super::say;
 use super::terminal::Terminal;
 use clap::Args;
@@ -26,6 +27,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
+    keep_folder_apart([&scene], &arguments.output)?;
     let progress = Terminal::new("writing");
     let written = write(&scene, arguments.layout, &arguments.output, &progress)?;
     drop(progress);

@@ -1,6 +1,7 @@
 //! Hints at the command's options for errors of the library, printed behind the error.
 
 use viewfuse_evaluate::EvaluateError;
+use viewfuse_evaluate::protocol::ProtocolError;
 use viewfuse_evaluate::run_folder::FolderError;
 use viewfuse_field::render::RenderError;
 use viewfuse_field::training_free::NoObject;
@@ -17,6 +18,27 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
         few_shot.or(photographs).or(folder).or(render).or(evaluation).or_else(|| of_training(cause))
     })
+}
+
+/// Whether an error, or one of its causes, is of what an option says, whatever the scene is.
+pub(crate) fn is_of_arguments(error: &anyhow::Error) -> bool {
+    let selection = |cause: &(dyn std::error::Error + 'static)| {
+        let of_evaluation = match cause.downcast_ref::<EvaluateError>() {
+            Some(EvaluateError::Selection(error)) => Some(error),
+            _ => None,
+        };
+        let of_protocol = match cause.downcast_ref::<ProtocolError>() {
+            Some(ProtocolError::Selection(error)) => Some(error),
+            _ => None,
+        };
+        of_evaluation.or(of_protocol).or_else(|| cause.downcast_ref::<SelectionError>()).is_some_and(is_of_list)
+    };
+    error.chain().any(selection)
+}
+
+/// Whether a list of views is written wrongly.
+fn is_of_list(error: &SelectionError) -> bool {
+    matches!(error, SelectionError::BadStep { .. } | SelectionError::BadRange { .. })
 }
 
 fn of_few_shot(error: &SelectionError) -> Option<&'static str> {

@@ -1,5 +1,6 @@
 //! `viewfuse inspect`.
 
+use super::outputs::keep_file_apart;
 use super::say;
 use super::terminal::Terminal;
 use clap::Args;
@@ -31,6 +32,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
+    arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart([&scene], path))?;
     let progress = Terminal::new("reading");
     let inspection = inspect(&scene, arguments.background, &progress)?;
     drop(progress);

@@ -3,6 +3,7 @@
 use super::environment::device_options;
 use super::model::NetworkOptions;
 use super::options::{PictureOptions, SourceOptions};
+use super::outputs::keep_folder_apart;
 use super::table::table;
 use super::terminal::Terminal;
 use super::{on_threads, say, wrong};
@@ -74,6 +75,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     let job = selection.resolve(&scene, field.about().least_sources)?;
     let options = arguments.picture.to_render_options(false, &field.about())?;
+    keep_folder_apart([&scene], &arguments.output)?;
     let [csv, svg, json] = ["pareto.csv", "pareto.svg", "pareto.json"].map(|name| arguments.output.join(name));
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;

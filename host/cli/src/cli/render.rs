@@ -2,6 +2,7 @@
 
 use super::model::{GENVS, ModelOptions, parse_level};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::outputs::keep_folder_apart;
 use super::parse::parse_count;
 use super::terminal::Terminal;
 use super::weighting::choice_help;
@@ -15,6 +16,7 @@ use viewfuse_field::Setting;
 use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
+use viewfuse_output::folder::check_folder;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
 use viewfuse_scene::photographs::SourceImages;
@@ -72,6 +74,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         Some(WeightingChoice::Auto) | None => None,
     };
     let scene = Scene::open(&arguments.scene)?;
+    keep_folder_apart([&scene], &arguments.output)?;
     let open_time = start.elapsed();
     let field = arguments.model.open(arguments.seed, arguments.reuse)?;
     let about = field.about();
@@ -79,6 +82,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let job = selection.resolve(&scene, about.least_sources)?;
     let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
     check_writable(&arguments.output.join(RECORD))?;
+    check_folder(&arguments.output, &job.targets)?;
     let Chosen { device, reason } = arguments.device.open()?;
     let label = arguments.scene.display().to_string();
     let before = weighting.clone().unwrap_or_else(Weighting::default_scheme);

@@ -1,5 +1,6 @@
 //! `viewfuse report`.
 
+use super::outputs::keep_runs;
 use super::say;
 use clap::Args;
 use std::path::PathBuf;
@@ -32,6 +33,8 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     check_writable(&arguments.output)?;
+    let Arguments { evaluations, pareto, training, output, .. } = arguments;
+    keep_runs(evaluations.iter().chain(pareto).chain(training).map(PathBuf::as_path), output)?;
     let report = Report {
         title: arguments.title.clone(),
         evaluations: arguments.evaluations.iter().map(|path| Evaluation::open(path)).collect::<Result<_, _>>()?,

@@ -1,16 +1,21 @@
 //! `viewfuse train`.
 
+use super::outputs::keep_input;
 use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use viewfuse_job::files::check_writable;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_train::{
     Embedding, GenvsSettings, Outcome, PixelNerfSettings, Schedule, WeightingSettings, train_genvs, train_pixelnerf,
     train_weighting,
 };
+
+/// The file of a run that holds the trained network.
+const MODEL: &str = "model.safetensors";
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -47,7 +52,7 @@ struct RunOptions {
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..))]
     steps: u32,
     /// Learning rate; it rises over the first hundred steps and falls along a cosine
-    #[arg(long, value_name = "RATE", default_value_t = 1.0e-3)]
+    #[arg(long, value_name = "RATE", default_value_t = 1.0e-3, value_parser = rate)]
     rate: f64,
     /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -56,7 +61,7 @@ struct RunOptions {
     #[arg(long, value_name = "N", default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..))]
     validate_every: u32,
     /// Seconds between writing the state
-    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = pause)]
     write_every: f64,
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -78,22 +83,22 @@ struct PixelNerfArguments {
     #[arg(long, value_name = "FILE", conflicts_with = "width")]
     from: Option<PathBuf>,
     /// Width of the point network
-    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count)]
     width: usize,
-    /// Side of the pictures, pixels
-    #[arg(long, value_name = "N", default_value_t = 64)]
+    /// Side of the pictures, pixels, a multiple of 16
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
     side: u32,
     /// Objects of a step
-    #[arg(long, value_name = "N", default_value_t = 8)]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = count)]
     objects: usize,
     /// Rays of each object
-    #[arg(long, value_name = "N", default_value_t = 64)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = count)]
     rays: usize,
     /// Samples of a ray in the first pass
-    #[arg(long, value_name = "N", default_value_t = 32)]
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = samples)]
     coarse: usize,
     /// Samples that the second pass adds
-    #[arg(long, value_name = "N", default_value_t = 16)]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = added_samples)]
     fine: usize,
 }
 
@@ -131,6 +136,32 @@ fn side(text: &str) -> Result<u32, String> {
 
 fn count(text: &str) -> Result<usize, String> {
     number(text, 1).map(|number| number as usize)
+}
+
+fn samples(text: &str) -> Result<usize, String> {
+    number(text, 1)
+        .ok()
+        .filter(|number| *number > 1)
+        .map(|number| number as usize)
+        .ok_or_else(|| "a whole number from 2 to 1024 is needed".to_owned())
+}
+
+fn added_samples(text: &str) -> Result<usize, String> {
+    if text == "0" { Ok(0) } else { count(text) }
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if (0.0..=1.0).contains(&rate) => Ok(rate),
+        _ => Err("a number from 0 to 1 is needed".to_owned()),
+    }
+}
+
+fn pause(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(seconds) if (0.0..=86_400.0).contains(&seconds) => Ok(seconds),
+        _ => Err("a number of seconds from 0 to 86400 is needed".to_owned()),
+    }
 }
 
 /// A whole number above zero, a multiple of `step`.
@@ -182,7 +213,7 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     let PixelNerfArguments { run, from, width, side, objects, rays, coarse, fine } = arguments;
     let settings =
         PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
-    let [train, validation] = scenes(&run.data)?;
+    let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("training");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
     let train_it =
@@ -196,7 +227,7 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
     let GenvsArguments { run, from, width, side, objects, targets, samples } = arguments;
     let settings =
         GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
-    let [train, validation] = scenes(&run.data)?;
+    let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("training");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
     let train_it =
@@ -213,7 +244,7 @@ fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
         EmbeddingName::Flat => Embedding::Flat,
     };
     let settings = WeightingSettings { embedding, side: *side, objects: *objects, rays: *rays };
-    let [train, validation] = scenes(&run.data)?;
+    let [train, validation] = scenes(run, Some(model))?;
     let checkpoint = Checkpoint::open(model)?;
     let progress = Terminal::new("training");
     let (schedule, scenes) = (run.schedule(), [&train[..], &validation[..]]);
@@ -223,9 +254,15 @@ fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
     report(&outcome)
 }
 
-/// Training and validation scenes.
-fn scenes(data: &Path) -> anyhow::Result<[Vec<PathBuf>; 2]> {
-    Ok([Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes])
+/// Training and validation scenes, once the folder of the run is known to be one that can be written and is none of the
+/// inputs.
+fn scenes(run: &RunOptions, network: Option<&Path>) -> anyhow::Result<[Vec<PathBuf>; 2]> {
+    let RunOptions { data, output, .. } = run;
+    check_writable(&output.join(MODEL))?;
+    network.map_or(Ok(()), |network| keep_input(network, &output.join(MODEL)))?;
+    let sets = [Dataset::open(data, Split::Train)?.scenes, Dataset::open(data, Split::Validation)?.scenes];
+    sets.iter().flatten().try_for_each(|scene| keep_input(scene, output))?;
+    Ok(sets)
 }
 
 fn report(outcome: &Outcome) -> anyhow::Result<ExitCode> {

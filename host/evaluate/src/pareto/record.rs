@@ -103,6 +103,21 @@ pub struct PointRecord {
     pub repeatable: bool,
 }
 
+/// Longest time and largest ratio of a record, up to the sign: larger ones are not of this program, and no axis holds them.
+const LARGEST: f64 = 1.0e9;
+
+impl PointRecord {
+    /// Whether a measurement could have given its numbers.
+    pub fn is_possible(&self) -> bool {
+        let DifferenceRecord { root_mean_square, psnr, largest } = self.versus_exact;
+        let [least, most] = self.seconds_range;
+        let times = [self.seconds, least, most, self.encode_seconds];
+        let ratios = [root_mean_square, psnr, largest, self.truth_psnr, self.truth_loss, Some(self.gain)];
+        times.iter().all(|time| (0.0..=LARGEST).contains(time))
+            && ratios.iter().flatten().all(|ratio| ratio.abs() <= LARGEST)
+    }
+}
+
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }

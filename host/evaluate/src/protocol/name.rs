@@ -56,6 +56,14 @@ pub enum ProtocolError {
         /// What the scenes lack.
         notes: String,
     },
+    /// A value is given twice.
+    #[error("protocol '{protocol}': {key} is given twice")]
+    Repeated {
+        /// The protocol.
+        protocol: String,
+        /// The value's name.
+        key: String,
+    },
     /// The lists do not fit a scene.
     #[error(transparent)]
     Selection(#[from] SelectionError),
@@ -128,8 +136,13 @@ impl FromStr for Protocol {
             "count" => Protocol::Count { sources: COUNTS.to_vec() },
             _ => return Err(unknown()),
         };
+        let mut keys = Vec::new();
         for pair in rest.split(',').filter(|pair| !pair.is_empty()) {
             let (key, value) = pair.split_once('=').ok_or_else(unknown)?;
+            if keys.contains(&key) {
+                return Err(ProtocolError::Repeated { protocol: name.to_owned(), key: key.to_owned() });
+            }
+            keys.push(key);
             let count = |text: &str| source_count(name, text, [1, MOST_SOURCES]);
             match (&mut protocol, key) {
                 (Protocol::Random { sources }, "sources") => *sources = count(value)?,

@@ -1,8 +1,8 @@
 //! Pictures side by side: the sources with their weights, every scheme's prediction, the truth.
 
-use super::{ReportError, counted, data_address, read};
+use super::{ReportError, counted, data_address};
 use crate::PSNR;
-use crate::gallery::{PICTURES, Shown, ShownScheme};
+use crate::gallery::{self, Shown, ShownScheme};
 use crate::summary::Metric;
 use maud::{Markup, html};
 use std::path::Path;
@@ -12,9 +12,8 @@ const BAR: [f32; 2] = [8.0, 22.0];
 
 /// The pictures of a target.
 pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportError> {
-    let picture = |file: &str| -> Result<String, ReportError> {
-        Ok(data_address("image/png", &read(&folder.join(PICTURES).join(file))?))
-    };
+    let picture =
+        |file: &str| -> Result<String, ReportError> { Ok(data_address("image/png", &gallery::picture(folder, file)?)) };
     let sources: Vec<String> = shown.sources.iter().map(|source| picture(&source.file)).collect::<Result<_, _>>()?;
     let predictions: Vec<String> =
         shown.schemes.iter().map(|scheme| picture(&scheme.file)).collect::<Result<_, _>>()?;

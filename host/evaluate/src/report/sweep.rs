@@ -5,6 +5,7 @@ use crate::pareto::plot;
 use crate::pareto::record::{DeviceRecord, PointRecord};
 use maud::{Markup, PreEscaped, html};
 use serde::Deserialize;
+use serde::de::Error;
 use std::path::{Path, PathBuf};
 
 /// The parts of `pareto.json` that are shown.
@@ -38,11 +39,15 @@ impl Sweep {
     /// [`ReportError`].
     pub fn open(path: &Path) -> Result<Sweep, ReportError> {
         let path = if path.is_dir() { path.join("pareto.json") } else { path.to_path_buf() };
-        let record = serde_json::from_slice(&read(&path)?).map_err(|cause| ReportError::Json {
-            path: path.clone(),
-            command: "pareto",
-            cause,
-        })?;
+        let json = |cause| ReportError::Json { path: path.clone(), command: "pareto", cause };
+        let record: Record = serde_json::from_slice(&read(&path)?).map_err(json)?;
+        if let Some(point) = record.devices.iter().flat_map(|device| &device.points).find(|point| !point.is_possible())
+        {
+            return Err(json(serde_json::Error::custom(format_args!(
+                "a number of the setting '{}' is out of its range",
+                point.setting
+            ))));
+        }
         Ok(Sweep { path, record })
     }
 

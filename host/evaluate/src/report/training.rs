@@ -27,7 +27,13 @@ impl Training {
         };
         // If neither exists, the message names the record.
         let record = if record.is_file() || !curve.is_file() { Some(parsed(&record)?) } else { None };
-        let curve = if curve.is_file() { Some(read(&curve)?) } else { None };
+        let drawn = |path: &Path| match read(path) {
+            // A link to something else must not become a part of the page.
+            Ok(bytes) if bytes.is_empty() || bytes.starts_with(b"<svg") => Ok(bytes),
+            Ok(_) => Err(ReportError::NoCurve { path: path.to_path_buf() }),
+            Err(error) => Err(error),
+        };
+        let curve = if curve.is_file() { Some(drawn(&curve)?) } else { None };
         Ok(Training { folder: folder.to_path_buf(), record, curve })
     }
 

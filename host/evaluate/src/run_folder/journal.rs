@@ -9,6 +9,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
+use viewfuse_job::files::read_at_most;
 
 /// The jobs of a process: those whose number modulo `count` is `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,9 +69,16 @@ pub struct Finished {
     pub scores: Vec<Score>,
 }
 
+/// Largest score of any metric, up to its sign; larger ones are not of this program.
+const LARGEST_SCORE: f64 = 1.0e9;
+/// Longest time of a picture, in seconds.
+const LONGEST_TIME: f64 = 1.0e9;
+/// Most bytes of a journal.
+const LONGEST_JOURNAL: u64 = 4 << 30;
+
 /// Scores as JSON: numbers that JSON cannot hold (the PSNR of equal pictures is infinite) as text.
 mod score_lines {
-    use super::{Deserialize, Duration, Score, Serialize};
+    use super::{Deserialize, Duration, LARGEST_SCORE, LONGEST_TIME, Score, Serialize};
     use serde::de::Error;
     use serde::{Deserializer, Serializer};
 
@@ -104,13 +112,19 @@ mod score_lines {
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Score>, D::Error> {
         let score = |line: Line| {
-            let value = |(name, number): (String, Number)| match number {
-                Number::Finite(value) => Ok((name, value)),
-                Number::Other(text) => match text.parse() {
-                    Ok(value) => Ok((name, value)),
-                    Err(_) => Err(D::Error::custom(format!("{name} is '{text}'"))),
-                },
+            let value = |(name, number): (String, Number)| {
+                let (value, text) = match number {
+                    Number::Finite(value) => (Some(value), format!("{value:e}")),
+                    Number::Other(text) => (text.parse().ok(), text),
+                };
+                let possible = value.filter(|value: &f64| !value.is_finite() || value.abs() <= LARGEST_SCORE);
+                possible
+                    .map(|value| (name.clone(), value))
+                    .ok_or_else(|| D::Error::custom(format!("{name} is '{text}'")))
             };
+            if !(0.0..=LONGEST_TIME).contains(&line.seconds) {
+                return Err(D::Error::custom(format!("seconds is '{:e}'", line.seconds)));
+            }
             Ok(Score {
                 scheme: line.scheme,
                 target: line.target,
@@ -193,5 +207,9 @@ pub(super) fn read(path: &Path) -> Result<Vec<Finished>, FolderError> {
 }
 
 fn read_bytes(path: &Path) -> Result<Vec<u8>, FolderError> {
-    fs::read(path).map_err(|cause| FolderError::Io { path: path.to_path_buf(), doing: "cannot be read", cause })
+    read_at_most(path, LONGEST_JOURNAL).map_err(|cause| FolderError::Io {
+        path: path.to_path_buf(),
+        doing: "cannot be read",
+        cause,
+    })
 }

@@ -1,15 +1,15 @@
 //! Reading binary files, with the path and the byte offset in every error. All numbers are little endian.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::SceneError;
 use super::fault::{FileFault, Place};
-use super::files::unreadable;
+use super::files::{LONGEST_FILE, unreadable};
+use viewfuse_job::files::read_at_most;
 
 /// A binary file's contents.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
-    fs::read(path).map_err(|cause| unreadable(path, cause))
+    read_at_most(path, LONGEST_FILE).map_err(|cause| unreadable(path, cause))
 }
 
 /// A cursor over bytes.

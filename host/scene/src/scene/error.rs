@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 use viewfuse_core::lens::LensError;
 use viewfuse_core::pose::{LARGEST_COORDINATE, PoseError};
+use viewfuse_job::panics::Panicked;
 
 use super::LARGEST_SIDE;
 use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place, Short};
@@ -196,12 +197,20 @@ pub enum SceneError {
         expected: &'static str,
     },
     /// An image file that cannot be decoded.
-    #[error("{path}: not a readable image: {cause}")]
+    #[error("{path}: not a readable image: {}", in_one_line(cause))]
     Image {
         /// The image file.
         path: PathBuf,
         /// What the decoder says.
         cause: image::ImageError,
+    },
+    /// An image file on which a decoder panics.
+    #[error("{path}: not a readable image: {panic}")]
+    Decoder {
+        /// The image file.
+        path: PathBuf,
+        /// The panic.
+        panic: Panicked,
     },
     /// An image header with too large a size.
     #[error("{path}: the image is {width} x {height}; at most {LARGEST_SIDE} pixels are allowed on a side")]
@@ -212,6 +221,18 @@ pub enum SceneError {
         width: u32,
         /// Height in the header.
         height: u32,
+    },
+    /// An image file that is too short for the size in its header.
+    #[error("{path}: the image is {width} x {height}, and its file has only {length} bytes")]
+    Hollow {
+        /// The image file.
+        path: PathBuf,
+        /// Width in the header.
+        width: u32,
+        /// Height in the header.
+        height: u32,
+        /// Bytes of the file.
+        length: u64,
     },
     /// The photograph's size differs from that of its camera.
     #[error("{path}: the image is {width} x {height}, but {declared_in} is for {declared_width} x {declared_height}")]
@@ -341,4 +362,9 @@ pub enum SceneError {
         /// Number of views.
         view_count: usize,
     },
+}
+
+/// A message of a decoder, some of which end in a line break.
+fn in_one_line(cause: &image::ImageError) -> String {
+    cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
 }

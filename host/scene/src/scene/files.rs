@@ -5,6 +5,8 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
+use viewfuse_job::files::read_at_most;
+
 use super::error::SceneError;
 use super::fault::{FileFault, Place};
 
@@ -14,6 +16,9 @@ pub(super) const IMAGE_EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "t
 /// Folders of photographs, in the order in which they are searched: the largest photographs first.
 pub(super) const IMAGE_FOLDERS: [&str; 8] =
     ["images", "images_1", "images_2", "images_4", "images_8", "input", "image", "rgb"];
+
+/// Most bytes of a list of cameras, points or depths.
+pub(super) const LONGEST_FILE: u64 = 4 << 30;
 
 /// Longest part of a wrong word that an error quotes: a binary file's first "word" may be the whole file.
 const LONGEST_EXCERPT: usize = 40;
@@ -34,7 +39,7 @@ pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
 /// [`SceneError::Missing`], [`SceneError::Read`] if it cannot be read, or [`SceneError::Damaged`] with the line if it is
 /// not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
-    let bytes = fs::read(path).map_err(|cause| unreadable(path, cause))?;
+    let bytes = read_at_most(path, LONGEST_FILE).map_err(|cause| unreadable(path, cause))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let place = Place::Line(1 + before.iter().filter(|byte| **byte == b'\n').count());
@@ -75,17 +80,25 @@ pub(super) fn image_folders(root: &Path) -> Result<Vec<PathBuf>, SceneError> {
     for entry in std::fs::read_dir(here).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let factor = match name.strip_prefix("images") {
-            Some("") => Some(1),
-            Some(rest) => rest.strip_prefix('_').and_then(|factor| factor.parse().ok()),
-            None => None,
-        };
-        if let Some(factor) = factor.filter(|_| path.is_dir()) {
+        if let Some(factor) = reduction(&name).filter(|_| path.is_dir()) {
             folders.push((factor, path));
         }
     }
     folders.sort();
     Ok(folders.into_iter().map(|(_, path)| path).collect())
+}
+
+/// How many times smaller the photographs in a folder `images` or `images_N` are.
+fn reduction(name: &str) -> Option<u64> {
+    match name.strip_prefix("images")? {
+        "" => Some(1),
+        rest => rest.strip_prefix('_')?.parse().ok(),
+    }
+}
+
+/// Whether a folder's name is `images` or `images_N`.
+pub(super) fn is_images_folder(name: &str) -> bool {
+    reduction(name).is_some()
 }
 
 /// The number that a name ends in.

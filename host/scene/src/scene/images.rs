@@ -10,6 +10,7 @@ use std::path::Path;
 
 use image::metadata::Orientation;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use viewfuse_job::panics::caught;
 
 use super::error::SceneError;
 use super::files::unreadable;
@@ -17,6 +18,13 @@ use super::{LARGEST_SIDE, Photograph};
 
 /// Most bytes of a decoded pixel: four channels of 16 bits.
 const LARGEST_PIXEL: u64 = 8;
+
+/// Decoded pixels of more bytes than this must have a file of fitting length.
+const SMALL_IMAGE: u64 = 32 << 20;
+
+/// Most decoded bytes for each byte of a file: twice what a plane of one colour takes in the format that packs it best but one
+/// (PNG: 1032). A header of a few bytes must not take memory for pixels that cannot be in the file.
+const LARGEST_RATIO: u64 = 2064;
 
 /// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles.
 const DECODER_ALLOWANCE: u64 = 64 << 20;
@@ -31,6 +39,8 @@ pub(super) struct Header {
     pub(super) size: [u32; 2],
     /// How the pixels must be turned to be upright.
     pub(super) orientation: Orientation,
+    /// Bytes of the decoded pixels.
+    bytes: u64,
 }
 
 /// Size and orientation; nothing of the size that the header states is allocated.
@@ -38,18 +48,19 @@ pub(super) struct Header {
 /// # Errors
 /// [`SceneError::TooLarge`] if a side has more than [`LARGEST_SIDE`] pixels; otherwise as for any unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
-    let (width, height, orientation) = match beginning_of_jpeg(path)? {
+    let found = match beginning_of_jpeg(path)? {
         Some(found) => found,
-        None => described(open(path)?).map_err(|cause| undecodable(path, cause))?,
+        None => described(path, open(path)?)?,
     };
+    let [width, height] = found.size;
     if width > LARGEST_SIDE || height > LARGEST_SIDE {
         return Err(SceneError::TooLarge { path: path.to_path_buf(), width, height });
     }
-    Ok(Header { size: [width, height], orientation })
+    Ok(found)
 }
 
 /// The header in the first bytes of a JPEG file; `None` for other files, and if more bytes are needed.
-fn beginning_of_jpeg(path: &Path) -> Result<Option<(u32, u32, Orientation)>, SceneError> {
+fn beginning_of_jpeg(path: &Path) -> Result<Option<Header>, SceneError> {
     let failed = |cause| unreadable(path, cause);
     let mut first = Vec::new();
     let mut file = File::open(path).map_err(failed)?.take(JPEG_HEADER);
@@ -58,16 +69,17 @@ fn beginning_of_jpeg(path: &Path) -> Result<Option<(u32, u32, Orientation)>, Sce
         return Ok(None);
     }
     file.read_to_end(&mut first).map_err(failed)?;
-    Ok(described(ImageReader::with_format(Cursor::new(first), ImageFormat::Jpeg)).ok())
+    Ok(described(path, ImageReader::with_format(Cursor::new(first), ImageFormat::Jpeg)).ok())
 }
 
-fn described<R: std::io::BufRead + std::io::Seek>(
-    reader: ImageReader<R>,
-) -> Result<(u32, u32, Orientation), image::ImageError> {
-    let mut decoder = reader.into_decoder()?;
-    let (width, height) = decoder.dimensions();
-    // An unreadable tag is ignored.
-    Ok((width, height, decoder.orientation().unwrap_or(Orientation::NoTransforms)))
+fn described<R: std::io::BufRead + std::io::Seek>(path: &Path, reader: ImageReader<R>) -> Result<Header, SceneError> {
+    decoding(path, || {
+        let mut decoder = reader.into_decoder()?;
+        let (width, height) = decoder.dimensions();
+        // An unreadable tag is ignored.
+        let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+        Ok(Header { size: [width, height], orientation, bytes: decoder.total_bytes() })
+    })
 }
 
 /// How a photograph's pixels in memory were made from the stored ones.
@@ -84,7 +96,7 @@ pub(super) struct Turn {
 impl Turn {
     /// Of a photograph whose cameras are for pictures of this width and height.
     pub(super) fn of(header: &Header, size: [u32; 2]) -> Turn {
-        let Header { size: stored, orientation } = *header;
+        let Header { size: stored, orientation, .. } = *header;
         Turn { stored, orientation, is_applied: stored != size && turned(stored, orientation) == size }
     }
 
@@ -106,7 +118,8 @@ impl Turn {
 /// [`SceneError::SizeMismatch`] if the file has another size.
 pub(super) fn decode(path: &Path, size: [u32; 2]) -> Result<(Photograph, Turn), SceneError> {
     let (mut decoded, orientation) = pixels(path)?;
-    let turn = Turn::of(&Header { size: [decoded.width(), decoded.height()], orientation }, size);
+    let bytes = decoded.as_bytes().len() as u64;
+    let turn = Turn::of(&Header { size: [decoded.width(), decoded.height()], orientation, bytes }, size);
     if turn.is_applied {
         decoded.apply_orientation(orientation);
     }
@@ -151,18 +164,34 @@ pub(super) fn turned(size: [u32; 2], orientation: Orientation) -> [u32; 2] {
 ///
 /// The header is checked first, and the decoder may allocate no more than an image of that size needs.
 pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneError> {
-    let Header { size: [width, height], orientation } = header(path)?;
+    let Header { size: [width, height], orientation, bytes } = header(path)?;
+    let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
+    if bytes > SMALL_IMAGE && bytes / LARGEST_RATIO > length {
+        return Err(SceneError::Hollow { path: path.to_path_buf(), width, height, length });
+    }
     let mut limits = Limits::default();
     limits.max_image_width = Some(width);
     limits.max_image_height = Some(height);
     limits.max_alloc = Some(u64::from(width) * u64::from(height) * LARGEST_PIXEL + DECODER_ALLOWANCE);
     let mut reader = open(path)?;
     reader.limits(limits);
-    Ok((reader.decode().map_err(|cause| undecodable(path, cause))?, orientation))
+    Ok((decoding(path, || reader.decode())?, orientation))
 }
 
-fn undecodable(path: &Path, cause: image::ImageError) -> SceneError {
-    SceneError::Image { path: path.to_path_buf(), cause }
+/// What a decoder makes of a file; it may fail or panic.
+fn decoding<T>(path: &Path, decode: impl FnOnce() -> image::ImageResult<T>) -> Result<T, SceneError> {
+    match caught(decode) {
+        Ok(decoded) => decoded.map_err(|cause| SceneError::Image { path: path.to_path_buf(), cause }),
+        Err(panic) => Err(SceneError::Decoder { path: path.to_path_buf(), panic }),
+    }
+}
+
+/// The pixels of any picture as stored: PNG, JPEG, WebP or TIFF of at most [`LARGEST_SIDE`] pixels on a side.
+///
+/// # Errors
+/// [`SceneError`] if it cannot be read or decoded, or is too large.
+pub fn read_picture(path: &Path) -> Result<DynamicImage, SceneError> {
+    Ok(pixels(path)?.0)
 }
 
 /// A reader for the format of the content, independent of the file's extension.

@@ -113,7 +113,7 @@ impl ImageFile {
     /// # Errors
     /// [`SceneError`] if it cannot be read, is not an image, or states a side above [`crate::LARGEST_SIDE`].
     pub fn open(path: &Path) -> Result<ImageFile, SceneError> {
-        let images::Header { size, orientation } = images::header(path)?;
+        let images::Header { size, orientation, .. } = images::header(path)?;
         Ok(ImageFile { path: path.to_path_buf(), size, orientation })
     }
 

@@ -5,6 +5,7 @@ use super::Arguments;
 use super::files::{csv_of, json_of};
 use super::jobs::{Jobs, names};
 use super::tables::{counted, print_published, print_table};
+use crate::cli::outputs::keep_folder_apart;
 use crate::cli::{on_threads, say, wrong};
 use anyhow::Context;
 use clap::Args;
@@ -66,6 +67,7 @@ pub(super) fn run(
     let about = field.about();
     let render_options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
     let scenes: Vec<Scene> = arguments.paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
+    folder.map_or(Ok(()), |folder| keep_folder_apart(&scenes, folder))?;
     let draws = Draws {
         seed: arguments.seed,
         trial_count: arguments.protocol.trials,

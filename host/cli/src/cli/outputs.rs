@@ -1,0 +1,53 @@
+//! Outputs that would replace inputs are refused before work begins.
+
+use super::wrong;
+use std::fs::canonicalize;
+use std::path::Path;
+use viewfuse_scene::Scene;
+
+/// Refuses a folder for pictures that one of the scenes is read from.
+pub(super) fn keep_folder_apart<'a>(scenes: impl IntoIterator<Item = &'a Scene>, folder: &Path) -> anyhow::Result<()> {
+    match scenes.into_iter().find(|scene| scene.reads_folder(folder)) {
+        Some(scene) => Err(inside(scene, folder, "folder")),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a file that one of the scenes is read from, or would be.
+pub(super) fn keep_file_apart<'a>(scenes: impl IntoIterator<Item = &'a Scene>, file: &Path) -> anyhow::Result<()> {
+    match scenes.into_iter().find(|scene| scene.reads_file(file)) {
+        Some(scene) => Err(inside(scene, file, "file")),
+        None => Ok(()),
+    }
+}
+
+fn inside(scene: &Scene, path: &Path, what: &str) -> anyhow::Error {
+    let (path, scene) = (path.display(), scene.path.display());
+    wrong(format_args!("--output {path}: the scene {scene} is read from this {what}; give another {what}"))
+}
+
+/// Refuses an output that is the input itself, under any spelling.
+pub(super) fn keep_input(input: &Path, output: &Path) -> anyhow::Result<()> {
+    match (canonicalize(input), canonicalize(output)) {
+        (Ok(from), Ok(to)) if from == to => {
+            let (input, output) = (input.display(), output.display());
+            Err(wrong(format_args!("{output}: is the input {input} itself, which is not replaced; give another name")))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Refuses an existing file in one of these folders, or in a folder in them, that is no page: it belongs to the folder's run.
+#[cfg(feature = "report")]
+pub(super) fn keep_runs<'a>(folders: impl IntoIterator<Item = &'a Path>, output: &Path) -> anyhow::Result<()> {
+    let is_page = output.extension().is_some_and(|extension| extension == "html" || extension == "htm");
+    let Some(output) = canonicalize(output).ok().filter(|_| !is_page) else { return Ok(()) };
+    let holds = |folder: &&Path| canonicalize(folder).is_ok_and(|folder| output.starts_with(folder));
+    match folders.into_iter().find(holds) {
+        Some(folder) => {
+            let (output, folder) = (output.display(), folder.display());
+            Err(wrong(format_args!("--output {output}: belongs to {folder}; give the name of a page (.html)")))
+        }
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,57 @@
+//! Output folders that appear completely or not at all.
+
+use super::unfinished::Own;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// A folder that is filled under a temporary name beside its own and appears when it is finished. Dropped before that, it
+/// leaves nothing.
+#[derive(Debug)]
+pub struct WholeFolder {
+    path: PathBuf,
+    temporary: TempDir,
+    own: Own,
+}
+
+impl WholeFolder {
+    /// Begins the folder `path`; its parent is created where it is missing.
+    ///
+    /// # Errors
+    /// If `path` does not end in a name, or the system reports an error.
+    pub fn create(path: &Path) -> io::Result<WholeFolder> {
+        let name = path.file_name().ok_or_else(|| io::Error::other("it does not name a folder"))?;
+        let parent = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent,
+            _ => Path::new("."),
+        };
+        fs::create_dir_all(parent)?;
+        let (temporary, own) =
+            Own::make(parent, |builder| builder.tempdir_in(parent), |made: &TempDir| made.path().to_path_buf())?;
+        // A temporary folder is closed to others; the result, a folder inside it, has the ordinary permissions.
+        fs::create_dir(temporary.path().join(name))?;
+        Ok(WholeFolder { path: path.to_path_buf(), temporary, own })
+    }
+
+    /// Where to put its files.
+    pub fn path(&self) -> PathBuf {
+        self.temporary.path().join(self.path.file_name().unwrap_or_default())
+    }
+
+    /// Renames it into place; an empty folder is replaced.
+    ///
+    /// # Errors
+    /// If the system reports an error; then nothing remains.
+    pub fn finish(self) -> io::Result<()> {
+        let from = self.path();
+        let WholeFolder { path, temporary, own } = self;
+        own.finish(|| {
+            if path.is_dir() {
+                fs::remove_dir(&path)?;
+            }
+            fs::rename(from, &path)
+        })?;
+        temporary.close()
+    }
+}

@@ -1,0 +1,128 @@
+//! Temporary files and folders of outputs that are not finished.
+//!
+//! Each is locked by its process. A process that ends at once removes its own ([`remove_all`]). What a kill leaves is
+//! removed by the next process that writes to the same folder: what nobody has locked belongs to nobody. On file systems
+//! without locks it stays.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use tempfile::Builder;
+
+/// What the names of temporary files begin with. The second one is of earlier versions.
+const PREFIXES: [&str; 2] = [".viewfuse-", ".unfinished-"];
+/// Random characters behind it.
+const RANDOM: usize = 6;
+/// How many times a temporary file is made again that another process took for one that a kill left.
+const ATTEMPTS: usize = 8;
+
+/// Temporary files and folders of this process.
+static OWN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// Folders in which this process has already looked for what a kill left.
+static CLEANED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files and folders of this process, which must end next: from here on every output waits forever
+/// instead of being finished or begun.
+pub fn remove_all() {
+    let own = lock(&OWN);
+    for path in own.iter() {
+        // A folder is no file. What cannot be removed stays, as after a kill.
+        if fs::remove_file(path).is_err() {
+            let _ = fs::remove_dir_all(path);
+        }
+    }
+    std::mem::forget(own);
+}
+
+/// A temporary file or folder of this process, until it is finished.
+#[derive(Debug)]
+pub(super) struct Own {
+    path: PathBuf,
+    /// Keeps the lock.
+    _locked: Option<File>,
+}
+
+impl Own {
+    /// Makes a temporary file or folder in `folder` by `make`, locks it by the handle that `open` gives, and lists it.
+    pub(super) fn make<T>(
+        folder: &Path,
+        make: impl Fn(&mut Builder<'_, '_>) -> io::Result<T>,
+        place: impl Fn(&T) -> PathBuf,
+    ) -> io::Result<(T, Own)> {
+        clean(folder);
+        let mut builder = Builder::new();
+        builder.prefix(PREFIXES[0]).rand_bytes(RANDOM);
+        let mut attempt = 0;
+        loop {
+            // Nothing is begun while the process ends.
+            let mut own = lock(&OWN);
+            let made = make(&mut builder)?;
+            let path = place(&made);
+            // A folder cannot be opened on every system: it is then not recognised after a kill.
+            let locked = File::open(&path).ok().filter(|file| file.try_lock().is_ok());
+            attempt += 1;
+            // Between making and locking, another process may have taken it for one that a kill left.
+            if path.exists() || attempt == ATTEMPTS {
+                own.insert(path.clone());
+                return Ok((made, Own { path, _locked: locked }));
+            }
+        }
+    }
+
+    /// Renames it to its final name by `rename`; while the process ends, this waits forever.
+    pub(super) fn finish<T>(self, rename: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
+        let own = lock(&OWN);
+        let renamed = rename();
+        drop(own);
+        renamed
+    }
+}
+
+impl Drop for Own {
+    fn drop(&mut self) {
+        lock(&OWN).remove(&self.path);
+    }
+}
+
+/// Removes what killed processes left in a folder; once for each process and folder.
+pub(super) fn clean(folder: &Path) {
+    let whole = fs::canonicalize(folder).unwrap_or_else(|_| folder.to_path_buf());
+    if !lock(&CLEANED).insert(whole) {
+        return;
+    }
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if is_temporary(&entry.file_name().to_string_lossy()) && !lock(&OWN).contains(&path) {
+            // Only of what nobody has locked.
+            let Ok(file) = File::open(&path) else { continue };
+            if file.try_lock().is_ok() && fs::remove_file(&path).is_err() {
+                let _ = fs::remove_dir_all(&path);
+            }
+        }
+    }
+}
+
+/// Whether a name is one that temporary files get.
+fn is_temporary(name: &str) -> bool {
+    let rest = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix));
+    rest.is_some_and(|rest| rest.len() == RANDOM && rest.bytes().all(|byte| byte.is_ascii_alphanumeric()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_temporary_names_are() {
+        assert!(is_temporary(".viewfuse-aB3xYz") && is_temporary(".unfinished-000000"));
+        for other in [".viewfuse-", ".viewfuse-aB3xY", ".viewfuse-aB3xYzz", ".viewfuse-a.3xYz", "viewfuse-aB3xYz"] {
+            assert!(!is_temporary(other), "{other}");
+        }
+    }
+}
