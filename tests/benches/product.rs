@@ -26,19 +26,19 @@ fn widest() -> Option<(&'static str, usize, Loop)> {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f") {
-            // Safety: the instructions are there.
+            // SAFETY: the instructions are there.
             #[allow(unsafe_code)]
             return Some(("AVX-512", 16, |steps| unsafe { x86::avx512(steps) }));
         }
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
-            // Safety: the instructions are there.
+            // SAFETY: the instructions are there.
             #[allow(unsafe_code)]
             return Some(("AVX2 with FMA", 8, |steps| unsafe { x86::avx2(steps) }));
         }
     }
     #[cfg(target_arch = "aarch64")]
     if std::arch::is_aarch64_feature_detected!("neon") {
-        // Safety: the instructions are there.
+        // SAFETY: the instructions are there.
         #[allow(unsafe_code)]
         return Some(("NEON", 4, |steps| unsafe { arm::neon(steps) }));
     }

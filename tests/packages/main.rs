@@ -1,11 +1,13 @@
 //! The packages as such: which depend on which, in which order their modules stand, what a library must not do, what a
-//! crate outside can add, which kernels have a twin on the CPU, and how the tests themselves are arranged.
+//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, and how the tests are arranged.
 
 mod crates;
 mod libraries;
 mod modules;
 mod outside;
+mod release;
 mod rooms;
+mod safety;
 mod twins;
 
 use serde_json::Value;

@@ -13,6 +13,7 @@ use viewfuse_core::pages::{Fetch, StartingAt};
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_fuse_views(
     weights: *const f32,

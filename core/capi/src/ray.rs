@@ -50,6 +50,7 @@ impl Ray {
 ///
 /// # Safety
 /// The pointer is null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_ray_start(ray: *mut Ray) -> Status {
     // SAFETY: the caller's promise.
@@ -61,6 +62,7 @@ pub unsafe extern "C" fn viewfuse_ray_start(ray: *mut Ray) -> Status {
 ///
 /// # Safety
 /// Pointers are null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_ray_add(ray: *mut Ray, rgb: *const f32, optical_depth: f32, depth: f32) -> Status {
     // SAFETY: the caller's promise is the same.
@@ -77,6 +79,7 @@ pub unsafe extern "C" fn viewfuse_ray_add(ray: *mut Ray, rgb: *const f32, optica
 ///
 /// # Safety
 /// Pointers are null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_ray_add_solid(ray: *mut Ray, rgb: *const f32, occupancy: f32, depth: f32) -> Status {
     // SAFETY: the caller's promise is the same.
@@ -92,6 +95,7 @@ pub unsafe extern "C" fn viewfuse_ray_add_solid(ray: *mut Ray, rgb: *const f32, 
 ///
 /// # Safety
 /// Pointers are null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_ray_finish(
     ray: *const Ray,

@@ -34,6 +34,7 @@ pub struct Step {
 ///
 /// # Safety
 /// The pointer is null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_noise_level(
     sigma_min: f32,
@@ -57,6 +58,7 @@ pub unsafe extern "C" fn viewfuse_noise_level(
 ///
 /// # Safety
 /// The pointer is null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_preconditioning_at(sigma: f32, factors: *mut Preconditioning) -> Status {
     if !is_level(sigma) {
@@ -71,6 +73,7 @@ pub unsafe extern "C" fn viewfuse_preconditioning_at(sigma: f32, factors: *mut P
 ///
 /// # Safety
 /// The pointer is null or valid.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_step_between(sigma: f32, next: f32, step: *mut Step) -> Status {
     if !(is_level(sigma) && is_level(next)) {
@@ -87,6 +90,7 @@ pub unsafe extern "C" fn viewfuse_step_between(sigma: f32, next: f32, step: *mut
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_network_input(
     factors: *const Preconditioning,
@@ -107,6 +111,7 @@ pub unsafe extern "C" fn viewfuse_network_input(
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_denoised(
     factors: *const Preconditioning,
@@ -131,6 +136,7 @@ pub unsafe extern "C" fn viewfuse_denoised(
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_step_euler(
     step: *const Step,
@@ -153,6 +159,7 @@ pub unsafe extern "C" fn viewfuse_step_euler(
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_step_correct(
     step: *const Step,

@@ -65,6 +65,7 @@ impl Status {
 }
 
 /// The message of a status, in English, as a static string. Every number is valid input.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub extern "C" fn viewfuse_status_text(status: i32) -> *const c_char {
     let text: &'static CStr = match status {

@@ -54,6 +54,7 @@ const _: () = assert!(ATTENTION_PARAMETERS as usize == FourierEmbedding::PARAMET
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_weigh_8(
     scheme: *const Scheme,
@@ -70,6 +71,7 @@ pub unsafe extern "C" fn viewfuse_weigh_8(
 ///
 /// # Safety
 /// As viewfuse_weigh_8.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_weigh_16(
     scheme: *const Scheme,
@@ -86,6 +88,7 @@ pub unsafe extern "C" fn viewfuse_weigh_16(
 ///
 /// # Safety
 /// As viewfuse_weigh_8.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_weigh_32(
     scheme: *const Scheme,
@@ -106,6 +109,7 @@ pub unsafe extern "C" fn viewfuse_weigh_32(
 ///
 /// # Safety
 /// Pointers are null or valid for these shapes; the parameters do not change during the call.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_attend_8(
     parameters: *const f32,
@@ -122,6 +126,7 @@ pub unsafe extern "C" fn viewfuse_attend_8(
 ///
 /// # Safety
 /// As viewfuse_attend_8.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_attend_16(
     parameters: *const f32,
@@ -138,6 +143,7 @@ pub unsafe extern "C" fn viewfuse_attend_16(
 ///
 /// # Safety
 /// As viewfuse_attend_8.
+// SAFETY: no other symbol has this name; it begins with the name of the library.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn viewfuse_attend_32(
     parameters: *const f32,

@@ -21,30 +21,35 @@ use viewfuse_list::denoised::{denoiser_step, noise};
 use viewfuse_list::formulas::{CHANNELS, SAMPLES, composite_ray, latents, samples, stratified, visibility};
 use viewfuse_list::rig::{Rig, VIEWS, schemes};
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_weigh(scheme: Scheme, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
     weigh(scheme, sources, target)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_embed(embedding: &FourierEmbedding, pose: &Pose) -> [f32; EMBEDDING] {
     embedding.embed(pose)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_attend(embedding: &FourierEmbedding, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
     cross_attention(embedding, sources, target)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_fuse(weights: &Weights<VIEWS>, latents: &[[f32; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
     fuse_views(weights, latents)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_fuse_visible(
@@ -55,24 +60,28 @@ fn measured_fuse_visible(
     fuse_visible(weights, visibility, latents, [0.0; CHANNELS])
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_ray(samples: &[[f32; 4]; SAMPLES]) -> Composite<3> {
     composite_ray(samples)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_depths(seed: u64) -> [f32; SAMPLES] {
     stratified(seed)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_step(schedule: &NoiseSchedule, index: u32, noisy: &[f32; CHANNELS]) -> [f32; CHANNELS] {
     denoiser_step(schedule, index, noisy)
 }
 
+// SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
 fn measured_sqrt(x: f32) -> f32 {
