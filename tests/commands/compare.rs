@@ -44,7 +44,7 @@ fn what_cannot_be_compared() {
     };
     refused("made toy/rgb", &["made: has no pictures"]);
     refused("toy/rgb made", &["made/000000.png: is missing", "toy/rgb/000000.png"]);
-    refused("broken.png toy/rgb/000000.png", &["broken.png: cannot be read"]);
+    refused("broken.png toy/rgb/000000.png", &["broken.png: not a readable image"]);
     refused("toy/rgb/000000.png toy/rgb", &["toy/rgb: is a folder"]);
     refused("small.png toy/rgb/000000.png", &["small.png", "4x4 cannot be compared with one of 128x128"]);
     let one = "toy/rgb/000000.png toy/rgb/000001.png";

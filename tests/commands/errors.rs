@@ -138,9 +138,10 @@ fn views_that_do_not_fit() {
     assert_refused("render toy --targets lorry -o out", &["toy: has no view 'lorry'"]);
     assert_refused("weights toy --target 24", &["toy: has no view '24'"]);
     assert_refused("evaluate toy --targets 24", &["toy: has no view '24'"]);
-    assert_refused(&render("all/0"), &["'all/0'", "at least 1"]);
-    assert_refused(&render("9..5"), &["'9..5'", "FIRST..LAST"]);
-    assert_refused(&render("9.."), &["'9..'", "FIRST..LAST"]);
+    // A list that is wrong for any scene is a wrong argument.
+    assert_wrong(&render("all/0"), &["'all/0'", "at least 1"]);
+    assert_wrong(&render("9..5"), &["'9..5'", "FIRST..LAST"]);
+    assert_wrong(&render("9.."), &["'9..'", "FIRST..LAST"]);
     assert_refused("render toy -o out", &["toy: no targets", "--targets", "--orbit"]);
 }
 

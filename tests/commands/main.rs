@@ -6,9 +6,12 @@ mod convert;
 mod devices;
 mod errors;
 mod genvs;
+mod hostile;
 mod inspect;
 mod interrupt;
+mod kill;
 mod memory;
+mod outputs;
 mod pareto;
 mod protocols;
 mod readme;
@@ -40,9 +43,12 @@ fn main() -> ExitCode {
         devices::trials(),
         errors::trials(),
         genvs::trials(),
+        hostile::trials(),
         inspect::trials(),
         interrupt::trials(),
+        kill::trials(),
         memory::trials(),
+        outputs::trials(),
         pareto::trials(),
         protocols::trials(),
         readme::trials(),

@@ -28,6 +28,8 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::report::the_page_holds_everything", the_page_holds_everything),
         trial("commands::report::evaluations_under_way_are_shown", evaluations_under_way_are_shown),
         trial("commands::report::what_is_no_record_is_refused", what_is_no_record_is_refused),
+        trial("commands::report::a_received_folder_shows_only_its_own", a_received_folder_shows_only_its_own),
+        trial("commands::report::damaged_numbers_are_refused", damaged_numbers_are_refused),
     ];
     let browser = Browser::find().map(Arc::new);
     let tests: [(&str, InBrowser); 3] = [
@@ -269,4 +271,100 @@ fn light_and_dark(browser: &Browser) {
         };
         assert!(picture.pixels().filter(|pixel| far(pixel)).count() > 1000, "{name} shows nothing");
     }
+}
+
+/// An evaluation of two jobs, with pictures of one.
+fn small_run() -> Folder {
+    let folder = toy();
+    let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
+    done(BINARY, folder.path(), &format!("{run} --weights mean -o run"));
+    folder
+}
+
+/// A folder that somebody sent must not bring files of whoever makes the page onto the page.
+fn a_received_folder_shows_only_its_own() {
+    let folder = small_run();
+    let path = folder.path();
+    folder.write("secret.png", "a key").write("run/secret.png", "a key").write("run/pictures/key.txt", "a key");
+    folder.write("run/pictures/false.png", "a key");
+    let file = path.join("run/pictures/job-00000.json");
+    let text = fs::read_to_string(&file).expect("a description");
+    let truth = "job-00000-truth.png";
+    assert!(text.contains(truth));
+    let absolute = path.join("secret.png");
+    for name in [
+        absolute.to_str().expect("text"),
+        "../secret.png",
+        "../../secret.png",
+        "./job-00000-truth.png",
+        "/etc/passwd",
+        "key.txt",
+        "",
+        "..",
+        "C:secret.png",
+    ] {
+        for old in [truth, "job-00000-source-000.png", "job-00000-scheme-000.png"] {
+            fs::write(&file, text.replace(old, name)).expect("a file");
+            let parts = ["run/pictures/job-00000.json: names", "no picture in the folder"];
+            assert_refused(BINARY, path, "report run -o page.html", &parts);
+        }
+    }
+    fs::write(&file, text.replace(truth, "false.png")).expect("a file");
+    assert_refused(BINARY, path, "report run -o page.html", &["run/pictures/false.png: is not a PNG"]);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::symlink;
+        fs::copy(path.join("toy/rgb/000000.png"), path.join("mine.png")).expect("a picture");
+        symlink(path.join("mine.png"), path.join("run/pictures/link.png")).expect("a link");
+        fs::write(&file, text.replace(truth, "link.png")).expect("a file");
+        assert_refused(BINARY, path, "report run -o page.html", &["link.png", "no picture in the folder"]);
+        folder.write("trained/record.json", "{}");
+        symlink("/etc/passwd", path.join("trained/curve.svg")).expect("a link");
+        assert_refused(BINARY, path, "report --training trained -o page.html", &["curve.svg: is not the curve"]);
+    }
+    fs::write(&file, text).expect("a file");
+    done(BINARY, path, "report run -o page.html");
+}
+
+fn damaged_numbers_are_refused() {
+    let folder = small_run();
+    let path = folder.path();
+    let change = |name: &str, change: &dyn Fn(&mut Value)| {
+        let text = fs::read_to_string(path.join(name)).expect("a record");
+        let mut value: Value =
+            serde_json::from_str(text.lines().next().filter(|_| name.ends_with('l')).unwrap_or(&text)).expect("JSON");
+        change(&mut value);
+        fs::write(path.join(name), format!("{value}\n")).expect("a file");
+        text
+    };
+    let refused = |parts: &[&str]| assert_refused(BINARY, path, "report run -o page.html", parts);
+    for count in [1_000_000_000_000_000_000_u64, 10_000_001] {
+        let whole = change("run/run.json", &|record| record["job_count"] = count.into());
+        refused(&["run/run.json: job_count is", &count.to_string(), "at most 10000000"]);
+        fs::write(path.join("run/run.json"), whole).expect("a file");
+    }
+    let journal = "run/scores-0-of-1.jsonl";
+    for value in [json!(1.0e308), json!(-1.0e308), json!("none"), json!("1e300")] {
+        let whole = change(journal, &|line| line["scores"][0]["values"][0][1] = value.clone());
+        refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "psnr is"]);
+        fs::write(path.join(journal), whole).expect("a file");
+    }
+    for value in [1.0e18, -1.0] {
+        let whole = change(journal, &|line| line["scores"][0]["seconds"] = value.into());
+        refused(&["scores-0-of-1.jsonl:1: is not of an evaluation", "seconds is"]);
+        fs::write(path.join(journal), whole).expect("a file");
+    }
+    done(BINARY, path, "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o sweep");
+    let text = fs::read_to_string(path.join("sweep/pareto.json")).expect("a sweep");
+    for key in ["seconds", "encode_seconds", "gain", "truth_psnr"] {
+        let mut record: Value = serde_json::from_str(&text).expect("JSON");
+        record["devices"][0]["points"][1][key] = 1.0e300.into();
+        folder.write("sweep/pareto.json", record.to_string());
+        let parts = ["sweep/pareto.json: is not a record of viewfuse pareto", "out of its range"];
+        assert_refused(BINARY, path, "report --pareto sweep -o page.html", &parts);
+    }
+    // An empty record of settings is that of a machine that lost its power: the evaluation goes on.
+    folder.write("run/run.json", "");
+    let run = "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --pictures 1 --size 16x16 --device cpu";
+    assert!(done(BINARY, path, &format!("{run} --weights mean -o run")).contains("0 jobs done; 2 of 2"));
 }

@@ -17,6 +17,9 @@ viewfuse_tests::trials![
     genvs_goes_on_too,
     data_are_told_by_what_is_in_them,
     wrong_input_is_told,
+    numbers_without_sense_are_refused,
+    a_damaged_state_is_refused_and_an_empty_one_is_none,
+    a_loss_is_shown_once_there_is_one,
 ];
 
 /// Small enough for a second a run.
@@ -162,4 +165,83 @@ fn wrong_input_is_told() {
     refused("train pixelnerf learn/toys -o .", &["./state.safetensors: is not the state of a training run"]);
     assert_wrong_arguments(BINARY, folder.path(), "train genvs learn/toys -o out --width 5", &["a multiple of 4"]);
     assert!(!folder.path().join("out").exists());
+}
+
+/// Numbers with which nothing would be computed, learned or written, or that no memory holds.
+fn numbers_without_sense_are_refused() {
+    let folder = scenes();
+    let wrong = |model: &str, option: &str, parts: &[&str]| {
+        let arguments = format!("train {model} learn/toys -o out {option}");
+        assert_wrong_arguments(BINARY, folder.path(), &arguments, parts);
+    };
+    for option in ["objects", "rays", "width"] {
+        for value in ["0", "100000", "18446744073709551615"] {
+            wrong("pixelnerf", &format!("--{option} {value}"), &[option, "from 1 to 1024"]);
+        }
+    }
+    for value in ["0", "1", "100000"] {
+        wrong("pixelnerf", &format!("--coarse {value}"), &["--coarse", "from 2 to 1024"]);
+    }
+    wrong("pixelnerf", "--fine 100000", &["--fine", "from 1 to 1024"]);
+    for value in ["0", "8", "100000"] {
+        wrong("pixelnerf", &format!("--side {value}"), &["--side", "a multiple of 16 from 16 to 1024"]);
+    }
+    for model in ["pixelnerf", "genvs"] {
+        for value in ["nan", "-1", "inf", "2", "-0.001"] {
+            wrong(model, &format!("--rate={value}"), &["--rate", "from 0 to 1"]);
+        }
+        for value in ["nan", "-1", "inf"] {
+            wrong(model, &format!("--write-every={value}"), &["--write-every", "from 0 to 86400"]);
+        }
+    }
+    let all = "train pixelnerf learn/toys -o out --objects 1024 --rays 1024 --coarse 1024 --width 1024";
+    assert_refused(BINARY, folder.path(), all, &["objects", "at most 2^28"]);
+    // The least that can be computed.
+    let least = "--side 16 --objects 1 --rays 1 --coarse 2 --fine 0 --width 1 --steps 1";
+    done(folder.path(), &format!("train pixelnerf learn/toys -o least {least}"));
+}
+
+/// The state of a run with this in the place of its progress.
+fn with_progress(state: &[u8], progress: &str) -> Vec<u8> {
+    let length = u64::from_le_bytes(state[..8].try_into().expect("a length")) as usize;
+    let mut header: serde_json::Value = serde_json::from_slice(&state[8..8 + length]).expect("a header");
+    header["__metadata__"]["progressed"] = progress.into();
+    let mut text = header.to_string();
+    text.push_str(&" ".repeat(text.len().next_multiple_of(8) - text.len()));
+    [&(text.len() as u64).to_le_bytes(), text.as_bytes(), &state[8 + length..]].concat()
+}
+
+fn a_damaged_state_is_refused_and_an_empty_one_is_none() {
+    let folder = scenes();
+    let run = format!("{} -o run", PIXELNERF.replace("--steps 30", "--steps 2"));
+    done(folder.path(), &run);
+    let path = folder.path().join("run/state.safetensors");
+    let state = fs::read(&path).expect("a state");
+    let sound = r#"{"steps":1,"seconds":1.0,"losses":[[1,0.5]],"pending":[0.0,0],"scores":[[1,12.0]]}"#;
+    for (from, to) in [
+        ("12.0", "1e308"),
+        ("12.0", "-1e308"),
+        ("[1,12.0]", "[7,12.0]"),
+        ("0.5", "1e300"),
+        ("[0.0,0]", "[1e308,1]"),
+        ("1.0,", "-1.0,"),
+    ] {
+        fs::write(&path, with_progress(&state, &sound.replace(from, to))).expect("a file");
+        assert_refused(BINARY, folder.path(), &run, &["run/state.safetensors: is not the state", "out of range"]);
+    }
+    fs::write(&path, with_progress(&state, sound)).expect("a file");
+    done(folder.path(), &run);
+    // A machine that lost its power leaves an empty file: the run begins again.
+    fs::write(&path, "").expect("a file");
+    assert!(done(folder.path(), &run).contains("2 steps in"));
+    fs::remove_file(&path).expect("a file");
+    fs::create_dir(&path).expect("a folder in the way");
+    assert_refused(BINARY, folder.path(), &run, &["run/state.safetensors: cannot be written: it is a folder"]);
+}
+
+fn a_loss_is_shown_once_there_is_one() {
+    let folder = scenes();
+    let run = PIXELNERF.replace("--validate-every 10", "--validate-every 1").replace("--steps 30", "--steps 2");
+    let said = done(folder.path(), &format!("{run} -o run"));
+    assert!(said.contains("step 1: loss 0.") && !said.contains("NaN"), "{said}");
 }

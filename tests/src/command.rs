@@ -92,7 +92,8 @@ pub fn files_below(folder: &Path) -> Vec<(PathBuf, u64)> {
     for entry in fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
         let is_folder = path.is_dir();
-        found.push((path.clone(), if is_folder { 0 } else { fs::metadata(&path).expect("a file").len() }));
+        // A link to nothing has no length.
+        found.push((path.clone(), if is_folder { 0 } else { fs::metadata(&path).map_or(0, |file| file.len()) }));
         if is_folder {
             found.extend(files_below(&path));
         }

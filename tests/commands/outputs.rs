@@ -1,0 +1,172 @@
+//! Outputs that would replace something else: refused before work begins, with everything as it was.
+
+use super::{BINARY, done};
+use std::fs;
+use std::path::{Path, PathBuf};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, names_in, toy};
+use viewfuse_tests::scenes::{Folder, middlebury};
+
+viewfuse_tests::trials![
+    pictures_do_not_replace_photographs,
+    files_do_not_replace_lists,
+    an_evaluation_keeps_its_record,
+    names_that_meet_in_a_file,
+    inputs_are_not_replaced,
+    links_to_nothing_are_noticed_first,
+    what_a_kill_left_is_removed,
+];
+
+const RENDER: &str = "render toy --targets 20 --size 16x16 --device cpu";
+const EVALUATE: &str = "evaluate toy --targets 20 --weights mean --size 16x16 --device cpu";
+
+/// Every file below a folder with its content.
+fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let files = viewfuse_tests::command::files_below(folder).into_iter().map(|(path, _)| path);
+    files.filter(|path| path.is_file()).map(|path| (path.clone(), fs::read(&path).expect("a file"))).collect()
+}
+
+/// The arguments are wrong, and every file is what it was.
+#[track_caller]
+fn assert_kept(folder: &Folder, arguments: &str, parts: &[&str]) {
+    let before = contents(folder.path());
+    assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
+    assert_eq!(contents(folder.path()), before, "viewfuse {arguments} changed a file");
+}
+
+fn pictures_do_not_replace_photographs() {
+    let folder = toy();
+    for out in ["toy/rgb", "toy", "./toy/../toy/rgb/", "toy/pose", "toy/images", "toy/images_8/new", "toy/masks"] {
+        assert_kept(&folder, &format!("{RENDER} -o {out}"), &["the scene toy is read from this folder"]);
+    }
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("toy/rgb", folder.path().join("elsewhere")).expect("a link");
+        assert_kept(&folder, &format!("{RENDER} -o elsewhere"), &["elsewhere", "the scene toy is read from"]);
+    }
+    for command in [
+        "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu",
+        "export toy --layout transforms",
+        "evaluate toy --protocol random --weights mean --size 16x16 --device cpu",
+    ] {
+        assert_kept(&folder, &format!("{command} -o toy/rgb"), &["toy/rgb", "is read from this folder"]);
+    }
+    // Photographs that lie in the scene's own folder.
+    let flat = middlebury();
+    let before = contents(flat.path());
+    assert_wrong_arguments(BINARY, flat.path(), "render . --targets toy0001 -o .", &["is read from this folder"]);
+    assert_eq!(contents(flat.path()), before);
+    // A folder of one's own in the scene's stays possible, also a second time.
+    for _ in 0..2 {
+        done(folder.path(), &format!("{RENDER} -o toy/out"));
+    }
+    assert!(folder.path().join("toy/out/000020.png").is_file());
+    assert!(done(folder.path(), "inspect toy").contains("24 photographs"));
+}
+
+fn files_do_not_replace_lists() {
+    let folder = toy();
+    for out in ["toy/intrinsics.txt", "toy/rgb/000003.png", "toy/rgb/new.png"] {
+        assert_kept(&folder, &format!("inspect toy -o {out}"), &[out, "is read from this file"]);
+        assert_kept(&folder, &format!("{EVALUATE} -o {out}"), &[out, "is read from this file"]);
+    }
+    for _ in 0..2 {
+        done(folder.path(), "inspect toy -o toy/cameras.png");
+    }
+}
+
+fn an_evaluation_keeps_its_record() {
+    let folder = toy();
+    let run = "evaluate toy --protocol random --trials 2 --weights mean --size 16x16 --device cpu -o out";
+    done(folder.path(), run);
+    let before = contents(folder.path());
+    let parts = ["out/run.json: is not the record of a render", "another folder"];
+    assert_refused(BINARY, folder.path(), &format!("{RENDER} -o out"), &parts);
+    assert_eq!(contents(folder.path()), before);
+    assert!(done(folder.path(), run).contains("0 jobs done; 2 of 2"), "it goes on");
+    // Nor is the record of a render taken for that of an evaluation.
+    done(folder.path(), &format!("{RENDER} -o pictures"));
+    let before = contents(folder.path());
+    assert_refused(BINARY, folder.path(), &run.replace("-o out", "-o pictures"), &["pictures/run.json"]);
+    assert_eq!(contents(folder.path()), before);
+}
+
+fn names_that_meet_in_a_file() {
+    let scene = toy();
+    for (kind, ending) in [("rgb", "png"), ("pose", "txt")] {
+        for (from, to) in [("000020", "x"), ("000021", "x_depth"), ("000022", "y_sheet"), ("000023", "y_confidence")] {
+            let name = |name: &str| scene.path().join(format!("toy/{kind}/{name}.{ending}"));
+            fs::rename(name(from), name(to)).expect("another name");
+        }
+    }
+    let small = "--size 16x16 --device cpu -o out";
+    let parts = ["'x'", "'x_depth'", "x_depth.png", "different folders"];
+    assert_refused(BINARY, scene.path(), &format!("render toy --targets x,x_depth {small}"), &parts);
+    done(scene.path(), &format!("render toy --targets x,y_sheet {small}"));
+    assert!(names_in(&scene.path().join("out")).contains(&"y_sheet_sheet.png".to_owned()));
+}
+
+fn inputs_are_not_replaced() {
+    let folder = toy();
+    let checkpoint = viewfuse_tests::places::data("pixelnerf_small.safetensors");
+    fs::copy(checkpoint, folder.file("runs/model.safetensors")).expect("a copy");
+    let model = "runs/model.safetensors";
+    assert_kept(&folder, &format!("convert {model} ./{model} --half"), &["is the input", "another name"]);
+    folder.write("cars_train/a/intrinsics.txt", "").write("cars_val/a/intrinsics.txt", "");
+    let parts = ["runs/model.safetensors", "is the input"];
+    assert_kept(&folder, &format!("train weighting {model} cars -o runs"), &parts);
+    assert_kept(&folder, &format!("train pixelnerf cars --from {model} -o runs"), &parts);
+    done(folder.path(), "evaluate toy --protocol random --weights mean --size 16x16 --device cpu -o out");
+    assert_kept(&folder, "report out -o out/run.json", &["out/run.json", "belongs to out"]);
+    assert_kept(&folder, "report out -o out/scores-0-of-1.jsonl", &["belongs to out"]);
+    for _ in 0..2 {
+        done(folder.path(), "report out -o out/page.html");
+    }
+}
+
+#[cfg(unix)]
+fn links_to_nothing_are_noticed_first() {
+    use std::os::unix::fs::symlink;
+    let folder = toy();
+    symlink("nowhere/at/all", folder.path().join("out")).expect("a link");
+    for arguments in [
+        format!("{RENDER} -o out"),
+        format!("{EVALUATE} -o out"),
+        "inspect toy -o out".to_owned(),
+        "report toy -o out".to_owned(),
+        "convert toy/rgb/000000.png out/a.safetensors".to_owned(),
+        "train pixelnerf cars -o out".to_owned(),
+    ] {
+        assert_refused(BINARY, folder.path(), &arguments, &["cannot be written: out is a link to nothing"]);
+    }
+}
+
+#[cfg(not(unix))]
+fn links_to_nothing_are_noticed_first() {}
+
+fn what_a_kill_left_is_removed() {
+    let folder = toy();
+    for left in ["out/.viewfuse-aB3xYz", "learn/.unfinished-000001/rgb/0.png", "learn/.viewfuse-000002/x"] {
+        folder.write(left, "half of a file");
+    }
+    // Of other programs, and of people.
+    for other in ["out/.viewfuse-notes", "out/.hidden", "learn/.unfinished-1/x"] {
+        folder.write(other, "whole");
+    }
+    done(folder.path(), &format!("{RENDER} -o out"));
+    let hidden = |name: &str| {
+        let names = names_in(&folder.path().join(name));
+        names.into_iter().filter(|name| name.starts_with('.')).collect::<Vec<_>>()
+    };
+    assert_eq!(hidden("out"), [".hidden", ".viewfuse-notes"]);
+    done(folder.path(), "export toy --layout transforms -o learn/toy");
+    assert_eq!(hidden("learn"), [".unfinished-1"]);
+    // What another process still writes stays.
+    let path = folder.path().join("out/.viewfuse-busyyy");
+    let busy = fs::File::create(&path).expect("a file");
+    busy.lock().expect("a lock");
+    done(folder.path(), &format!("{RENDER} -o out"));
+    assert!(path.exists());
+    drop(busy);
+    done(folder.path(), &format!("{RENDER} -o out"));
+    assert!(!path.exists());
+}
