@@ -19,6 +19,7 @@ mod tables;
 mod train;
 mod trained;
 mod verify;
+mod view;
 
 use libtest_mimic::{Arguments, run};
 use serde_json::Value;
@@ -53,6 +54,7 @@ fn main() -> ExitCode {
         train::trials(),
         trained::trials(),
         verify::trials(),
+        view::trials(),
     ];
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }
@@ -87,6 +89,7 @@ fn help_fits_and_gives_examples() {
     let commands = [
         "",
         "render",
+        "view",
         "weights",
         "inspect",
         "evaluate",

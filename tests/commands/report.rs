@@ -4,7 +4,7 @@
 //! say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
-mod browser;
+pub(crate) mod browser;
 
 use super::BINARY;
 use browser::Browser;
