@@ -348,41 +348,72 @@ function drawFrustum(context, eye, project, points, colour, width) {
   return seen;
 }
 
-function drawSources(context, eye, project, ratio, own, hasNames) {
+// The source cameras, the greatest weights last. `own` are their weights.
+function drawSources(context, eye, project, ratio, own, isMap) {
   const most = Math.max(...own, 1e-9);
   const order = own.map((_, i) => i).sort((a, b) => own[a] - own[b]);
-  order.forEach((i, place) => {
+  const tips = order.map((i) => {
     const share = own[i] / most;
     const source = scene.sources[i];
-    // A camera that stands where the eye is would cover everything.
-    if (length(sub(source.pose.centre, eye.centre)) < 0.02 * scene.distance) return;
-    const points = frustum(source, scene.frustum);
-    const seen = drawFrustum(context, eye, project, points, css(share), (1 + 2 * share) * ratio);
-    if (hasNames && place >= order.length - 3 && seen[0][2] > 0) {
-      const [x, y] = project(seen[0]);
-      context.fillStyle = getComputedStyle(document.body).color;
-      context.fillText(source.name, x + 6 * ratio, y - 6 * ratio);
-    }
+    // In the picture, cameras beside the eye would cover everything and show nothing.
+    if (!isMap && inCamera(eye, source.pose.centre)[2] < 0.1 * scene.distance) return null;
+    return drawFrustum(context, eye, project, frustum(source, scene.frustum), css(share), (1 + 2 * share) * ratio)[0];
   });
+  if (!isMap) return;
+  // Names, of the greatest weights first, where they do not cover one another.
+  const style = getComputedStyle(document.body);
+  const taken = [];
+  for (const place of order.keys()) {
+    const at = order.length - 1 - place;
+    const { name } = scene.sources[order[at]];
+    if (tips[at][2] <= 0) continue;
+    const [x, y] = project(tips[at]);
+    const box = [x - context.measureText(name).width / 2, y + 16 * ratio, context.measureText(name).width, 14 * ratio];
+    if (taken.some((other) => Math.abs(other[0] + other[2] / 2 - box[0] - box[2] / 2) < (other[2] + box[2]) / 2 + 4 * ratio
+      && Math.abs(other[1] - box[1]) < box[3])) continue;
+    taken.push(box);
+    context.lineWidth = 3 * ratio;
+    context.strokeStyle = style.getPropertyValue('--card');
+    context.strokeText(name, box[0], box[1]);
+    context.fillStyle = style.color;
+    context.fillText(name, box[0], box[1]);
+  }
 }
 
 // ---------------------------------------------------------------- map
 
-// From behind and above the middle of the cameras, far enough to see all of them.
+// How the map's camera projects, for a canvas of this size.
+function mapProjection(width, height) {
+  const focal = 1.6 * height;
+  return ([x, y, z]) => [width / 2 + focal * x / z, height / 2 + focal * y / z];
+}
+
+// From behind and above the middle of the cameras, far enough to see all of them and the subject.
 function firstObserver() {
   const centres = scene.sources.map((source) => source.pose.centre);
-  const middle = times(centres.reduce(add), 1 / centres.length);
-  let away = sub(middle, scene.focus);
-  away = sub(away, times(scene.up, dot(away, scene.up)));
-  if (length(away) < 0.2 * scene.distance) away = sub(scene.start.centre, scene.focus);
-  away = sub(away, times(scene.up, dot(away, scene.up)));
+  const level = (a) => sub(a, times(scene.up, dot(a, scene.up)));
+  let away = level(sub(times(centres.reduce(add), 1 / centres.length), scene.focus));
+  if (length(away) < 0.2 * scene.distance) away = level(sub(scene.start.centre, scene.focus));
   const side = unit(cross(scene.up, away));
-  const direction = turned(turned(unit(away), side, -0.65), scene.up, 0.35);
-  // The middle of what is to be seen, and how far it reaches.
-  const all = [...centres, scene.focus];
-  const target = times(all.reduce(add), 1 / all.length);
-  const reach = Math.max(...all.map((point) => length(sub(point, target)))) + scene.frustum;
-  return { target, pose: lookAt(add(target, times(direction, 3.1 * reach)), target, scene.up) };
+  const direction = turned(turned(unit(away), side, -0.75), scene.up, 0.3);
+  const all = [scene.focus, ...scene.sources.flatMap((source) => frustum(source, scene.frustum))];
+  const ends = [0, 1, 2].map((i) => [Math.min, Math.max].map((end) => end(...all.map((point) => point[i]))));
+  const target = ends.map(([least, most]) => (least + most) / 2);
+  const { clientWidth: width, clientHeight: height } = element('map');
+  const project = mapProjection(width, height);
+  const seen = (distance) => {
+    const own = lookAt(add(target, times(direction, distance)), target, scene.up);
+    const fits = all.map((point) => inCamera(own, point)).every((point) => {
+      const [x, y] = project(point);
+      return point[2] > 0 && x > 0.06 * width && x < 0.94 * width && y > 0.1 * height && y < 0.92 * height;
+    });
+    return fits ? own : null;
+  };
+  for (let distance = 0.5 * scene.distance; distance < 100 * scene.distance; distance *= 1.05) {
+    const own = seen(distance);
+    if (own !== null) return { target, pose: own };
+  }
+  return { target, pose: lookAt(add(target, times(direction, 4 * scene.distance)), target, scene.up) };
 }
 
 function drawMap() {
@@ -391,9 +422,15 @@ function drawMap() {
   const { context, width, height, ratio } = fitted(canvas);
   const style = getComputedStyle(document.body);
   context.clearRect(0, 0, width, height);
-  const focal = 1.35 * Math.min(width, 1.4 * height);
-  const project = ([x, y, z]) => [width / 2 + focal * x / z, height / 2 + focal * y / z];
-  const eye = observer.pose;
+  const project = mapProjection(width, height);
+  // From farther away while the novel view's camera would be out of sight.
+  let eye = observer.pose;
+  for (let i = 0; i < 60; i += 1) {
+    const tip = inCamera(eye, pose.centre);
+    const [x, y] = project(tip);
+    if (tip[2] > 0 && x > 0.03 * width && x < 0.97 * width && y > 0.03 * height && y < 0.97 * height) break;
+    eye = { ...eye, centre: add(observer.target, times(sub(eye.centre, observer.target), 1.05)) };
+  }
   context.font = `${12 * ratio}px system-ui, sans-serif`;
 
   // A ring around the focus, so that the ground can be told.
@@ -783,6 +820,7 @@ async function begin() {
   element('name').textContent = scene.name;
   element('about').textContent = `${scene.sources.length} source views, ${scene.field} field on ${scene.device}`;
   element('picture').style.aspectRatio = scene.size.join(' / ');
+  element('picture').style.maxWidth = `calc(68vh * ${scene.size[0] / scene.size[1]})`;
   pose = scene.start;
   focus = scene.focus;
   observer = firstObserver();
