@@ -13,12 +13,12 @@ use devtools::{Chromium, Tab};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
 use program::{Program, request};
-use serde_json::{Value, json};
+use serde_json::json;
 use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use viewfuse_tests::command::{assert_refused, done, files_below, names_in, toy};
+use viewfuse_tests::command::{assert_refused, files_below, names_in, run, toy};
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::{is_required, needing, trial};
@@ -107,9 +107,9 @@ fn other_hosts_and_addresses_get_nothing() {
 fn full_pictures_are_those_of_render() {
     let folder = Folder::new();
     let scene = data("room");
-    let options = "--sources 000..004,006..009 --size 96x72 --device cpu";
+    let options = "--sources 000..004,006..009 --size 96x72";
     for scheme in ["error:alpha=1", "gaussian:beta=2"] {
-        let arguments = format!("render {} --targets 005 --weights {scheme} {options} -o out", scene.display());
+        let arguments = format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
         done_with_warnings(folder.path(), &arguments);
     }
     let program = Program::start(folder.path(), &format!("{} {options}", scene.display()));
@@ -137,7 +137,7 @@ fn full_pictures_are_those_of_render() {
 
 /// Runs the command, which must succeed; it may warn.
 fn done_with_warnings(folder: &Path, arguments: &str) {
-    let outcome = viewfuse_tests::command::run(BINARY, folder, arguments);
+    let outcome = run(BINARY, folder, arguments);
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
 }
 
@@ -252,9 +252,9 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
     sum as f64 / a.as_raw().len() as f64
 }
 
-const FIRST: &str = "document.getElementById('picture').dataset.pictures > 0";
-const FULL: &str = "document.getElementById('picture').dataset.kind === 'full'";
-const COARSE: &str = "document.getElementById('picture').dataset.kind === 'coarse'";
+const FIRST: &str = "document.getElementById('picture')?.dataset.pictures > 0";
+const FULL: &str = "document.getElementById('picture')?.dataset.kind === 'full'";
+const COARSE: &str = "document.getElementById('picture')?.dataset.kind === 'coarse'";
 const WEIGHTS: &str = "[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))";
 const COUNT: &str = "Number(document.getElementById('picture').dataset.pictures)";
 
@@ -486,8 +486,7 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     }
     // With a photograph beside it, it is a scene of one view.
     fs::copy(&saved, folder.file("transforms.json")).expect("a copy");
-    RgbImage::new(320, 240).save(folder.file("view.png")).expect("a picture");
-    done(folder.path(), "inspect . -o cameras.png");
+    RgbImage::new(96, 72).save(folder.file("view.png")).expect("a picture");
     let scene = viewfuse::scene::Scene::open(folder.path()).expect("a scene");
     let pose = scene.views[0].camera.pose.to_opencv();
     let shown: Vec<f64> = super::numbers(&tab.evaluate("matrixOf(pose).flat()"));
