@@ -109,7 +109,8 @@ fn full_pictures_are_those_of_render() {
     let scene = data("room");
     let options = "--sources 000..004,006..009 --size 96x72";
     for scheme in ["error:alpha=1", "gaussian:beta=2"] {
-        let arguments = format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
+        let arguments =
+            format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
         done_with_warnings(folder.path(), &arguments);
     }
     let program = Program::start(folder.path(), &format!("{} {options}", scene.display()));

@@ -17,7 +17,7 @@ use crate::{Viewed, Viewer};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
-use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
+use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album, working_side};
 use viewfuse_field::{FieldError, Renderer};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
@@ -96,11 +96,10 @@ struct Weighed<'a> {
 }
 
 impl Weighed<'_> {
-    /// Encodes the sources under a weighting, unless they are.
+    /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use them.
     fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
         let scheme = weighting.to_string();
         if self.scheme != scheme {
-            // If it is stopped half-way, the next frame encodes the rest.
             self.scheme = scheme;
             self.stage.weigh(weighting, progress)?;
         }
@@ -157,7 +156,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
     let cheap_renderer = cheaper.as_ref().map(|field| field.on(device));
     stopped((|| {
         shared.status.begin("reading photographs");
-        let album = Album::open_at(scene, sources.iter().copied(), source_side, &watch)?;
+        let album = open_album(scene, sources.iter().copied(), renderer.as_ref(), options, &watch)?;
         let images = Arc::new(album.sources(sources, source_side, options.background, &watch)?);
         if let Some(warning) = &images.warning {
             watch.warn(&format!("{}: {warning}", scene.path.display()));
@@ -256,6 +255,8 @@ impl<'a> RenderLoop<'a> {
         if let Some(coarse) = &mut self.coarse {
             self.shared.status.begin("encoding sources for coarse pictures");
             coarse.weigh(&request.weighting, &watch)?;
+            // A frame that has to encode sources first would come late.
+            coarse.stage.encode_all(&watch)?;
         }
         if self.full.is_none() {
             self.prepare(&watch)?;
