@@ -7,8 +7,8 @@
 mod devtools;
 mod program;
 
-use super::BINARY;
 use super::report::browser::Browser;
+use super::{BINARY, done};
 use devtools::{Chromium, Tab};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
@@ -254,7 +254,8 @@ fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
 }
 
 const FIRST: &str = "document.getElementById('picture')?.dataset.pictures > 0";
-const FULL: &str = "document.getElementById('picture')?.dataset.kind === 'full'";
+/// The full picture of the view as it is now.
+const FULL: &str = "typeof shown !== 'undefined' && shown && shown.full && shown.pose === pose";
 const COARSE: &str = "document.getElementById('picture')?.dataset.kind === 'coarse'";
 const WEIGHTS: &str = "[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))";
 const COUNT: &str = "Number(document.getElementById('picture').dataset.pictures)";
@@ -501,6 +502,15 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     assert_eq!(line, tab.text("document.getElementById('command').textContent"));
     let start = "viewfuse render tests/data/room --camera-path view.json --sources 003,004,005,006,007 --size 96x72";
     assert!(line.starts_with(start) && line.ends_with(" --weights error:alpha=1 -o out"), "{line}");
+    // Where the command takes camera paths, the line renders what is shown.
+    if done(folder.path(), "render --help").contains("--camera-path") {
+        fs::copy(&saved, folder.file("view.json")).expect("a copy");
+        let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
+        done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
+        let rendered = image::open(folder.path().join("out/view.png")).expect("a picture").to_rgb8();
+        let (_, picture) = program.connect().picture(&request("x", &tab.evaluate("matrixOf(pose)"), false)).unpacked();
+        assert!(rendered == picture, "the command line renders another picture");
+    }
     // A view of the scene that is no source has a name.
     tab.evaluate("goTo(scene.others[0].pose)");
     let line = tab.text("document.getElementById('command').textContent");
