@@ -533,7 +533,8 @@ function showSchemes() {
   if (row && row.parameter && given.has(row.parameter.key)) {
     element('parameter').value = placeOf(row.parameter, Number(given.get(row.parameter.key)));
   }
-  scheme = schemeText();
+  schemeText();
+  scheme = scene.scheme;
 }
 
 const rowOf = (name) => scene.schemes.find((row) => row.name === name);
@@ -563,7 +564,7 @@ function chooseScheme() {
   }
 }
 
-// As the program writes it on the command line. What it was started with keeps its spelling.
+// What the menu, the choice and the slider say, as on the command line.
 function schemeText() {
   const name = element('scheme').value;
   const row = rowOf(name);
