@@ -54,16 +54,6 @@ struct LayerPart {
     has_gaps: bool,
 }
 
-impl Serialize for Layer {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(match self {
-            Layer::None => "none",
-            Layer::Depth => "depth",
-            Layer::Confidence => "confidence",
-        })
-    }
-}
-
 /// The bytes of an answer.
 ///
 /// # Errors

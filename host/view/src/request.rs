@@ -1,6 +1,6 @@
 //! Requests of the page, as JSON, checked.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use viewfuse_core::pose::{Pose, PoseError};
 use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec};
 
@@ -31,7 +31,7 @@ pub(crate) enum RequestError {
 }
 
 /// What is shown besides the picture.
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, PartialEq, Eq)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Layer {
     /// Nothing.
