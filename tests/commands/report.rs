@@ -4,10 +4,10 @@
 //! say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
-pub(crate) mod browser;
+mod browser;
 
 use super::BINARY;
-use browser::Browser;
+pub(super) use browser::Browser;
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;

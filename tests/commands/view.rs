@@ -7,7 +7,7 @@
 mod devtools;
 mod program;
 
-use super::report::browser::Browser;
+use super::report::Browser;
 use super::{BINARY, done};
 use devtools::{Chromium, Tab};
 use image::{RgbImage, RgbaImage};
@@ -34,6 +34,7 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
         trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
         trial("commands::view::the_newest_request_wins", the_newest_request_wins),
+        trial("commands::view::many_connections_at_once_are_answered", many_connections_at_once_are_answered),
         trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
         trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
         trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
@@ -65,7 +66,7 @@ fn room(more: &str) -> Program {
 }
 
 fn other_hosts_and_addresses_get_nothing() {
-    let program = Program::start(&toy().path().to_path_buf(), &format!("{} --size 24x24", data("toy").display()));
+    let program = Program::start(&repository(), &format!("{} --size 24x24", data("toy").display()));
     let own = ("Host", program.host.as_str());
     let status = |method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]| {
         program.connect().ask(method, path, headers, body).status
@@ -166,6 +167,22 @@ fn the_newest_request_wins() {
         request("a", &start, true).to_string().as_bytes(),
     );
     assert_eq!(super::numbers(&weights.json()).len(), 11);
+}
+
+/// Browsers open several connections at once and keep them.
+fn many_connections_at_once_are_answered() {
+    let folder = toy();
+    let program = Program::start(folder.path(), "toy --size 24x24");
+    let path = format!("{}status", program.path);
+    let mut connections = Vec::new();
+    for _ in 0..10 {
+        let mut new: Vec<_> = (0..6).map(|_| program.connect()).collect();
+        new.iter_mut().for_each(|own| own.send("GET", &path, &[("Host", &program.host)], b""));
+        connections.extend(new);
+    }
+    for connection in &mut connections {
+        assert_eq!(connection.receive().status, 200);
+    }
 }
 
 fn ctrl_c_ends_it_and_nothing_is_written() {

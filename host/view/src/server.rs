@@ -12,13 +12,18 @@ use crate::request::Request;
 use crate::response::Answer;
 use serde::Serialize;
 use std::io::Read;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 use tiny_http::Method;
 use viewfuse_job::progress::Progress;
 use viewfuse_weighting::sources::SourcePoses;
 
 /// Most bytes of a request's body. What is shorter than this is read before the request arrives here.
 const LONGEST_BODY: usize = 1024;
+
+/// So often a connection of the server to itself is opened and closed. When several connections arrive at once, tiny_http's
+/// pool may count on a thread that is taken already, and leave one of them waiting until the next one arrives.
+const NUDGE: Duration = Duration::from_millis(100);
 
 /// Random bytes of the token.
 const TOKEN_BYTES: usize = 16;
@@ -90,7 +95,12 @@ impl Server {
         progress: &dyn Progress,
         is_over: impl Fn() -> bool,
     ) {
+        let mut nudged = Instant::now();
         while !progress.is_cancelled() && !is_over() {
+            if nudged.elapsed() > NUDGE {
+                drop(TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)));
+                nudged = Instant::now();
+            }
             // An error is that of a single connection.
             let Ok(Some(request)) = self.http.recv_timeout(PATIENCE) else { continue };
             self.answer(request, viewer, shared);
