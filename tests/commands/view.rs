@@ -281,13 +281,15 @@ const COUNT: &str = "Number(document.getElementById('picture').dataset.pictures)
 /// The weights on the page, which sum to 1.
 #[track_caller]
 fn weights(tab: &Tab<'_>) -> Vec<f64> {
-    let weights = super::numbers(&tab.evaluate(WEIGHTS));
+    let bars = "[...document.querySelectorAll('.bar span')].map((own) => parseFloat(own.style.width))";
+    let sum = "document.getElementById('sum').textContent";
+    let seen = tab.evaluate(&format!("({{weights: {WEIGHTS}, sum: {sum}, bars: {bars}}})"));
+    let weights = super::numbers(&seen["weights"]);
     super::assert_near(weights.iter().sum(), 1.0, 1.0e-5);
-    assert_eq!(tab.text("document.getElementById('sum').textContent"), "1.000");
+    assert_eq!(seen["sum"], "1.000");
     // Bars are as long as the weights are large.
     let longest = weights.iter().copied().fold(0.0, f64::max);
-    let bars = tab.evaluate("[...document.querySelectorAll('.bar span')].map((own) => parseFloat(own.style.width))");
-    for (bar, weight) in super::numbers(&bars).into_iter().zip(&weights) {
+    for (bar, weight) in super::numbers(&seen["bars"]).into_iter().zip(&weights) {
         super::assert_near(bar, 100.0 * weight / longest, 0.01);
     }
     weights
@@ -392,7 +394,7 @@ fn pictures_follow_the_hand(browser: &Browser) {
     let [x, y] = tab.middle_of("#picture");
     // Until the size of coarse pictures has settled.
     tab.drag([x, y], [x + 40.0, y], 40);
-    tab.evaluate("weightsTold = 0; tellWeightsBefore = tellWeights; tellWeights = (own) => { weightsTold += 1; tellWeightsBefore(own); }");
+    tab.evaluate("weightsTold = 0; tellWeightsBefore = tellWeights; tellWeights = (own, number) => { weightsTold += 1; tellWeightsBefore(own, number); }");
     tab.mouse("mousePressed", [x, y], json!({}));
     let (start, before) = (Instant::now(), tab.number(COUNT));
     let mut step = 0;

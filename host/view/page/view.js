@@ -150,7 +150,7 @@ async function askPicture(moving) {
     if (number < drawn) return;
     drawn = number;
     shown = { pose: at, ...answer };
-    tellWeights(answer.weights);
+    tellWeights(answer.weights, number);
     drawPicture();
     tellStatus(answer);
   } catch (error) {
@@ -206,9 +206,11 @@ async function pumpWeights() {
   if (isWeightsOut || !areWeightsWanted) return;
   isWeightsOut = true;
   areWeightsWanted = false;
+  asked += 1;
+  const number = asked;
   try {
     const response = await post('weights', { tab, pose: matrixOf(pose), scheme });
-    tellWeights(await response.json());
+    tellWeights(await response.json(), number);
   } catch (error) {
     told(error);
   }
@@ -499,7 +501,11 @@ function showPhotographs() {
   for (const { parts } of scene.sources) parts.image.src = `source/${parts.number}`;
 }
 
-function tellWeights(own) {
+let weighed = 0;             // the newest request whose weights are shown
+
+function tellWeights(own, number) {
+  if (number < weighed) return;
+  weighed = number;
   weights = own;
   const most = Math.max(...own, 1e-9);
   own.forEach((weight, i) => {
