@@ -17,6 +17,8 @@ pub use viewfuse_scene as scene;
 pub use viewfuse_synthetic as synthetic;
 #[cfg(feature = "train")]
 pub use viewfuse_train as train;
+#[cfg(feature = "view")]
+pub use viewfuse_view as view;
 pub use viewfuse_vulkan as vulkan;
 pub use viewfuse_weighting as weighting;
 

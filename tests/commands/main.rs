@@ -22,6 +22,7 @@ mod tables;
 mod train;
 mod trained;
 mod verify;
+mod view;
 
 use libtest_mimic::{Arguments, run};
 use serde_json::Value;
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         train::trials(),
         trained::trials(),
         verify::trials(),
+        view::trials(),
     ];
     run(&arguments, trials.into_iter().flatten().collect()).exit_code()
 }
@@ -93,6 +95,7 @@ fn help_fits_and_gives_examples() {
     let commands = [
         "",
         "render",
+        "view",
         "weights",
         "inspect",
         "evaluate",

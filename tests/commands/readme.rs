@@ -69,6 +69,7 @@ const NOT_RUN: [(&str, &str); 10] = [
     ("tests/run", "it runs this test"),
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
+    ("cargo run --release -- view ", "it runs until Ctrl-C; `view.rs` runs it"),
     ("cargo install", "it would change the machine"),
     ("viewfuse ", "on files of a person, or hours of training"),
     ("VIEWFUSE_FUZZ_SECONDS=", "`fuzz` runs a part of it; the whole takes minutes"),
@@ -94,6 +95,7 @@ fn is_built_with(feature: &str) -> bool {
         "pareto" => cfg!(feature = "pareto"),
         "report" => cfg!(feature = "report"),
         "train" => cfg!(feature = "train"),
+        "view" => cfg!(feature = "view"),
         _ => panic!("no feature '{feature}' is known here"),
     }
 }
@@ -117,9 +119,9 @@ fn every_command_runs() {
     };
     let mut count = 0;
     for line in commands() {
-        let Some((arguments, features)) = ours(&line) else {
-            let is_known = line.trim().is_empty() || NOT_RUN.iter().any(|(start, _)| line.starts_with(start));
-            assert!(is_known, "neither run here nor in the list of what is not: {line}");
+        let is_left_out = line.trim().is_empty() || NOT_RUN.iter().any(|(start, _)| line.starts_with(start));
+        let Some((arguments, features)) = ours(&line).filter(|_| !is_left_out) else {
+            assert!(is_left_out, "neither run here nor in the list of what is not: {line}");
             continue;
         };
         count += 1;

@@ -7,7 +7,7 @@
 mod browser;
 
 use super::BINARY;
-use browser::Browser;
+pub(super) use browser::Browser;
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;

@@ -7,10 +7,11 @@ use std::collections::BTreeSet;
 /// So many crates the library may take without features.
 const MOST_CRATES: usize = 90;
 /// Not one of these is among them.
-const FORBIDDEN: [&str; 7] = ["candle-core", "faer", "maud", "plotters", "clap", "indicatif", "tokenizers"];
+const FORBIDDEN: [&str; 8] =
+    ["candle-core", "faer", "maud", "plotters", "clap", "indicatif", "tiny_http", "tokenizers"];
 
 /// The crates along the data: one uses only those before it.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 16] = [
     "viewfuse-core",
     "viewfuse-vulkan",
     "viewfuse-job",
@@ -24,18 +25,21 @@ const ORDER: [&str; 15] = [
     "viewfuse-synthetic",
     "viewfuse-check",
     "viewfuse-train",
+    "viewfuse-view",
     "viewfuse-cli",
     "viewfuse",
 ];
 
 /// Heavy dependencies, and where they may be: in crates, always or only as an option.
-const HEAVY: [(&str, &[&str]); 11] = [
+const HEAVY: [(&str, &[&str]); 13] = [
     ("candle-core", &["viewfuse-train"]),
     ("ndarray", &["viewfuse-train"]),
     ("faer", &["viewfuse-evaluate?"]),
     ("maud", &["viewfuse-evaluate?"]),
     ("base64", &["viewfuse-evaluate?"]),
     ("plotters", &["viewfuse-evaluate?", "viewfuse-train"]),
+    ("tiny_http", &["viewfuse-view"]),
+    ("open", &["viewfuse-cli?"]),
     ("clap", &["viewfuse-cli"]),
     ("indicatif", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),

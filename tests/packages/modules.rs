@@ -11,7 +11,7 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
 /// Crates whose modules have an order.
-const CRATES: [&str; 13] = [
+const CRATES: [&str; 14] = [
     "core",
     "vulkan",
     "host/job",
@@ -25,6 +25,7 @@ const CRATES: [&str; 13] = [
     "host/synthetic",
     "host/check",
     "host/train",
+    "host/view",
 ];
 
 /// What stands in a list for all modules that it does not name.

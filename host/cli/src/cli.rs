@@ -28,6 +28,8 @@ mod terminal;
 #[cfg(feature = "train")]
 mod train;
 mod verify;
+#[cfg(feature = "view")]
+mod view;
 mod weighting;
 mod weights;
 
@@ -37,6 +39,8 @@ use left_out::pareto;
 use left_out::report;
 #[cfg(not(feature = "train"))]
 use left_out::train;
+#[cfg(not(feature = "view"))]
+use left_out::view;
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -62,6 +66,8 @@ struct Arguments {
 enum Command {
     /// Render novel views: pictures, depth maps, contact sheets and a run record.
     Render(render::Arguments),
+    /// Look around in a scene, in the browser: drag the camera and see the picture and the weights change.
+    View(view::Arguments),
     /// Show the weight of each source view for a target view under every scheme.
     Weights(weights::Arguments),
     /// Show a scene: its cameras from above, the point that they look at, and warnings.
@@ -112,6 +118,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     terminal::listen()?;
     match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
+        Command::View(arguments) => view::run(&arguments, &options::given(&command, &matches)),
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),

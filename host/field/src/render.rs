@@ -360,15 +360,43 @@ impl<'a> Stage<'a> {
         target: &Target,
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
+        let camera = self.at_working_size(&target.camera)?;
+        self.frame_at(weighting, target, &camera, progress)
+    }
+
+    /// As [`Stage::frame`] without a truth, with a picture of another size than the options': for coarse pictures.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn frame_of_size(
+        &mut self,
+        weighting: &Weighting,
+        camera: &Camera,
+        [width, height]: [u32; 2],
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError> {
+        let pinhole =
+            camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        let target = Target { name: String::new(), camera: *camera, truth: None };
+        self.frame_at(weighting, &target, &Camera { pinhole, ..*camera }, progress)
+    }
+
+    /// `camera` is the target's, of the picture's size.
+    fn frame_at(
+        &mut self,
+        weighting: &Weighting,
+        target: &Target,
+        camera: &Camera,
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError> {
         let start = Instant::now();
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
-        let camera = self.at_working_size(&target.camera)?;
         let failed = |error| RenderError::of(error, self.scene);
         let mut encode = Duration::ZERO;
         timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
         let early_termination = self.options.early_termination;
-        let rendered = self.session.render(&camera, &omission.weights, early_termination, progress).map_err(failed)?;
+        let rendered = self.session.render(camera, &omission.weights, early_termination, progress).map_err(failed)?;
         let time = start.elapsed();
         let Rendered { colours, depths, confidences, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);

@@ -14,7 +14,7 @@ const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "goog
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Chromium or Chrome.
-pub(super) struct Browser {
+pub(crate) struct Browser {
     program: PathBuf,
 }
 
@@ -28,7 +28,7 @@ pub(super) struct Seen {
 
 impl Browser {
     /// The one that is there, or what is missing.
-    pub(super) fn find() -> Result<Browser, String> {
+    pub(crate) fn find() -> Result<Browser, String> {
         if let Some(program) = env::var_os("VIEWFUSE_BROWSER") {
             return Ok(Browser { program: program.into() });
         }
@@ -36,6 +36,11 @@ impl Browser {
         let places = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
         let program = places.into_iter().find(|place| place.is_file()).ok_or("no Chromium: tests/run installs it")?;
         Ok(Browser { program })
+    }
+
+    /// Its program.
+    pub(crate) fn program(&self) -> &Path {
+        &self.program
     }
 
     /// Runs it to its end and returns what it printed: the page, and its messages.

@@ -16,7 +16,8 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let folder = cause.downcast_ref::<FolderError>().and_then(of_run_folder);
         let render = cause.downcast_ref::<RenderError>().and_then(of_render);
         let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
-        few_shot.or(photographs).or(folder).or(render).or(evaluation).or_else(|| of_training(cause))
+        let others = || of_training(cause).or_else(|| of_viewer(cause));
+        few_shot.or(photographs).or(folder).or(render).or(evaluation).or_else(others)
     })
 }
 
@@ -95,5 +96,18 @@ fn of_training(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str
 
 #[cfg(not(feature = "train"))]
 fn of_training(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    None
+}
+
+#[cfg(feature = "view")]
+fn of_viewer(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    match cause.downcast_ref::<viewfuse_view::ListenError>() {
+        Some(viewfuse_view::ListenError::Port { .. }) => Some("give another --port, or none"),
+        _ => None,
+    }
+}
+
+#[cfg(not(feature = "view"))]
+fn of_viewer(_: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
     None
 }

@@ -36,4 +36,4 @@ macro_rules! stand_ins {
     )*};
 }
 
-stand_ins!(pareto "pareto", report "report", train "train");
+stand_ins!(pareto "pareto", report "report", train "train", view "view");

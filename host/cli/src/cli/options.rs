@@ -3,6 +3,7 @@
 use super::environment::device_options;
 use super::parse::{parse_count, parse_seconds, parse_share, parse_size};
 use super::wrong;
+use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -92,6 +93,23 @@ pub(crate) fn values(command: &Command, matches: &ArgMatches) -> BTreeMap<String
         let values = matches.try_get_raw(argument.get_id().as_str()).ok()??;
         let texts: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
         Some((argument.get_long()?.to_owned(), texts.join(" ")))
+    };
+    arguments.filter_map(value).collect()
+}
+
+/// The options of the command that were written on the command line, by long name, each with its value if it takes one.
+pub(crate) fn given(command: &Command, matches: &ArgMatches) -> Vec<(String, Option<String>)> {
+    let Some((name, matches)) = matches.subcommand() else { return Vec::new() };
+    let arguments = command.find_subcommand(name).into_iter().flat_map(Command::get_arguments);
+    let value = |argument: &clap::Arg| {
+        let id = argument.get_id().as_str();
+        let name = argument.get_long()?.to_owned();
+        if matches.value_source(id)? != ValueSource::CommandLine {
+            return None;
+        }
+        let values = matches.try_get_raw(id).ok()??;
+        let texts: Vec<String> = values.map(|value| value.to_string_lossy().into_owned()).collect();
+        Some((name, argument.get_action().takes_values().then(|| texts.join(","))))
     };
     arguments.filter_map(value).collect()
 }

@@ -65,6 +65,12 @@ impl Terminal {
         bar.enable_steady_tick(Duration::from_millis(200));
         Terminal { bar, told: Mutex::default() }
     }
+
+    /// Without a bar: for work that shows its progress elsewhere.
+    #[cfg(feature = "view")]
+    pub(crate) fn without_bar() -> Terminal {
+        Terminal { bar: ProgressBar::hidden(), told: Mutex::default() }
+    }
 }
 
 impl Progress for Terminal {

@@ -1,0 +1,119 @@
+//! `viewfuse view`.
+
+use super::model::ModelOptions;
+use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::terminal::Terminal;
+use super::{on_threads, say};
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_device::choice::Chosen;
+use viewfuse_scene::{READERS, Scene, looked_for};
+use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
+use viewfuse_weighting::{WeightingSpec, grammar};
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse view photos/\n      drag to turn around the subject, scroll or pinch to move; see which photographs count\n  \
+    viewfuse view car/ --model genvs.safetensors --sources 1,5,9 --device vulkan\n      a learned field, from three views\n  \
+    viewfuse view photos/ --port 8000 --no-browser\n      only prints the address: for another browser, or through a tunnel (ssh -L 8000:127.0.0.1:8000)\n\n\
+    The page is for this machine alone, under an address that nobody can guess. Ctrl-C ends it.")]
+pub(crate) struct Arguments {
+    #[arg(help = scene_help())]
+    scene: PathBuf,
+    #[command(flatten)]
+    sources: SourceOptions,
+    #[arg(long, value_name = "SCHEME", default_value_t = WeightingSpec::default(), help = weights_help())]
+    weights: WeightingSpec,
+    #[command(flatten)]
+    picture: PictureOptions,
+    #[command(flatten)]
+    model: ModelOptions,
+    #[command(flatten)]
+    device: DeviceOptions,
+    /// Seed of every random draw (the training-free field makes none)
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Port of the page [default: any that is free]
+    #[arg(long, value_name = "PORT", default_value_t = 0, hide_default_value = true)]
+    port: u16,
+    /// Print the address, and open no browser
+    #[arg(long)]
+    no_browser: bool,
+}
+
+/// Options that only this command has, or that the page gives anew.
+const NOT_OF_RENDER: [&str; 5] = ["port", "no-browser", "weights", "sources", "views"];
+
+fn scene_help() -> String {
+    format!("The scene: {}", looked_for(&READERS))
+}
+
+fn weights_help() -> String {
+    format!("Weighting scheme at the beginning; the page can choose another: {}", grammar())
+}
+
+/// `given` are the options on the command line, by long name, each with its value if it takes one.
+pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> anyhow::Result<ExitCode> {
+    let weighting = arguments.weights.open()?;
+    let scene = Scene::open(&arguments.scene)?;
+    let field = arguments.model.open(arguments.seed, None)?;
+    let about = field.about();
+    let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
+    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let Chosen { device, reason } = arguments.device.open()?;
+    let commands = commands(arguments, given, &scene, &sources);
+    on_threads(arguments.picture.threads, || {
+        let viewed = Viewed {
+            scene: &scene,
+            sources: &sources,
+            field: &field,
+            device: &device,
+            options: &options,
+            weighting: &weighting,
+        };
+        let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
+        let (count, path) = (sources.len(), arguments.scene.display());
+        say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name()))?;
+        say(format_args!("{}", viewer.address()))?;
+        if !arguments.no_browser && open::that_detached(viewer.address()).is_err() {
+            say("no browser could be started: open this address")?;
+        }
+        viewer.serve(&Terminal::without_bar()).map_err(plain)
+    })??;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The error behind a viewer's, so that its hint is found.
+fn plain(error: ViewError) -> anyhow::Error {
+    match error {
+        ViewError::Listen(error) => error.into(),
+        ViewError::Render(error) => error.into(),
+    }
+}
+
+/// The command lines that render a view of the page.
+fn commands(arguments: &Arguments, given: &[(String, Option<String>)], scene: &Scene, sources: &[usize]) -> Commands {
+    let mut options = String::new();
+    if given.iter().any(|(name, _)| name == "sources" || name == "views") {
+        let names: Vec<&str> = sources.iter().map(|&view| scene.views[view].name.as_str()).collect();
+        options = format!(" --sources {}", quoted(&names.join(",")));
+    }
+    for (name, value) in given.iter().filter(|(name, _)| !NOT_OF_RENDER.contains(&name.as_str())) {
+        options += &format!(" --{name}");
+        options.extend(value.iter().map(|value| format!(" {}", quoted(value))));
+    }
+    let path = quoted(&arguments.scene.to_string_lossy());
+    let line = |what: &str| format!("viewfuse render {path} {what}{options} --weights {{weights}} -o out");
+    Commands { view: line("--targets {view}"), pose: line("--camera-path {file}") }
+}
+
+/// A word as a shell takes it.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_@%+=:,./-".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
+}

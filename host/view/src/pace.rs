@@ -1,0 +1,85 @@
+//! How coarse a picture has to be to come in time, from the times of the pictures before.
+
+use std::time::Duration;
+
+/// Time of a coarse picture that is aimed at: with encoding and the way to the page it makes ten pictures a second.
+pub(crate) const TIME_OF_A_PICTURE: Duration = Duration::from_millis(80);
+
+/// Longest sides of coarse pictures as shares of the largest one, in 16ths.
+const SIXTEENTHS: [u32; 6] = [16, 13, 10, 8, 6, 4];
+
+/// Times that a size is judged by: the median of so many.
+const MEMORY: usize = 3;
+
+/// The choice of the coarse pictures' size.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pace {
+    /// Index into [`SIXTEENTHS`].
+    step: usize,
+    /// Times of the last pictures of that size.
+    times: Vec<Duration>,
+}
+
+impl Pace {
+    /// Longest side for the next picture, of at most `most` pixels; at least 1.
+    pub(crate) fn side(&self, most: u32) -> u32 {
+        (most * SIXTEENTHS[self.step] / 16).max(1)
+    }
+
+    /// The last picture took so long: coarser pictures follow if it was too long, finer ones if those should be in time
+    /// as well. Time is assumed to be linear in the pixels.
+    pub(crate) fn took(&mut self, time: Duration) {
+        self.times.push(time);
+        if self.times.len() < MEMORY {
+            return;
+        }
+        let mut sorted = self.times.clone();
+        sorted.sort_unstable();
+        let median = sorted[MEMORY / 2];
+        self.times.remove(0);
+        let finer = self.step.checked_sub(1).map(|finer| {
+            let [side, finer] = [self.step, finer].map(|step| f64::from(SIXTEENTHS[step]));
+            median.mul_f64((finer / side).powi(2))
+        });
+        if median > TIME_OF_A_PICTURE && self.step + 1 < SIXTEENTHS.len() {
+            self.step += 1;
+            self.times.clear();
+        } else if finer.is_some_and(|time| time < TIME_OF_A_PICTURE.mul_f64(0.9)) {
+            self.step -= 1;
+            self.times.clear();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MEMORY, Pace, TIME_OF_A_PICTURE};
+    use std::time::Duration;
+
+    /// Renders with a time linear in the pixels until the size settles.
+    fn settle(pace: &mut Pace, time_of_largest: f64) -> u32 {
+        for _ in 0..50 {
+            let share = f64::from(pace.side(160)) / 160.0;
+            pace.took(Duration::from_secs_f64(time_of_largest * share * share));
+        }
+        pace.side(160)
+    }
+
+    #[test]
+    fn pictures_are_as_fine_as_time_allows() {
+        let mut pace = Pace::default();
+        assert_eq!(settle(&mut pace, 0.02), 160);
+        assert_eq!(settle(&mut pace, 0.15), 100);
+        assert_eq!(settle(&mut pace, 100.0), 40, "the coarsest");
+        assert_eq!(settle(&mut pace, 0.02), 160, "and back");
+    }
+
+    #[test]
+    fn one_slow_picture_changes_nothing() {
+        let mut pace = Pace::default();
+        for index in 0..10 * MEMORY {
+            pace.took(if index % MEMORY == 1 { 50 * TIME_OF_A_PICTURE } else { TIME_OF_A_PICTURE / 2 });
+        }
+        assert_eq!(pace.side(160), 160);
+    }
+}

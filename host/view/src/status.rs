@@ -1,0 +1,53 @@
+//! What is being done, for the page: the stage of the work and the warnings.
+
+use serde::Serialize;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Most warnings that are kept.
+const MOST_WARNINGS: usize = 20;
+
+/// What is being done.
+#[derive(Debug, Default)]
+pub(crate) struct Status(Mutex<Shown>);
+
+#[derive(Clone, Debug, Default, Serialize)]
+struct Shown {
+    /// What is being done; empty while nothing is.
+    stage: &'static str,
+    done: usize,
+    /// So many pieces in all; 0 if that is not known.
+    pieces: usize,
+    warnings: Vec<String>,
+}
+
+impl Status {
+    /// No work is done while it is held, so it cannot be poisoned.
+    fn shown(&self) -> MutexGuard<'_, Shown> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn begin(&self, stage: &'static str) {
+        let mut shown = self.shown();
+        (shown.stage, shown.done, shown.pieces) = (stage, 0, 0);
+    }
+
+    pub(crate) fn expect(&self, pieces: usize) {
+        self.shown().pieces += pieces;
+    }
+
+    pub(crate) fn step(&self) {
+        self.shown().done += 1;
+    }
+
+    /// Each warning is kept once.
+    pub(crate) fn warn(&self, warning: &str) {
+        let mut shown = self.shown();
+        if shown.warnings.len() < MOST_WARNINGS && !shown.warnings.iter().any(|known| known == warning) {
+            shown.warnings.push(warning.to_owned());
+        }
+    }
+
+    pub(crate) fn json(&self) -> Vec<u8> {
+        serde_json::to_vec(&*self.shown()).unwrap_or_default()
+    }
+}
