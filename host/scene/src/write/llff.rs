@@ -3,6 +3,7 @@
 use super::numpy::npy;
 use super::{Draft, WriteSceneError};
 use crate::Scene;
+use crate::numpy::npy;
 
 /// Largest distance of a principal point from the centre of the photograph, in pixels.
 const CENTRED: f32 = 1.0e-3;

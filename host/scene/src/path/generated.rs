@@ -1,0 +1,158 @@
+//! Camera paths that follow from the cameras of a scene.
+
+use std::f32::consts::TAU;
+
+use glam::{DMat3, DQuat, DVec3};
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
+use viewfuse_core::pose::{Pose, PoseError};
+
+use crate::rig::{Rig, nearest_point_to_lines};
+
+/// Turns of a spiral, as in LLFF.
+const TURNS: f32 = 2.0;
+/// Turns towards the subject and back, for each turn around.
+const TURNS_TOWARDS: f32 = 0.5;
+/// Share of the cameras' offsets from their middle that a spiral's radii exceed, as in LLFF.
+const QUANTILE: f32 = 0.9;
+/// Share of the farther of two bounds in the depth that a spiral looks at, as in LLFF.
+const FAR_SHARE: f32 = 0.75;
+/// Least length of the mean viewing direction of cameras that look the same way: 45 degrees from it on average.
+const LEAST_COMMON: f32 = 0.7;
+
+/// `count` cameras on a full circle around the focus of some cameras (at least one), at their mean height and distance,
+/// all looking at the focus with the rig's up direction; frame 0 is on the side of the first camera.
+///
+/// # Errors
+/// [`PoseError`] if the circle degenerates (all cameras at the focus, or straight above it).
+pub fn orbit(cameras: &[Camera], pinhole: Pinhole, count: usize) -> Result<Vec<Camera>, PoseError> {
+    let Rig { focus, up, distance, .. } = Rig::of(cameras);
+    let height =
+        cameras.iter().map(|c| (c.pose.centre_world() - focus).dot(up)).sum::<f32>() / cameras.len().max(1) as f32;
+    let radius = (distance * distance - height * height).max(0.0).sqrt();
+    let first = cameras.first().map_or(Vec3::X, |c| c.pose.centre_world() - focus);
+    let start = (first - up * first.dot(up)).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
+    let side = up.cross(start);
+    (0..count)
+        .map(|frame| {
+            let angle = TAU * frame as f32 / count as f32;
+            let centre = focus + up * height + (start * angle.cos() + side * angle.sin()) * radius;
+            Ok(Camera { pose: Pose::look_at(centre, focus, up)?, pinhole })
+        })
+        .collect()
+}
+
+/// `count` cameras from the first to the last one, both included (one alone is the first).
+///
+/// The rotation changes at a constant rate (slerp). If both look at a point in front of them, the centre moves on an arc
+/// around it, so that the point stays where it is in the pictures; otherwise on a line. Focal length and principal point
+/// change with the step; the size is that of the first.
+///
+/// # Errors
+/// [`PoseError`] if a pose between them is none: never for finite cameras.
+pub fn between(first: &Camera, last: &Camera, count: usize) -> Result<Vec<Camera>, PoseError> {
+    let [from, to] = [first, last].map(|camera| camera.pose.centre_world().as_dvec3());
+    let [turned_from, turned_to] = [first, last].map(rotation);
+    let subject = common_subject(first, last);
+    (0..count)
+        .map(|frame| {
+            let step = if count > 1 { frame as f64 / (count - 1) as f64 } else { 0.0 };
+            let centre = match subject {
+                Some(subject) => subject + on_arc(from - subject, to - subject, step),
+                None => from.lerp(to, step),
+            };
+            let pose = pose_of(turned_from.slerp(turned_to, step), centre)?;
+            // Two pinholes in range have none out of range between them.
+            let pinhole = mixed(&first.pinhole, &last.pinhole, step as f32).unwrap_or(first.pinhole);
+            Ok(Camera { pose, pinhole })
+        })
+        .collect()
+}
+
+/// `count` cameras on LLFF's spiral for cameras side by side: around their middle, two turns within the offsets that nine
+/// of ten cameras do not exceed, all looking at one point ahead of it. Its depth is between the near and far `bounds` of
+/// the views, nearer to the far one; without bounds, that of the cameras' focus.
+///
+/// `None` if the cameras do not look the same way, or are all in one place.
+pub fn spiral(cameras: &[Camera], pinhole: Pinhole, bounds: &[[f32; 2]], count: usize) -> Option<Vec<Camera>> {
+    let number = cameras.len().max(1) as f32;
+    let mean = |of: &dyn Fn(&Camera) -> Vec3| cameras.iter().map(of).sum::<Vec3>() / number;
+    let forward = mean(&|camera| camera.pose.forward_world());
+    if forward.length() < LEAST_COMMON {
+        return None;
+    }
+    let middle = mean(&|camera| camera.pose.centre_world());
+    let down = mean(&|camera| camera.pose.down_world());
+    let mean_pose = Pose::look_at(middle, middle + forward, -down).ok()?;
+    let offsets: Vec<Vec3> = cameras.iter().map(|camera| mean_pose.to_camera(camera.pose.centre_world())).collect();
+    let radii = [0, 1, 2].map(|axis| quantile(offsets.iter().map(|offset| offset[axis].abs()).collect()));
+    if radii.iter().all(|radius| *radius <= 0.0) {
+        return None;
+    }
+    let depth = depth_of(bounds).unwrap_or_else(|| {
+        let ahead = mean_pose.to_camera(Rig::of(cameras).focus).z;
+        if ahead > 0.0 { ahead } else { 10.0 * radii[0].max(radii[1]) }
+    });
+    let subject = middle + mean_pose.forward_world() * depth;
+    (0..count)
+        .map(|frame| {
+            let angle = TURNS * TAU * frame as f32 / count as f32;
+            let offset = Vec3::new(angle.cos(), angle.sin(), (TURNS_TOWARDS * angle).sin());
+            let centre = middle + mean_pose.rotate_to_world(offset * Vec3::from(radii));
+            Some(Camera { pose: Pose::look_at(centre, subject, -mean_pose.down_world()).ok()?, pinhole })
+        })
+        .collect()
+}
+
+/// The depth of bounds of views, by their disparities.
+fn depth_of(bounds: &[[f32; 2]]) -> Option<f32> {
+    let near = bounds.iter().map(|[near, _]| *near).reduce(f32::min)?;
+    let far = bounds.iter().map(|[_, far]| *far).reduce(f32::max)?;
+    Some(1.0 / ((1.0 - FAR_SHARE) / near + FAR_SHARE / far))
+}
+
+/// The value that nine of ten do not exceed; 0 of none.
+fn quantile(mut values: Vec<f32>) -> f32 {
+    values.sort_by(f32::total_cmp);
+    let at = QUANTILE * values.len().saturating_sub(1) as f32;
+    let value = |index: usize| values.get(index).copied().unwrap_or_default();
+    let low = value(at as usize);
+    low + (value((at as usize + 1).min(values.len().saturating_sub(1))) - low) * at.fract()
+}
+
+/// The point nearest to both principal axes, if it is in front of both cameras.
+fn common_subject(first: &Camera, last: &Camera) -> Option<DVec3> {
+    let axes = [first, last].map(|camera| (camera.pose.centre_world(), camera.pose.forward_world()));
+    let point = nearest_point_to_lines(&axes)?;
+    let is_ahead = |camera: &Camera| camera.pose.to_camera(point).z > 0.0;
+    (is_ahead(first) && is_ahead(last)).then(|| point.as_dvec3())
+}
+
+/// Between two offsets from a point: the direction on an arc, the length in proportion.
+fn on_arc(from: DVec3, to: DVec3, step: f64) -> DVec3 {
+    let turn = DQuat::from_rotation_arc(from.normalize(), to.normalize());
+    let length = from.length() + step * (to.length() - from.length());
+    DQuat::IDENTITY.slerp(turn, step) * from.normalize() * length
+}
+
+/// The rotation from the camera to the world.
+fn rotation(camera: &Camera) -> DQuat {
+    let axes = [camera.pose.right_world(), camera.pose.down_world(), camera.pose.forward_world()];
+    let [x, y, z] = axes.map(|axis| axis.as_dvec3());
+    DQuat::from_mat3(&DMat3::from_cols(x, y, z)).normalize()
+}
+
+fn pose_of(rotation: DQuat, centre: DVec3) -> Result<Pose, PoseError> {
+    let axes = DMat3::from_quat(rotation);
+    let columns = [axes.x_axis, axes.y_axis, axes.z_axis, centre];
+    let entry = |row: usize, column: usize| if row < 3 { columns[column][row] } else { f64::from(column == 3) };
+    Pose::from_opencv(&std::array::from_fn(|row| std::array::from_fn(|column| entry(row, column) as f32)))
+}
+
+/// A pinhole between two, of the first one's size.
+fn mixed(first: &Pinhole, last: &Pinhole, step: f32) -> Result<Pinhole, PinholeError> {
+    let (width, height) = (first.width(), first.height());
+    let last = last.resized(width, height)?;
+    let mix = |a: [f32; 2], b: [f32; 2]| [a[0] + step * (b[0] - a[0]), a[1] + step * (b[1] - a[1])];
+    Pinhole::new(mix(first.focal(), last.focal()), mix(first.principal(), last.principal()), width, height)
+}
