@@ -1,6 +1,7 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
 mod check;
+mod clouds;
 mod compare;
 mod convert;
 mod devices;
@@ -8,7 +9,9 @@ mod errors;
 mod genvs;
 mod inspect;
 mod interrupt;
+mod lists;
 mod memory;
+mod moving;
 mod pareto;
 mod protocols;
 mod readme;
@@ -35,6 +38,7 @@ fn main() -> ExitCode {
     let trials = [
         trials(),
         check::trials(),
+        clouds::trials(),
         compare::trials(),
         convert::trials(),
         devices::trials(),
@@ -42,7 +46,9 @@ fn main() -> ExitCode {
         genvs::trials(),
         inspect::trials(),
         interrupt::trials(),
+        lists::trials(),
         memory::trials(),
+        moving::trials(),
         pareto::trials(),
         protocols::trials(),
         readme::trials(),
@@ -88,6 +94,8 @@ fn help_fits_and_gives_examples() {
         "",
         "render",
         "weights",
+        "select",
+        "points",
         "inspect",
         "evaluate",
         "pareto",

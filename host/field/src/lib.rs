@@ -46,7 +46,8 @@ pub mod training_free;
 pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
-    About, DepthMap, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable,
+    About, DepthMap, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces,
+    Tunable,
 };
 pub use record::{Denoising, LeftOut, Record};
 pub use renderer::{On, Renderer};

@@ -482,10 +482,14 @@ pub fn render<X: From<RenderError>>(
 ) -> Result<Finished, X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
+    let (count, stage_count) = (job.targets.len(), 2 + job.targets.len());
+    progress.stage("reading the sources", 0, stage_count);
     let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
+    progress.stage("encoding the sources", 1, stage_count);
     stage.weigh(weighting, progress)?;
-    for target in &job.targets {
+    for (index, target) in job.targets.iter().enumerate() {
+        progress.stage(&format!("view {} of {count}", index + 1), 2 + index, stage_count);
         let frame = stage.frame(weighting, target, progress)?;
         deliver(&stage.images, frame)?;
     }

@@ -34,8 +34,8 @@ pub mod run;
 pub mod selected;
 pub mod sheet;
 pub mod video;
-pub mod weights;
 pub mod webp;
+pub mod weights;
 pub mod y4m;
 
 /// The examples of the README, compiled and run.

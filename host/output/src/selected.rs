@@ -76,7 +76,8 @@ impl SelectedSources {
             let chosen = select_sources(std::slice::from_ref(own), count);
             let few = SourcePoses::new(&chosen.iter().map(|&one| poses[one]).collect::<Vec<_>>())?;
             let few_weights = weighting.weigh(&few, &target.camera.pose);
-            let mut order: Vec<(usize, f32)> = chosen.iter().copied().zip(few_weights.values().iter().copied()).collect();
+            let mut order: Vec<(usize, f32)> =
+                chosen.iter().copied().zip(few_weights.values().iter().copied()).collect();
             order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
             let indices: Vec<usize> = order.iter().map(|(one, _)| job.sources[*one]).collect();
             targets.push(ForTarget {

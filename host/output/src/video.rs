@@ -229,7 +229,9 @@ fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), Vid
     }
     let ended = child.wait().map_err(|cause| io_error(path, cause));
     let outcome = match (sent, ended) {
-        (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame { .. } | VideoError::Sizes { .. })), _) => Err(error),
+        (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame { .. } | VideoError::Sizes { .. })), _) => {
+            Err(error)
+        }
         (_, Err(error)) => Err(error),
         (sent, Ok(status)) if status.success() => sent,
         (_, Ok(status)) => {

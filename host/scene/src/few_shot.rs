@@ -5,7 +5,7 @@
 //! either to take every `STEP`-th.
 
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
-use crate::rig::spread;
+use crate::rig::{Rig, spread};
 use crate::{Scene, SceneError, Split, View};
 use std::collections::HashSet;
 use std::path::PathBuf;
@@ -334,7 +334,8 @@ fn along(choice: &PathChoice, scene: &Scene, sources: &[usize]) -> Result<Camera
         }
         PathChoice::Between { first, last, count } => {
             let [first, last] = [view_of(scene, first)?, view_of(scene, last)?].map(|view| &scene.views[view]);
-            let between = generated::between(&first.camera, &last.camera, *count);
+            let up = Rig::of(&cameras).up;
+            let between = generated::between(&first.camera, &last.camera, up, *count);
             let failed = |error| SelectionError::NoWay {
                 scene: scene_name(),
                 first: first.name.clone(),

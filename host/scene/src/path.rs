@@ -29,7 +29,8 @@ use crate::scene::reader::RawView;
 use crate::scene::{SceneError, files};
 
 /// What files of camera paths look like, for help texts and messages.
-pub const FORMS: &str = "nerfstudio's camera_path.json; a transforms.json, of which only the poses are read; a .csv of poses";
+pub const FORMS: &str =
+    "nerfstudio's camera_path.json; a transforms.json, of which only the poses are read; a .csv of poses";
 
 /// A camera of a path.
 #[derive(Clone, Debug, PartialEq)]

@@ -275,7 +275,8 @@ mod tests {
 
     #[test]
     fn labels_stand_in_front() -> Result<(), WeightingError> {
-        let (spec, meant): (WeightingSpec, WeightingSpec) = ("half=error:alpha=0.5".parse()?, "error:alpha=0.5".parse()?);
+        let (spec, meant): (WeightingSpec, WeightingSpec) =
+            ("half=error:alpha=0.5".parse()?, "error:alpha=0.5".parse()?);
         assert_eq!((spec.to_string().as_str(), &spec.kind), ("half", &meant.kind));
         let spec: WeightingSpec = "cars=attention:a=b/c:d.safetensors".parse()?;
         assert_eq!((spec.to_string().as_str(), spec.file()), ("cars", Some(Path::new("a=b/c:d.safetensors"))));

@@ -35,11 +35,9 @@ fn file_help() -> String {
 impl PathOptions {
     pub(crate) fn choice(&self) -> Option<PathChoice> {
         let between = self.between.as_deref().and_then(|names| match names {
-            [first, last] => Some(PathChoice::Between {
-                first: first.clone(),
-                last: last.clone(),
-                count: self.frames.unwrap_or(1),
-            }),
+            [first, last] => {
+                Some(PathChoice::Between { first: first.clone(), last: last.clone(), count: self.frames.unwrap_or(1) })
+            }
             _ => None,
         });
         self.orbit

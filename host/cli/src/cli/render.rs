@@ -23,8 +23,8 @@ use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
-use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::rate::FrameRate;
+use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
 use viewfuse_output::video::{VideoError, VideoFormat};
 use viewfuse_scene::few_shot::{FewShot, Target};
@@ -104,8 +104,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let renderer = renderer.as_ref();
     let progress = Terminal::new("rendering");
     if is_stream {
-        let render =
-            || stream::render_to_stdout(&scene, &job, weighting.as_ref(), renderer, &options, rate, &progress);
+        let render = || stream::render_to_stdout(&scene, &job, weighting.as_ref(), renderer, &options, rate, &progress);
         on_threads(arguments.picture.threads, render)??;
         return Ok(ExitCode::SUCCESS);
     }
@@ -165,6 +164,7 @@ fn videos(
 ) -> anyhow::Result<Vec<String>> {
     let mut lines = Vec::new();
     for format in formats {
+        progress.stage(&format!("writing video.{format}"), 1, 1);
         match writer.write_video(*format, rate, progress) {
             Err(error @ VideoError::NoProgram) => {
                 let path = writer.write_video(VideoFormat::Y4m, rate, progress)?;

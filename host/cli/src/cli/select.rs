@@ -67,7 +67,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else if arguments.lines {
         selected.lines()
     } else if arguments.index {
-        let no_index = || wrong("--index needs targets that are photographs of the scene, of which it holds the indices");
+        let no_index =
+            || wrong("--index needs targets that are photographs of the scene, of which it holds the indices");
         format!("{}\n", selected.index().ok_or_else(no_index)?)
     } else {
         readable(&selected)

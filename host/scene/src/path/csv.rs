@@ -24,7 +24,8 @@ use crate::scene::reader::{PoseForm, RawIntrinsics, RawPose, RawView};
 use crate::scene::{Place, SceneError};
 
 /// For the error of a wrong column.
-const COLUMNS: &str = "name; x y z with qw qx qy qz or look_x look_y look_z, or m00 m01 .. m23; fx fy cx cy width height";
+const COLUMNS: &str =
+    "name; x y z with qw qx qy qz or look_x look_y look_z, or m00 m01 .. m23; fx fy cx cy width height";
 
 const CENTRE: [&str; 3] = ["x", "y", "z"];
 const ROTATION: [&str; 4] = ["qw", "qx", "qy", "qz"];
@@ -164,7 +165,8 @@ pub(super) fn read(path: &Path, text: &str, scene: &Scene) -> Result<RawPath, Sc
     };
     let names = reader.headers().map_err(not_a_table)?;
     let place = Place::Line(names.position().map_or(1, |position| position.line() as usize));
-    let wrong = |problem| SceneError::Columns { path: path.to_path_buf(), place: place.clone(), problem, columns: COLUMNS };
+    let wrong =
+        |problem| SceneError::Columns { path: path.to_path_buf(), place: place.clone(), problem, columns: COLUMNS };
     let columns = Columns::of(names).map_err(wrong)?;
     let form = columns.form().map_err(wrong)?;
     let cameras: Vec<Camera> = scene.views.iter().map(|view| view.camera).collect();

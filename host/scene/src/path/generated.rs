@@ -44,29 +44,71 @@ pub fn orbit(cameras: &[Camera], pinhole: Pinhole, count: usize) -> Result<Vec<C
 
 /// `count` cameras from the first to the last one, both included (one alone is the first).
 ///
-/// The rotation changes at a constant rate (slerp). If both look at a point in front of them, the centre moves on an arc
-/// around it, so that the point stays where it is in the pictures; otherwise on a line. Focal length and principal point
-/// change with the step; the size is that of the first.
+/// If both look at a point in front of them, the centre goes around it, the shorter way about `up` (unit): height,
+/// distance from the axis and angle change at constant rates, and the point moves in the pictures as little as the ends
+/// demand. Otherwise, and where an end is straight above the point, the centre moves on a line and the rotation at a
+/// constant rate (slerp). Focal length and principal point change with the step; the size is that of the first.
 ///
 /// # Errors
 /// [`PoseError`] if a pose between them is none: never for finite cameras.
-pub fn between(first: &Camera, last: &Camera, count: usize) -> Result<Vec<Camera>, PoseError> {
+pub fn between(first: &Camera, last: &Camera, up: Vec3, count: usize) -> Result<Vec<Camera>, PoseError> {
+    let around = Around::of(first, last, up);
     let [from, to] = [first, last].map(|camera| camera.pose.centre_world().as_dvec3());
-    let [turned_from, turned_to] = [first, last].map(rotation);
-    let subject = common_subject(first, last);
+    let [turned_from, turned_to] = [first, last].map(|camera| rotation(&camera.pose));
     (0..count)
         .map(|frame| {
             let step = if count > 1 { frame as f64 / (count - 1) as f64 } else { 0.0 };
-            let centre = match subject {
-                Some(subject) => subject + on_arc(from - subject, to - subject, step),
-                None => from.lerp(to, step),
+            let pose = match &around {
+                Some(around) => around.pose(step)?,
+                None => pose_of(turned_from.slerp(turned_to, step), from.lerp(to, step))?,
             };
-            let pose = pose_of(turned_from.slerp(turned_to, step), centre)?;
             // Two pinholes in range have none out of range between them.
             let pinhole = mixed(&first.pinhole, &last.pinhole, step as f32).unwrap_or(first.pinhole);
             Ok(Camera { pose, pinhole })
         })
         .collect()
+}
+
+/// The way around a subject.
+struct Around {
+    subject: Vec3,
+    up: Vec3,
+    /// Two directions across `up`, the first towards the first camera.
+    across: [DVec3; 2],
+    /// Of the first camera and of the last: height above the subject, distance from the axis, angle.
+    places: [DVec3; 2],
+    /// Of both: the rotation relative to looking at the subject.
+    turns: [DQuat; 2],
+}
+
+impl Around {
+    /// `None` without a point that both look at, and if one of them is straight above it.
+    fn of(first: &Camera, last: &Camera, up: Vec3) -> Option<Around> {
+        let subject = common_subject(first, last)?;
+        let axis = up.as_dvec3();
+        let [from, to] = [first, last].map(|camera| (camera.pose.centre_world() - subject).as_dvec3());
+        let [flat_from, flat_to] = [from, to].map(|offset| offset - axis * offset.dot(axis));
+        let ahead = flat_from.try_normalize()?;
+        let across = [ahead, axis.cross(ahead)];
+        // Between minus and plus half a turn: the shorter way.
+        let angle = flat_to.dot(across[1]).atan2(flat_to.dot(across[0]));
+        let place = |offset: DVec3, flat: DVec3, angle: f64| DVec3::new(offset.dot(axis), flat.length(), angle);
+        let places = [place(from, flat_from, 0.0), place(to, flat_to, angle)];
+        let turn = |camera: &Camera| {
+            let looking = Pose::look_at(camera.pose.centre_world(), subject, up).ok()?;
+            Some(rotation(&looking).inverse() * rotation(&camera.pose))
+        };
+        Some(Around { subject, up, across, places, turns: [turn(first)?, turn(last)?] })
+    }
+
+    fn pose(&self, step: f64) -> Result<Pose, PoseError> {
+        let place = self.places[0].lerp(self.places[1], step);
+        let (sine, cosine) = place.z.sin_cos();
+        let flat = (self.across[0] * cosine + self.across[1] * sine) * place.y;
+        let centre = self.subject.as_dvec3() + self.up.as_dvec3() * place.x + flat;
+        let looking = Pose::look_at(centre.as_vec3(), self.subject, self.up)?;
+        pose_of(rotation(&looking) * self.turns[0].slerp(self.turns[1], step), centre)
+    }
 }
 
 /// `count` cameras on LLFF's spiral for cameras side by side: around their middle, two turns within the offsets that nine
@@ -121,23 +163,16 @@ fn quantile(mut values: Vec<f32>) -> f32 {
 }
 
 /// The point nearest to both principal axes, if it is in front of both cameras.
-fn common_subject(first: &Camera, last: &Camera) -> Option<DVec3> {
+fn common_subject(first: &Camera, last: &Camera) -> Option<Vec3> {
     let axes = [first, last].map(|camera| (camera.pose.centre_world(), camera.pose.forward_world()));
     let point = nearest_point_to_lines(&axes)?;
     let is_ahead = |camera: &Camera| camera.pose.to_camera(point).z > 0.0;
-    (is_ahead(first) && is_ahead(last)).then(|| point.as_dvec3())
-}
-
-/// Between two offsets from a point: the direction on an arc, the length in proportion.
-fn on_arc(from: DVec3, to: DVec3, step: f64) -> DVec3 {
-    let turn = DQuat::from_rotation_arc(from.normalize(), to.normalize());
-    let length = from.length() + step * (to.length() - from.length());
-    DQuat::IDENTITY.slerp(turn, step) * from.normalize() * length
+    (is_ahead(first) && is_ahead(last)).then_some(point)
 }
 
 /// The rotation from the camera to the world.
-fn rotation(camera: &Camera) -> DQuat {
-    let axes = [camera.pose.right_world(), camera.pose.down_world(), camera.pose.forward_world()];
+fn rotation(pose: &Pose) -> DQuat {
+    let axes = [pose.right_world(), pose.down_world(), pose.forward_world()];
     let [x, y, z] = axes.map(|axis| axis.as_dvec3());
     DQuat::from_mat3(&DMat3::from_cols(x, y, z)).normalize()
 }

@@ -39,8 +39,7 @@ pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPa
         let (key, value) = ("camera_type".to_owned(), kind.to_string());
         return Err(SceneError::Distorted { path: path.to_path_buf(), key, value });
     }
-    let [width, height] =
-        size(path, place("render_height"), required("render_width")?, required("render_height")?)?;
+    let [width, height] = size(path, place("render_height"), required("render_width")?, required("render_height")?)?;
     let world = Similarity::of_parser(path, scene)?;
     let mut views = Vec::new();
     for (index, value) in top.array(KEY)?.iter().enumerate() {
@@ -54,7 +53,8 @@ pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPa
         let missing = || SceneError::MissingKey { path: path.to_path_buf(), key: frame.full("fov") };
         let angle = frame.number("fov")?.ok_or_else(missing)? * PI / 180.0;
         if !(angle > 0.0 && angle < PI) {
-            let (path, place, fault) = (path.to_path_buf(), Place::Key(frame.full("fov")), IntrinsicsFault::Angle { angle });
+            let (path, place, fault) =
+                (path.to_path_buf(), Place::Key(frame.full("fov")), IntrinsicsFault::Angle { angle });
             return Err(SceneError::Intrinsics { path, place, fault });
         }
         let focal = 0.5 * f64::from(height) / (0.5 * angle).tan();
@@ -67,12 +67,8 @@ pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPa
             place: Place::Key(key),
             size_place: place("render_width"),
         };
-        let pose = RawPose {
-            matrix,
-            form: PoseForm::WorldFromOpenGl,
-            path: path.to_path_buf(),
-            place: Place::Key(pose_key),
-        };
+        let pose =
+            RawPose { matrix, form: PoseForm::WorldFromOpenGl, path: path.to_path_buf(), place: Place::Key(pose_key) };
         views.push(RawView::new(String::new(), None, pose, Some(intrinsics)));
     }
     Ok(RawPath { views, frames_per_second: top.number("fps")? })
@@ -101,7 +97,8 @@ impl Similarity {
         // The parser's transform begins at the coordinates before the scene's own transform was applied.
         let rotation = rotation * applied_rotation.inverse();
         let world = Similarity { rotation, offset: offset - rotation * applied_offset, scale: scale / applied_scale };
-        let is_usable = (world.rotation.determinant() - 1.0).abs() < 1.0e-3 && world.scale > 0.0 && world.scale.is_finite();
+        let is_usable =
+            (world.rotation.determinant() - 1.0).abs() < 1.0e-3 && world.scale > 0.0 && world.scale.is_finite();
         if is_usable { Ok(Some(world)) } else { Err(SceneError::NoSimilarity { path: file }) }
     }
 
@@ -128,8 +125,7 @@ fn affine(rows: &[[f64; 4]; 3]) -> (DMat3, DVec3) {
 /// `applied_transform` and `applied_scale` of the scene's `transforms.json`; those of no change for other layouts.
 fn applied(scene: &Scene) -> Result<(DMat3, DVec3, f64), SceneError> {
     let none = (DMat3::IDENTITY, DVec3::ZERO, 1.0);
-    let file: PathBuf =
-        if scene.path.is_dir() { scene.path.join("transforms.json") } else { scene.path.clone() };
+    let file: PathBuf = if scene.path.is_dir() { scene.path.join("transforms.json") } else { scene.path.clone() };
     if scene.layout != "transforms" || !file.is_file() {
         return Ok(none);
     }

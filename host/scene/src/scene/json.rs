@@ -98,7 +98,9 @@ impl<'a> Object<'a> {
 
 fn all_numbers<const N: usize>(path: &Path, key: &str, values: &[Value]) -> Result<[f64; N], SceneError> {
     let mut numbers = [0.0; N];
-    for (index, (number_out, value)) in numbers.iter_mut().zip(of_length::<N>(path, key, values, "numbers")?).enumerate() {
+    for (index, (number_out, value)) in
+        numbers.iter_mut().zip(of_length::<N>(path, key, values, "numbers")?).enumerate()
+    {
         *number_out = number(path, &format!("{key}[{index}]"), value)?;
     }
     Ok(numbers)
