@@ -9,7 +9,8 @@ viewfuse_tests::trials![
     weights_of_many_targets,
     the_few_sources_of_a_target,
     the_few_sources_of_a_path,
-    labels_name_schemes
+    labels_name_schemes,
+    tables_for_papers,
 ];
 
 fn json(text: &str) -> Value {
@@ -110,4 +111,22 @@ fn labels_name_schemes() {
     let record = json(&fs::read_to_string(folder.join("out/run.json")).expect("a record"));
     assert_eq!(record["weighting"], "near");
     assert_wrong_arguments(BINARY, folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
+}
+
+fn tables_for_papers() {
+    let scene = toy();
+    let arguments = "evaluate toy --targets 20,21 --sources 0..5 --size 16x16 --weights mean --weights a_b=error:alpha=1 --device cpu";
+    let latex = done(scene.path(), &format!("{arguments} --latex"));
+    assert!(latex.starts_with("\\begin{table}\n") && latex.trim_end().ends_with("\\end{table}"), "{latex}");
+    let rows: Vec<&str> = latex.lines().filter(|line| line.ends_with("\\\\")).collect();
+    // The heading, three baselines, two schemes; as many cells in each.
+    assert_eq!(rows.len(), 6, "{latex}");
+    let cells = |row: &str| row.matches(" & ").count();
+    rows.iter().for_each(|row| assert_eq!(cells(row), cells(rows[0]), "{row}"));
+    assert!(rows[5].starts_with("    a\\_b & $") && latex.contains("\\pm") && !latex.contains('±'), "{latex}");
+    // The same numbers as in the table for people.
+    let table = done(scene.path(), arguments);
+    let mean = rows[4].split(" & ").nth(1).expect("a cell");
+    let number = mean.trim_start_matches("$\\mathbf{").trim_start_matches('$').split(' ').next().expect("a number");
+    assert!(number.parse::<f64>().is_ok() && table.contains(number), "{mean} is not in\n{table}");
 }

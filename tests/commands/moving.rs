@@ -194,13 +194,19 @@ fn npy(path: &Path) -> (String, Vec<f32>) {
 fn depths_and_opacity_for_other_programs() {
     let scene = toy();
     let folder = scene.path();
-    done(folder, "render toy --targets 20 --size 48x32 --device cpu --no-sheets --alpha --depth png,exr,npy -o out");
+    // Wider than high, so that rows and columns differ.
+    scene.write(
+        "wide.csv",
+        "name,x,y,z,look_x,look_y,look_z,fx,fy,cx,cy,width,height\nwide,1,0.7,0.5,0,0,0,60,60,24,16,48,32\n",
+    );
+    let arguments = "render toy --camera-path wide.csv --device cpu --no-sheets";
+    done(folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
     let out = folder.join("out");
-    assert_eq!(names_in(&out), ["000020.png", "000020_depth.exr", "000020_depth.npy", "000020_depth.png", "run.json"]);
-    let (header, depths) = npy(&out.join("000020_depth.npy"));
+    assert_eq!(names_in(&out), ["wide.png", "wide_depth.exr", "wide_depth.npy", "wide_depth.png", "run.json"]);
+    let (header, depths) = npy(&out.join("wide_depth.npy"));
     assert!(header.contains("'descr': '<f4'") && header.contains("'shape': (32, 48)"), "{header}");
     assert!(depths.len() == 48 * 32 && depths.iter().all(|depth| depth.is_finite()));
-    let exr = exr::prelude::read_first_flat_layer_from_file(out.join("000020_depth.exr")).expect("OpenEXR");
+    let exr = exr::prelude::read_first_flat_layer_from_file(out.join("wide_depth.exr")).expect("OpenEXR");
     let channel = &exr.layer_data.channel_data.list[0];
     assert_eq!((channel.name.to_string(), exr.layer_data.size.0, exr.layer_data.size.1), ("Z".to_owned(), 48, 32));
     let read: Vec<f32> = channel.sample_data.values_as_f32().collect();
@@ -209,14 +215,14 @@ fn depths_and_opacity_for_other_programs() {
     let record: Value = serde_json::from_slice(&fs::read(out.join("run.json")).expect("a record")).expect("JSON");
     let step = record["frames"][0]["depth_step"].as_f64().expect("a step");
     assert_eq!(record["depth_units"]["unit_in_files"], 1.0);
-    let levels = image::open(out.join("000020_depth.png")).expect("a map").to_luma16();
+    let levels = image::open(out.join("wide_depth.png")).expect("a map").to_luma16();
     for (level, depth) in levels.pixels().zip(&depths) {
         assert!((f64::from(level[0]) * step - f64::from(*depth)).abs() <= 0.51 * step);
     }
     // Opacity is that of the object; colour and background make the picture without alpha.
-    let with_alpha = image::open(out.join("000020.png")).expect("a picture").into_rgba8();
-    done(folder, "render toy --targets 20 --size 48x32 --device cpu --no-sheets -o plain");
-    let plain = png(&folder.join("plain"), "000020.png");
+    let with_alpha = image::open(out.join("wide.png")).expect("a picture").into_rgba8();
+    done(folder, &format!("{arguments} -o plain"));
+    let plain = png(&folder.join("plain"), "wide.png");
     let background: Vec<f64> = record["background"]["used"]
         .as_array()
         .expect("a colour")
@@ -242,7 +248,7 @@ fn camera_paths_from_files() {
     let record = |run: &str| -> Value {
         serde_json::from_slice(&fs::read(folder.join(run).join("run.json")).expect("a record")).expect("JSON")
     };
-    done(folder, "render toy --targets 20 --sources all/2 --size 24x24 --device cpu --no-sheets -o view");
+    done(folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
     let pose = record("view")["frames"][0]["world_from_camera"].clone();
     // The same camera by a table, and by nerfstudio's viewer with axes turned around.
     let number = |row: usize, column: usize| pose[row][column].as_f64().expect("a number");
@@ -254,7 +260,7 @@ fn camera_paths_from_files() {
     let frame = json!({ "file_path": "view", "transform_matrix": opengl.chunks(4).collect::<Vec<_>>() });
     scene.write("poses.json", json!({ "frames": [frame], "fps": 10 }).to_string());
     for file in ["poses.csv", "poses.json"] {
-        let arguments = format!("--camera-path {file} --sources all/2 --size 24x24 --device cpu --no-sheets");
+        let arguments = format!("--camera-path {file} --sources 0..11 --size 24x24 --device cpu --no-sheets");
         done(folder, &format!("render toy {arguments} --video y4m -o path"));
         assert!(png(&folder.join("path"), "view.png") == png(&folder.join("view"), "000020.png"), "{file}");
         let video = y4m::decode(File::open(folder.join("path/video.y4m")).expect("a file")).expect("y4m");

@@ -83,7 +83,7 @@ fn page(folder: &Path) -> String {
 fn the_page_holds_everything() {
     let folder = runs();
     let said = done(BINARY, folder.path(), REPORT);
-    assert!(said.starts_with("page.html: "), "{said}");
+    assert!(said.starts_with("page.html: ") && said.ends_with(" kB\n"), "{said}");
     let first = page(folder.path());
     // No address but those that hold what they point to, and those on the page.
     for attribute in ["src=\"", "href=\"", "url("] {
@@ -98,7 +98,10 @@ fn the_page_holds_everything() {
     assert!(!first.contains("<script") && first.contains("Content-Security-Policy"));
     // Three jobs of one scene with 2, 4 and 8 sources, one of the other scene, one of the other evaluation.
     let sources = 2 + 4 + 8 + 2 + 3;
-    assert_eq!(first.matches("data:image/png;base64,").count(), sources + 5 * (1 + 3));
+    // The truth, the nearest copy and every scheme; below the last two their errors.
+    assert_eq!(first.matches("data:image/png;base64,").count(), sources + 5 * (1 + 2 + 2 * 3));
+    assert_eq!(first.matches("nearest copy</figcaption>").count() + first.matches("nearest copy<br>").count(), 5);
+    assert!(first.contains("<a href=\"#section-1\">Number of sources: training-free</a>"), "no field in the contents");
     assert_eq!(first.matches("data:image/svg+xml;base64,").count(), 1);
     for part in [
         "<h2>Number of sources</h2>",

@@ -61,6 +61,14 @@ pub enum ReportError {
         /// What is wrong with it.
         cause: serde_json::Error,
     },
+    /// A picture cannot be decoded.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's error.
+        cause: image::ImageError,
+    },
     /// A figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),
