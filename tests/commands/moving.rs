@@ -202,7 +202,7 @@ fn depths_and_opacity_for_other_programs() {
     let arguments = "render toy --camera-path wide.csv --device cpu --no-sheets";
     done(folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
     let out = folder.join("out");
-    assert_eq!(names_in(&out), ["wide.png", "wide_depth.exr", "wide_depth.npy", "wide_depth.png", "run.json"]);
+    assert_eq!(names_in(&out), ["run.json", "wide.png", "wide_depth.exr", "wide_depth.npy", "wide_depth.png"]);
     let (header, depths) = npy(&out.join("wide_depth.npy"));
     assert!(header.contains("'descr': '<f4'") && header.contains("'shape': (32, 48)"), "{header}");
     assert!(depths.len() == 48 * 32 && depths.iter().all(|depth| depth.is_finite()));
