@@ -21,7 +21,7 @@ viewfuse_tests::trials![
     camera_paths_from_files,
 ];
 
-const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --device cpu --no-sheets";
+const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --weights error:alpha=1 --device cpu --no-sheets";
 const PATIENCE: Duration = Duration::from_secs(300);
 
 fn png(folder: &Path, name: &str) -> RgbImage {

@@ -52,16 +52,19 @@ impl Default for CloudOptions {
     }
 }
 
-/// The cloud of a stage whose weighting began ([`Stage::weigh`]); empty for fields without depth maps of sources.
+/// The cloud of a stage, all of whose sources are encoded under this weighting; empty for fields without depth maps of
+/// sources.
 ///
 /// # Errors
 /// [`RenderError`].
 pub fn point_cloud(
-    stage: &Stage<'_>,
+    stage: &mut Stage<'_>,
     weighting: &Weighting,
     options: CloudOptions,
     progress: &dyn Progress,
 ) -> Result<Vec<CloudPoint>, RenderError> {
+    stage.weigh(weighting, progress)?;
+    stage.encode_all(progress)?;
     let maps = stage.source_depths()?;
     let relevance = stage.relevance(weighting);
     let (images, has_silhouettes) = (&stage.images.images[..], stage.images.has_silhouettes);

@@ -60,8 +60,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let points = on_threads(arguments.picture.threads, || -> anyhow::Result<Vec<CloudPoint>> {
         let album = Album::open(&scene, sources.iter().copied(), &progress)?;
         let mut stage = Stage::prepare(&scene, &album, &sources, renderer.as_ref(), &options, &progress)?;
-        stage.weigh(&weighting, &progress)?;
-        Ok(point_cloud(&stage, &weighting, CloudOptions { least_views: arguments.agree }, &progress)?)
+        Ok(point_cloud(&mut stage, &weighting, CloudOptions { least_views: arguments.agree }, &progress)?)
     })??;
     drop(progress);
     if points.is_empty() {
