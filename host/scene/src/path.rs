@@ -66,7 +66,7 @@ impl CameraPath {
     /// # Errors
     /// [`SceneError`] with the path, and the line or key, of the first thing that is missing or wrong.
     pub fn open(path: &Path, scene: &Scene, pinhole: &Pinhole) -> Result<CameraPath, SceneError> {
-        let unknown = || SceneError::UnknownCameraPath { path: path.to_path_buf() };
+        let unknown = || SceneError::UnknownCameraPath { path: path.to_path_buf(), looked_for: FORMS };
         if path.is_dir() {
             return Err(unknown());
         }

@@ -37,10 +37,12 @@ pub enum SceneError {
         looked_for: String,
     },
     /// A file that is no camera path.
-    #[error("{path}: no camera path; looked for {}", crate::path::FORMS)]
+    #[error("{path}: no camera path; looked for {looked_for}")]
     UnknownCameraPath {
         /// The file.
         path: PathBuf,
+        /// What such files look like.
+        looked_for: &'static str,
     },
     /// A camera path without cameras.
     #[error("{path}: the path has no cameras")]
