@@ -1,8 +1,8 @@
 //! Depth maps as files: 16-bit PNG for viewers, OpenEXR and NumPy's arrays with the depths as they were computed.
 //!
 //! All hold depths along the principal axis, row-major, 0 where there is no surface: PNG in steps of
-//! [`depth_step`](crate::record::depth_step), the others in units of the world as `f32`. The run record says how long that
-//! unit is in the coordinates of the scene's files.
+//! [`depth_step`](crate::record::depth_step), the others as `f32`. [`RunWriter`](crate::run::RunWriter) writes them in units of
+//! the scene's files.
 
 use crate::png::write_png;
 use crate::record::depth_step;

@@ -75,20 +75,15 @@ pub struct DepthUnits {
     pub png: &'static str,
     /// What EXR and npy files hold.
     pub exr_npy: &'static str,
-    /// The length of a unit of the world in units of the scene's files; 1 for ordinary scenes.
-    pub unit_in_files: f64,
 }
 
 impl DepthUnits {
-    /// Those of a scene.
-    pub fn of(scene: &Scene) -> DepthUnits {
-        DepthUnits {
-            depth: "distance along the camera's principal axis; 0: no surface",
-            png: "16 bit, times the frame's depth_step: units of the world",
-            exr_npy: "32-bit floating point, units of the world",
-            unit_in_files: scene.frame.scale,
-        }
-    }
+    /// Of all depth maps.
+    pub const ALL: DepthUnits = DepthUnits {
+        depth: "distance along the camera's principal axis, in units of the scene's files; 0: no surface",
+        png: "16 bit; times the frame's depth_step",
+        exr_npy: "32-bit floating point",
+    };
 }
 
 /// See [`RunRecord::chosen`].

@@ -55,7 +55,6 @@ pub struct RunWriter {
     continued: usize,
     /// The targets' names, in their order.
     target_names: Vec<String>,
-    depth_units: DepthUnits,
     /// The scene's path as it was opened.
     scene: String,
     /// The last part of it.
@@ -99,7 +98,6 @@ impl RunWriter {
             journal: None,
             continued: 0,
             target_names: job.targets.iter().map(|target| target.name.clone()).collect(),
-            depth_units: DepthUnits::of(scene),
             scene: scene_label,
             scene_name: scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             space: scene.frame,
@@ -163,11 +161,12 @@ impl RunWriter {
             false => DynamicImage::ImageRgb8(frame.picture.clone()),
         };
         write_png(&self.folder.join(&files[0]), &picture)?;
+        let depths: Vec<f32> = frame.depths.iter().map(|depth| self.space.file_length(*depth)).collect();
         for format in DepthFormat::ALL {
             let file = format!("{name}_depth.{format}");
             let path = self.folder.join(&file);
             if !frame.depths.is_empty() && self.outputs.depths.contains(format) {
-                write_depth(&path, *format, &frame.depths, size)?;
+                write_depth(&path, *format, &depths, size)?;
                 files.push(file);
             } else {
                 // One of an earlier run would belong to another picture.
@@ -273,7 +272,7 @@ impl RunWriter {
             times: times_record(open_time, costs, frame_time, total_time),
             kernels: kernel_records(&renderer.kernel_times()),
             transfers: renderer.transfers().into(),
-            depth_units: self.depth_units,
+            depth_units: DepthUnits::ALL,
             continued: self.continued,
             frames: self.frames,
         };

@@ -20,8 +20,10 @@ pub struct WeightTable {
     pub scene: String,
     /// Names of the schemes.
     pub schemes: Vec<String>,
-    /// Names and poses of the targets.
-    pub targets: Vec<(String, Pose)>,
+    /// Names of the targets.
+    pub targets: Vec<String>,
+    /// Their camera-to-world matrices in the coordinates of the scene's files, OpenCV axes, row-major.
+    pub poses: Vec<[[f64; 4]; 4]>,
     /// Names of the sources.
     pub sources: Vec<String>,
     values: Vec<f32>,
@@ -34,8 +36,8 @@ pub struct TargetWeights {
     pub scene: String,
     /// The target's name.
     pub target: String,
-    /// Its camera-to-world matrix, OpenCV axes, row-major, world units.
-    pub world_from_camera: [[f32; 4]; 4],
+    /// Its camera-to-world matrix in the coordinates of the scene's files, OpenCV axes, row-major.
+    pub world_from_camera: [[f64; 4]; 4],
     /// Names of the sources.
     pub sources: Vec<String>,
     /// For each scheme the weight of each source, in their order.
@@ -60,7 +62,8 @@ impl WeightTable {
         Ok(WeightTable {
             scene: scene.path.display().to_string(),
             schemes: weightings.iter().map(Weighting::to_string).collect(),
-            targets: job.targets.iter().map(|target| (target.name.clone(), target.camera.pose)).collect(),
+            targets: job.targets.iter().map(|target| target.name.clone()).collect(),
+            poses: job.targets.iter().map(|target| scene.frame.file_from_camera(&target.camera.pose)).collect(),
             sources: source_names(scene, job),
             values,
         })
@@ -74,17 +77,17 @@ impl WeightTable {
 
     /// One object a target, for JSON. Of two schemes of one name, the last one.
     pub fn documents(&self) -> Vec<TargetWeights> {
-        let document = |(target, (name, pose)): (usize, &(String, Pose))| {
+        let document = |(target, (name, pose)): (usize, (&String, &[[f64; 4]; 4]))| {
             let of = |(scheme, name): (usize, &String)| (name.clone(), self.weights(scheme, target).to_vec());
             TargetWeights {
                 scene: self.scene.clone(),
                 target: name.clone(),
-                world_from_camera: pose.to_opencv(),
+                world_from_camera: *pose,
                 sources: self.sources.clone(),
                 weights: self.schemes.iter().enumerate().map(of).collect(),
             }
         };
-        self.targets.iter().enumerate().map(document).collect()
+        self.targets.iter().zip(&self.poses).enumerate().map(document).collect()
     }
 
     /// The shape of [`WeightTable::npy`]: schemes, targets, sources.

@@ -62,9 +62,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         say(csv_of(&weights)?.trim_end_matches('\n'))?;
     } else if let Some(path) = &arguments.npy {
         write_whole(path, &weights.npy())?;
-        let targets: Vec<&str> = weights.targets.iter().map(|(name, _)| name.as_str()).collect();
         let axes = json!({
-            "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": targets, "sources": weights.sources,
+            "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets, "sources": weights.sources,
         });
         say(format_args!("{axes:#}"))?;
     } else {
@@ -80,7 +79,7 @@ fn csv_of(weights: &WeightTable) -> anyhow::Result<String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(["scheme", "target", "source", "weight"])?;
     for (scheme, scheme_name) in weights.schemes.iter().enumerate() {
-        for (target, (target_name, _)) in weights.targets.iter().enumerate() {
+        for (target, target_name) in weights.targets.iter().enumerate() {
             for (source, weight) in weights.sources.iter().zip(weights.weights(scheme, target)) {
                 writer.write_record([scheme_name, target_name, source, &weight.to_string()])?;
             }

@@ -1,6 +1,5 @@
 //! LLFF's `poses_bounds.npy`: one focal length for each view, the principal point in the centre, near and far.
 
-use super::numpy::npy;
 use super::{Draft, WriteSceneError};
 use crate::Scene;
 use crate::numpy::npy;
