@@ -112,7 +112,8 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
         .lines()
         .find_map(|line| line.strip_prefix("continued: ")?.split_once(" of them were there")?.0.parse().ok())
         .unwrap_or_else(|| panic!("nothing was continued:\n{printed}"));
-    assert!((60..120).contains(&there), "{printed}");
+    // A frame whose file went is in the journal twice.
+    assert!((55..120).contains(&there), "{printed}");
     let is_result = |name: &String| !name.starts_with(".viewfuse-");
     let names: Vec<String> = names_in(&folder.join("cut")).into_iter().filter(is_result).collect();
     assert_eq!(names, names_in(&folder.join("whole")));
