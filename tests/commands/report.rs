@@ -132,7 +132,7 @@ fn evaluations_under_way_are_shown() {
     // Nothing at all is done yet.
     fs::remove_file(path.join("half/scores-1-of-2.jsonl")).expect("a journal");
     done(BINARY, path, "report half -o page.html");
-    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("nearest copy"));
+    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("warped copy"));
 }
 
 fn what_is_no_record_is_refused() {

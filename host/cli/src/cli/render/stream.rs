@@ -13,10 +13,13 @@ use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_weighting::Weighting;
 
+/// What is written, and the size of its frames.
+type Video = (Y4m<BufWriter<StdoutLock<'static>>>, (u32, u32));
+
 /// A video on standard output, which begins with its first frame.
 struct Stream {
     rate: FrameRate,
-    video: Option<(Y4m<BufWriter<StdoutLock<'static>>>, (u32, u32))>,
+    video: Option<Video>,
 }
 
 impl Stream {
