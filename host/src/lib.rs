@@ -30,6 +30,6 @@ pub mod prelude {
     pub use crate::field::training_free::TrainingFree;
     pub use crate::job::progress::{Progress, Silent};
     pub use crate::scene::Scene;
-    pub use crate::scene::few_shot::Selection;
+    pub use crate::scene::few_shot::{PathChoice, Selection};
     pub use crate::weighting::Weighting;
 }

@@ -1,6 +1,7 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
 mod check;
+mod clouds;
 mod compare;
 mod convert;
 mod devices;
@@ -10,7 +11,9 @@ mod hostile;
 mod inspect;
 mod interrupt;
 mod kill;
+mod lists;
 mod memory;
+mod moving;
 mod outputs;
 mod pareto;
 mod protocols;
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
     let trials = [
         trials(),
         check::trials(),
+        clouds::trials(),
         compare::trials(),
         convert::trials(),
         devices::trials(),
@@ -48,7 +52,9 @@ fn main() -> ExitCode {
         inspect::trials(),
         interrupt::trials(),
         kill::trials(),
+        lists::trials(),
         memory::trials(),
+        moving::trials(),
         outputs::trials(),
         pareto::trials(),
         protocols::trials(),
@@ -97,6 +103,8 @@ fn help_fits_and_gives_examples() {
         "render",
         "view",
         "weights",
+        "select",
+        "points",
         "inspect",
         "evaluate",
         "pareto",

@@ -85,7 +85,7 @@ fn page(folder: &Path) -> String {
 fn the_page_holds_everything() {
     let folder = runs();
     let said = done(BINARY, folder.path(), REPORT);
-    assert!(said.starts_with("page.html: "), "{said}");
+    assert!(said.starts_with("page.html: ") && said.ends_with(" kB\n"), "{said}");
     let first = page(folder.path());
     // No address but those that hold what they point to, and those on the page.
     for attribute in ["src=\"", "href=\"", "url("] {
@@ -100,7 +100,10 @@ fn the_page_holds_everything() {
     assert!(!first.contains("<script") && first.contains("Content-Security-Policy"));
     // Three jobs of one scene with 2, 4 and 8 sources, one of the other scene, one of the other evaluation.
     let sources = 2 + 4 + 8 + 2 + 3;
-    assert_eq!(first.matches("data:image/png;base64,").count(), sources + 5 * (1 + 3));
+    // The truth, the nearest copy and every scheme; below the last two their errors.
+    assert_eq!(first.matches("data:image/png;base64,").count(), sources + 5 * (1 + 2 + 2 * 3));
+    assert_eq!(first.matches("nearest copy</figcaption>").count() + first.matches("nearest copy<br>").count(), 5);
+    assert!(first.contains("<a href=\"#section-1\">Number of sources: training-free</a>"), "no field in the contents");
     assert_eq!(first.matches("data:image/svg+xml;base64,").count(), 1);
     for part in [
         "<h2>Number of sources</h2>",
@@ -131,7 +134,7 @@ fn evaluations_under_way_are_shown() {
     // Nothing at all is done yet.
     fs::remove_file(path.join("half/scores-1-of-2.jsonl")).expect("a journal");
     done(BINARY, path, "report half -o page.html");
-    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("nearest copy"));
+    assert!(page(path).contains("0 of 5 jobs") && !page(path).contains("warped copy"));
 }
 
 fn what_is_no_record_is_refused() {

@@ -522,15 +522,13 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     assert_eq!(line, tab.text("document.getElementById('command').textContent"));
     let start = "viewfuse render tests/data/room --camera-path view.json --sources 003,004,005,006,007 --size 96x72";
     assert!(line.starts_with(start) && line.ends_with(" --weights error:alpha=1 -o out"), "{line}");
-    // Where the command takes camera paths, the line renders what is shown.
-    if done(folder.path(), "render --help").contains("--camera-path") {
-        fs::copy(&saved, folder.file("view.json")).expect("a copy");
-        let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
-        done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
-        let rendered = image::open(folder.path().join("out/view.png")).expect("a picture").to_rgb8();
-        let (_, picture) = program.connect().picture(&request("x", &tab.evaluate("matrixOf(pose)"), false)).unpacked();
-        assert!(rendered == picture, "the command line renders another picture");
-    }
+    // The line renders what is shown.
+    fs::copy(&saved, folder.file("view.json")).expect("a copy");
+    let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
+    done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
+    let rendered = image::open(folder.path().join("out/view.png")).expect("a picture").to_rgb8();
+    let (_, picture) = program.connect().picture(&request("x", &tab.evaluate("matrixOf(pose)"), false)).unpacked();
+    assert!(rendered == picture, "the command line renders another picture");
     // A view of the scene that is no source has a name.
     tab.evaluate("goTo(scene.others[0].pose)");
     let line = tab.text("document.getElementById('command').textContent");

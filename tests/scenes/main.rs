@@ -10,6 +10,7 @@ mod large;
 mod layouts;
 mod lenses;
 mod made;
+mod paths;
 mod photographs;
 mod synthetic;
 mod transforms;

@@ -14,7 +14,7 @@ pub struct Outcome {
     pub code: Option<i32>,
     /// Standard output.
     pub stdout: String,
-    /// Standard error.
+    /// Standard error, without lines of progress: whether there are any depends on how busy the machine is.
     pub stderr: String,
 }
 
@@ -23,8 +23,14 @@ impl Outcome {
     pub fn of(mut command: Command) -> Outcome {
         let output = command.output().expect("the command starts");
         let text = |bytes| String::from_utf8(bytes).expect("the command prints UTF-8");
-        Outcome { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
+        let stderr = without_progress(&text(output.stderr));
+        Outcome { code: output.status.code(), stdout: text(output.stdout), stderr }
     }
+}
+
+/// What was said on standard error beside lines of progress.
+pub fn without_progress(said: &str) -> String {
+    said.split_inclusive('\n').filter(|line| !line.starts_with("progress: ")).collect()
 }
 
 /// The command, ready to be started in a folder with arguments that are separated by blanks.

@@ -67,9 +67,8 @@ impl Picture {
         };
         let selection = Selection {
             targets: scene.views.last().map(|view| view.name.clone()),
-            orbit: None,
-            sources: None,
             view_count: Some(MOST_SOURCES),
+            ..Selection::default()
         };
         let job = selection.resolve(&scene, AnyField::default().about().least_sources)?;
         let options =

@@ -18,10 +18,13 @@ mod outputs;
 #[cfg(feature = "pareto")]
 mod pareto;
 mod parse;
+mod path;
+mod points;
 mod render;
 #[cfg(feature = "report")]
 mod report;
 mod scenes;
+mod select;
 mod shown;
 mod table;
 mod terminal;
@@ -70,6 +73,10 @@ enum Command {
     View(view::Arguments),
     /// Show the weight of each source view for a target view under every scheme.
     Weights(weights::Arguments),
+    /// Select the few sources that targets need, for systems that take a list of views.
+    Select(select::Arguments),
+    /// Write the surfaces that the sources show as a coloured point cloud (PLY).
+    Points(points::Arguments),
     /// Show a scene: its cameras from above, the point that they look at, and warnings.
     Inspect(inspect::Arguments),
     /// Compare weighting schemes on held-out views.
@@ -117,9 +124,11 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
     terminal::silence_caught_panics();
     terminal::listen()?;
     match arguments.command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments, &options::values(&command, &matches)),
         Command::View(arguments) => view::run(&arguments, &options::given(&command, &matches)),
         Command::Weights(arguments) => weights::run(&arguments),
+        Command::Select(arguments) => select::run(&arguments),
+        Command::Points(arguments) => points::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
         Command::Evaluate(arguments) => evaluate::run(&arguments, options::values(&command, &matches)),
         Command::Pareto(arguments) => pareto::run(&arguments),

@@ -4,6 +4,7 @@ use image::{DynamicImage, RgbImage, imageops};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
+use viewfuse_core::metrics::psnr;
 use viewfuse_field::render::Frame;
 use viewfuse_job::files::{WriteError, read_at_most, write_whole};
 use viewfuse_output::png::write_png;
@@ -72,6 +73,9 @@ pub struct Shown {
     pub target: String,
     /// The photograph at the target.
     pub truth: String,
+    /// A copy of the nearest source; null in folders of versions that kept none.
+    #[serde(default)]
+    pub copy: Option<ShownCopy>,
     /// The sources in their order.
     pub sources: Vec<ShownSource>,
     /// The schemes in theirs.
@@ -100,15 +104,27 @@ fn is_picture_name(name: &str) -> bool {
 /// # Errors
 /// [`GalleryError`].
 pub fn picture(folder: &Path, name: &str) -> Result<Vec<u8>, GalleryError> {
+    let path = picture_path(folder, name)?;
+    match read_at_most(&path, LONGEST_PICTURE) {
+        Ok(bytes) if bytes.starts_with(PNG) => Ok(bytes),
+        Ok(_) => Err(GalleryError::NoPicture { path }),
+        Err(cause) => Err(GalleryError::Read { path, cause }),
+    }
+}
+
+/// The path of a picture that a run's record names, which must lie in the run's own folder of pictures.
+///
+/// # Errors
+/// [`GalleryError`].
+pub fn picture_path(folder: &Path, name: &str) -> Result<PathBuf, GalleryError> {
     let folder = folder.join(PICTURES);
     let path = folder.join(name);
-    let unreadable = |cause| GalleryError::Read { path: path.clone(), cause };
-    let is_inside = fs::canonicalize(&path).map_err(unreadable)?.parent() == fs::canonicalize(&folder).ok().as_deref();
-    if !(is_picture_name(name) && is_inside) {
-        return Err(GalleryError::Outside { path: folder, file: name.to_owned() });
+    let canonical = fs::canonicalize(&path).map_err(|cause| GalleryError::Read { path: path.clone(), cause })?;
+    let is_inside = canonical.parent() == fs::canonicalize(&folder).ok().as_deref();
+    match is_picture_name(name) && is_inside {
+        true => Ok(path),
+        false => Err(GalleryError::Outside { path: folder, file: name.to_owned() }),
     }
-    let bytes = read_at_most(&path, LONGEST_PICTURE).map_err(unreadable)?;
-    if bytes.starts_with(PNG) { Ok(bytes) } else { Err(GalleryError::NoPicture { path: path.clone() }) }
 }
 
 /// A source.
@@ -118,6 +134,17 @@ pub struct ShownSource {
     pub name: String,
     /// Its photograph.
     pub file: String,
+}
+
+/// The copy of the nearest source.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShownCopy {
+    /// The source's name.
+    pub source: String,
+    /// Its photograph at the target's size.
+    pub file: String,
+    /// Its peak signal to noise ratio, decibels; null if it is not finite.
+    pub psnr: Option<f64>,
 }
 
 /// A scheme's picture.
@@ -138,6 +165,8 @@ pub struct ShownScheme {
 pub struct Gallery {
     sources: Vec<RgbImage>,
     truth: Option<RgbImage>,
+    /// The nearest source by its index, and its copy.
+    copy: Option<(usize, RgbImage)>,
     schemes: Vec<(RgbImage, ShownScheme)>,
 }
 
@@ -148,6 +177,11 @@ impl Gallery {
         if self.sources.is_empty() {
             self.sources = (0..sources.images.len()).map(|source| thumbnail(sources.picture(source))).collect();
             self.truth = Some(truth.picture.clone());
+            self.copy = nearest(frame, sources).map(|source| {
+                let (width, height) = truth.picture.dimensions();
+                let own = sources.picture(source);
+                (source, imageops::resize(&own, width, height, imageops::FilterType::Triangle))
+            });
         }
         let finite = |(name, value): &(String, f64)| (name.clone(), Some(*value).filter(|value| value.is_finite()));
         let shown = ShownScheme {
@@ -177,6 +211,14 @@ impl Gallery {
             write_png(&folder.join(&name), &DynamicImage::ImageRgb8(picture))?;
             Ok(name)
         };
+        let copy = match self.copy {
+            Some((source, picture)) => {
+                let psnr = Some(psnr(&picture, &truth)).filter(|psnr| psnr.is_finite());
+                let file = write(format!("job-{job:05}-copy.png"), picture)?;
+                Some(ShownCopy { source: names.get(source).cloned().unwrap_or_default(), file, psnr })
+            }
+            None => None,
+        };
         let truth = write(format!("job-{job:05}-truth.png"), truth)?;
         let mut sources = Vec::new();
         for (index, (picture, name)) in self.sources.into_iter().zip(names).enumerate() {
@@ -188,11 +230,17 @@ impl Gallery {
             let file = write(format!("job-{job:05}-scheme-{index:03}.png"), picture)?;
             schemes.push(ShownScheme { file, ..shown });
         }
-        let shown = Shown { job, scene: scene.to_owned(), target: target.to_owned(), truth, sources, schemes };
+        let shown = Shown { job, scene: scene.to_owned(), target: target.to_owned(), truth, copy, sources, schemes };
         let path = folder.join(format!("job-{job:05}.json"));
         let json = serde_json::to_vec(&shown).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
         Ok(write_whole(&path, &json)?)
     }
+}
+
+/// The source whose camera is nearest to the target's, by its index; of equally near ones the first.
+fn nearest(frame: &Frame, sources: &SourceImages) -> Option<usize> {
+    let distance = |source: usize| sources.images[source].camera.pose.distance(&frame.target.camera.pose);
+    (0..sources.images.len()).min_by(|a, b| distance(*a).total_cmp(&distance(*b)))
 }
 
 /// At most [`THUMBNAIL`] pixels on a side.

@@ -34,6 +34,7 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use std::path::{Path, PathBuf};
 use viewfuse_job::files::read_at_most;
+use viewfuse_scene::SceneError;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
@@ -68,6 +69,9 @@ pub enum ReportError {
         /// The file.
         path: PathBuf,
     },
+    /// A picture cannot be decoded.
+    #[error(transparent)]
+    Picture(#[from] SceneError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] PlotError),

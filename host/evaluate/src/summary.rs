@@ -9,8 +9,10 @@
 //! ```text
 //! metric    how a metric is written
 //! verdict   comparison of each scheme with the baselines, in words
+//! latex     a table for a paper
 //! ```
 
+mod latex;
 mod metric;
 mod verdict;
 

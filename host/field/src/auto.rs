@@ -230,12 +230,17 @@ pub fn render<X: From<RenderError>>(
 ) -> Result<(Finished, Chosen), X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
+    let (count, stage_count) = (job.targets.len(), 3 + job.targets.len());
+    progress.stage("reading the sources", 0, stage_count);
     let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
+    progress.stage("choosing the scheme", 1, stage_count);
     let chosen = choose(&stage, renderer, options, progress)?;
     stage.tune(&chosen.settings);
+    progress.stage("encoding the sources", 2, stage_count);
     stage.weigh(&chosen.weighting, progress)?;
-    for target in &job.targets {
+    for (index, target) in job.targets.iter().enumerate() {
+        progress.stage(&format!("view {} of {count}", index + 1), 3 + index, stage_count);
         let frame = stage.frame(&chosen.weighting, target, progress)?;
         deliver(&stage.images, frame, &chosen)?;
     }

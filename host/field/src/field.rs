@@ -5,7 +5,7 @@ use super::error::FieldError;
 use super::record::Record;
 use serde::Serialize;
 use viewfuse_core::Vec3;
-use viewfuse_core::camera::Camera;
+use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -83,6 +83,15 @@ pub trait Prepared {
         Surfaces::default()
     }
 
+    /// The depth map of each source view that is encoded, under the current weighting; empty by default, for fields without
+    /// maps of sources. For point clouds.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        Ok(Vec::new())
+    }
+
     /// The record of its work so far; the session counts encoded views.
     fn record(&self) -> Record {
         Record::default()
@@ -116,6 +125,17 @@ pub struct Surfaces {
     pub points: Vec<Vec3>,
     /// Nearest and farthest depth in any view.
     pub near_far: Option<[f32; 2]>,
+}
+
+/// A source view's depths.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthMap {
+    /// The camera, of the map's size; its first texel is 0.
+    pub camera: CameraBlock,
+    /// Depths along the principal axis in world units, 0 where there is no surface; row-major.
+    pub depths: Vec<f32>,
+    /// How far each depth can be relied on, in `[0, 1]`; empty for fields that do not tell.
+    pub confidences: Vec<f32>,
 }
 
 /// Requirements and properties of a field.

@@ -16,6 +16,7 @@
 //! enlarged          previews: small pictures, enlarged
 //! scores            PSNR and SSIM of what a photograph shows
 //! render            the render loop, from a scene to pictures
+//! point_cloud       the sources' depths as one cloud of points
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
 //! ```
 //!
@@ -34,6 +35,7 @@ pub mod genvs;
 pub mod learned;
 pub mod options;
 pub mod pixelnerf;
+pub mod point_cloud;
 pub mod record;
 pub mod render;
 pub mod renderer;
@@ -44,7 +46,8 @@ pub mod training_free;
 pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
-    About, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable,
+    About, DepthMap, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces,
+    Tunable,
 };
 pub use record::{Denoising, LeftOut, Record};
 pub use renderer::{On, Renderer};

@@ -1,7 +1,7 @@
 //! The render loop, from a scene to pictures.
 
 use crate::scores::{psnr_of_seen, ssim_of_seen};
-use crate::{FieldError, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
+use crate::{DepthMap, FieldError, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
 use image::{GrayImage, RgbImage};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -294,7 +294,7 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`RenderError`].
     pub fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
-        let relevance = relevance_among(&self.sources, weighting, self.options.leave_out);
+        let relevance = self.relevance(weighting);
         let session = &mut self.session;
         timed(&mut self.costs.encode, || session.weigh(&relevance, progress))
             .map_err(|error| RenderError::of(error, self.scene))
@@ -328,6 +328,19 @@ impl<'a> Stage<'a> {
     /// What the field knows of where the surfaces are.
     pub fn surfaces(&self) -> Surfaces {
         self.session.surfaces()
+    }
+
+    /// The depth maps of the sources, under the weighting that began; see [`Prepared::source_depths`](crate::Prepared::source_depths).
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn source_depths(&self) -> Result<Vec<DepthMap>, RenderError> {
+        self.session.source_depths().map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// The weights of all sources for each source as a target; a source's weight for itself is 0.
+    pub fn relevance(&self, weighting: &Weighting) -> Vec<SourceWeights> {
+        relevance_among(&self.sources, weighting, self.options.leave_out)
     }
 
     /// Longest side of the pictures.
@@ -497,10 +510,14 @@ pub fn render<X: From<RenderError>>(
 ) -> Result<Finished, X> {
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
+    let (count, stage_count) = (job.targets.len(), 2 + job.targets.len());
+    progress.stage("reading the sources", 0, stage_count);
     let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
+    progress.stage("encoding the sources", 1, stage_count);
     stage.weigh(weighting, progress)?;
-    for target in &job.targets {
+    for (index, target) in job.targets.iter().enumerate() {
+        progress.stage(&format!("view {} of {count}", index + 1), 2 + index, stage_count);
         let frame = stage.frame(weighting, target, progress)?;
         deliver(&stage.images, frame)?;
     }

@@ -1,7 +1,7 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{Encoding, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
+use super::field::{DepthMap, Encoding, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use super::record::{LeftOut, Record};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
@@ -121,6 +121,14 @@ impl<'a> Session<'a> {
     /// See [`Prepared::surfaces`].
     pub fn surfaces(&self) -> Surfaces {
         self.prepared.surfaces()
+    }
+
+    /// See [`Prepared::source_depths`].
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        self.prepared.source_depths()
     }
 
     /// The record of the work so far.

@@ -21,6 +21,11 @@ pub fn sha256_of(path: &Path) -> io::Result<String> {
     }
 }
 
+/// The digest of some bytes.
+pub fn sha256(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
 /// Two digits a byte.
 pub fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()

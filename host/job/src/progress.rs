@@ -9,7 +9,11 @@ pub struct Interrupted;
 /// The caller's side of long work: it receives progress reports and can cancel. Every method has a default that shows
 /// nothing and never cancels, so that `impl Progress for MyType {}` is enough to begin with.
 pub trait Progress: Sync {
-    /// The work has this many more pieces.
+    /// A stage begins: its name, and how many of the whole work's stages are done, of how many. The pieces that follow are
+    /// of this stage. Work that others contain leaves the stages to them.
+    fn stage(&self, _name: &str, _done: usize, _of: usize) {}
+
+    /// The work, or its stage, has this many more pieces.
     fn expect(&self, _pieces: usize) {}
 
     /// A piece is done.

@@ -7,17 +7,38 @@
 //! canvas   text, lines and small pictures on a picture
 //! sheet    the contact sheet of a target
 //! record   the run record, as JSON
+//! exr      depth maps as OpenEXR (feature `exr`)
+//! depth    depth maps as files of any format
+//! ply      point clouds as PLY
+//! rate     frames per second
+//! webp     animated pictures
+//! y4m      video without compression
+//! video    the frames of a run as one file of any format
+//! weights  the weights of many targets: JSON, NumPy's arrays
+//! selected the few sources that targets need: JSON, lines
+//! journal  what an interrupted run continues from
 //! run      all of it in a folder
 //! folder   checks of that folder before work begins
 //! ```
 #![forbid(unsafe_code)]
 
 pub mod canvas;
+pub mod depth;
+#[cfg(feature = "exr")]
+pub mod exr;
 pub mod folder;
+pub mod journal;
+pub mod ply;
 pub mod png;
+pub mod rate;
 pub mod record;
 pub mod run;
+pub mod selected;
 pub mod sheet;
+pub mod video;
+pub mod webp;
+pub mod weights;
+pub mod y4m;
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

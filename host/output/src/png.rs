@@ -1,6 +1,6 @@
 //! Pictures as PNG files.
 
-use image::{DynamicImage, ImageFormat};
+use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
 use std::io::Cursor;
 use std::path::Path;
 use viewfuse_job::files::{WriteError, write_whole};
@@ -15,4 +15,21 @@ pub fn write_png(path: &Path, picture: &DynamicImage) -> Result<(), WriteError> 
         .write_to(&mut bytes, ImageFormat::Png)
         .map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })?;
     write_whole(path, bytes.get_ref())
+}
+
+/// A picture with its opacity as straight alpha: what is in front of a background of one colour (in `[0, 1]`), which was
+/// mixed into `colours` (red, green, blue in `[0, 1]` and opacity, row-major, of this width and height). Black where the
+/// opacity is 0.
+pub fn without_background(colours: &[[f32; 4]], [width, height]: [u32; 2], background: [f32; 3]) -> RgbaImage {
+    RgbaImage::from_fn(width, height, |x, y| {
+        let colour = colours[(y * width + x) as usize];
+        let alpha = colour[3].clamp(0.0, 1.0);
+        let level = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
+        // Opacities that round to 0 have no colour: dividing by them would only enlarge rounding errors.
+        if level(alpha) == 0 {
+            return Rgba([0; 4]);
+        }
+        let own = |channel: usize| level((colour[channel] - (1.0 - alpha) * background[channel]) / alpha);
+        Rgba([own(0), own(1), own(2), level(alpha)])
+    })
 }

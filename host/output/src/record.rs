@@ -1,6 +1,6 @@
 //! The run record: the inputs, settings and results of a run, as JSON.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
 use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
@@ -58,8 +58,32 @@ pub struct RunRecord {
     pub kernels: Vec<KernelRecord>,
     /// Transfers between host and device; zeros for devices whose memory is the host's.
     pub transfers: TransfersRecord,
+    /// What the numbers of depth maps mean.
+    pub depth_units: DepthUnits,
+    /// Frames that were there already when an interrupted run was continued.
+    pub continued: usize,
     /// One entry a target.
     pub frames: Vec<FrameRecord>,
+}
+
+/// See [`RunRecord::depth_units`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DepthUnits {
+    /// What a depth is.
+    pub depth: &'static str,
+    /// What PNG files hold.
+    pub png: &'static str,
+    /// What EXR and npy files hold.
+    pub exr_npy: &'static str,
+}
+
+impl DepthUnits {
+    /// Of all depth maps.
+    pub const ALL: DepthUnits = DepthUnits {
+        depth: "distance along the camera's principal axis, in units of the scene's files; 0: no surface",
+        png: "16 bit; times the frame's depth_step",
+        exr_npy: "32-bit floating point",
+    };
 }
 
 /// See [`RunRecord::chosen`].
@@ -153,7 +177,7 @@ pub fn kernel_records(times: &[KernelTime]) -> Vec<KernelRecord> {
 }
 
 /// One target.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// The target's name.
     pub target: String,

@@ -1,18 +1,26 @@
-//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit), `NAME_confidence.png` (8 bit) and `NAME_sheet.png` for
-//! each target, and `run.json`.
+//! The output folder of a run: `NAME.png`, `NAME_depth.png` (16 bit; also `.exr` and `.npy`), `NAME_confidence.png` (8 bit)
+//! and `NAME_sheet.png` for each target, and `run.json` when all are there.
+//!
+//! A run that was interrupted continues: [`RunWriter::resume`] tells which targets are finished.
 
-use crate::png::write_png;
+use crate::depth::{DepthFormat, write_depth};
+use crate::journal::{FinishedFrame, JOURNAL, Journal};
+use crate::png::{without_background, write_png};
+use crate::rate::FrameRate;
 use crate::record::{
-    ChosenRecord, FrameRecord, RunRecord, background_record, depth_step, kernel_records, source_names, times_record,
+    ChosenRecord, DepthUnits, FrameRecord, RunRecord, background_record, kernel_records, source_names, times_record,
 };
 use crate::sheet::{Sheet, SheetSource, depth_picture};
+use crate::video::{VideoError, VideoFormat, write_video};
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use viewfuse_field::Renderer;
 use viewfuse_field::auto::Chosen;
 use viewfuse_field::render::{Finished, Frame, RenderOptions};
 use viewfuse_job::files::{WriteError, remove_if_there, write_whole};
+use viewfuse_job::progress::Progress;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{Scene, SceneFrame};
@@ -23,10 +31,32 @@ pub const RECORD: &str = "run.json";
 
 /// What stands behind a target's name in the names of its pictures.
 pub const SUFFIXES: [&str; 4] = ["", "_depth", "_confidence", "_sheet"];
+/// What is written for each target beside `NAME.png`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Outputs {
+    /// Write the opacity as the picture's alpha channel, and the colour without the background.
+    pub alpha: bool,
+    /// Formats of the depth map.
+    pub depths: Vec<DepthFormat>,
+    /// Write the contact sheet.
+    pub sheet: bool,
+}
+
+impl Default for Outputs {
+    /// No alpha channel, the depth map as PNG, the contact sheet.
+    fn default() -> Outputs {
+        Outputs { alpha: false, depths: vec![DepthFormat::Png], sheet: true }
+    }
+}
 
 /// Writes a run's frames one by one, and the record after the last.
 pub struct RunWriter {
     folder: PathBuf,
+    outputs: Outputs,
+    journal: Option<Journal>,
+    continued: usize,
+    /// The targets' names, in their order.
+    target_names: Vec<String>,
     /// The scene's path as it was opened.
     scene: String,
     /// The last part of it.
@@ -36,7 +66,6 @@ pub struct RunWriter {
     weighting: String,
     source_names: Vec<String>,
     frames: Vec<FrameRecord>,
-    frame_time: Duration,
     size: [u32; 2],
     background: [f32; 3],
     warning: Option<String>,
@@ -67,18 +96,45 @@ impl RunWriter {
     pub fn new(folder: &Path, scene: &Scene, scene_label: String, job: &FewShot, weighting: &Weighting) -> RunWriter {
         RunWriter {
             folder: folder.to_path_buf(),
+            outputs: Outputs::default(),
+            journal: None,
+            continued: 0,
+            target_names: job.targets.iter().map(|target| target.name.clone()).collect(),
             scene: scene_label,
             scene_name: scene.path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned()),
             space: scene.frame,
             weighting: weighting.to_string(),
             source_names: source_names(scene, job),
             frames: Vec::new(),
-            frame_time: Duration::ZERO,
             size: [0, 0],
             background: [0.0; 3],
             warning: None,
             chosen: None,
         }
+    }
+
+    /// Writes this for the frames that follow, instead of the defaults.
+    pub fn set_outputs(&mut self, outputs: Outputs) {
+        self.outputs = outputs;
+    }
+
+    /// Keeps a journal of finished frames, and continues an earlier start of the same run in this folder: returns the
+    /// names of the targets that need not be rendered again. One target always remains. `run` is any text that differs for
+    /// runs that would write different frames. Nothing is written yet.
+    ///
+    /// # Errors
+    /// [`WriteError::Io`] if there is a journal that cannot be read.
+    pub fn resume(&mut self, run: &str) -> Result<BTreeSet<String>, WriteError> {
+        let (journal, mut finished) = Journal::open(&self.folder, run)?;
+        finished.retain(|earlier| self.target_names.contains(&earlier.frame.target));
+        if finished.len() == self.target_names.len() {
+            // The run's background and size are known from a frame.
+            finished.pop();
+        }
+        self.journal = Some(journal);
+        self.continued = finished.len();
+        self.frames = finished.into_iter().map(|earlier| earlier.frame).collect();
+        Ok(self.frames.iter().map(|frame| frame.target.clone()).collect())
     }
 
     /// The frames that follow are of a scheme and settings that were chosen for the scene: they replace the weighting, and each
@@ -96,28 +152,85 @@ impl RunWriter {
     /// # Errors
     /// [`WriteError`].
     pub fn write(&mut self, sources: &SourceImages, frame: &Frame) -> Result<(), WriteError> {
-        if self.frames.is_empty() {
-            remove_if_there(&self.folder.join(RECORD))?;
+        if self.frames.len() == self.continued {
+            self.begin()?;
         }
         let name = &frame.target.name;
-        write_png(&self.file(name, ""), &DynamicImage::ImageRgb8(frame.picture.clone()))?;
-        match depth_map(frame) {
-            Some(map) => write_png(&self.file(name, "_depth"), &DynamicImage::ImageLuma16(map))?,
-            // One of an earlier run would belong to another picture.
-            None => remove_if_there(&self.file(name, "_depth"))?,
+        let size = [frame.picture.width(), frame.picture.height()];
+        let mut files = vec![format!("{name}.png")];
+        let picture = match self.outputs.alpha {
+            true => DynamicImage::ImageRgba8(without_background(&frame.colours, size, sources.background)),
+            false => DynamicImage::ImageRgb8(frame.picture.clone()),
+        };
+        write_png(&self.folder.join(&files[0]), &picture)?;
+        let depths: Vec<f32> = frame.depths.iter().map(|depth| self.space.file_length(*depth)).collect();
+        for format in DepthFormat::ALL {
+            let file = format!("{name}_depth.{format}");
+            let path = self.folder.join(&file);
+            if !frame.depths.is_empty() && self.outputs.depths.contains(format) {
+                write_depth(&path, *format, &depths, size)?;
+                files.push(file);
+            } else {
+                // One of an earlier run would belong to another picture.
+                remove_if_there(&path)?;
+            }
         }
-        match confidence_map(frame) {
-            Some(map) => write_png(&self.file(name, "_confidence"), &DynamicImage::ImageLuma8(map))?,
-            None => remove_if_there(&self.file(name, "_confidence"))?,
+        let sheet = self.outputs.sheet.then(|| DynamicImage::ImageRgb8(self.sheet(sources, frame)));
+        let confidences = confidence_map(frame).map(DynamicImage::ImageLuma8);
+        for (what, picture) in [("confidence", confidences), ("sheet", sheet)] {
+            let file = format!("{name}_{what}.png");
+            let path = self.folder.join(&file);
+            match picture {
+                Some(picture) => {
+                    write_png(&path, &picture)?;
+                    files.push(file);
+                }
+                None => remove_if_there(&path)?,
+            }
         }
-        write_png(&self.file(name, "_sheet"), &DynamicImage::ImageRgb8(self.sheet(sources, frame)))?;
-        self.frame_time += frame.time;
-        self.size = [frame.picture.width(), frame.picture.height()];
+        self.size = size;
         self.background = sources.background;
         self.warning.clone_from(&sources.warning);
         let expected = self.chosen.as_ref().and_then(|chosen| chosen.expected(frame));
-        self.frames.push(FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.space) });
+        let record = FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.space) };
+        if let Some(journal) = &mut self.journal {
+            journal.add(&FinishedFrame { frame: record.clone(), files })?;
+        }
+        self.frames.push(record);
         Ok(())
+    }
+
+    /// Before the first file: what an earlier run left, and what would be wrong for the new pictures, goes.
+    fn begin(&mut self) -> Result<(), WriteError> {
+        let record = self.folder.join(RECORD);
+        if record.is_file() {
+            for format in VideoFormat::ALL {
+                remove_if_there(&self.folder.join(format!("video.{format}")))?;
+            }
+            remove_if_there(&record)?;
+        }
+        match &mut self.journal {
+            Some(journal) => journal.begin(),
+            None => remove_if_there(&self.folder.join(JOURNAL)),
+        }
+    }
+
+    /// Writes the pictures of all targets, which are there, as `video.FORMAT`; returns its path. For before the record.
+    ///
+    /// # Errors
+    /// [`VideoError`].
+    pub fn write_video(
+        &self,
+        format: VideoFormat,
+        rate: FrameRate,
+        progress: &dyn Progress,
+    ) -> Result<PathBuf, VideoError> {
+        let path = self.folder.join(format!("video.{format}"));
+        let frames: Vec<PathBuf> =
+            self.target_names.iter().map(|name| self.folder.join(format!("{name}.png"))).collect();
+        let background = self.background.map(|value| (value * 255.0).round() as u8);
+        write_video(&path, format, &frames, rate, background, progress)?;
+        Ok(path)
     }
 
     /// Writes the record.
@@ -125,7 +238,7 @@ impl RunWriter {
     /// # Errors
     /// [`WriteError`].
     pub fn finish(
-        self,
+        mut self,
         renderer: &dyn Renderer,
         options: &RenderOptions,
         finished: Finished,
@@ -134,6 +247,9 @@ impl RunWriter {
         let Finished { costs, record } = finished;
         let Circumstances { program, device_reason, model, exact, seed, open_time, total_time } = circumstances;
         let path = self.folder.join(RECORD);
+        let place = |frame: &FrameRecord| self.target_names.iter().position(|name| *name == frame.target);
+        self.frames.sort_by_key(place);
+        let frame_time = Duration::from_secs_f64(self.frames.iter().map(|frame| frame.seconds).sum());
         let record = RunRecord {
             viewfuse: program,
             scene: self.scene,
@@ -155,19 +271,18 @@ impl RunWriter {
             sources: self.source_names,
             memory_estimate: record.memory_estimate,
             near_far: record.near_far.map(|bounds| bounds.map(|depth| self.space.file_length(depth))),
-            times: times_record(open_time, costs, self.frame_time, total_time),
+            times: times_record(open_time, costs, frame_time, total_time),
             kernels: kernel_records(&renderer.kernel_times()),
             transfers: renderer.transfers().into(),
+            depth_units: DepthUnits::ALL,
+            continued: self.continued,
             frames: self.frames,
         };
         let json = serde_json::to_vec_pretty(&record)
             .map_err(|cause| WriteError::Encode { path: path.clone(), cause: cause.into() })?;
         write_whole(&path, &json)?;
+        self.journal.map_or(Ok(()), Journal::remove)?;
         Ok(record)
-    }
-
-    fn file(&self, target: &str, what: &str) -> PathBuf {
-        self.folder.join(format!("{target}{what}.png"))
     }
 
     /// The contact sheet of a frame.
@@ -198,15 +313,4 @@ pub fn confidence_map(frame: &Frame) -> Option<ImageBuffer<Luma<u8>, Vec<u8>>> {
     let (width, height) = frame.picture.dimensions();
     let confidence = |x: u32, y: u32| Luma([(frame.confidences[(y * width + x) as usize] * 255.0).round() as u8]);
     Some(ImageBuffer::from_fn(width, height, confidence))
-}
-
-/// A frame's depths in steps of [`depth_step`]; `None` for fields without depths.
-pub fn depth_map(frame: &Frame) -> Option<ImageBuffer<Luma<u16>, Vec<u16>>> {
-    if frame.depths.is_empty() {
-        return None;
-    }
-    let (width, height) = frame.picture.dimensions();
-    let step = depth_step(&frame.depths);
-    let depth = |x: u32, y: u32| Luma([(frame.depths[(y * width + x) as usize] / step).round() as u16]);
-    Some(ImageBuffer::from_fn(width, height, depth))
 }

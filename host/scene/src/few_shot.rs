@@ -4,9 +4,12 @@
 //! included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
 //! either to take every `STEP`-th.
 
+use crate::path::{CameraPath, NamedCamera, generated, numbered};
 use crate::rig::{Rig, spread};
-use crate::{Scene, Split, View};
-use viewfuse_core::camera::{Camera, Pinhole};
+use crate::{Scene, SceneError, Split, View};
+use std::collections::HashSet;
+use std::path::PathBuf;
+use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
 use viewfuse_weighting::sources::MOST_SOURCES;
 
@@ -85,6 +88,35 @@ pub enum SelectionError {
         /// What was wrong with an orbit camera.
         error: PoseError,
     },
+    /// The way between two views is no path of cameras.
+    #[error("{scene}: there is no way between '{first}' and '{last}': {error}")]
+    NoWay {
+        /// The scene's path.
+        scene: String,
+        /// Name of a view.
+        first: String,
+        /// Name of another.
+        last: String,
+        /// What was wrong with a camera between them.
+        error: PoseError,
+    },
+    /// The cameras do not look the same way, or are all in one place.
+    #[error("{scene}: its cameras span no spiral, which is for cameras side by side that look the same way")]
+    NoSpiral {
+        /// The scene's path.
+        scene: String,
+    },
+    /// A camera path could not be read.
+    #[error(transparent)]
+    Path(#[from] SceneError),
+    /// A camera of a path has the name of a chosen target.
+    #[error("{scene}: two targets are called '{name}'")]
+    SameName {
+        /// The scene's path.
+        scene: String,
+        /// The name.
+        name: String,
+    },
 }
 
 /// A camera to render, with its truth if the scene has it.
@@ -105,6 +137,28 @@ pub struct FewShot {
     pub sources: Vec<usize>,
     /// Target cameras.
     pub targets: Vec<Target>,
+    /// Frames per second, if the targets are from a file that states them.
+    pub frames_per_second: Option<f64>,
+}
+
+/// Targets that are cameras along a path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum PathChoice {
+    /// This many cameras on a circle around what the sources look at, named `orbit-000` and so on.
+    Orbit(usize),
+    /// The way from a view to another, both included, named `between-000` and so on.
+    Between {
+        /// Name of the first view.
+        first: String,
+        /// Name of the last one.
+        last: String,
+        /// Number of cameras.
+        count: usize,
+    },
+    /// This many cameras on a spiral in front of what the sources look at, named `spiral-000` and so on.
+    Spiral(usize),
+    /// The cameras of a file.
+    File(PathBuf),
 }
 
 /// The requested sources and targets.
@@ -112,8 +166,8 @@ pub struct FewShot {
 pub struct Selection {
     /// `--targets`.
     pub targets: Option<String>,
-    /// `--orbit`: this many cameras on a circle.
-    pub orbit: Option<usize>,
+    /// Targets that are cameras along a path.
+    pub path: Option<PathChoice>,
     /// `--sources`; otherwise every view with a photograph that is not a target.
     pub sources: Option<String>,
     /// `--views`: at most this many of the sources, spread as far apart as possible.
@@ -121,25 +175,33 @@ pub struct Selection {
 }
 
 impl Selection {
-    /// Sources and targets for a render. Without `--targets` and `--orbit` the targets are the scene's target poses.
+    /// Sources and targets for a render. Without targets and a path, the targets are the scene's target poses.
     ///
     /// # Errors
     /// [`SelectionError`]; `least_sources` is the number that the field requires.
     pub fn resolve(&self, scene: &Scene, least_sources: usize) -> Result<FewShot, SelectionError> {
         let target_views = match &self.targets {
             Some(list) => view_list(scene, list)?,
-            None if self.orbit.is_some() => Vec::new(),
+            None if self.path.is_some() => Vec::new(),
             None => (0..scene.views.len()).filter(|&view| scene.views[view].image.is_none()).collect(),
         };
         let sources = self.sources_without(scene, &target_views, least_sources)?;
         let mut targets: Vec<Target> = target_views.iter().map(|&view| target_of(scene, view)).collect();
-        if let Some(count) = self.orbit {
-            targets.extend(orbit(scene, &sources, count)?);
+        let mut frames_per_second = None;
+        if let Some(choice) = &self.path {
+            let path = along(choice, scene, &sources)?;
+            frames_per_second = path.frames_per_second;
+            let target = |own: NamedCamera| Target { name: own.name, camera: own.camera, truth: None };
+            targets.extend(path.cameras.into_iter().map(target));
         }
         if targets.is_empty() {
             return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() });
         }
-        Ok(FewShot { sources, targets })
+        let mut seen = HashSet::new();
+        if let Some(Target { name, .. }) = targets.iter().find(|target| !seen.insert(target.name.as_str())) {
+            return Err(SelectionError::SameName { scene: scene.path.display().to_string(), name: name.clone() });
+        }
+        Ok(FewShot { sources, targets, frames_per_second })
     }
 
     /// The source views when `targets` are rendered.
@@ -195,19 +257,22 @@ pub fn target_of(scene: &Scene, view: usize) -> Target {
     Target { name: name.clone(), camera: *camera, truth: image.is_some().then_some(view) }
 }
 
+/// The view of a name or number.
+fn view_of(scene: &Scene, name: &str) -> Result<usize, SelectionError> {
+    scene.view_named(name).ok_or_else(|| SelectionError::NoSuchView {
+        scene: scene.path.display().to_string(),
+        name: name.to_owned(),
+        first: scene.views.first().map(|view| view.name.clone()).unwrap_or_default(),
+        last: scene.views.last().map(|view| view.name.clone()).unwrap_or_default(),
+    })
+}
+
 /// The views that a list names, in the order of the scene, each once.
 ///
 /// # Errors
 /// [`SelectionError::NoSuchView`], [`SelectionError::BadStep`] or [`SelectionError::BadRange`].
 pub fn view_list(scene: &Scene, list: &str) -> Result<Vec<usize>, SelectionError> {
-    let find = |name: &str| {
-        scene.view_named(name).ok_or_else(|| SelectionError::NoSuchView {
-            scene: scene.path.display().to_string(),
-            name: name.to_owned(),
-            first: scene.views.first().map(|view| view.name.clone()).unwrap_or_default(),
-            last: scene.views.last().map(|view| view.name.clone()).unwrap_or_default(),
-        })
-    };
+    let find = |name: &str| view_of(scene, name);
     let mut chosen = Vec::new();
     for item in list.split(',').map(str::trim).filter(|item| !item.is_empty()) {
         // A view may be called `a/b`: only an item that is not a name is split.
@@ -256,15 +321,35 @@ fn part_named(scene: &Scene, text: &str) -> Option<Vec<usize>> {
     (!views.is_empty()).then_some(views)
 }
 
-fn orbit(scene: &Scene, sources: &[usize], count: usize) -> Result<Vec<Target>, SelectionError> {
+/// The cameras of a path for these sources.
+fn along(choice: &PathChoice, scene: &Scene, sources: &[usize]) -> Result<CameraPath, SelectionError> {
+    let scene_name = || scene.path.display().to_string();
     let cameras: Vec<Camera> = sources.iter().map(|&view| scene.views[view].camera).collect();
-    let pinhole: Pinhole = cameras[0].pinhole;
-    let orbit = Rig::of(&cameras)
-        .orbit(&cameras, pinhole, count)
-        .map_err(|error| SelectionError::NoOrbit { scene: scene.path.display().to_string(), error })?;
-    Ok(orbit
-        .into_iter()
-        .enumerate()
-        .map(|(frame, camera)| Target { name: format!("orbit-{frame:03}"), camera, truth: None })
-        .collect())
+    let pinhole = cameras[0].pinhole;
+    let (what, cameras) = match choice {
+        PathChoice::File(file) => return Ok(CameraPath::open(file, scene, &pinhole)?),
+        PathChoice::Orbit(count) => {
+            let orbit = generated::orbit(&cameras, pinhole, *count);
+            ("orbit", orbit.map_err(|error| SelectionError::NoOrbit { scene: scene_name(), error })?)
+        }
+        PathChoice::Between { first, last, count } => {
+            let [first, last] = [view_of(scene, first)?, view_of(scene, last)?].map(|view| &scene.views[view]);
+            let up = Rig::of(&cameras).up;
+            let between = generated::between(&first.camera, &last.camera, up, *count);
+            let failed = |error| SelectionError::NoWay {
+                scene: scene_name(),
+                first: first.name.clone(),
+                last: last.name.clone(),
+                error,
+            };
+            ("between", between.map_err(failed)?)
+        }
+        PathChoice::Spiral(count) => {
+            let bounds: Vec<[f32; 2]> = sources.iter().filter_map(|&view| scene.views[view].near_far).collect();
+            let spiral = generated::spiral(&cameras, pinhole, &bounds, *count);
+            ("spiral", spiral.ok_or_else(|| SelectionError::NoSpiral { scene: scene_name() })?)
+        }
+    };
+    let named = |(index, camera)| NamedCamera { name: numbered(what, index), camera };
+    Ok(CameraPath { cameras: cameras.into_iter().enumerate().map(named).collect(), frames_per_second: None })
 }

@@ -3,10 +3,12 @@
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
+//! numpy         arrays as NumPy's files
 //! scene         a folder of posed photographs, in any layout: Scene, View, Photograph, ScenePoint
 //!               reader: what a layout's reader is, and READERS, all of them
 //! dataset       folders of many scenes: Dataset, Split
-//! rig           the cameras as a whole: focus, up, orbits
+//! rig           the cameras as a whole: focus, up
+//! path          cameras without photographs: from files, or generated
 //! few_shot      which views are sources, which cameras are targets: FewShot
 //! photographs   sources at working size without their background: SourceImages
 //! write         a scene written out, in each layout that can hold it: Layout
@@ -15,6 +17,8 @@
 
 pub mod dataset;
 pub mod few_shot;
+pub mod numpy;
+pub mod path;
 pub mod photographs;
 pub mod rig;
 mod scene;

@@ -3,7 +3,6 @@
 use crate::scene::frame;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::pose::{Pose, PoseError};
 
 /// Cameras seen as one arrangement around a subject. World coordinates and units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,28 +62,6 @@ impl Rig {
         let mut gaps: Vec<f32> = (0..cameras.len()).filter_map(nearest).collect();
         gaps.sort_by(f32::total_cmp);
         gaps.get(gaps.len() / 2).copied()
-    }
-
-    /// `count` cameras on a full circle around the focus, at the mean height and distance of the given ones, all
-    /// looking at the focus with the rig's up direction; frame 0 is on the side of the first camera.
-    ///
-    /// # Errors
-    /// [`PoseError`] if the circle degenerates (all cameras at the focus, or straight above it).
-    pub fn orbit(&self, cameras: &[Camera], pinhole: Pinhole, count: usize) -> Result<Vec<Camera>, PoseError> {
-        let height = cameras.iter().map(|c| (c.pose.centre_world() - self.focus).dot(self.up)).sum::<f32>()
-            / cameras.len().max(1) as f32;
-        let radius = (self.distance * self.distance - height * height).max(0.0).sqrt();
-        let first = cameras.first().map_or(Vec3::X, |c| c.pose.centre_world() - self.focus);
-        let start =
-            (first - self.up * first.dot(self.up)).try_normalize().unwrap_or_else(|| self.up.any_orthonormal_vector());
-        let side = self.up.cross(start);
-        (0..count)
-            .map(|frame| {
-                let angle = std::f32::consts::TAU * frame as f32 / count as f32;
-                let centre = self.focus + self.up * height + (start * angle.cos() + side * angle.sin()) * radius;
-                Ok(Camera { pose: Pose::look_at(centre, self.focus, self.up)?, pinhole })
-            })
-            .collect()
     }
 }
 

@@ -18,14 +18,14 @@ use viewfuse_core::pose::Pose;
 
 mod bytes;
 mod camera_models;
-mod check;
+pub(crate) mod check;
 mod colmap;
 mod error;
 mod fault;
 pub(crate) mod files;
 pub(crate) mod frame;
 mod images;
-mod json;
+pub(crate) mod json;
 mod llff;
 mod masks;
 mod middlebury;
@@ -36,7 +36,7 @@ mod own_files;
 pub mod reader;
 mod split;
 mod srn;
-mod transforms;
+pub(crate) mod transforms;
 mod undistort;
 
 use check::Checked;

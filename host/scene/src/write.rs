@@ -11,7 +11,6 @@ mod colmap;
 mod llff;
 mod middlebury;
 mod neus;
-mod numpy;
 mod photographs;
 mod srn;
 mod transforms;

@@ -7,12 +7,14 @@
 //! spec        the text form, parsed without any file     WeightingSpec, scheme_names, grammar
 //! choice      a scheme or the best for the scene         WeightingChoice, choice_grammar
 //! weighting   ready to weigh                             Weighting, Weigh
+//! select      the few sources that targets need
 //! ```
 
 #![forbid(unsafe_code)]
 
 pub mod attention;
 mod choice;
+pub mod select;
 pub mod sources;
 mod spec;
 mod weighting;

@@ -73,6 +73,12 @@ pub enum WeightingError {
         /// The given text.
         value: String,
     },
+    /// A label that could not stand in a table.
+    #[error("'{label}' is not a label of a weighting: letters, digits, '-', '_', '.' and blanks")]
+    BadLabel {
+        /// The given text.
+        label: String,
+    },
     /// Learned attention without its parameters.
     #[error("weighting scheme '{ATTENTION}' needs a file of parameters: {ATTENTION}:FILE")]
     NoFile,
@@ -120,7 +126,7 @@ impl From<Scheme> for WeightingSpec {
 }
 
 impl fmt::Display for WeightingSpec {
-    /// The text as given.
+    /// The label, or the text as given.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text)
     }
@@ -129,8 +135,23 @@ impl fmt::Display for WeightingSpec {
 impl FromStr for WeightingSpec {
     type Err = WeightingError;
 
-    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not read.
+    /// `NAME`, `NAME:KEY=VALUE[,KEY=VALUE]` or `attention:FILE`; the file is not read. `LABEL=` in front of any of them is
+    /// what it is called in tables and records.
     fn from_str(text: &str) -> Result<WeightingSpec, WeightingError> {
+        // A parameter's `=` comes after the colon.
+        let label = text.split(':').next().and_then(|head| head.split_once('=')).map(|(label, _)| label);
+        if let Some(label) = label {
+            let is_label = |byte: u8| byte.is_ascii_alphanumeric() || b"-_. ".contains(&byte);
+            if label.is_empty() || !label.bytes().all(is_label) {
+                return Err(WeightingError::BadLabel { label: label.to_owned() });
+            }
+            let rest = &text[label.len() + 1..];
+            let spec: WeightingSpec = rest.parse()?;
+            if spec.text != rest {
+                return Err(WeightingError::BadLabel { label: text[..text.len() - spec.text.len()].to_owned() });
+            }
+            return Ok(WeightingSpec { text: label.to_owned(), ..spec });
+        }
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         if name == ATTENTION {
             return match rest {
@@ -270,6 +291,20 @@ mod tests {
             let (spec, meant): (WeightingSpec, WeightingSpec) = (text.parse()?, meant.parse()?);
             assert_eq!(spec.kind, meant.kind, "{text}");
             assert_eq!(spec.to_string(), text);
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn labels_stand_in_front() -> Result<(), WeightingError> {
+        let (spec, meant): (WeightingSpec, WeightingSpec) =
+            ("half=error:alpha=0.5".parse()?, "error:alpha=0.5".parse()?);
+        assert_eq!((spec.to_string().as_str(), &spec.kind), ("half", &meant.kind));
+        let spec: WeightingSpec = "cars=attention:a=b/c:d.safetensors".parse()?;
+        assert_eq!((spec.to_string().as_str(), spec.file()), ("cars", Some(Path::new("a=b/c:d.safetensors"))));
+        // A label has none itself.
+        for wrong in ["=mean", "a/b=mean", "a=b=mean", "a=nothing"] {
+            wrong.parse::<WeightingSpec>().expect_err(wrong);
         }
         Ok(())
     }

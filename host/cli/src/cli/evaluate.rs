@@ -77,6 +77,9 @@ pub(crate) struct Arguments {
     /// Print the tables as JSON
     #[arg(long)]
     json: bool,
+    /// Print the tables as LaTeX, for the package booktabs
+    #[arg(long, conflicts_with = "json")]
+    latex: bool,
     /// Write every single score to this CSV file; with --protocol the folder of the evaluation
     #[arg(short, long, value_name = "PATH")]
     output: Option<PathBuf>,
@@ -116,9 +119,10 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let (mut all, mut json_tables): (Vec<Vec<Score>>, Vec<serde_json::Value>) = (Vec::new(), Vec::new());
     let mut tell = |name: &str, results: &Table| -> anyhow::Result<()> {
         let title = format!("{name}: {}", counted(results.target_count, "target"));
-        match arguments.json {
-            true => json_tables.push(json_of(&title, results)?),
-            false => print_table(&title, results)?,
+        match (arguments.json, arguments.latex) {
+            (true, _) => json_tables.push(json_of(&title, results)?),
+            (_, true) => say(results.latex(&title))?,
+            _ => print_table(&title, results)?,
         }
         Ok(())
     };
@@ -148,7 +152,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
             "viewfuse": env!("CARGO_PKG_VERSION"), "device": device.name(), "options": values, "tables": json_tables,
         });
         say(format_args!("{whole:#}"))?;
-    } else {
+    } else if !arguments.latex {
         say(format_args!("device: {}, {reason}", device.name()))?;
     }
     if let Some(path) = &arguments.output {
@@ -157,7 +161,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
             .zip(&all)
             .flat_map(|(scene, scores)| scores.iter().map(move |score| (vec![scene.display().to_string()], score)));
         write_whole(path, &csv_of(&["scene"], &lines.collect::<Vec<_>>())?)?;
-        if !arguments.json {
+        if !arguments.json && !arguments.latex {
             say(format_args!("{}", path.display()))?;
         }
     }

@@ -46,8 +46,11 @@ fn of_few_shot(error: &SelectionError) -> Option<&'static str> {
     match error {
         SelectionError::TargetIsSource { .. } => Some("remove it from --sources or from --targets"),
         SelectionError::TooManySources { .. } => Some("choose with --sources or --views"),
-        SelectionError::NoTargets { .. } => Some("give --targets NAMES or --orbit N"),
+        SelectionError::NoTargets { .. } => {
+            Some("give --targets NAMES, --orbit N, --between A B, --spiral N or --camera-path FILE")
+        }
         SelectionError::NoOrbit { .. } => Some("give --targets"),
+        SelectionError::NoSpiral { .. } => Some("give --orbit or --between"),
         _ => None,
     }
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::About;
 use viewfuse_field::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
-use viewfuse_scene::few_shot::Selection;
+use viewfuse_scene::few_shot::{PathChoice, Selection};
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
@@ -79,8 +79,8 @@ pub(crate) struct SourceOptions {
 }
 
 impl SourceOptions {
-    pub(crate) fn to_selection(&self, targets: Option<&str>, orbit: Option<usize>) -> Selection {
-        Selection { targets: targets.map(str::to_owned), orbit, sources: self.sources.clone(), view_count: self.views }
+    pub(crate) fn to_selection(&self, targets: Option<&str>, path: Option<PathChoice>) -> Selection {
+        Selection { targets: targets.map(str::to_owned), path, sources: self.sources.clone(), view_count: self.views }
     }
 }
 

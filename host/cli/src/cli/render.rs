@@ -1,13 +1,20 @@
 //! `viewfuse render`.
 
+mod identity;
+mod outputs;
+mod stream;
+
 use super::model::{GENVS, ModelOptions, parse_level};
 use super::options::{DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
-use super::parse::parse_count;
+use super::path::PathOptions;
 use super::terminal::Terminal;
 use super::weighting::choice_help;
 use super::{on_threads, say};
 use clap::Args;
+use identity::run_identity;
+use outputs::OutputOptions;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -16,9 +23,13 @@ use viewfuse_field::Setting;
 use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
+use viewfuse_job::progress::Progress;
 use viewfuse_output::folder::check_folder;
+use viewfuse_output::rate::FrameRate;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
+use viewfuse_output::video::{VideoError, VideoFormat};
+use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_weighting::{Weighting, WeightingChoice};
@@ -27,18 +38,20 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 #[command(after_help = "Examples:\n  \
     viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
     viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with scores\n  \
-    viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n\n\
+    viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n  \
+    viewfuse render photos/ --between 3 7 --frames 120 --video webp,mp4 -o out\n      the way from view 3 to view 7 as a video\n  \
+    viewfuse render photos/ --camera-path camera_path.json -o - | ffplay -\n      a path from nerfstudio's viewer, played as it comes\n\n\
     Writes NAME.png, NAME_depth.png (16 bit; scale in run.json; none with a GeNVS), NAME_confidence.png (8 bit; where the field \
-    tells), NAME_sheet.png for each target, and run.json.")]
+    tells), NAME_sheet.png for each target, and run.json. A run that was interrupted continues where it was when it is started \
+    again. With `-o -` the pictures go to standard output as y4m, and nothing is written.")]
 pub(crate) struct Arguments {
     #[arg(help = scene_help())]
     scene: PathBuf,
     /// Views to render, as for --sources; left out of the sources [default: the scene's target poses]
     #[arg(long, value_name = "VIEWS")]
     targets: Option<String>,
-    /// Render this many views on a circle around the object
-    #[arg(long, value_name = "N", value_parser = parse_count)]
-    orbit: Option<usize>,
+    #[command(flatten)]
+    path: PathOptions,
     #[command(flatten)]
     sources: SourceOptions,
     #[arg(long, value_name = "SCHEME", help = choice_help())]
@@ -56,7 +69,9 @@ pub(crate) struct Arguments {
     /// Seed of every random draw (the training-free field makes none)
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Folder for the results; made if missing
+    #[command(flatten)]
+    outputs: OutputOptions,
+    /// Folder for the results, made if missing; `-` for y4m on standard output
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
 }
@@ -65,7 +80,8 @@ fn scene_help() -> String {
     format!("The scene: {}", looked_for(&READERS))
 }
 
-pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+/// `values` are all options and their values as a person would write them.
+pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
     let weighting = match &arguments.weights {
         Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
@@ -74,23 +90,44 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         Some(WeightingChoice::Auto) | None => None,
     };
     let scene = Scene::open(&arguments.scene)?;
-    keep_folder_apart([&scene], &arguments.output)?;
     let open_time = start.elapsed();
     let field = arguments.model.open(arguments.seed, arguments.reuse)?;
     let about = field.about();
-    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.orbit);
+    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, about.least_sources)?;
     let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
-    check_writable(&arguments.output.join(RECORD))?;
-    check_folder(&arguments.output, &job.targets)?;
+    let rate = arguments.outputs.rate(job.frames_per_second);
+    let is_stream = arguments.output == Path::new("-");
+    if !is_stream {
+        keep_folder_apart([&scene], &arguments.output)?;
+        check_writable(&arguments.output.join(RECORD))?;
+        check_folder(&arguments.output, &job.targets)?;
+    }
     let Chosen { device, reason } = arguments.device.open()?;
+    let renderer = field.on(&device);
+    let renderer = renderer.as_ref();
+    let progress = Terminal::new("rendering");
+    if is_stream {
+        let render = || stream::render_to_stdout(&scene, &job, weighting.as_ref(), renderer, &options, rate, &progress);
+        on_threads(arguments.picture.threads, render)??;
+        return Ok(ExitCode::SUCCESS);
+    }
     let label = arguments.scene.display().to_string();
     let before = weighting.clone().unwrap_or_else(Weighting::default_scheme);
     let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &before);
-    let renderer = field.on(&device);
-    let renderer = renderer.as_ref();
-    let record = on_threads(arguments.picture.threads, || -> anyhow::Result<RunRecord> {
-        let progress = Terminal::new("rendering");
+    writer.set_outputs(arguments.outputs.outputs());
+    let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).collect();
+    // With `reuse` a frame depends on the one before.
+    let job = match arguments.reuse {
+        None => {
+            let run = run_identity(values, &device.name(), &scene, &job, &files)?;
+            let finished = writer.resume(&run)?;
+            let is_left = |target: &Target| !finished.contains(&target.name);
+            FewShot { targets: job.targets.into_iter().filter(is_left).collect(), ..job }
+        }
+        Some(_) => job,
+    };
+    let (record, videos) = on_threads(arguments.picture.threads, || -> anyhow::Result<(RunRecord, Vec<String>)> {
         let finished = match &weighting {
             Some(weighting) => {
                 let write = |sources: &SourceImages, frame: Frame| anyhow::Ok(writer.write(sources, &frame)?);
@@ -104,6 +141,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
                 auto::render(&scene, &job, renderer, &options, &progress, write)?.0
             }
         };
+        let videos = videos(&writer, &arguments.outputs.video, rate, &progress)?;
         let circumstances = Circumstances {
             program: env!("CARGO_PKG_VERSION"),
             device_reason: reason,
@@ -113,10 +151,33 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             open_time,
             total_time: start.elapsed(),
         };
-        Ok(writer.finish(renderer, &options, finished, circumstances)?)
+        Ok((writer.finish(renderer, &options, finished, circumstances)?, videos))
     })??;
+    drop(progress);
     print(&record, &arguments.output)?;
+    videos.iter().try_for_each(say)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Writes the pictures as videos; returns a line about each.
+fn videos(
+    writer: &RunWriter,
+    formats: &[VideoFormat],
+    rate: FrameRate,
+    progress: &dyn Progress,
+) -> anyhow::Result<Vec<String>> {
+    let mut lines = Vec::new();
+    for format in formats {
+        progress.stage(&format!("writing video.{format}"), 1, 1);
+        match writer.write_video(*format, rate, progress) {
+            Err(error @ VideoError::NoProgram) => {
+                let path = writer.write_video(VideoFormat::Y4m, rate, progress)?;
+                lines.push(format!("{}: instead of mp4: {error}", path.display()));
+            }
+            written => lines.push(written?.display().to_string()),
+        }
+    }
+    Ok(lines)
 }
 
 /// Prints the summary of a run.
@@ -133,6 +194,9 @@ fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
         record.device,
         record.times.total
     ))?;
+    if record.continued > 0 {
+        say(format_args!("continued: {} of them were there", record.continued))?;
+    }
     if let Some(chosen) = &record.chosen {
         say(format_args!("{}", choice(chosen, &record.weighting)))?;
     }

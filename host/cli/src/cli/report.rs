@@ -31,6 +31,15 @@ pub(crate) struct Arguments {
     output: PathBuf,
 }
 
+/// `640 bytes`, `38 kB`, `2.4 MB`.
+fn size_words(bytes: usize) -> String {
+    match bytes {
+        0..=999 => format!("{bytes} bytes"),
+        1000..=999_499 => format!("{:.0} kB", bytes as f64 / 1.0e3),
+        _ => format!("{:.1} MB", bytes as f64 / 1.0e6),
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     check_writable(&arguments.output)?;
     let Arguments { evaluations, pareto, training, output, .. } = arguments;
@@ -43,6 +52,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     };
     let page = page(&report)?;
     write_whole(&arguments.output, page.as_bytes())?;
-    say(format_args!("{}: {:.1} MB", arguments.output.display(), page.len() as f64 / 1.0e6))?;
+    say(format_args!("{}: {}", arguments.output.display(), size_words(page.len())))?;
     Ok(ExitCode::SUCCESS)
 }

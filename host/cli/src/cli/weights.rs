@@ -1,6 +1,7 @@
 //! `viewfuse weights`.
 
 use super::options::SourceOptions;
+use super::path::PathOptions;
 use super::say;
 use super::table::table;
 use super::weighting::{many_help, open_all, or_every_scheme};
@@ -8,76 +9,103 @@ use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_core::sources::Sources;
+use viewfuse_job::files::write_whole;
+use viewfuse_output::weights::WeightTable;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_weighting::WeightingSpec;
-use viewfuse_weighting::sources::MOST_SOURCES;
 
 #[derive(Args)]
-#[command(after_help = "Example:\n  viewfuse weights dino/ --target 4 --weights error:alpha=0.5 --json")]
+#[command(after_help = "Examples:\n  viewfuse weights dino/ --target 4 --weights error:alpha=0.5 --json\n  \
+    viewfuse weights dino/ --orbit 36 --weights mean --weights cars=attention:cars.safetensors --csv\n  \
+    viewfuse weights dino/ --targets all/4 --npy weights.npy\n\n\
+    CSV has a line for each scheme, target and source. The array is [scheme][target][source]; what its indices mean is printed as \
+    JSON.")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
-    /// The target view
-    #[arg(long, value_name = "VIEW")]
-    target: String,
+    /// The target views, as for --sources [default: the scene's target poses]
+    #[arg(long, alias = "target", value_name = "VIEWS")]
+    targets: Option<String>,
+    #[command(flatten)]
+    path: PathOptions,
     #[command(flatten)]
     sources: SourceOptions,
     #[arg(long, value_name = "SCHEME", help = many_help())]
     weights: Vec<WeightingSpec>,
-    /// Print JSON instead of a table
+    /// Print JSON instead of tables: an object for one target, a list of them for several
     #[arg(long)]
     json: bool,
+    /// Print CSV instead of tables
+    #[arg(long, conflicts_with = "json")]
+    csv: bool,
+    /// Write an array for NumPy to this file, and print what its indices mean
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["json", "csv"])]
+    npy: Option<PathBuf>,
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let weightings = open_all(&or_every_scheme(&arguments.weights)?)?;
     let scene = Scene::open(&arguments.scene)?;
-    let job = arguments.sources.to_selection(Some(&arguments.target), None).resolve(&scene, 1)?;
-    let poses: Vec<_> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();
-    let sources = Sources::<MOST_SOURCES>::new(&poses)?;
-    let mut documents = Vec::new();
-    for target in &job.targets {
-        let columns: Vec<(String, Vec<f32>)> = weightings
-            .iter()
-            .map(|weighting| {
-                let weights = weighting.weigh(&sources, &target.camera.pose);
-                (weighting.to_string(), weights.values()[..job.sources.len()].to_vec())
-            })
-            .collect();
-        if arguments.json {
-            documents.push(as_json(&scene, &job, target, &columns));
-        } else {
-            print_table(&scene, &job, target, &columns)?;
-        }
-    }
+    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
+    let job = selection.resolve(&scene, 1)?;
+    let weights = WeightTable::of(&scene, &job, &weightings)?;
     if arguments.json {
+        let mut documents = weights.documents();
         // One target is the rule; several become a list.
-        let document = if documents.len() == 1 { documents.remove(0) } else { documents.into() };
-        say(format_args!("{}", serde_json::to_string_pretty(&document)?))?;
+        let text = match documents.len() {
+            1 => serde_json::to_string_pretty(&documents.remove(0))?,
+            _ => serde_json::to_string_pretty(&documents)?,
+        };
+        say(text)?;
+    } else if arguments.csv {
+        say(csv_of(&weights)?.trim_end_matches('\n'))?;
+    } else if let Some(path) = &arguments.npy {
+        write_whole(path, &weights.npy())?;
+        let axes = json!({
+            "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets, "sources": weights.sources,
+        });
+        say(format_args!("{axes:#}"))?;
+    } else {
+        for (index, target) in job.targets.iter().enumerate() {
+            print_table(&scene, &job, target, &weights, index)?;
+        }
     }
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Vec<f32>)]) -> serde_json::Value {
-    let sources: Vec<&str> = job.sources.iter().map(|&view| scene.views[view].name.as_str()).collect();
-    let weights: serde_json::Map<String, serde_json::Value> =
-        columns.iter().map(|(name, values)| (name.clone(), json!(values))).collect();
-    json!({ "scene": scene.path, "target": target.name, "sources": sources, "weights": weights })
+/// A line for each scheme, target and source.
+fn csv_of(weights: &WeightTable) -> anyhow::Result<String> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(["scheme", "target", "source", "weight"])?;
+    for (scheme, scheme_name) in weights.schemes.iter().enumerate() {
+        for (target, target_name) in weights.targets.iter().enumerate() {
+            for (source, weight) in weights.sources.iter().zip(weights.weights(scheme, target)) {
+                writer.write_record([scheme_name, target_name, source, &weight.to_string()])?;
+            }
+        }
+    }
+    Ok(String::from_utf8(writer.into_inner()?)?)
 }
 
-fn print_table(scene: &Scene, job: &FewShot, target: &Target, columns: &[(String, Vec<f32>)]) -> std::io::Result<()> {
+fn print_table(
+    scene: &Scene,
+    job: &FewShot,
+    target: &Target,
+    weights: &WeightTable,
+    index: usize,
+) -> std::io::Result<()> {
     let lead = ["source".to_owned(), "distance".to_owned(), "angle".to_owned()];
     // Parameters go below the name, so that the table stays narrow.
-    let names = columns.iter().map(|(name, _)| name.replace(':', "\n").replace(',', ",\n").replace('-', "-\n"));
+    let names = weights.schemes.iter().map(|name| name.replace(':', "\n").replace(',', ",\n").replace('-', "-\n"));
     let mut rows = table(lead.into_iter().chain(names));
     for (row, &view) in job.sources.iter().enumerate() {
         let (source, pose) = (&scene.views[view], target.camera.pose);
         let distance = source.camera.pose.distance(&pose);
         let angle = source.camera.pose.axis_angle(&pose).to_degrees();
         let lead = [source.name.clone(), format!("{distance:.3}"), format!("{angle:.1}\u{b0}")];
-        rows.add_row(lead.into_iter().chain(columns.iter().map(|(_, values)| format!("{:.4}", values[row]))));
+        let of = |scheme| format!("{:.4}", weights.weights(scheme, index)[row]);
+        rows.add_row(lead.into_iter().chain((0..weights.schemes.len()).map(of)));
     }
     say(format_args!("{}: target {}, {} sources", scene.path.display(), target.name, job.sources.len()))?;
     say(format_args!("{rows}"))

@@ -55,6 +55,14 @@ impl Evaluation {
         }
     }
 
+    /// Its heading in the contents, with its field and network.
+    pub(super) fn entry(&self) -> String {
+        let Settings { field, options, .. } = &self.settings;
+        let network = options.get("model").map(|model| model.rsplit(['/', '\\']).next().unwrap_or(model));
+        let network = network.map_or(String::new(), |network| format!(" {network}"));
+        format!("{}: {field}{network}", self.title())
+    }
+
     pub(super) fn section(&self, id: &str) -> Result<Markup, ReportError> {
         let Settings { protocol, field, job_count, notes, scenes, options, .. } = &self.settings;
         let network = options.get("model").map_or(String::new(), |model| format!(" {model}"));
@@ -85,6 +93,7 @@ impl Evaluation {
                 @if !self.shown.is_empty() {
                     h3 { "Pictures" }
                     p.legend { "Bars are the weights of the sources, in their order, on one scale." }
+                    p.legend { (pictures::error_legend()) }
                     @for shown in &self.shown { (pictures::comparison(&self.folder, shown)?) }
                 }
                 @if !notes.is_empty() {

@@ -16,7 +16,7 @@ pub fn page(report: &Report) -> Result<String, ReportError> {
     let mut sections: Vec<(String, Markup)> = Vec::new();
     let id = |sections: &Vec<_>| format!("section-{}", sections.len() + 1);
     for evaluation in evaluations {
-        sections.push((evaluation.title().to_owned(), evaluation.section(&id(&sections))?));
+        sections.push((evaluation.entry(), evaluation.section(&id(&sections))?));
     }
     for sweep in sweeps {
         sections.push((sweep.title(), sweep.section(&id(&sections))?));

@@ -4,11 +4,41 @@ use super::{ReportError, counted, data_address};
 use crate::PSNR;
 use crate::gallery::{self, Shown, ShownScheme};
 use crate::summary::Metric;
+use image::{ImageFormat, RgbImage};
 use maud::{Markup, html};
+use std::io::Cursor;
 use std::path::Path;
+use viewfuse_output::sheet::error_map;
+use viewfuse_scene::read_picture;
 
 /// Width and height of a bar of weights, in units of the figure.
 const BAR: [f32; 2] = [8.0, 22.0];
+
+/// What the colours of error maps mean.
+pub(super) fn error_legend() -> Markup {
+    html! {
+        span.scale aria-hidden="true" {}
+        " Below each picture its error: white where it is equal to the photograph, through red to black at a mean difference of a \
+         quarter of the range, and above."
+    }
+}
+
+/// A picture of the folder, as pixels.
+fn pixels(folder: &Path, file: &str) -> Result<RgbImage, ReportError> {
+    Ok(read_picture(&gallery::picture_path(folder, file)?)?.into_rgb8())
+}
+
+/// The error map of a picture as a data URL; none if it has another size than the truth.
+fn error_address(folder: &Path, file: &str, truth: &RgbImage) -> Result<Option<String>, ReportError> {
+    let picture = pixels(folder, file)?;
+    if picture.dimensions() != truth.dimensions() {
+        return Ok(None);
+    }
+    let mut bytes = Cursor::new(Vec::new());
+    let written = error_map(&picture, truth).write_to(&mut bytes, ImageFormat::Png);
+    written.map_err(|cause| ReportError::Figure(cause.to_string()))?;
+    Ok(Some(data_address("image/png", bytes.get_ref())))
+}
 
 /// The pictures of a target.
 pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportError> {
@@ -18,13 +48,22 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
     let predictions: Vec<String> =
         shown.schemes.iter().map(|scheme| picture(&scheme.file)).collect::<Result<_, _>>()?;
     let truth = picture(&shown.truth)?;
+    let truth_pixels = pixels(folder, &shown.truth)?;
+    let error = |file: &str| error_address(folder, file, &truth_pixels);
+    let errors: Vec<Option<String>> =
+        shown.schemes.iter().map(|scheme| error(&scheme.file)).collect::<Result<_, _>>()?;
+    let copy = match &shown.copy {
+        Some(copy) => Some((copy, picture(&copy.file)?, error(&copy.file)?)),
+        None => None,
+    };
     let heaviest = shown.schemes.iter().flat_map(|scheme| &scheme.weights).copied().fold(0.0, f32::max);
     let metric = Metric::named(PSNR);
     let psnr = |scheme: &ShownScheme| {
         scheme.values.iter().find(|(name, _)| name == PSNR).map(|(_, value)| value.unwrap_or(f64::INFINITY))
     };
     // The best as it is written.
-    let best = shown.schemes.iter().filter_map(psnr).fold(f64::NEG_INFINITY, f64::max);
+    let copied = shown.copy.as_ref().and_then(|copy| copy.psnr);
+    let best = shown.schemes.iter().filter_map(psnr).chain(copied).fold(f64::NEG_INFINITY, f64::max);
     let marked = |value: f64| {
         if metric.text(value) == metric.text(best) {
             html! { b { (metric.text(value)) } }
@@ -42,9 +81,20 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
             }
             div.predictions {
                 figure.truth { img src=(truth) alt="the photograph at the target"; figcaption { "truth" } }
-                @for (scheme, address) in shown.schemes.iter().zip(&predictions) {
+                @if let Some((copy, address, error)) = &copy {
+                    figure {
+                        img src=(address) alt={ "copy of the nearest source, " (copy.source) };
+                        @if let Some(error) = error { img.error src=(error) alt="its error"; }
+                        figcaption {
+                            "nearest copy"
+                            @if let Some(psnr) = copy.psnr { br; (marked(psnr)) " dB" }
+                        }
+                    }
+                }
+                @for ((scheme, address), error) in shown.schemes.iter().zip(&predictions).zip(&errors) {
                     figure {
                         img src=(address) alt={ "prediction with " (scheme.scheme) };
+                        @if let Some(error) = error { img.error src=(error) alt={ "error with " (scheme.scheme) }; }
                         (bars(&scheme.weights, heaviest))
                         figcaption {
                             (breakable(&scheme.scheme))

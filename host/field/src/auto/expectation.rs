@@ -9,7 +9,7 @@
 
 use super::geometry::Standing;
 use super::leave_out::Outcome;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// `c0` to `c3`. Least squares over 111 targets of 16 scenes ( fern, fox, cup, herz_jesus_p8, dtu_scan65, dino, three
 /// torcs_cars; the rooms, gardens and the lorry of `viewfuse-synthetic`) from 3 to 12 sources, at longest sides of 128 and 320
@@ -25,7 +25,7 @@ const DEVIATIONS_OF_80: f64 = 1.2816;
 pub const TERMS: usize = 4;
 
 /// An expected score, decibels.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Expected {
     /// The centre of the interval.
     pub psnr: f64,

@@ -3,7 +3,7 @@
 
 mod bounds;
 
-use crate::{Encoding, FieldError, Prepared, Rendered, Request};
+use crate::{DepthMap, Encoding, FieldError, Prepared, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::visual_hull::ray_marching::MarchBlock;
@@ -181,6 +181,17 @@ impl<D: Device> Prepared for Views<'_, D> {
             device.pick_depth(&sweep, first, kept, object, views, &means, entries, first_guess, maps)?;
         }
         Ok(())
+    }
+
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        let depths = self.depths.as_ref().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
+        let maps = self.device.download(&depths.maps)?;
+        let map = |camera: &CameraBlock| {
+            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+            let depths = own.map(|depth| if *depth < NO_SURFACE { *depth } else { 0.0 }).collect();
+            DepthMap { camera: CameraBlock { first_texel: 0, ..*camera }, depths, confidences: Vec::new() }
+        };
+        Ok(self.scene.cameras.iter().map(map).collect())
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {

@@ -11,7 +11,7 @@ mod search;
 
 use super::exposure;
 use super::space::Space;
-use crate::{Encoding, FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
+use crate::{DepthMap, Encoding, FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::plane_sweep::blend::BlendBlock;
@@ -245,6 +245,21 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn surfaces(&self) -> Surfaces {
         self.space.surfaces()
+    }
+
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        let maps = self.device.download(&self.disparities)?;
+        let map = |(camera, step): (&CameraBlock, &f32)| {
+            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+            // Below half a step a disparity is that of the farthest plane: it bounds nothing.
+            let depth = |disparity: f32| if *step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
+            DepthMap {
+                camera: CameraBlock { first_texel: 0, ..*camera },
+                depths: own.clone().map(|[disparity, _]| depth(*disparity)).collect(),
+                confidences: own.map(|[_, confidence]| *confidence).collect(),
+            }
+        };
+        Ok(self.matched.cameras.iter().zip(&self.steps).map(map).collect())
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {

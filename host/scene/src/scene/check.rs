@@ -73,6 +73,13 @@ pub(super) fn scene(found: &Path, form: &'static str, raw: RawScene) -> Result<C
     Ok(Checked { views, points, warnings, frame })
 }
 
+/// The camera of a view without a photograph, in the world of a scene that is open; `pinhole` is that of a view without
+/// intrinsics.
+pub(crate) fn camera_in(raw: &RawView, pinhole: &Pinhole, frame: &SceneFrame) -> Result<Camera, SceneError> {
+    let pinhole = raw.intrinsics.as_ref().map_or(Ok(*pinhole), |intrinsics| pinhole_of(intrinsics, None))?;
+    Ok(Camera { pose: pose(&raw.pose, frame)?, pinhole })
+}
+
 /// Depths of a view in world units.
 fn near_far(raw: &RawView, frame: &SceneFrame) -> Result<Option<[f32; 2]>, SceneError> {
     let Some([near, far]) = raw.near_far else { return Ok(None) };
@@ -226,7 +233,7 @@ fn pinhole(
 }
 
 /// A width and a height from numbers of a file.
-pub(super) fn size(path: &Path, place: Place, width: f64, height: f64) -> Result<[u32; 2], SceneError> {
+pub(crate) fn size(path: &Path, place: Place, width: f64, height: f64) -> Result<[u32; 2], SceneError> {
     let whole = |side: f64| (1.0..=f64::from(1u32 << 20)).contains(&side) && side.fract() == 0.0;
     if whole(width) && whole(height) {
         return Ok([width as u32, height as u32]);

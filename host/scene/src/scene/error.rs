@@ -37,6 +37,48 @@ pub enum SceneError {
         /// The layouts that the readers recognise.
         looked_for: String,
     },
+    /// A file that is no camera path.
+    #[error("{path}: no camera path; looked for {looked_for}")]
+    UnknownCameraPath {
+        /// The file.
+        path: PathBuf,
+        /// What such files look like.
+        looked_for: &'static str,
+    },
+    /// A camera path without cameras.
+    #[error("{path}: the path has no cameras")]
+    NoCameras {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A column of a table of poses is missing, unknown, or there twice.
+    #[error("{path}{place}: {problem}; the columns are {columns}")]
+    Columns {
+        /// The file.
+        path: PathBuf,
+        /// The line with the columns' names.
+        place: Place,
+        /// What is wrong.
+        problem: String,
+        /// The columns that there can be.
+        columns: &'static str,
+    },
+    /// A table that is no CSV.
+    #[error("{path}{place}: not a table of comma-separated values: {reason}")]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        place: Place,
+        /// What the parser said.
+        reason: String,
+    },
+    /// nerfstudio's record of what it did to a scene is no rotation, offset and scale.
+    #[error("{path}: transform is not a rotation with an offset, or scale is not above 0")]
+    NoSimilarity {
+        /// The file.
+        path: PathBuf,
+    },
     /// More than one list of cameras in a folder.
     #[error("{path}: holds both {first} and {second}; give the path of one of them")]
     Ambiguous {

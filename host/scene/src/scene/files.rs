@@ -154,7 +154,7 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 }
 
 /// A finite number from a word of a line.
-pub(super) fn number(path: &Path, line: usize, word: &str) -> Result<f64, SceneError> {
+pub(crate) fn number(path: &Path, line: usize, word: &str) -> Result<f64, SceneError> {
     let (path, place) = (path.to_path_buf(), Place::Line(line));
     let Ok(value) = word.parse::<f64>() else {
         return Err(SceneError::NotANumber { path, place, word: excerpt(word) });
@@ -163,7 +163,7 @@ pub(super) fn number(path: &Path, line: usize, word: &str) -> Result<f64, SceneE
 }
 
 /// The first few characters of a word.
-pub(super) fn excerpt(word: &str) -> String {
+pub(crate) fn excerpt(word: &str) -> String {
     let mut short: String = word.chars().take(LONGEST_EXCERPT).collect();
     if short.len() < word.len() {
         short.push_str("...");

@@ -11,7 +11,7 @@ use super::fault::Place;
 
 /// An object of a JSON file and its place.
 #[derive(Clone, Debug)]
-pub(super) struct Object<'a> {
+pub(crate) struct Object<'a> {
     path: &'a Path,
     /// Put before a key: empty at the top, `frames[3].` in a frame.
     prefix: String,
@@ -19,7 +19,7 @@ pub(super) struct Object<'a> {
 }
 
 /// Parses a file's text. A key that stands in an object twice is an error.
-pub(super) fn parse(path: &Path, text: &str) -> Result<Value, SceneError> {
+pub(crate) fn parse(path: &Path, text: &str) -> Result<Value, SceneError> {
     let parsed = serde_json::from_str::<Unrepeated>(text).map(|Unrepeated(value)| value);
     parsed.map_err(|error| {
         let (line, column) = (error.line(), error.column());
@@ -32,7 +32,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Value, SceneError> {
 
 impl<'a> Object<'a> {
     /// The object that a value must be; `key` is empty for the whole file.
-    pub(super) fn new(path: &'a Path, key: &str, value: &'a Value) -> Result<Object<'a>, SceneError> {
+    pub(crate) fn new(path: &'a Path, key: &str, value: &'a Value) -> Result<Object<'a>, SceneError> {
         let Value::Object(entries) = value else {
             let key = if key.is_empty() { "the whole file" } else { key };
             return Err(wrong_type(path, key.to_string(), "an object"));
@@ -42,12 +42,12 @@ impl<'a> Object<'a> {
     }
 
     /// The key's full name.
-    pub(super) fn full(&self, key: &str) -> String {
+    pub(crate) fn full(&self, key: &str) -> String {
         format!("{}{key}", self.prefix)
     }
 
     /// A value; `null` counts as absent.
-    pub(super) fn get(&self, key: &str) -> Option<&'a Value> {
+    pub(crate) fn get(&self, key: &str) -> Option<&'a Value> {
         self.entries.get(key).filter(|value| !value.is_null())
     }
 
@@ -57,35 +57,53 @@ impl<'a> Object<'a> {
     }
 
     /// A number, if there is one.
-    pub(super) fn number(&self, key: &str) -> Result<Option<f64>, SceneError> {
+    pub(crate) fn number(&self, key: &str) -> Result<Option<f64>, SceneError> {
         self.get(key).map(|value| number(self.path, &self.full(key), value)).transpose()
     }
 
     /// A required text.
-    pub(super) fn text(&self, key: &str) -> Result<&'a str, SceneError> {
+    pub(crate) fn text(&self, key: &str) -> Result<&'a str, SceneError> {
         let value = self.required(key)?;
         value.as_str().ok_or_else(|| wrong_type(self.path, self.full(key), "a text"))
     }
 
     /// A required array.
-    pub(super) fn array(&self, key: &str) -> Result<&'a [Value], SceneError> {
+    pub(crate) fn array(&self, key: &str) -> Result<&'a [Value], SceneError> {
         array(self.path, &self.full(key), self.required(key)?)
     }
 
     /// The 16 numbers of a required array of 4 rows of 4 numbers.
     pub(super) fn matrix(&self, key: &str) -> Result<[f64; 16], SceneError> {
-        let name = self.full(key);
-        let rows = of_length(self.path, &name, self.array(key)?, "rows")?;
-        let mut matrix = [0.0; 16];
-        for (row, values) in rows.iter().enumerate() {
-            let name = format!("{name}[{row}]");
-            let values = of_length(self.path, &name, array(self.path, &name, values)?, "numbers")?;
-            for (column, value) in values.iter().enumerate() {
-                matrix[4 * row + column] = number(self.path, &format!("{name}[{column}]"), value)?;
-            }
-        }
-        Ok(matrix)
+        let rows = self.rows::<4>(key)?;
+        Ok(std::array::from_fn(|index| rows[index / 4][index % 4]))
     }
+
+    /// A required array of this many rows of 4 numbers.
+    pub(crate) fn rows<const N: usize>(&self, key: &str) -> Result<[[f64; 4]; N], SceneError> {
+        let name = self.full(key);
+        let mut rows = [[0.0; 4]; N];
+        let values = of_length::<N>(self.path, &name, self.array(key)?, "rows")?;
+        for (row, (numbers, values)) in rows.iter_mut().zip(values).enumerate() {
+            let name = format!("{name}[{row}]");
+            *numbers = all_numbers(self.path, &name, array(self.path, &name, values)?)?;
+        }
+        Ok(rows)
+    }
+
+    /// A required array of this many numbers.
+    pub(crate) fn numbers<const N: usize>(&self, key: &str) -> Result<[f64; N], SceneError> {
+        all_numbers(self.path, &self.full(key), self.array(key)?)
+    }
+}
+
+fn all_numbers<const N: usize>(path: &Path, key: &str, values: &[Value]) -> Result<[f64; N], SceneError> {
+    let mut numbers = [0.0; N];
+    for (index, (number_out, value)) in
+        numbers.iter_mut().zip(of_length::<N>(path, key, values, "numbers")?).enumerate()
+    {
+        *number_out = number(path, &format!("{key}[{index}]"), value)?;
+    }
+    Ok(numbers)
 }
 
 /// JSON has no NaN and the parser refuses numbers beyond f64, so that a number is finite here.
@@ -97,12 +115,17 @@ fn array<'a>(path: &Path, key: &str, value: &'a Value) -> Result<&'a [Value], Sc
     value.as_array().map(Vec::as_slice).ok_or_else(|| wrong_type(path, key.to_string(), "an array"))
 }
 
-fn of_length<'a>(path: &Path, key: &str, values: &'a [Value], of: &'static str) -> Result<&'a [Value; 4], SceneError> {
+fn of_length<'a, const N: usize>(
+    path: &Path,
+    key: &str,
+    values: &'a [Value],
+    of: &'static str,
+) -> Result<&'a [Value; N], SceneError> {
     values.try_into().map_err(|_| SceneError::WrongCount {
         path: path.to_path_buf(),
         place: Place::Key(key.to_string()),
         of,
-        expected: 4,
+        expected: N,
         found: values.len(),
     })
 }

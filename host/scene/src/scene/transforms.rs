@@ -16,7 +16,7 @@
 //! or settings of a particular trainer; the poses are read as they are written. `depth_file_path` is ignored, with a
 //! warning.
 
-mod frame;
+pub(crate) mod frame;
 
 use std::path::{Path, PathBuf};
 

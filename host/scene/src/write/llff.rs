@@ -1,8 +1,8 @@
 //! LLFF's `poses_bounds.npy`: one focal length for each view, the principal point in the centre, near and far.
 
-use super::numpy::npy;
 use super::{Draft, WriteSceneError};
 use crate::Scene;
+use crate::numpy::npy;
 
 /// Largest distance of a principal point from the centre of the photograph, in pixels.
 const CENTRED: f32 = 1.0e-3;

@@ -16,8 +16,8 @@ use viewfuse_core::camera::Camera;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::numpy::npy;
 use super::{Draft, Layout, WriteSceneError, camera_from_world};
+use crate::numpy::npy;
 use crate::rig::Rig;
 use crate::scene::files::{natural_order, trailing_number};
 use crate::{Scene, View};

@@ -27,8 +27,8 @@ use viewfuse_weighting::Weighting;
 
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
-const NO_SETTINGS: [&str; 9] =
-    ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol", "targets", "json"];
+const NO_SETTINGS: [&str; 10] =
+    ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol", "targets", "json", "latex"];
 /// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
@@ -143,6 +143,11 @@ pub(super) fn run(
             "missing": missing,
         });
         say(format_args!("{json:#}"))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    if arguments.latex {
+        let mut tables = results.iter();
+        tables.try_for_each(|table| say(table.latex(&outcome.title(table))))?;
         return Ok(ExitCode::SUCCESS);
     }
     outcome.print()?;

@@ -56,23 +56,18 @@ pub(super) fn lists(top: &Object) -> Result<HashMap<String, Split>, SceneError> 
 }
 
 /// One entry of `frames`.
-pub(super) struct Frame<'a> {
-    pub(super) path: &'a Path,
+pub(crate) struct Frame<'a> {
+    pub(crate) path: &'a Path,
     /// `frames[3]`.
-    pub(super) key: String,
+    pub(crate) key: String,
     /// Where its intrinsics are looked up: in the frame, then at the top of the file.
-    pub(super) scopes: [Object<'a>; 2],
+    pub(crate) scopes: [Object<'a>; 2],
 }
 
 impl<'a> Frame<'a> {
     pub(super) fn view(&self, lists: &HashMap<String, Split>) -> Result<Listed, SceneError> {
         let [frame, _] = &self.scopes;
-        let pose = RawPose {
-            matrix: frame.matrix("transform_matrix")?,
-            form: PoseForm::WorldFromOpenGl,
-            path: self.path.to_path_buf(),
-            place: Place::Key(frame.full("transform_matrix")),
-        };
+        let pose = self.pose()?;
         let file_path = frame.text("file_path")?;
         let given = self.beside(file_path);
         let Some(image) = photograph(&given).or_else(|| smaller(&given)) else {
@@ -84,6 +79,28 @@ impl<'a> Frame<'a> {
         view.mask = self.mask()?;
         view.split = lists.get(file_path).copied();
         Ok(Listed::View(Box::new(view)))
+    }
+
+    /// Its camera alone: photograph, mask and lens are ignored. A size that is not stated is `size`; without focal lengths
+    /// it has no intrinsics.
+    pub(crate) fn camera_alone(&self, size: [u32; 2]) -> Result<RawView, SceneError> {
+        let [frame, _] = &self.scopes;
+        let pose = self.pose()?;
+        let has_focal = ["fl_x", "camera_angle_x"].iter().any(|key| self.get(key).is_some());
+        let intrinsics = if has_focal { Some(RawIntrinsics { lens: None, ..self.intrinsics(size)? }) } else { None };
+        let intrinsics = intrinsics.map(|own| RawIntrinsics { size: own.size.or(Some(size)), ..own });
+        let name = frame.get("file_path").and_then(Value::as_str).map(|path| files::stem(&self.beside(path)));
+        Ok(RawView::new(name.unwrap_or_default(), None, pose, intrinsics))
+    }
+
+    fn pose(&self) -> Result<RawPose, SceneError> {
+        let [frame, _] = &self.scopes;
+        Ok(RawPose {
+            matrix: frame.matrix("transform_matrix")?,
+            form: PoseForm::WorldFromOpenGl,
+            path: self.path.to_path_buf(),
+            place: Place::Key(frame.full("transform_matrix")),
+        })
     }
 
     /// Whether it names a depth image.

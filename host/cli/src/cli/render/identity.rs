@@ -1,0 +1,45 @@
+//! What identifies a run: everything that its frames depend on. An interrupted run is continued only if it is the same.
+
+use anyhow::Context;
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::path::Path;
+use std::time::UNIX_EPOCH;
+use viewfuse_job::digest::{sha256, sha256_of};
+use viewfuse_scene::few_shot::FewShot;
+use viewfuse_scene::{Scene, View};
+
+/// Options that change no frame.
+const NO_CHANGE: [&str; 5] = ["output", "threads", "time-limit", "video", "fps"];
+
+/// The digest of a run's inputs: the program's version, the options' values, the device, cameras and photographs (by
+/// length and time of change), and the content of other files.
+pub(super) fn run_identity(
+    options: &BTreeMap<String, String>,
+    device: &str,
+    scene: &Scene,
+    job: &FewShot,
+    files: &[&Path],
+) -> anyhow::Result<String> {
+    let mut text = format!("{} {device}\n", env!("CARGO_PKG_VERSION"));
+    for (name, value) in options.iter().filter(|(name, _)| !NO_CHANGE.contains(&name.as_str())) {
+        writeln!(text, "{name} {value}")?;
+    }
+    for view in &scene.views {
+        writeln!(text, "{} {:?} {:?} {:?}", view.name, view.camera, view.lens, view.near_far)?;
+        let View { image, mask, .. } = view;
+        for file in image.iter().chain(mask) {
+            let about = std::fs::metadata(file).with_context(|| file.display().to_string())?;
+            let changed = about.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+            writeln!(text, "{} {} {changed:?}", file.display(), about.len())?;
+        }
+    }
+    writeln!(text, "{:?} {}", job.sources, scene.points.len())?;
+    for target in &job.targets {
+        writeln!(text, "{} {:?} {:?}", target.name, target.camera, target.truth)?;
+    }
+    for file in files {
+        writeln!(text, "{}", sha256_of(file).with_context(|| file.display().to_string())?)?;
+    }
+    Ok(sha256(text.as_bytes()))
+}

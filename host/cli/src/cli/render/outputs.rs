@@ -1,0 +1,47 @@
+//! Options of what a render writes.
+
+use clap::Args;
+use viewfuse_output::depth::DepthFormat;
+use viewfuse_output::rate::FrameRate;
+use viewfuse_output::run::Outputs;
+use viewfuse_output::video::VideoFormat;
+
+/// Heading of these options in the help.
+const FILES: &str = "Files";
+
+/// What is written.
+#[derive(Args)]
+pub(crate) struct OutputOptions {
+    /// Write the opacity as the pictures' alpha channel, without the background
+    #[arg(long, help_heading = FILES)]
+    alpha: bool,
+    /// Formats of depth maps: png (16 bit), exr, npy (both 32-bit floating point); units are in run.json
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "png", help_heading = FILES)]
+    depth: Vec<DepthFormat>,
+    /// Write no contact sheets
+    #[arg(long, help_heading = FILES)]
+    no_sheets: bool,
+    /// Write all pictures, in order, also as video.FORMAT: webp (animated), y4m (not compressed), mp4 (by the ffmpeg on the
+    /// path; without one y4m)
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', help_heading = FILES)]
+    pub(crate) video: Vec<VideoFormat>,
+    /// Frames per second of a video [default: those of the camera path's file, else 30]
+    #[arg(long, value_name = "N", value_parser = parse_rate, help_heading = FILES)]
+    fps: Option<FrameRate>,
+}
+
+impl OutputOptions {
+    pub(crate) fn outputs(&self) -> Outputs {
+        Outputs { alpha: self.alpha, depths: self.depth.clone(), sheet: !self.no_sheets }
+    }
+
+    /// `stated` is what the camera path's file says.
+    pub(crate) fn rate(&self, stated: Option<f64>) -> FrameRate {
+        self.fps.or_else(|| stated.and_then(FrameRate::new)).unwrap_or(FrameRate::DEFAULT)
+    }
+}
+
+fn parse_rate(text: &str) -> Result<FrameRate, String> {
+    let rate = text.parse().ok().and_then(FrameRate::new);
+    rate.ok_or_else(|| "frames per second from 0.1 to 240".to_owned())
+}

@@ -1,0 +1,106 @@
+//! `viewfuse select`.
+
+use super::options::SourceOptions;
+use super::parse::parse_count;
+use super::path::PathOptions;
+use super::table::table;
+use super::{say, wrong};
+use anyhow::Context;
+use clap::Args;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use viewfuse_job::files::write_whole;
+use viewfuse_output::selected::SelectedSources;
+use viewfuse_scene::Scene;
+use viewfuse_weighting::{WeightingSpec, grammar};
+
+/// Targets that are printed; of more, how many there are.
+const PRINTED: usize = 32;
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  viewfuse select photos/ --count 3 --targets 4,9\n  \
+    viewfuse select photos/ --count 5 --between 3 7 --frames 60 --json -o views.json\n  \
+    viewfuse select photos/ --count 2 --targets test --index -o evaluation_index.json\n\n\
+    Indices count the scene's photographs from 0, in its order. What the chosen views lack of the whole weight bounds how much \
+    a fusion of all views changes without the others, as a share of the range of what is fused.")]
+pub(crate) struct Arguments {
+    /// The scene
+    scene: PathBuf,
+    /// How many sources
+    #[arg(short = 'k', long, value_name = "K", value_parser = parse_count)]
+    count: usize,
+    /// The target views, as for --sources [default: the scene's target poses]
+    #[arg(long, value_name = "VIEWS")]
+    targets: Option<String>,
+    #[command(flatten)]
+    path: PathOptions,
+    #[command(flatten)]
+    sources: SourceOptions,
+    #[arg(long, value_name = "SCHEME", default_value_t = WeightingSpec::default(), help = scheme_help())]
+    weights: WeightingSpec,
+    /// Everything as JSON: for each target alone, and for all together
+    #[arg(long)]
+    json: bool,
+    /// A line a target: its name and the indices of its sources, the greatest weight first
+    #[arg(long, conflicts_with = "json")]
+    lines: bool,
+    /// An index file as pixelSplat and MVSplat read: the sources for all targets together, and the targets
+    #[arg(long, conflicts_with_all = ["json", "lines"])]
+    index: bool,
+    /// Write to this file instead of standard output
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+fn scheme_help() -> String {
+    format!("Weighting scheme: {}", grammar())
+}
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+    let weighting = arguments.weights.open()?;
+    let scene = Scene::open(&arguments.scene)?;
+    let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
+    let job = selection.resolve(&scene, 1)?;
+    let selected = SelectedSources::of(&scene, &job, &weighting, arguments.count)?;
+    let text = if arguments.json {
+        format!("{}\n", serde_json::to_string_pretty(&selected)?)
+    } else if arguments.lines {
+        selected.lines()
+    } else if arguments.index {
+        let no_index =
+            || wrong("--index needs targets that are photographs of the scene, of which it holds the indices");
+        format!("{}\n", selected.index().ok_or_else(no_index)?)
+    } else {
+        readable(&selected)
+    };
+    match &arguments.output {
+        Some(path) => {
+            write_whole(path, text.as_bytes()).context("the selection")?;
+            say(path.display())?;
+        }
+        None => say(text.trim_end_matches('\n'))?,
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// For a person.
+fn readable(selected: &SelectedSources) -> String {
+    let mut rows = table(["target", "share", "sources and their weights"].map(str::to_owned));
+    for target in selected.targets.iter().take(PRINTED) {
+        let of = |(name, weight): (&String, &f32)| format!("{name} {weight:.3}");
+        let sources: Vec<String> = target.sources.iter().zip(&target.weights).map(of).collect();
+        rows.add_row([target.target.clone(), format!("{:.3}", target.share), sources.join(", ")]);
+    }
+    let more = selected.targets.len().saturating_sub(PRINTED);
+    let more = if more > 0 { format!("and {more} more targets\n") } else { String::new() };
+    let together = &selected.together;
+    let [mean, least] = together.share;
+    format!(
+        "{}, {}: {} of {} views\n{rows}\n{more}for all together: {} (share of the weight: mean {mean:.3}, least {least:.3})\n",
+        selected.scene,
+        selected.weighting,
+        together.indices.len(),
+        selected.views.len(),
+        together.sources.join(", ")
+    )
+}

@@ -1,0 +1,235 @@
+//! The sources' depth maps as one cloud of points, with normals and colours.
+//!
+//! A pixel's point is kept if enough other views agree: it lies on their surface too, and their point comes back to the
+//! pixel. What agrees becomes one point, the mean by the scheme's weights; its pixels make no further points. A point is
+//! dropped if more views see through it (their surface is clearly behind it, or it is outside of their silhouette)
+//! than agree.
+
+use crate::DepthMap;
+use crate::render::{RenderError, Stage};
+use viewfuse_core::Vec3;
+use viewfuse_core::lookup::bilinear;
+use viewfuse_job::progress::{Interrupted, Progress};
+use viewfuse_scene::photographs::SourceImage;
+use viewfuse_weighting::Weighting;
+use viewfuse_weighting::sources::SourceWeights;
+
+/// Greatest relative difference of depths that agree.
+const DEPTH_TOLERANCE: f32 = 0.01;
+/// Greatest distance in pixels of a map at which another view's point comes back.
+const PIXEL_TOLERANCE: f32 = 1.0;
+/// Greatest relative difference of the depths of neighbours on one surface.
+const SURFACE_TOLERANCE: f32 = 0.05;
+/// Confidence from which on a depth counts, where the field tells.
+const LEAST_CONFIDENCE: f32 = 0.5;
+/// Opacity of a photograph from which on a pixel belongs to the object.
+const LEAST_OPACITY: f32 = 0.5;
+
+/// A point on a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudPoint {
+    /// World coordinates.
+    pub position: Vec3,
+    /// Unit, towards the side that was seen; world coordinates.
+    pub normal: Vec3,
+    /// Red, green, blue.
+    pub colour: [u8; 3],
+    /// How many views agree.
+    pub view_count: u32,
+}
+
+/// Options of a cloud.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CloudOptions {
+    /// Fewest views that agree on a point, its own included; 1 keeps every pixel with a depth.
+    pub least_views: u32,
+}
+
+impl Default for CloudOptions {
+    /// Two views.
+    fn default() -> CloudOptions {
+        CloudOptions { least_views: 2 }
+    }
+}
+
+/// The cloud of a stage, all of whose sources are encoded under this weighting; empty for fields without depth maps of
+/// sources.
+///
+/// # Errors
+/// [`RenderError`].
+pub fn point_cloud(
+    stage: &mut Stage<'_>,
+    weighting: &Weighting,
+    options: CloudOptions,
+    progress: &dyn Progress,
+) -> Result<Vec<CloudPoint>, RenderError> {
+    stage.weigh(weighting, progress)?;
+    stage.encode_all(progress)?;
+    let maps = stage.source_depths()?;
+    let relevance = stage.relevance(weighting);
+    let (images, has_silhouettes) = (&stage.images.images[..], stage.images.has_silhouettes);
+    let fusion = Fusion { maps: &maps, images, has_silhouettes, relevance: &relevance, options };
+    fusion.points(progress).map_err(|interrupted| RenderError::Field(interrupted.into()))
+}
+
+/// The maps of all views, with what else is fused.
+struct Fusion<'a> {
+    maps: &'a [DepthMap],
+    /// The photographs, of the same cameras at any size.
+    images: &'a [SourceImage],
+    /// Whether their opacity is a silhouette. Otherwise it says what the lens saw.
+    has_silhouettes: bool,
+    relevance: &'a [SourceWeights],
+    options: CloudOptions,
+}
+
+/// A view's part of a point.
+struct Part {
+    view: usize,
+    pixel: usize,
+    position: Vec3,
+    weight: f32,
+}
+
+impl Fusion<'_> {
+    fn points(&self, progress: &dyn Progress) -> Result<Vec<CloudPoint>, Interrupted> {
+        let mut is_used: Vec<Vec<bool>> = self.maps.iter().map(|map| vec![false; map.depths.len()]).collect();
+        let mut points = Vec::new();
+        progress.expect(self.maps.len());
+        for (view, map) in self.maps.iter().enumerate() {
+            progress.check()?;
+            for pixel in 0..map.depths.len() {
+                if is_used[view][pixel] {
+                    continue;
+                }
+                if let Some(parts) = self.parts(view, pixel) {
+                    parts.iter().for_each(|part| is_used[part.view][part.pixel] = true);
+                    points.extend(self.fused(&parts));
+                }
+            }
+            progress.step();
+        }
+        Ok(points)
+    }
+
+    /// The point of a pixel with the points of the views that agree, its own first; `None` if too few agree.
+    fn parts(&self, view: usize, pixel: usize) -> Option<Vec<Part>> {
+        let position = self.point(view, pixel)?;
+        let own = self.maps[view].camera;
+        let width = own.width as usize;
+        let (x, y) = ((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
+        let mut parts = vec![Part { view, pixel, position, weight: self.confidence(view, pixel) }];
+        let mut against = 0;
+        for (other, map) in self.maps.iter().enumerate().filter(|(other, _)| *other != view) {
+            let seen = map.camera.project(position);
+            if !seen.in_image {
+                continue;
+            }
+            let there = map.camera.texel_at(seen.x, seen.y);
+            let depth = map.depths[there];
+            if depth <= 0.0 {
+                // Outside of a silhouette there is nothing; inside, a missing depth says nothing.
+                against += u32::from(self.has_silhouettes && !self.is_object(other, seen.x, seen.y));
+                continue;
+            }
+            let behind = depth - seen.depth;
+            if behind > SURFACE_TOLERANCE * seen.depth {
+                against += 1;
+            }
+            let Some(point) = self.point(other, there) else { continue };
+            let back = own.project(point);
+            let is_back = (back.x - x).abs() <= PIXEL_TOLERANCE && (back.y - y).abs() <= PIXEL_TOLERANCE;
+            if behind.abs() <= DEPTH_TOLERANCE * seen.depth && back.in_front && is_back {
+                let weight = self.relevance[view].get(other as u32) * self.confidence(other, there);
+                parts.push(Part { view: other, pixel: there, position: point, weight });
+            }
+        }
+        let agreeing = parts.len() as u32;
+        (agreeing >= self.options.least_views && against < agreeing).then_some(parts)
+    }
+
+    /// One point of all parts.
+    fn fused(&self, parts: &[Part]) -> Option<CloudPoint> {
+        let sum: f32 = parts.iter().map(|part| part.weight).sum();
+        let first = parts.first()?;
+        let (mut position, mut normal, mut colour) = (Vec3::ZERO, Vec3::ZERO, [0.0; 3]);
+        for part in parts {
+            let share = if sum > 0.0 { part.weight / sum } else { 1.0 / parts.len() as f32 };
+            // Relative to one of them, where rounding is least.
+            position += (part.position - first.position) * share;
+            normal += self.normal(part.view, part.pixel) * share;
+            let own = self.colour(part.view, part.pixel);
+            (0..3).for_each(|channel| colour[channel] += share * own[channel]);
+        }
+        let towards = self.maps[first.view].camera.centre_world() - first.position;
+        Some(CloudPoint {
+            position: first.position + position,
+            normal: normal.try_normalize().or_else(|| towards.try_normalize())?,
+            colour: colour.map(|value| (value.clamp(0.0, 1.0) * 255.0).round() as u8),
+            view_count: parts.len() as u32,
+        })
+    }
+
+    /// The point of a pixel; `None` without a depth that counts.
+    fn point(&self, view: usize, pixel: usize) -> Option<Vec3> {
+        let DepthMap { camera, depths, .. } = &self.maps[view];
+        let depth = depths[pixel];
+        if !(depth > 0.0 && self.confidence(view, pixel) >= LEAST_CONFIDENCE) {
+            return None;
+        }
+        let width = camera.width as usize;
+        let towards = camera.towards((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
+        let is_object = self.is_object(view, (pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
+        is_object.then(|| camera.centre_world() + towards * depth)
+    }
+
+    fn confidence(&self, view: usize, pixel: usize) -> f32 {
+        self.maps[view].confidences.get(pixel).copied().unwrap_or(1.0)
+    }
+
+    /// The unit normal of a view's surface at a pixel, towards the camera; that direction itself where no neighbour is on
+    /// the surface.
+    fn normal(&self, view: usize, pixel: usize) -> Vec3 {
+        let DepthMap { camera, depths, .. } = &self.maps[view];
+        let (width, depth) = (camera.width as usize, depths[pixel]);
+        let (column, row) = ((pixel % width) as i32, (pixel / width) as i32);
+        let at = |right: i32, down: i32| {
+            let (x, y) = (column + right, row + down);
+            let inside = x >= 0 && y >= 0 && x < camera.width as i32 && y < camera.height as i32;
+            let there = depths[if inside { (y * camera.width as i32 + x) as usize } else { pixel }];
+            let is_surface = inside && there > 0.0 && (there - depth).abs() <= SURFACE_TOLERANCE * depth;
+            is_surface.then(|| camera.towards(x as f32 + 0.5, y as f32 + 0.5) * there)
+        };
+        let own = camera.towards(column as f32 + 0.5, row as f32 + 0.5) * depth;
+        let slope = |ahead: Option<Vec3>, behind: Option<Vec3>| match (ahead, behind) {
+            (None, None) => None,
+            (ahead, behind) => Some(ahead.unwrap_or(own) - behind.unwrap_or(own)),
+        };
+        let across = slope(at(1, 0), at(-1, 0)).zip(slope(at(0, 1), at(0, -1)));
+        let normal = across.and_then(|(right, down)| down.cross(right).try_normalize());
+        match normal {
+            Some(normal) if normal.dot(own) > 0.0 => -normal,
+            Some(normal) => normal,
+            None => (-own).normalize(),
+        }
+    }
+
+    /// A photograph's premultiplied colour and opacity at an image coordinate of the view's map.
+    fn texel(&self, view: usize, x: f32, y: f32) -> [f32; 4] {
+        let (map, image) = (&self.maps[view].camera, &self.images[view]);
+        let (width, height) = (image.camera.pinhole.width(), image.camera.pinhole.height());
+        let (x, y) = (x * width as f32 / map.width as f32, y * height as f32 / map.height as f32);
+        bilinear(&image.texels[..], width, height, x, y)
+    }
+
+    fn is_object(&self, view: usize, x: f32, y: f32) -> bool {
+        self.texel(view, x, y)[3] >= LEAST_OPACITY
+    }
+
+    /// Red, green and blue of a pixel, without the background.
+    fn colour(&self, view: usize, pixel: usize) -> [f32; 3] {
+        let width = self.maps[view].camera.width as usize;
+        let [r, g, b, alpha] = self.texel(view, (pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
+        [r, g, b].map(|value| value / alpha.max(LEAST_OPACITY))
+    }
+}

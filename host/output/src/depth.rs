@@ -1,0 +1,82 @@
+//! Depth maps as files: 16-bit PNG for viewers, OpenEXR and NumPy's arrays with the depths as they were computed.
+//!
+//! All hold depths along the principal axis, row-major, 0 where there is no surface: PNG in steps of
+//! [`depth_step`](crate::record::depth_step), the others as `f32`. [`RunWriter`](crate::run::RunWriter) writes them in units of
+//! the scene's files.
+
+use crate::png::write_png;
+use crate::record::depth_step;
+use image::{DynamicImage, ImageBuffer, Luma};
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+use viewfuse_job::files::{WriteError, write_whole};
+use viewfuse_scene::numpy::npy;
+
+/// A format of depth maps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthFormat {
+    /// 16-bit grey PNG, in steps of [`depth_step`](crate::record::depth_step).
+    Png,
+    /// OpenEXR with one channel `Z` of `f32`.
+    #[cfg(feature = "exr")]
+    Exr,
+    /// NumPy's array of `f32`, `[height][width]`.
+    Npy,
+}
+
+impl DepthFormat {
+    /// All of them that this build writes.
+    pub const ALL: &[DepthFormat] = &[
+        DepthFormat::Png,
+        #[cfg(feature = "exr")]
+        DepthFormat::Exr,
+        DepthFormat::Npy,
+    ];
+}
+
+impl fmt::Display for DepthFormat {
+    /// The extension of its files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            DepthFormat::Png => "png",
+            #[cfg(feature = "exr")]
+            DepthFormat::Exr => "exr",
+            DepthFormat::Npy => "npy",
+        })
+    }
+}
+
+/// The name is not that of a format of depth maps.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a format of depth maps: {all}", all = DepthFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
+pub struct UnknownDepthFormat(String);
+
+impl FromStr for DepthFormat {
+    type Err = UnknownDepthFormat;
+
+    fn from_str(name: &str) -> Result<DepthFormat, UnknownDepthFormat> {
+        let found = DepthFormat::ALL.iter().find(|format| format.to_string() == name);
+        found.copied().ok_or_else(|| UnknownDepthFormat(name.to_owned()))
+    }
+}
+
+/// Writes depths of a picture of this size, completely or not at all.
+///
+/// # Errors
+/// [`WriteError`].
+pub fn write_depth(path: &Path, format: DepthFormat, depths: &[f32], size: [u32; 2]) -> Result<(), WriteError> {
+    match format {
+        DepthFormat::Png => write_png(path, &DynamicImage::ImageLuma16(depth_map(depths, size))),
+        #[cfg(feature = "exr")]
+        DepthFormat::Exr => crate::exr::write_exr(path, depths, size),
+        DepthFormat::Npy => write_whole(path, &npy(&[size[1] as usize, size[0] as usize], depths)),
+    }
+}
+
+/// Depths in steps of [`depth_step`](crate::record::depth_step).
+pub fn depth_map(depths: &[f32], [width, height]: [u32; 2]) -> ImageBuffer<Luma<u16>, Vec<u16>> {
+    let step = depth_step(depths);
+    let depth = |x: u32, y: u32| Luma([(depths[(y * width + x) as usize] / step).round() as u16]);
+    ImageBuffer::from_fn(width, height, depth)
+}

@@ -1,0 +1,247 @@
+//! The frames of a run as one file: an animated picture, or a video.
+
+use crate::rate::FrameRate;
+use crate::webp::Animation;
+use crate::y4m::Y4m;
+use image::{DynamicImage, ImageError, Rgb, RgbImage};
+use std::fmt;
+use std::fs;
+use std::io::{self, BufWriter, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::str::FromStr;
+use viewfuse_job::files::{WholeFile, WriteError, write_whole};
+use viewfuse_job::progress::{Interrupted, Progress};
+
+/// The program that compresses videos, where a person has it.
+const FFMPEG: &str = "ffmpeg";
+
+/// A format of moving pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VideoFormat {
+    /// Animated WebP without loss, for pages and messages.
+    Webp,
+    /// YUV4MPEG2, without compression, for video programs.
+    Y4m,
+    /// MP4, by the person's own `ffmpeg`.
+    Mp4,
+}
+
+impl VideoFormat {
+    /// All of them.
+    pub const ALL: [VideoFormat; 3] = [VideoFormat::Webp, VideoFormat::Y4m, VideoFormat::Mp4];
+}
+
+impl fmt::Display for VideoFormat {
+    /// The extension of its files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            VideoFormat::Webp => "webp",
+            VideoFormat::Y4m => "y4m",
+            VideoFormat::Mp4 => "mp4",
+        })
+    }
+}
+
+/// The name is not that of a format of moving pictures.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("'{0}' is not a format of moving pictures: webp, y4m or mp4")]
+pub struct UnknownVideoFormat(String);
+
+impl FromStr for VideoFormat {
+    type Err = UnknownVideoFormat;
+
+    fn from_str(name: &str) -> Result<VideoFormat, UnknownVideoFormat> {
+        let found = VideoFormat::ALL.into_iter().find(|format| format.to_string() == name);
+        found.ok_or_else(|| UnknownVideoFormat(name.to_owned()))
+    }
+}
+
+/// Why no video was written.
+#[derive(Debug, thiserror::Error)]
+pub enum VideoError {
+    /// The file could not be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// A frame could not be read.
+    #[error("{}: cannot be read: {cause}", path.display())]
+    Frame {
+        /// Its file.
+        path: PathBuf,
+        /// The decoder's error.
+        cause: ImageError,
+    },
+    /// The frames differ in size.
+    #[error("{}: has {}x{} pixels, the first frame {}x{}; the frames of a video have one size", path.display(), size[0], size[1], first[0], first[1])]
+    Sizes {
+        /// The frame's file.
+        path: PathBuf,
+        /// Its width and height.
+        size: [u32; 2],
+        /// Those of the first frame.
+        first: [u32; 2],
+    },
+    /// There is no frame.
+    #[error("a video needs at least one frame")]
+    NoFrames,
+    /// There is no `ffmpeg` on this machine.
+    #[error("there is no {FFMPEG} on the path, which mp4 needs")]
+    NoProgram,
+    /// `ffmpeg` failed.
+    #[error("{}: {FFMPEG} could not write it: {said}", path.display())]
+    Program {
+        /// The file to write.
+        path: PathBuf,
+        /// What it said.
+        said: String,
+    },
+    /// The person stopped the work.
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// Writes pictures that are there as files, all of one size, as a moving picture, completely or not at all. Transparency
+/// is kept in WebP, and laid over `background` in the others.
+///
+/// # Errors
+/// [`VideoError`]; [`VideoError::NoProgram`] if the format is MP4 and there is no `ffmpeg`.
+pub fn write_video(
+    path: &Path,
+    format: VideoFormat,
+    frames: &[PathBuf],
+    rate: FrameRate,
+    background: [u8; 3],
+    progress: &dyn Progress,
+) -> Result<(), VideoError> {
+    let first = frames.first().ok_or(VideoError::NoFrames)?;
+    let size = image::image_dimensions(first).map_err(|cause| VideoError::Frame { path: first.clone(), cause })?;
+    let frames = Frames { files: frames, size: size.into(), background, progress };
+    match format {
+        VideoFormat::Webp => {
+            let mut animation = Animation::new(frames.size, rate);
+            let encode = |cause: ImageError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
+            frames.each(|frame| Ok(animation.add(&frame).map_err(encode)?))?;
+            Ok(write_whole(path, &animation.finish())?)
+        }
+        VideoFormat::Y4m => {
+            let mut file = WholeFile::create(path)?;
+            frames.stream(&mut Unfailing(&mut file), rate, |cause| io_error(path, cause))?;
+            Ok(file.finish()?)
+        }
+        VideoFormat::Mp4 => compress(path, &frames, rate),
+    }
+}
+
+/// Pictures that are there as files.
+struct Frames<'a> {
+    files: &'a [PathBuf],
+    size: [u32; 2],
+    background: [u8; 3],
+    progress: &'a dyn Progress,
+}
+
+impl Frames<'_> {
+    fn each(&self, mut deliver: impl FnMut(DynamicImage) -> Result<(), VideoError>) -> Result<(), VideoError> {
+        self.progress.expect(self.files.len());
+        for path in self.files {
+            self.progress.check()?;
+            let frame = image::open(path).map_err(|cause| VideoError::Frame { path: path.clone(), cause })?;
+            let size = [frame.width(), frame.height()];
+            if size != self.size {
+                return Err(VideoError::Sizes { path: path.clone(), size, first: self.size });
+            }
+            deliver(frame)?;
+            self.progress.step();
+        }
+        Ok(())
+    }
+
+    /// As y4m.
+    fn stream(
+        &self,
+        writer: &mut dyn Write,
+        rate: FrameRate,
+        failed: impl Fn(io::Error) -> VideoError,
+    ) -> Result<(), VideoError> {
+        let mut video = Y4m::begin(writer, self.size, rate).map_err(&failed)?;
+        self.each(|frame| video.frame(&over(frame, self.background)).map_err(&failed))?;
+        video.finish().map_err(&failed).map(drop)
+    }
+}
+
+/// A picture over a background of one colour.
+fn over(picture: DynamicImage, background: [u8; 3]) -> RgbImage {
+    if !picture.color().has_alpha() {
+        return picture.into_rgb8();
+    }
+    let picture = picture.into_rgba8();
+    RgbImage::from_fn(picture.width(), picture.height(), |x, y| {
+        let [r, g, b, a] = picture.get_pixel(x, y).0.map(u32::from);
+        let mix = |own: u32, behind: u8| ((own * a + u32::from(behind) * (255 - a) + 127) / 255) as u8;
+        Rgb([mix(r, background[0]), mix(g, background[1]), mix(b, background[2])])
+    })
+}
+
+/// A file that appears when it is whole, as a writer.
+struct Unfailing<'a>(&'a mut WholeFile);
+
+impl Write for Unfailing<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.write(bytes).map_err(|error| match error {
+            WriteError::Io { cause, .. } => cause,
+            error => io::Error::other(error),
+        })?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+fn io_error(path: &Path, cause: io::Error) -> VideoError {
+    WriteError::Io { path: path.to_path_buf(), cause }.into()
+}
+
+/// Frames as y4m to the standard input of `ffmpeg`, which writes the file. It is named otherwise until it is whole.
+fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), VideoError> {
+    let draft = path.with_file_name(format!(".viewfuse-{}", path.file_name().unwrap_or_default().to_string_lossy()));
+    let mut command = Command::new(FFMPEG);
+    command.args(["-hide_banner", "-loglevel", "error", "-y", "-f", "yuv4mpegpipe", "-i", "-"]);
+    // Half the resolution of colours, as every player expects, needs even sides.
+    command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]).arg(&draft);
+    let started = command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn();
+    let mut child = started.map_err(|cause| match cause.kind() {
+        io::ErrorKind::NotFound => VideoError::NoProgram,
+        _ => io_error(path, cause),
+    })?;
+    let sent = match child.stdin.take() {
+        Some(input) => frames.stream(&mut BufWriter::new(input), rate, |cause| io_error(path, cause)),
+        None => Ok(()),
+    };
+    if matches!(sent, Err(VideoError::Interrupted(_) | VideoError::Frame { .. } | VideoError::Sizes { .. })) {
+        // It would make a video of the frames that it got.
+        child.kill().ok();
+    }
+    let mut said = String::new();
+    if let Some(errors) = &mut child.stderr {
+        errors.read_to_string(&mut said).ok();
+    }
+    let ended = child.wait().map_err(|cause| io_error(path, cause));
+    let outcome = match (sent, ended) {
+        (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame { .. } | VideoError::Sizes { .. })), _) => {
+            Err(error)
+        }
+        (_, Err(error)) => Err(error),
+        (sent, Ok(status)) if status.success() => sent,
+        (_, Ok(status)) => {
+            let said = if said.trim().is_empty() { status.to_string() } else { said.trim().replace('\n', "; ") };
+            Err(VideoError::Program { path: path.to_path_buf(), said })
+        }
+    };
+    let outcome = outcome.and_then(|()| fs::rename(&draft, path).map_err(|cause| io_error(path, cause)));
+    if outcome.is_err() {
+        fs::remove_file(&draft).ok();
+    }
+    outcome
+}

@@ -1,0 +1,132 @@
+//! What other programs take from the weights: arrays, tables, and lists of the few views that targets need.
+
+use super::{BINARY, assert_near, done, numbers, texts};
+use serde_json::Value;
+use std::fs;
+use viewfuse_tests::command::{assert_wrong_arguments, toy};
+
+viewfuse_tests::trials![
+    weights_of_many_targets,
+    the_few_sources_of_a_target,
+    the_few_sources_of_a_path,
+    labels_name_schemes,
+    tables_for_papers,
+];
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON")
+}
+
+fn weights_of_many_targets() {
+    let scene = toy();
+    let folder = scene.path();
+    let what = "weights toy --orbit 3 --sources 0..5 --weights mean --weights half=error:alpha=0.5";
+    let listed = json(&done(folder, &format!("{what} --json")));
+    let targets = listed.as_array().expect("a list");
+    assert_eq!(targets.len(), 3);
+    let csv = done(folder, &format!("{what} --csv"));
+    let lines: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!((lines[0].join(","), lines.len()), ("scheme,target,source,weight".to_owned(), 1 + 2 * 3 * 6));
+    let axes = json(&done(folder, &format!("{what} --npy weights.npy")));
+    assert_eq!((texts(&axes["schemes"]), numbers(&axes["shape"])), (vec!["mean", "half"], vec![2.0, 3.0, 6.0]));
+    let bytes = fs::read(folder.join("weights.npy")).expect("an array");
+    let array: Vec<f64> = bytes[bytes.len() - 4 * 36..]
+        .chunks_exact(4)
+        .map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]]).into())
+        .collect();
+    // The three forms hold the same numbers in the same order.
+    for (scheme, name) in ["mean", "half"].into_iter().enumerate() {
+        for (target, document) in targets.iter().enumerate() {
+            let weights = numbers(&document["weights"][name]);
+            assert_near(weights.iter().sum(), 1.0, 1.0e-5);
+            assert_eq!(document["target"], axes["targets"][target]);
+            for (source, weight) in weights.iter().enumerate() {
+                let place = (scheme * 3 + target) * 6 + source;
+                assert_near(array[place], *weight, 1.0e-7);
+                let line = &lines[1 + place];
+                assert_eq!((line[0], line[2]), (name, texts(&axes["sources"])[source]));
+                assert_near(line[3].parse().expect("a number"), *weight, 1.0e-7);
+            }
+        }
+    }
+    assert_near(numbers(&targets[0]["world_from_camera"][3])[3], 1.0, 0.0);
+}
+
+fn the_few_sources_of_a_target() {
+    let scene = toy();
+    let folder = scene.path();
+    let all = json(&done(folder, "weights toy --target 20 --weights error:alpha=1 --json"));
+    let selected = json(&done(folder, "select toy -k 3 --targets 20 --json"));
+    let target = &selected["targets"][0];
+    assert_eq!((&target["target"], target["index"].as_u64()), (&"000020".into(), Some(20)));
+    // Those of greatest weight, in that order.
+    let weights = numbers(&all["weights"]["error:alpha=1"]);
+    let mut order: Vec<usize> = (0..weights.len()).collect();
+    order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]));
+    let greatest: Vec<&str> = order[..3].iter().map(|&source| texts(&all["sources"])[source]).collect();
+    assert_eq!(texts(&target["sources"]), greatest);
+    assert_near(target["share"].as_f64().expect("a share"), order[..3].iter().map(|&one| weights[one]).sum(), 1.0e-5);
+    assert_near(numbers(&target["weights"]).iter().sum(), 1.0, 1.0e-5);
+    let views = texts(&selected["views"]);
+    let indices: Vec<usize> = numbers(&target["indices"]).into_iter().map(|index| index as usize).collect();
+    assert_eq!(indices.iter().map(|&index| views[index]).collect::<Vec<_>>(), greatest);
+    // As lines, and as an index file.
+    let line = done(folder, "select toy --count 3 --targets 20 --lines -o views.txt");
+    assert_eq!(line, "views.txt\n");
+    let expected: Vec<String> = indices.iter().map(usize::to_string).collect();
+    assert_eq!(
+        fs::read_to_string(folder.join("views.txt")).expect("a list"),
+        format!("000020 {}\n", expected.join(" "))
+    );
+    let index = json(&done(folder, "select toy -k 3 --targets 20,21 --index"));
+    assert_eq!((numbers(&index["toy"]["target"]), numbers(&index["toy"]["context"]).len()), (vec![20.0, 21.0], 3));
+    assert_wrong_arguments(BINARY, folder, "select toy -k 2 --orbit 3 --index", &["--index needs targets"]);
+    let table = done(folder, "select toy -k 2 --targets 20");
+    assert!(table.contains(greatest[0]) && table.contains("for all together: "), "{table}");
+}
+
+fn the_few_sources_of_a_path() {
+    let scene = toy();
+    let selected = json(&done(scene.path(), "select toy -k 4 --orbit 12 --json"));
+    assert_eq!(selected["targets"].as_array().map(Vec::len), Some(12));
+    assert_eq!(selected["targets"][3]["index"], Value::Null);
+    let together = &selected["together"];
+    assert_eq!(numbers(&together["indices"]).len(), 4);
+    let share = numbers(&together["share"]);
+    assert!(share[0] >= share[1] && share[1] > 0.0 && share[0] < 1.0, "{share:?}");
+    // Each target alone has more of the weight than of what serves all.
+    let own: Vec<f64> = selected["targets"]
+        .as_array()
+        .expect("targets")
+        .iter()
+        .map(|one| one["share"].as_f64().expect("a share"))
+        .collect();
+    assert!(own.iter().sum::<f64>() / 12.0 >= share[0] - 1.0e-6);
+}
+
+fn labels_name_schemes() {
+    let scene = toy();
+    let folder = scene.path();
+    done(folder, "render toy --targets 20 --size 16x16 --weights near=error:alpha=0.5 --device cpu -o out");
+    let record = json(&fs::read_to_string(folder.join("out/run.json")).expect("a record"));
+    assert_eq!(record["weighting"], "near");
+    assert_wrong_arguments(BINARY, folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
+}
+
+fn tables_for_papers() {
+    let scene = toy();
+    let arguments = "evaluate toy --targets 20,21 --sources 0..5 --size 16x16 --weights mean --weights a_b=error:alpha=1 --device cpu";
+    let latex = done(scene.path(), &format!("{arguments} --latex"));
+    assert!(latex.starts_with("\\begin{table}\n") && latex.trim_end().ends_with("\\end{table}"), "{latex}");
+    let rows: Vec<&str> = latex.lines().filter(|line| line.ends_with("\\\\")).collect();
+    // The heading, three baselines, two schemes; as many cells in each.
+    assert_eq!(rows.len(), 6, "{latex}");
+    let cells = |row: &str| row.matches(" & ").count();
+    rows.iter().for_each(|row| assert_eq!(cells(row), cells(rows[0]), "{row}"));
+    assert!(rows[5].starts_with("    a\\_b & $") && latex.contains("\\pm") && !latex.contains('±'), "{latex}");
+    // The same numbers as in the table for people.
+    let table = done(scene.path(), arguments);
+    let mean = rows[4].split(" & ").nth(1).expect("a cell");
+    let number = mean.trim_start_matches("$\\mathbf{").trim_start_matches('$').split(' ').next().expect("a number");
+    assert!(number.parse::<f64>().is_ok() && table.contains(number), "{mean} is not in\n{table}");
+}

@@ -1,0 +1,270 @@
+//! Videos and animated pictures of paths: their content by other readers, and runs that are killed and continued.
+
+use super::{BINARY, done};
+use image::codecs::webp::WebPDecoder;
+use image::{AnimationDecoder, Rgb, RgbImage};
+use serde_json::{Value, json};
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use viewfuse_tests::command::{Outcome, command, files_below, names_in, toy, without_progress};
+
+viewfuse_tests::trials![
+    a_path_as_animated_webp_and_as_y4m,
+    a_run_that_was_killed_twice_ends_with_the_same_bytes,
+    another_run_begins_anew,
+    mp4_by_the_ffmpeg_of_the_machine_or_y4m,
+    depths_and_opacity_for_other_programs,
+    camera_paths_from_files,
+];
+
+const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --weights error:alpha=1 --device cpu --no-sheets";
+const PATIENCE: Duration = Duration::from_secs(300);
+
+fn png(folder: &Path, name: &str) -> RgbImage {
+    image::open(folder.join(name)).expect("a picture").to_rgb8()
+}
+
+/// Red, green and blue from planes of BT.601, limited range, at full resolution.
+fn rgb_of(frame: &y4m::Frame<'_>, width: usize, x: usize, y: usize) -> [f64; 3] {
+    let value = |plane: &[u8], offset: f64| (f64::from(plane[y * width + x]) - offset) / 255.0;
+    let luma = value(frame.get_y_plane(), 16.0) * 255.0 / 219.0;
+    let [blue, red] = [value(frame.get_u_plane(), 128.0), value(frame.get_v_plane(), 128.0)].map(|c| c * 255.0 / 224.0);
+    [luma + 1.402 * red, luma - 0.344136 * blue - 0.714136 * red, luma + 1.772 * blue].map(|level| 255.0 * level)
+}
+
+fn a_path_as_animated_webp_and_as_y4m() {
+    let scene = toy();
+    let printed = done(scene.path(), &format!("{PATH} --video webp,y4m --fps 12 -o out"));
+    assert!(printed.contains("out/video.webp\n") && printed.contains("out/video.y4m\n"), "{printed}");
+    let out = scene.path().join("out");
+    let pictures: Vec<RgbImage> = (0..5).map(|frame| png(&out, &format!("between-{frame:03}.png"))).collect();
+    assert!(pictures[0] != pictures[4], "the camera does not move");
+
+    // The decoder of `image` knows animations; nothing is lost.
+    let decoder = WebPDecoder::new(BufReader::new(File::open(out.join("video.webp")).expect("a file"))).expect("WebP");
+    assert!(decoder.has_animation());
+    let frames = decoder.into_frames().collect_frames().expect("frames");
+    let times: Vec<u32> = frames.iter().map(|frame| frame.delay().numer_denom_ms()).map(|(n, d)| n / d).collect();
+    assert_eq!(times, [83, 84, 83, 83, 84]);
+    for (frame, picture) in frames.into_iter().zip(&pictures) {
+        let shown = image::DynamicImage::ImageRgba8(frame.into_buffer()).to_rgb8();
+        assert!(shown == *picture, "a frame differs from its picture");
+    }
+
+    let mut video = y4m::decode(File::open(out.join("video.y4m")).expect("a file")).expect("y4m");
+    assert_eq!((video.get_width(), video.get_height()), (24, 24));
+    assert_eq!((video.get_framerate().num, video.get_framerate().den), (12, 1));
+    for picture in &pictures {
+        let frame = video.read_frame().expect("a frame");
+        for (x, y, Rgb(own)) in picture.enumerate_pixels() {
+            let shown = rgb_of(&frame, 24, x as usize, y as usize);
+            own.iter()
+                .zip(shown)
+                .for_each(|(own, shown)| assert!((f64::from(*own) - shown).abs() < 3.0, "{own} {shown}"));
+        }
+    }
+    assert!(video.read_frame().is_err(), "a sixth frame");
+    // On standard output the same bytes, and nothing else.
+    let before = files_below(scene.path());
+    let run = command(BINARY, scene.path(), &format!("{PATH} --fps 12 -o -")).output().expect("the command starts");
+    let said = without_progress(&String::from_utf8_lossy(&run.stderr));
+    assert!(run.status.success() && said.is_empty(), "{said}");
+    assert!(run.stdout == fs::read(out.join("video.y4m")).expect("a file"), "another video on standard output");
+    assert_eq!(files_below(scene.path()), before);
+}
+
+/// Starts a run and kills it without warning when this many frames are in its journal.
+fn killed(folder: &Path, arguments: &str, frames: usize) {
+    let journal = folder.join("cut/frames.jsonl");
+    let mut run = command(BINARY, folder, arguments);
+    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+    let start = Instant::now();
+    let lines = || fs::read_to_string(&journal).unwrap_or_default().lines().count();
+    while lines() < 1 + frames {
+        assert!(child.try_wait().expect("a process").is_none(), "the command ended early");
+        assert!(start.elapsed() < PATIENCE, "nothing appeared");
+        sleep(Duration::from_millis(2));
+    }
+    child.kill().expect("a process to kill");
+    child.wait().expect("a dead process");
+    assert!(!folder.join("cut/run.json").exists());
+}
+
+fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
+    let scene = toy();
+    let folder = scene.path();
+    let arguments = "render toy --orbit 120 --size 24x24 --device cpu --no-sheets --depth npy --video webp,y4m -o";
+    done(folder, &format!("{arguments} whole"));
+    let arguments = format!("{arguments} cut");
+    killed(folder, &arguments, 3);
+    // What a kill leaves in the middle of a line and of a frame.
+    let journal = folder.join("cut/frames.jsonl");
+    let text = fs::read_to_string(&journal).expect("a journal");
+    fs::write(&journal, format!("{text}{{\"frame\":")).expect("a journal");
+    fs::remove_file(folder.join("cut/orbit-001_depth.npy")).expect("a file");
+    killed(folder, &arguments, 60);
+    let printed = done(folder, &arguments);
+    let there: usize = printed
+        .lines()
+        .find_map(|line| line.strip_prefix("continued: ")?.split_once(" of them were there")?.0.parse().ok())
+        .unwrap_or_else(|| panic!("nothing was continued:\n{printed}"));
+    // A frame whose file went is in the journal twice.
+    assert!((55..120).contains(&there), "{printed}");
+    let is_result = |name: &String| !name.starts_with(".viewfuse-");
+    let names: Vec<String> = names_in(&folder.join("cut")).into_iter().filter(is_result).collect();
+    assert_eq!(names, names_in(&folder.join("whole")));
+    assert_eq!(names.len(), 2 * 120 + 3);
+    for name in names.iter().filter(|name| *name != "run.json") {
+        let [whole, cut] = ["whole", "cut"].map(|run| fs::read(folder.join(run).join(name)).expect("a file"));
+        assert!(whole == cut, "{name} differs");
+    }
+    // The record is complete, and in the order of the path.
+    let record = |run: &str| -> Value {
+        serde_json::from_slice(&fs::read(folder.join(run).join("run.json")).expect("a record")).expect("JSON")
+    };
+    let targets = |record: &Value| -> Vec<Value> {
+        record["frames"].as_array().expect("frames").iter().map(|frame| frame["target"].clone()).collect()
+    };
+    assert_eq!(targets(&record("cut")), targets(&record("whole")));
+    assert_eq!((record("cut")["continued"].as_u64(), &record("whole")["continued"]), (Some(there as u64), &json!(0)));
+}
+
+fn another_run_begins_anew() {
+    let scene = toy();
+    let folder = scene.path();
+    let arguments = "render toy --orbit 60 --size 24x24 --device cpu --no-sheets -o cut";
+    killed(folder, arguments, 2);
+    let printed = done(folder, &format!("{PATH} -o cut"));
+    assert!(!printed.contains("continued"), "{printed}");
+    // Other weights make other pictures.
+    killed(folder, arguments, 2);
+    let printed = done(folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean -o cut");
+    assert!(!printed.contains("continued"), "{printed}");
+    assert!(!folder.join("cut/frames.jsonl").exists() && folder.join("cut/run.json").is_file());
+}
+
+/// Runs the command with a folder of programs as its path.
+fn with_programs(folder: &Path, programs: &Path, arguments: &str) -> Outcome {
+    let mut run = command(BINARY, folder, arguments);
+    run.env("PATH", programs);
+    Outcome::of(run)
+}
+
+fn mp4_by_the_ffmpeg_of_the_machine_or_y4m() {
+    let scene = toy();
+    let folder = scene.path();
+    let programs = folder.join("programs");
+    fs::create_dir(&programs).expect("a folder");
+    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+    assert!(run.stdout.contains("out/video.y4m: instead of mp4: there is no ffmpeg"), "{}", run.stdout);
+    let video = fs::read(folder.join("out/video.y4m")).expect("a video");
+    if cfg!(not(unix)) {
+        return;
+    }
+    // A program of that name that keeps what it reads, and says how it was called.
+    let script = "#!/bin/sh\nfor last; do :; done\nexec /bin/cat > \"$last\"\n";
+    fs::write(programs.join("ffmpeg"), script).expect("a program");
+    let made = Command::new("chmod").arg("+x").arg(programs.join("ffmpeg")).status().expect("chmod runs");
+    assert!(made.success());
+    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+    assert!(fs::read(folder.join("out/video.mp4")).expect("a video") == video, "the program got another video");
+    assert!(!folder.join("out/video.y4m").exists(), "the video of the run before is left");
+    // One that fails.
+    fs::write(programs.join("ffmpeg"), "#!/bin/sh\necho no such encoder >&2\nexit 3\n").expect("a program");
+    let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
+    assert_eq!(run.code, Some(1));
+    assert!(run.stderr.contains("video.mp4: ffmpeg could not write it: no such encoder"), "{}", run.stderr);
+    assert!(names_in(&folder.join("out")).iter().all(|name| !name.ends_with("mp4")));
+}
+
+/// The numbers of a `.npy` file of `<f4`, with its header.
+fn npy(path: &Path) -> (String, Vec<f32>) {
+    let bytes = fs::read(path).expect("an array");
+    assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
+    let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let values = bytes[end..].chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    (String::from_utf8(bytes[10..end].to_vec()).expect("text"), values)
+}
+
+fn depths_and_opacity_for_other_programs() {
+    let scene = toy();
+    let folder = scene.path();
+    // Wider than high, so that rows and columns differ.
+    scene.write(
+        "wide.csv",
+        "name,x,y,z,look_x,look_y,look_z,fx,fy,cx,cy,width,height\nwide,1,0.7,0.5,0,0,0,60,60,24,16,48,32\n",
+    );
+    let arguments = "render toy --camera-path wide.csv --device cpu --no-sheets";
+    done(folder, &format!("{arguments} --alpha --depth png,exr,npy -o out"));
+    let out = folder.join("out");
+    assert_eq!(names_in(&out), ["run.json", "wide.png", "wide_depth.exr", "wide_depth.npy", "wide_depth.png"]);
+    let (header, depths) = npy(&out.join("wide_depth.npy"));
+    assert!(header.contains("'descr': '<f4'") && header.contains("'shape': (32, 48)"), "{header}");
+    assert!(depths.len() == 48 * 32 && depths.iter().all(|depth| depth.is_finite()));
+    let exr = exr::prelude::read_first_flat_layer_from_file(out.join("wide_depth.exr")).expect("OpenEXR");
+    let channel = &exr.layer_data.channel_data.list[0];
+    assert_eq!((channel.name.to_string(), exr.layer_data.size.0, exr.layer_data.size.1), ("Z".to_owned(), 48, 32));
+    let read: Vec<f32> = channel.sample_data.values_as_f32().collect();
+    assert_eq!(read, depths);
+    // The steps of the PNG, by the record.
+    let record: Value = serde_json::from_slice(&fs::read(out.join("run.json")).expect("a record")).expect("JSON");
+    let step = record["frames"][0]["depth_step"].as_f64().expect("a step");
+    assert!(record["depth_units"]["depth"].as_str().is_some_and(|words| words.contains("units of the scene's files")));
+    let levels = image::open(out.join("wide_depth.png")).expect("a map").to_luma16();
+    for (level, depth) in levels.pixels().zip(&depths) {
+        assert!((f64::from(level[0]) * step - f64::from(*depth)).abs() <= 0.51 * step);
+    }
+    // Opacity is that of the object; colour and background make the picture without alpha.
+    let with_alpha = image::open(out.join("wide.png")).expect("a picture").into_rgba8();
+    done(folder, &format!("{arguments} -o plain"));
+    let plain = png(&folder.join("plain"), "wide.png");
+    let background: Vec<f64> = record["background"]["used"]
+        .as_array()
+        .expect("a colour")
+        .iter()
+        .map(|level| level.as_f64().expect("a level"))
+        .collect();
+    let opaque = with_alpha.pixels().filter(|pixel| pixel[3] == 255).count();
+    let empty = with_alpha.pixels().filter(|pixel| pixel[3] == 0).count();
+    assert!(opaque > 100 && empty > 300, "{opaque} {empty}");
+    for (own, plain) in with_alpha.pixels().zip(plain.pixels()) {
+        let alpha = f64::from(own[3]) / 255.0;
+        for channel in 0..3 {
+            let mixed = alpha * f64::from(own[channel]) + (1.0 - alpha) * background[channel];
+            // Faint pixels round their alpha.
+            assert!((mixed - f64::from(plain[channel])).abs() <= 2.0, "{own:?} over the background is not {plain:?}");
+        }
+    }
+}
+
+fn camera_paths_from_files() {
+    let scene = toy();
+    let folder = scene.path();
+    let record = |run: &str| -> Value {
+        serde_json::from_slice(&fs::read(folder.join(run).join("run.json")).expect("a record")).expect("JSON")
+    };
+    done(folder, "render toy --targets 20 --sources 0..11 --size 24x24 --device cpu --no-sheets -o view");
+    let pose = record("view")["frames"][0]["world_from_camera"].clone();
+    // The same camera by a table, and by nerfstudio's viewer with axes turned around.
+    let number = |row: usize, column: usize| pose[row][column].as_f64().expect("a number");
+    let entries: Vec<String> = (0..12).map(|k| number(k / 4, k % 4).to_string()).collect();
+    let names: Vec<String> = (0..12).map(|k| format!("m{}{}", k / 4, k % 4)).collect();
+    scene.write("poses.csv", format!("name,{}\nview,{}\n", names.join(","), entries.join(",")));
+    let opengl: Vec<f64> =
+        (0..16).map(|k| number(k / 4, k % 4) * if k % 4 == 1 || k % 4 == 2 { -1.0 } else { 1.0 }).collect();
+    let frame = json!({ "file_path": "view", "transform_matrix": opengl.chunks(4).collect::<Vec<_>>() });
+    scene.write("poses.json", json!({ "frames": [frame], "fps": 10 }).to_string());
+    for file in ["poses.csv", "poses.json"] {
+        let arguments = format!("--camera-path {file} --sources 0..11 --size 24x24 --device cpu --no-sheets");
+        done(folder, &format!("render toy {arguments} --video y4m -o path"));
+        assert!(png(&folder.join("path"), "view.png") == png(&folder.join("view"), "000020.png"), "{file}");
+        let video = y4m::decode(File::open(folder.join("path/video.y4m")).expect("a file")).expect("y4m");
+        assert_eq!(video.get_framerate().num, if file == "poses.json" { 10 } else { 30 });
+    }
+}
