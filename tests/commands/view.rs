@@ -7,8 +7,8 @@
 mod devtools;
 mod program;
 
+use super::BINARY;
 use super::report::Browser;
-use super::{BINARY, done};
 use devtools::{Chromium, Tab};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;

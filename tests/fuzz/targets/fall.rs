@@ -17,7 +17,7 @@ impl Target for Fall {
 
     fn run(&mut self, bytes: &[u8]) -> Result<Verdict, String> {
         if !bytes.starts_with(b"fall") {
-            return Ok(if bytes.len() % 2 == 0 { Verdict::Read } else { Verdict::Refused("odd".to_owned()) });
+            return Ok(if bytes.len().is_multiple_of(2) { Verdict::Read } else { Verdict::Refused("odd".to_owned()) });
         }
         match self.0 {
             "panics" => panic!("a panic of fuzzing"),

@@ -1,6 +1,7 @@
 //! `viewfuse select`.
 
 use super::options::SourceOptions;
+use super::outputs::keep_file_apart;
 use super::parse::parse_count;
 use super::path::PathOptions;
 use super::table::table;
@@ -75,6 +76,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     };
     match &arguments.output {
         Some(path) => {
+            keep_file_apart([&scene], path)?;
             write_whole(path, text.as_bytes()).context("the selection")?;
             say(path.display())?;
         }

@@ -1,6 +1,7 @@
 //! `viewfuse weights`.
 
 use super::options::SourceOptions;
+use super::outputs::keep_file_apart;
 use super::path::PathOptions;
 use super::say;
 use super::table::table;
@@ -61,6 +62,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else if arguments.csv {
         say(csv_of(&weights)?.trim_end_matches('\n'))?;
     } else if let Some(path) = &arguments.npy {
+        keep_file_apart([&scene], path)?;
         write_whole(path, &weights.npy())?;
         let axes = json!({
             "file": path, "shape": weights.shape(), "schemes": weights.schemes, "targets": weights.targets, "sources": weights.sources,
