@@ -21,7 +21,7 @@ pub use expectation::{Basis, Expected, TERMS};
 pub use geometry::Standing;
 pub use leave_out::{MOST_LEFT_OUT, MOST_NEIGHBOURS, SIDE};
 
-use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, open_album};
+use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
 use crate::{Renderer, Setting};
 use geometry::Measure;
 use leave_out::{Outcome, Trials, coarse, mean};
@@ -226,23 +226,12 @@ pub fn render<X: From<RenderError>>(
     renderer: &dyn Renderer,
     options: &RenderOptions,
     progress: &dyn Progress,
-    mut deliver: impl FnMut(&SourceImages, Frame, &Chosen) -> Result<(), X>,
+    deliver: impl FnMut(&SourceImages, Frame, &Chosen) -> Result<(), X>,
 ) -> Result<(Finished, Chosen), X> {
-    let truths = job.targets.iter().filter_map(|target| target.truth);
-    let shown = job.sources.iter().copied().chain(truths);
-    let (count, stage_count) = (job.targets.len(), 3 + job.targets.len());
-    progress.stage("reading the sources", 0, stage_count);
-    let album = open_album(scene, shown, renderer, options, progress)?;
-    let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
-    progress.stage("choosing the scheme", 1, stage_count);
-    let chosen = choose(&stage, renderer, options, progress)?;
-    stage.tune(&chosen.settings);
-    progress.stage("encoding the sources", 2, stage_count);
-    stage.weigh(&chosen.weighting, progress)?;
-    for (index, target) in job.targets.iter().enumerate() {
-        progress.stage(&format!("view {} of {count}", index + 1), 3 + index, stage_count);
-        let frame = stage.frame(&chosen.weighting, target, progress)?;
-        deliver(&stage.images, frame, &chosen)?;
-    }
-    Ok((Finished { costs: stage.costs, record: stage.record() }, chosen))
+    let choose = |stage: &mut Stage<'_>| {
+        let chosen = choose(stage, renderer, options, progress)?;
+        stage.tune(&chosen.settings);
+        Ok((chosen.weighting.clone(), chosen))
+    };
+    render_chosen(scene, job, renderer, options, progress, choose, deliver)
 }

@@ -31,14 +31,12 @@ pub struct TrainingFree {
     pub sweep: Sweep,
     /// Side of the sources as a share of the pictures', above 0: smaller sources take less time to match.
     pub source_share: f32,
-    /// Use the plane sweep also for sources with silhouettes.
-    pub always_sweep: bool,
 }
 
 impl Default for TrainingFree {
     /// Sources at the size of the pictures.
     fn default() -> TrainingFree {
-        TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0, always_sweep: false }
+        TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0 }
     }
 }
 
@@ -72,7 +70,7 @@ impl Field for TrainingFree {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        if sources.has_silhouettes && !self.always_sweep {
+        if sources.has_silhouettes {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
             let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();

@@ -1,0 +1,80 @@
+//! The options of a render, and the sizes that follow from them.
+
+use super::RenderError;
+use crate::{Renderer, Setting};
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side};
+use viewfuse_scene::{Scene, View};
+
+/// The options of a render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Width and height of the pictures; the default is the views' size, at most the field's
+    /// [`About::longest_side`](crate::About::longest_side) on a side.
+    pub size: Option<[u32; 2]>,
+    /// The background of the object.
+    pub background: BackgroundChoice,
+    /// Sources of least weight are left out while their weights together stay at or below this.
+    pub leave_out: f32,
+    /// Transmittance of early termination.
+    pub early_termination: f32,
+    /// Values of the field's scalars ([`Tunable`]); those that are not named take their defaults.
+    pub settings: Vec<Setting>,
+}
+
+/// Default of the largest share of the weight that is left out: it bounds the change of a fusion of all
+/// views at 1 % of the range of its inputs. Where only some views see a point, the bound is this over their weight: for
+/// schemes that give one view nearly everything (cross attention), leaving out 5 % already costs 1 dB where that one view
+/// sees nothing.
+pub const DEFAULT_LEAVE_OUT: f32 = 0.01;
+/// Default transmittance of early termination: 1/256 of the range of a channel.
+pub const DEFAULT_EARLY_TERMINATION: f32 = 1.0 / 256.0;
+
+impl Default for RenderOptions {
+    fn default() -> RenderOptions {
+        RenderOptions {
+            size: None,
+            background: BackgroundChoice::Auto,
+            leave_out: DEFAULT_LEAVE_OUT,
+            early_termination: DEFAULT_EARLY_TERMINATION,
+            settings: Vec::new(),
+        }
+    }
+}
+
+/// The longest side of the pictures of a run: of the requested size, or of the largest photograph, at most `longest`
+/// (a field's [`About::longest_side`](crate::About::longest_side)).
+///
+/// # Errors
+/// [`RenderError::Shape`] if the requested size would stretch the pictures by more than a pixel.
+pub fn working_side(scene: &Scene, options: &RenderOptions, longest: u32) -> Result<u32, RenderError> {
+    let Some([width, height]) = options.size else {
+        let largest = scene.views.iter().map(|view| longest_side(&view.camera)).max();
+        return Ok(largest.unwrap_or(longest).min(longest));
+    };
+    if let Some(View { camera, .. }) = scene.views.first() {
+        let (view_width, view_height) = (camera.pinhole.width(), camera.pinhole.height());
+        camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        let fitting_height = (f64::from(view_height) * f64::from(width) / f64::from(view_width)).round() as u32;
+        if fitting_height.abs_diff(height) > 1 {
+            return Err(RenderError::Shape { width, height, view_width, view_height, fitting_height });
+        }
+    }
+    Ok(width.max(height))
+}
+
+/// The photographs of these views, decoded no larger than a render with these options needs them.
+///
+/// # Errors
+/// [`RenderError`].
+pub fn open_album<'a>(
+    scene: &'a Scene,
+    views: impl IntoIterator<Item = usize>,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Album<'a>, RenderError> {
+    let about = renderer.about();
+    let side = working_side(scene, options, about.longest_side)?;
+    Ok(Album::open_at(scene, views, side.max(about.source_side.of(side)), progress)?)
+}

@@ -1,0 +1,298 @@
+//! Sources on a device, from which targets are rendered.
+
+use super::{Frame, RenderError, RenderOptions, Truth, working_side};
+use crate::{DepthMap, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use viewfuse_core::camera::Camera;
+use viewfuse_core::weights::Weights;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::Target;
+use viewfuse_scene::photographs::{Album, GroundTruth, SourceImages, reduced_size, scaled_size, to_rgb8};
+use viewfuse_weighting::Weighting;
+use viewfuse_weighting::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
+
+/// Times of the stages. Stages that several frames share are counted once, in their run.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StageCosts {
+    /// Decoding photographs, removing backgrounds, resampling.
+    pub photographs: Duration,
+    /// Taking the photographs to the device and finding the object.
+    pub prepare: Duration,
+    /// Encoding the sources before the frames; for encoding at the first use see [`Frame::encode`].
+    pub encode: Duration,
+}
+
+/// A set of sources on a device: the state that depends on no weighting and no target.
+pub struct Stage<'a> {
+    scene: &'a Scene,
+    album: &'a Album<'a>,
+    options: &'a RenderOptions,
+    side: u32,
+    /// The source views, as indices into the scene's views.
+    pub views: Vec<usize>,
+    sources: SourcePoses,
+    /// The sources at working size.
+    pub images: Arc<SourceImages>,
+    session: Session<'a>,
+    /// Times of the stages so far.
+    pub costs: StageCosts,
+}
+
+impl<'a> Stage<'a> {
+    /// Prepares these source views on the device.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn prepare(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        renderer: &'a dyn Renderer,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Stage<'a>, RenderError> {
+        let about = renderer.about();
+        let source_side = about.source_side.of(working_side(scene, options, about.longest_side)?);
+        let mut photographs = Duration::ZERO;
+        let images = timed(&mut photographs, || album.sources(sources, source_side, options.background, progress))?;
+        if let Some(warning) = &images.warning {
+            progress.warn(&format!("{}: {warning}", scene.path.display()));
+        }
+        let images = Arc::new(images);
+        let mut stage = Stage::of_images(scene, album, sources, images, renderer, options, progress)?;
+        stage.costs.photographs = photographs;
+        Ok(stage)
+    }
+
+    /// The same with prepared photographs: those of these sources, at the field's size and over the options'
+    /// background.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    #[allow(clippy::too_many_arguments)]
+    pub fn of_images(
+        scene: &'a Scene,
+        album: &'a Album<'a>,
+        sources: &[usize],
+        images: Arc<SourceImages>,
+        renderer: &'a dyn Renderer,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Stage<'a>, RenderError> {
+        let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
+        let side = working_side(scene, options, renderer.about().longest_side)?;
+        let mut costs = StageCosts::default();
+        let mut session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))
+            .map_err(|error| RenderError::of(error, scene))?;
+        session.tune(&options.settings);
+        let views = sources.to_vec();
+        Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, costs })
+    }
+
+    /// Begins a weighting for the following frames: encodes the sources if the field does so before the frames, each
+    /// source as a target of the others.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
+        let relevance = self.relevance(weighting);
+        let session = &mut self.session;
+        timed(&mut self.costs.encode, || session.weigh(&relevance, progress))
+            .map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// Encodes all sources that are not encoded yet, so that what follows does not change how they are.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
+        let session = &mut self.session;
+        timed(&mut self.costs.encode, || session.encode_all(progress))
+            .map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// The field's scalars that can be chosen for a scene.
+    pub fn tunables(&self) -> &'static [Tunable] {
+        self.session.tunables()
+    }
+
+    /// Sets the field's scalars for what follows; views that are encoded stay as they are.
+    pub fn tune(&mut self, settings: &[Setting]) {
+        self.session.tune(settings);
+    }
+
+    /// What follows is only compared with one another; see [`Prepared::simplify`](crate::Prepared::simplify).
+    pub fn simplify(&mut self) {
+        self.session.simplify();
+    }
+
+    /// What the field knows of where the surfaces are.
+    pub fn surfaces(&self) -> Surfaces {
+        self.session.surfaces()
+    }
+
+    /// The depth maps of the sources, under the weighting that began; see [`Prepared::source_depths`](crate::Prepared::source_depths).
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn source_depths(&self) -> Result<Vec<DepthMap>, RenderError> {
+        self.session.source_depths().map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// The weights of all sources for each source as a target; a source's weight for itself is 0.
+    pub fn relevance(&self, weighting: &Weighting) -> Vec<SourceWeights> {
+        relevance_among(&self.sources, weighting, self.options.leave_out)
+    }
+
+    /// Longest side of the pictures.
+    pub fn side(&self) -> u32 {
+        self.side
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
+    /// Its photographs.
+    pub fn album(&self) -> &'a Album<'a> {
+        self.album
+    }
+
+    /// The record of the field's work so far.
+    pub fn record(&self) -> Record {
+        self.session.record()
+    }
+
+    /// Weighs the sources for a target, leaves out those of least weight, renders, and compares with the ground truth.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn frame(
+        &mut self,
+        weighting: &Weighting,
+        target: &Target,
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError> {
+        let camera = self.at_working_size(&target.camera)?;
+        self.frame_at(weighting, target, &camera, progress)
+    }
+
+    /// As [`Stage::frame`] without a truth, with a picture of another size than the options': for coarse pictures.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn frame_of_size(
+        &mut self,
+        weighting: &Weighting,
+        camera: &Camera,
+        [width, height]: [u32; 2],
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError> {
+        let pinhole =
+            camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        let target = Target { name: String::new(), camera: *camera, truth: None };
+        self.frame_at(weighting, &target, &Camera { pinhole, ..*camera }, progress)
+    }
+
+    /// `camera` is the target's, of the picture's size.
+    fn frame_at(
+        &mut self,
+        weighting: &Weighting,
+        target: &Target,
+        camera: &Camera,
+        progress: &dyn Progress,
+    ) -> Result<Frame, RenderError> {
+        let start = Instant::now();
+        let weights = weighting.weigh(&self.sources, &target.camera.pose);
+        let omission = weights.without_least(self.options.leave_out);
+        let failed = |error| RenderError::of(error, self.scene);
+        let mut encode = Duration::ZERO;
+        timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
+        let early_termination = self.options.early_termination;
+        let rendered = self.session.render(camera, &omission.weights, early_termination, progress).map_err(failed)?;
+        let time = start.elapsed();
+        let Rendered { colours, depths, confidences, width, height } = rendered;
+        let picture = to_rgb8(&colours, [width, height]);
+        let truth = match target.truth {
+            Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
+            None => None,
+        };
+        let target = target.clone();
+        Ok(Frame { target, weights, omission, colours, picture, depths, confidences, truth, time, encode })
+    }
+
+    /// A view's photograph at a size, over the run's background.
+    ///
+    /// # Errors
+    /// [`RenderError::Scene`] if it cannot be read.
+    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<GroundTruth, RenderError> {
+        let background = self.images.has_silhouettes.then_some(self.images.background);
+        Ok(self.album.truth(view, size, background)?)
+    }
+
+    /// Width and height of the picture that is rendered at a view's camera.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError> {
+        self.size_at(&self.scene.views[view].camera)
+    }
+
+    /// Width and height of the picture that is rendered at a camera.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn size_at(&self, camera: &Camera) -> Result<[u32; 2], RenderError> {
+        let camera = self.at_working_size(camera)?;
+        Ok([camera.pinhole.width(), camera.pinhole.height()])
+    }
+
+    fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError> {
+        let (width, height) = match (self.options.size, self.scene.views.first()) {
+            (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
+            (Some(_), _) => scaled_size(camera, self.side),
+            (None, _) => reduced_size(camera, self.side),
+        };
+        let pinhole =
+            camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
+        Ok(Camera { pinhole, ..*camera })
+    }
+}
+
+fn same_size(a: &Camera, b: &Camera) -> bool {
+    a.pinhole.width() == b.pinhole.width() && a.pinhole.height() == b.pinhole.height()
+}
+
+/// The weights of all sources for each source as a target; a source's weight for itself is 0.
+fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32) -> Vec<SourceWeights> {
+    let count = sources.count();
+    (0..count)
+        .map(|view| {
+            // The scheme sees only the others: its own pose would take nearly all the weight.
+            let others: Vec<_> = (0..count).filter(|other| *other != view).map(|other| *sources.pose(other)).collect();
+            let Ok(others) = SourcePoses::new(&others) else {
+                return Weights::mean(count);
+            };
+            let weights = weighting.weigh(&others, sources.pose(view)).without_least(leave_out).weights;
+            let mut scores = [0.0; MOST_SOURCES];
+            for other in 0..count {
+                if other != view {
+                    scores[other as usize] = weights.get(if other < view { other } else { other - 1 });
+                }
+            }
+            Weights::from_scores(&scores, count)
+        })
+        .collect()
+}
+
+/// Runs `work` and adds its time.
+fn timed<T>(total: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let result = work();
+    *total += start.elapsed();
+    result
+}
