@@ -90,6 +90,10 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         Some(WeightingChoice::Auto) | None => None,
     };
     let scene = Scene::open(&arguments.scene)?;
+    let is_stream = arguments.output == Path::new("-");
+    if !is_stream {
+        keep_folder_apart([&scene], &arguments.output)?;
+    }
     let open_time = start.elapsed();
     let field = arguments.model.open(arguments.seed, arguments.reuse)?;
     let about = field.about();
@@ -97,9 +101,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let job = selection.resolve(&scene, about.least_sources)?;
     let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
     let rate = arguments.outputs.rate(job.frames_per_second);
-    let is_stream = arguments.output == Path::new("-");
     if !is_stream {
-        keep_folder_apart([&scene], &arguments.output)?;
         check_writable(&arguments.output.join(RECORD))?;
         check_folder(&arguments.output, &job.targets)?;
     }

@@ -87,7 +87,8 @@ mod tests {
                 before = course.share();
             }
         }
-        assert!(before > 0.75 && before < 1.0);
+        // The only piece that was known was done: the further ones do not lower it.
+        assert_eq!(before, 1.0);
         // Pieces without stages.
         let mut course = Course::new("pieces", Instant::now());
         course.step();
