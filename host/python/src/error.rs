@@ -1,0 +1,104 @@
+//! Errors as Python exceptions, with the text that the command prints.
+
+use pyo3::PyErr;
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError, PyValueError};
+use std::error::Error as StdError;
+use viewfuse::device::choice::UnknownDevice;
+use viewfuse::field::FieldError;
+use viewfuse::field::options::OpenError;
+use viewfuse::field::render::RenderError;
+use viewfuse::job::files::WriteError;
+use viewfuse::job::progress::Interrupted;
+use viewfuse::nn::checkpoint::CheckpointError;
+use viewfuse::scene::SceneError;
+use viewfuse::scene::few_shot::SelectionError;
+use viewfuse::vulkan::VulkanError;
+use viewfuse::weighting::WeightingError;
+use viewfuse::weighting::attention::AttentionError;
+
+pyo3::create_exception!(
+    viewfuse,
+    Error,
+    PyException,
+    "Work failed although its input was good: a device, for example."
+);
+
+/// Why a call failed.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// The input is at fault: `ValueError`.
+    Input(String),
+    /// A file could not be written: `OSError`.
+    File(String),
+    /// Something else: `viewfuse.Error`.
+    Other(String),
+    /// The work was cancelled: `KeyboardInterrupt`.
+    Interrupted,
+}
+
+/// The error with its causes, as the command prints it.
+fn text(error: &(dyn StdError + 'static)) -> String {
+    causes(error).map(ToString::to_string).collect::<Vec<_>>().join(": ")
+}
+
+fn causes<'a>(error: &'a (dyn StdError + 'static)) -> impl Iterator<Item = &'a (dyn StdError + 'static)> {
+    std::iter::successors(Some(error), |&error| error.source())
+}
+
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Failure {
+        if causes(&error).any(|cause| cause.is::<Interrupted>()) {
+            return Failure::Interrupted;
+        }
+        match &error {
+            RenderError::Field(FieldError::Device(_) | FieldError::NotFinite(_)) => Failure::Other(text(&error)),
+            _ => Failure::Input(text(&error)),
+        }
+    }
+}
+
+/// Errors of what the caller gave.
+macro_rules! input {
+    ($($Type:ty),+) => {
+        $(impl From<$Type> for Failure {
+            fn from(error: $Type) -> Failure {
+                Failure::Input(text(&error))
+            }
+        })+
+    };
+}
+
+input!(SceneError, SelectionError, WeightingError, AttentionError, UnknownDevice, CheckpointError, OpenError);
+
+impl From<VulkanError> for Failure {
+    fn from(error: VulkanError) -> Failure {
+        Failure::Other(text(&error))
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Failure {
+        Failure::File(text(&error))
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> PyErr {
+        match failure {
+            Failure::Input(text) => PyValueError::new_err(text),
+            Failure::File(text) => PyOSError::new_err(text),
+            Failure::Other(text) => Error::new_err(text),
+            Failure::Interrupted => PyKeyboardInterrupt::new_err(Interrupted.to_string()),
+        }
+    }
+}
+
+/// A decoder that panics is an error of the file; its panic is not printed.
+pub(crate) fn silence_caught_panics() {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !viewfuse::job::panics::is_catching() {
+            hook(panic);
+        }
+    }));
+}

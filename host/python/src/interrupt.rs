@@ -1,0 +1,79 @@
+//! Long work, without Python's lock, which Ctrl-C ends.
+//!
+//! Only the thread that called may ask Python for signals, and the library asks for cancellation on any thread. So the work
+//! has a thread of its own, and the calling one looks after Python until it is done.
+
+use crate::error::Failure;
+use pyo3::exceptions::PyUserWarning;
+use pyo3::prelude::*;
+use std::ffi::CString;
+use std::panic::resume_unwind;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+use std::time::Duration;
+use viewfuse::job::progress::Progress;
+
+/// Time between two questions to Python.
+const EVERY: Duration = Duration::from_millis(50);
+
+/// What the calling thread and the work tell each other.
+#[derive(Default)]
+struct Watched {
+    is_cancelled: AtomicBool,
+    /// Each once.
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Progress for Watched {
+    fn warn(&self, warning: &str) {
+        let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
+        if !warnings.iter().any(|known| known == warning) {
+            warnings.push(warning.to_owned());
+        }
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.is_cancelled.load(Ordering::Relaxed)
+    }
+}
+
+/// Runs `work` while other Python threads run; its warnings become Python's.
+///
+/// # Errors
+/// Those of `work`; what a signal handler raised (`KeyboardInterrupt`), or a warnings filter.
+pub(crate) fn interruptible<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&dyn Progress) -> Result<T, Failure> + Send,
+) -> PyResult<T> {
+    let watched = Watched::default();
+    let (outcome, signal) = py.detach(|| {
+        thread::scope(|scope| {
+            let (working, done) = channel::<()>();
+            let shared = &watched;
+            let worker = scope.spawn(move || {
+                // Dropped at the end, also by a panic.
+                let _working = working;
+                work(shared)
+            });
+            let mut signal = None;
+            while done.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
+                if signal.is_none() {
+                    signal = Python::attach(|py| py.check_signals()).err();
+                    watched.is_cancelled.store(signal.is_some(), Ordering::Relaxed);
+                }
+            }
+            (worker.join(), signal)
+        })
+    });
+    if let Some(signal) = signal {
+        return Err(signal);
+    }
+    let result = outcome.unwrap_or_else(|panic| resume_unwind(panic))?;
+    for warning in watched.warnings.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        let warning = CString::new(warning.replace('\0', " "))?;
+        PyErr::warn(py, &py.get_type::<PyUserWarning>(), &warning, 1)?;
+    }
+    Ok(result)
+}

@@ -1,0 +1,46 @@
+//! The Python package `viewfuse`: scenes, weights and pictures as numpy arrays.
+//!
+//! ```text
+//! error       errors as Python exceptions
+//! interrupt   work without Python's lock, which Ctrl-C ends
+//! arrays      arrays in and out
+//! request     what to render: targets and sources from Python's arguments
+//! weights     weights of the sources for targets
+//! frame       a rendered view
+//! render      the render loop
+//! scene       a scene, with the methods that use the modules above
+//! scores      PSNR and SSIM of two pictures
+//! ```
+
+mod arrays;
+mod error;
+mod frame;
+mod interrupt;
+mod render;
+mod request;
+mod scene;
+mod scores;
+mod weights;
+
+/// Few-shot novel view synthesis: scenes, weights and pictures as numpy arrays.
+#[pyo3::pymodule(name = "viewfuse")]
+mod module {
+    #[pymodule_export]
+    use crate::error::Error;
+    #[pymodule_export]
+    use crate::frame::PyFrame;
+    #[pymodule_export]
+    use crate::scene::PyScene;
+    #[pymodule_export]
+    use crate::scores::{psnr, ssim};
+    #[pymodule_export]
+    use crate::weights::PyWeights;
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        crate::error::silence_caught_panics();
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

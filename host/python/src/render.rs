@@ -1,0 +1,111 @@
+//! The render loop, with the defaults of the command.
+
+use crate::error::Failure;
+use crate::frame::Finished;
+use crate::request::Request;
+use std::path::PathBuf;
+use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
+use viewfuse::field::auto::{self, Chosen};
+use viewfuse::field::options::FieldOptions;
+use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, Frame, RenderOptions, render};
+use viewfuse::field::{AnyField, family};
+use viewfuse::job::progress::Progress;
+use viewfuse::nn::checkpoint::Checkpoint;
+use viewfuse::scene::Scene;
+use viewfuse::scene::photographs::{BackgroundChoice, SourceImages};
+use viewfuse::weighting::{Weighting, WeightingChoice};
+
+/// The arguments of a render.
+pub(crate) struct Order {
+    pub(crate) request: Request,
+    pub(crate) weights: Option<String>,
+    pub(crate) size: Option<(u32, u32)>,
+    pub(crate) model: Option<PathBuf>,
+    pub(crate) device: String,
+    pub(crate) background: String,
+    pub(crate) leave_out: f32,
+    pub(crate) seed: u64,
+}
+
+impl Order {
+    /// All frames, and the views of the scene that were their sources.
+    ///
+    /// # Errors
+    /// Those of the command.
+    pub(crate) fn carry_out(
+        &self,
+        scene: &Scene,
+        progress: &dyn Progress,
+    ) -> Result<(Vec<usize>, Vec<Finished>), Failure> {
+        let weighting = self.weighting()?;
+        let field = match &self.model {
+            None => AnyField::default(),
+            Some(path) => {
+                family::open(Checkpoint::open(path)?, &FieldOptions { seed: self.seed, ..FieldOptions::default() })?
+            }
+        };
+        let about = field.about();
+        let job = self.request.resolve(scene, about.least_sources)?;
+        let options = RenderOptions {
+            size: self.size()?,
+            background: self.background()?,
+            leave_out: self.leave_out()?,
+            early_termination: if about.ends_rays { DEFAULT_EARLY_TERMINATION } else { 0.0 },
+            ..RenderOptions::default()
+        };
+        let device = choice::open(&self.device.parse::<DeviceChoice>()?, &DeviceOptions::default())?.device;
+        let renderer = field.on(&device);
+        let renderer = renderer.as_ref();
+        let mut finished = Vec::with_capacity(job.targets.len());
+        match weighting {
+            Some(weighting) => {
+                let keep = |_: &SourceImages, frame: Frame| {
+                    finished.push(Finished { frame, scheme: weighting.to_string(), expected: None });
+                    Ok::<(), Failure>(())
+                };
+                render(scene, &job, &weighting, renderer, &options, progress, keep)?;
+            }
+            None => {
+                let keep = |_: &SourceImages, frame: Frame, chosen: &Chosen| {
+                    let (scheme, expected) = (chosen.weighting.to_string(), chosen.expected(&frame));
+                    finished.push(Finished { frame, scheme, expected });
+                    Ok::<(), Failure>(())
+                };
+                auto::render(scene, &job, renderer, &options, progress, keep)?;
+            }
+        }
+        Ok((job.sources, finished))
+    }
+
+    /// `None` for the best of the scene, which is the default without a network: trying schemes takes a network too long.
+    fn weighting(&self) -> Result<Option<Weighting>, Failure> {
+        let choice = self.weights.as_deref().map(str::parse::<WeightingChoice>).transpose()?;
+        match choice {
+            Some(WeightingChoice::Given(spec)) => Ok(Some(spec.open()?)),
+            None if self.model.is_some() => Ok(Some(Weighting::default_scheme())),
+            Some(WeightingChoice::Auto) | None => Ok(None),
+        }
+    }
+
+    fn size(&self) -> Result<Option<[u32; 2]>, Failure> {
+        let sides = 1..=16_384;
+        match self.size {
+            None => Ok(None),
+            Some((width, height)) if sides.contains(&width) && sides.contains(&height) => Ok(Some([width, height])),
+            Some((width, height)) => {
+                Err(Failure::Input(format!("size: {width}x{height}; width and height are from 1 to 16384")))
+            }
+        }
+    }
+
+    fn background(&self) -> Result<BackgroundChoice, Failure> {
+        self.background.parse().map_err(|error| Failure::Input(format!("{error}")))
+    }
+
+    fn leave_out(&self) -> Result<f32, Failure> {
+        match self.leave_out {
+            share if (0.0..1.0).contains(&share) => Ok(share),
+            share => Err(Failure::Input(format!("leave_out: {share} is not at least 0 and less than 1"))),
+        }
+    }
+}

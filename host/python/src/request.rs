@@ -1,0 +1,121 @@
+//! What to render: targets and sources from Python's arguments.
+
+use crate::error::Failure;
+use glam::DVec3;
+use numpy::{AllowTypeChange, PyArrayLike3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use viewfuse::core::camera::Camera;
+use viewfuse::core::pose::{Pose, PoseError};
+use viewfuse::scene::few_shot::{FewShot, PathChoice, Selection, SelectionError, Target};
+use viewfuse::scene::{Scene, SceneFrame};
+
+/// The arguments that choose sources and targets, which several methods take as keywords.
+pub(crate) struct Request {
+    selection: Selection,
+    /// Camera-to-world matrices of further targets, in the coordinates of the scene's files, OpenCV axes.
+    poses: Vec<[[f64; 4]; 4]>,
+}
+
+/// Names of the keywords.
+const KEYWORDS: [&str; 8] = ["targets", "sources", "views", "orbit", "between", "spiral", "camera_path", "poses"];
+
+impl Request {
+    /// # Errors
+    /// `TypeError` for a keyword that is none of these or a value of another type, `ValueError` for two paths.
+    pub(crate) fn of(method: &str, keywords: Option<&Bound<'_, PyDict>>) -> PyResult<Request> {
+        let mut request = Request { selection: Selection::default(), poses: Vec::new() };
+        let mut paths = Vec::new();
+        for (name, value) in keywords.into_iter().flatten() {
+            let name: String = name.extract()?;
+            if !KEYWORDS.contains(&name.as_str()) {
+                let text = format!("{method}() got an unexpected keyword argument '{name}'");
+                return Err(pyo3::exceptions::PyTypeError::new_err(text));
+            }
+            if value.is_none() {
+                continue;
+            }
+            match name.as_str() {
+                "targets" => request.selection.targets = Some(value.extract()?),
+                "sources" => request.selection.sources = Some(value.extract()?),
+                "views" => request.selection.view_count = Some(count(&name, &value)?),
+                "orbit" => paths.push(PathChoice::Orbit(count(&name, &value)?)),
+                "between" => {
+                    let (first, last, _): (String, String, Bound<'_, PyAny>) = value.extract()?;
+                    paths.push(PathChoice::Between { first, last, count: count(&name, &value.get_item(2)?)? });
+                }
+                "spiral" => paths.push(PathChoice::Spiral(count(&name, &value)?)),
+                "camera_path" => paths.push(PathChoice::File(value.extract::<PathBuf>()?)),
+                _ => request.poses = matrices(&value)?,
+            }
+        }
+        if paths.len() > 1 {
+            let text = "orbit, between, spiral and camera_path are one choice; two of them were given";
+            return Err(Failure::Input(text.to_owned()).into());
+        }
+        request.selection.path = paths.pop();
+        Ok(request)
+    }
+
+    /// The sources and targets of a scene.
+    ///
+    /// # Errors
+    /// If a view is not there, or there are too few or too many sources, or a matrix is no pose.
+    pub(crate) fn resolve(&self, scene: &Scene, least_sources: usize) -> Result<FewShot, Failure> {
+        let Request { selection, poses } = self;
+        let mut job = if poses.is_empty() || selection.targets.is_some() || selection.path.is_some() {
+            selection.resolve(scene, least_sources)?
+        } else {
+            let sources = selection.sources_without(scene, &[], least_sources)?;
+            FewShot { sources, targets: Vec::new(), frames_per_second: None }
+        };
+        let pinhole = scene.views[job.sources[0]].camera.pinhole;
+        for (index, matrix) in poses.iter().enumerate() {
+            let name = format!("pose-{index:03}");
+            let pose =
+                world_pose(matrix, &scene.frame).map_err(|error| Failure::Input(format!("poses[{index}]: {error}")))?;
+            if job.targets.iter().any(|target| target.name == name) {
+                return Err(SelectionError::SameName { scene: scene.path.display().to_string(), name }.into());
+            }
+            job.targets.push(Target { name, camera: Camera { pose, pinhole }, truth: None });
+        }
+        Ok(job)
+    }
+}
+
+/// A number of views or cameras.
+fn count(name: &str, value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let count: i64 = value.extract()?;
+    match usize::try_from(count) {
+        Ok(count) if (1..=10_000).contains(&count) => Ok(count),
+        _ => Err(Failure::Input(format!("{name}: {count} is not a whole number from 1 to 10000")).into()),
+    }
+}
+
+/// One 4x4 matrix or several; an array of float64 is only read.
+fn matrices(value: &Bound<'_, PyAny>) -> PyResult<Vec<[[f64; 4]; 4]>> {
+    let wrong = |shape: &[usize]| {
+        PyErr::from(Failure::Input(format!("poses: an array of shape {shape:?}; it must be N x 4 x 4, N at least 1")))
+    };
+    let array: PyArrayLike3<'_, f64, AllowTypeChange> = value.extract()?;
+    let view = array.as_array();
+    match *view.shape() {
+        [count, 4, 4] if count > 0 => {}
+        ref shape => return Err(wrong(shape)),
+    }
+    let matrix = |m: numpy::ndarray::ArrayView2<'_, f64>| {
+        std::array::from_fn(|row| std::array::from_fn(|column| m[[row, column]]))
+    };
+    Ok(view.outer_iter().map(matrix).collect())
+}
+
+/// A matrix of the scene's files as a pose in the world: as the files' own are read.
+fn world_pose(matrix: &[[f64; 4]; 4], frame: &SceneFrame) -> Result<Pose, PoseError> {
+    let mut moved = *matrix;
+    if *frame != SceneFrame::FILE {
+        let centre = frame.world(DVec3::new(matrix[0][3], matrix[1][3], matrix[2][3]));
+        (moved[0][3], moved[1][3], moved[2][3]) = (centre.x, centre.y, centre.z);
+    }
+    Pose::from_opencv(&moved.map(|row| row.map(|value| value as f32)))
+}

@@ -1,0 +1,359 @@
+"""Tests of the installed package, by `host/python/test`, which sets:
+
+VIEWFUSE_COMMAND      the command viewfuse, to compare with
+VIEWFUSE_REPOSITORY   the repository's root
+"""
+
+import ast
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import warnings
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+import viewfuse
+
+COMMAND = os.environ["VIEWFUSE_COMMAND"]
+REPOSITORY = Path(os.environ["VIEWFUSE_REPOSITORY"])
+HERE = Path(__file__).parent
+ROOM = REPOSITORY / "tests/data/room"
+TOY = REPOSITORY / "tests/data/toy"
+CAR = REPOSITORY / "tests/data/car"
+NETWORK = REPOSITORY / "tests/data/pixelnerf_small.safetensors"
+SMALL = (40, 30)
+
+
+def run(*arguments):
+    """Runs the command."""
+    return subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True)
+
+
+def rendered(scene, *options):
+    """The files that `render` writes, by name."""
+    with tempfile.TemporaryDirectory() as folder:
+        done = run("render", scene, *options, "--no-sheets", "-o", folder)
+        assert done.returncode == 0, done.stderr
+        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+def decoded(png):
+    """An 8-bit RGB PNG as an array: by the format's specification, with no library of this project."""
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    place, data, header = 8, b"", None
+    while place < len(png):
+        length, kind = int.from_bytes(png[place : place + 4], "big"), png[place + 4 : place + 8]
+        content = png[place + 8 : place + 8 + length]
+        place += 12 + length
+        if kind == b"IHDR":
+            header = content
+        elif kind == b"IDAT":
+            data += content
+    width, height = (int.from_bytes(header[at : at + 4], "big") for at in (0, 4))
+    assert tuple(header[8:]) == (8, 2, 0, 0, 0), "8 bits, RGB, not interlaced"
+    rows = np.frombuffer(zlib.decompress(data), np.uint8).reshape(height, 1 + 3 * width).astype(int)
+    picture = np.zeros((height, 3 * width), int)
+    above = np.zeros(3 * width, int)
+    for row, (kind, *values) in enumerate(rows.tolist()):
+        own = [0] * (3 * width)
+        for at, value in enumerate(values):
+            left, corner = (own[at - 3], int(above[at - 3])) if at >= 3 else (0, 0)
+            up = int(above[at])
+            if kind == 1:
+                value += left
+            elif kind == 2:
+                value += up
+            elif kind == 3:
+                value += (left + up) // 2
+            elif kind == 4:
+                guess = left + up - corner
+                distances = [abs(guess - left), abs(guess - up), abs(guess - corner)]
+                value += (left, up, corner)[distances.index(min(distances))]
+            own[at] = value % 256
+        picture[row] = above = np.array(own)
+    return picture.reshape(height, width, 3).astype(np.uint8)
+
+
+def npy(data):
+    with tempfile.NamedTemporaryFile(suffix=".npy") as file:
+        file.write(data)
+        file.flush()
+        return np.load(file.name)
+
+
+class Scenes(unittest.TestCase):
+    def test_views(self):
+        scene = viewfuse.Scene(ROOM)
+        count = len(scene)
+        self.assertEqual((count, scene.layout, scene.path), (11, "NeRF", ROOM))
+        self.assertEqual(len(scene.names), count)
+        for array, shape, kind in [
+            (scene.poses, (count, 4, 4), np.float64),
+            (scene.intrinsics, (count, 3, 3), np.float64),
+            (scene.sizes, (count, 2), np.int64),
+            (scene.has_photograph, (count,), np.bool_),
+        ]:
+            self.assertEqual((array.shape, array.dtype), (shape, kind))
+            self.assertTrue(array.flags.c_contiguous and array.flags.writeable)
+        self.assertTrue((scene.sizes == [320, 240]).all() and scene.has_photograph.all())
+        rotations = scene.poses[:, :3, :3]
+        np.testing.assert_allclose(rotations @ rotations.transpose(0, 2, 1), np.broadcast_to(np.eye(3), (count, 3, 3)), atol=1e-5)
+        np.testing.assert_array_equal(scene.poses[:, 3], np.broadcast_to([0, 0, 0, 1], (count, 4)))
+
+    def test_poses_are_those_of_the_file(self):
+        import json
+
+        frames = json.loads((ROOM / "transforms.json").read_text())["frames"]
+        scene = viewfuse.Scene(ROOM)
+        # The file has OpenGL axes.
+        own = {Path(frame["file_path"]).stem: np.array(frame["transform_matrix"]) * [1, -1, -1, 1] for frame in frames}
+        for name, pose in zip(scene.names, scene.poses):
+            np.testing.assert_allclose(pose, own[name], atol=1e-6)
+
+    def test_photographs(self):
+        scene = viewfuse.Scene(ROOM)
+        photograph = scene.photograph("5")
+        self.assertEqual((photograph.shape, photograph.dtype), ((240, 320, 4), np.uint8))
+        self.assertTrue((photograph[..., 3] == 255).all())
+        (frame,) = scene.render("mean", targets="5", sources="4,6")
+        np.testing.assert_array_equal(frame.truth, photograph[..., :3])
+
+
+class Weights(unittest.TestCase):
+    def test_are_those_of_the_command(self):
+        schemes = ["error:alpha=0.5", "mean", "gaussian"]
+        weights = viewfuse.Scene(TOY).weights(schemes, targets="20..22")
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "weights.npy"
+            options = [word for scheme in schemes for word in ("--weights", scheme)]
+            done = run("weights", TOY, "--targets", "20..22", *options, "--npy", file)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            np.testing.assert_array_equal(weights.values, np.load(file))
+        self.assertEqual(weights.values.dtype, np.float32)
+        self.assertEqual(weights.values.shape, (3, 3, len(weights.sources)))
+        np.testing.assert_allclose(weights.values.sum(axis=2), 1, atol=1e-5)
+        self.assertEqual((len(weights.schemes), weights.poses.shape), (3, (3, 4, 4)))
+        self.assertIs(np.asarray(weights), weights.values)
+
+    def test_targets_by_poses(self):
+        scene = viewfuse.Scene(TOY)
+        target = scene.names.index("000020")
+        by_name = scene.weights("error:alpha=1", targets="20", sources="0..9")
+        pose = scene.poses[target]
+        for poses in [pose[None], pose[None].tolist(), np.asfortranarray(pose)[None]]:
+            by_pose = scene.weights("error:alpha=1", poses=poses, sources="0..9")
+            np.testing.assert_array_equal(by_pose.values, by_name.values)
+        self.assertEqual(by_pose.targets, ["pose-000"])
+        self.assertGreater(len(scene.weights(targets="20").schemes), 3)
+
+
+class Pictures(unittest.TestCase):
+    def test_the_example_is_the_picture_of_the_command(self):
+        files = rendered(ROOM, "--targets", "5", "--weights", "error:alpha=1", "--size", "160x120")
+        (picture,) = (data for name, data in files.items() if name == "005.png")
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "view.png"
+            example = [sys.executable, REPOSITORY / "host/python/examples/room.py", ROOM, file]
+            done = subprocess.run([*map(str, example)], capture_output=True, text=True, cwd=folder)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertEqual(file.read_bytes(), picture)
+            self.assertIn("PSNR", done.stdout)
+        (frame,) = viewfuse.Scene(ROOM).render("error:alpha=1", targets="5", size=(160, 120))
+        np.testing.assert_array_equal(frame.picture, decoded(picture))
+
+    def test_arrays(self):
+        scene = viewfuse.Scene(ROOM)
+        files = rendered(ROOM, "--targets", "2,5", "--weights", "l1", "--size", "40x30", "--depth", "npy")
+        frames = scene.render("l1", targets="2,5", size=SMALL)
+        self.assertEqual([frame.name for frame in frames], ["002", "005"])
+        for frame in frames:
+            for array, shape, kind in [
+                (frame.colours, (30, 40, 4), np.float32),
+                (frame.picture, (30, 40, 3), np.uint8),
+                (frame.depths, (30, 40), np.float32),
+                (frame.confidences, (30, 40), np.float32),
+                (frame.truth, (30, 40, 3), np.uint8),
+                (frame.weights, (len(frame.sources),), np.float32),
+                (frame.pose, (4, 4), np.float64),
+                (frame.intrinsics, (3, 3), np.float64),
+            ]:
+                self.assertEqual((array.shape, array.dtype), (shape, kind))
+                self.assertTrue(array.flags.c_contiguous and array.flags.writeable)
+            # One array each, not a copy at each look.
+            self.assertIs(frame.colours, frame.colours)
+            np.testing.assert_array_equal(frame.picture, decoded(files[f"{frame.name}.png"]))
+            np.testing.assert_array_equal(frame.depths, npy(files[f"{frame.name}_depth.npy"]))
+            np.testing.assert_allclose(frame.picture, frame.colours[..., :3] * 255, atol=0.51)
+            self.assertAlmostEqual(frame.weights.sum(), 1, places=5)
+            self.assertEqual(frame.psnr, viewfuse.psnr(frame.picture, frame.truth))
+            self.assertEqual(frame.ssim, viewfuse.ssim(frame.picture, frame.truth))
+            view = scene.names.index(frame.name)
+            np.testing.assert_array_equal(frame.pose, scene.poses[view])
+            np.testing.assert_allclose(frame.intrinsics[:2], scene.intrinsics[view][:2] / 8, rtol=1e-6)
+            self.assertIsNone(frame.expected)
+
+    def test_a_pose_is_the_view_there(self):
+        scene = viewfuse.Scene(ROOM)
+        (view,) = scene.render("mean", targets="5", sources="3,4,6,7", size=SMALL)
+        (pose,) = scene.render("mean", poses=view.pose[None], sources="3,4,6,7", size=SMALL)
+        np.testing.assert_array_equal(pose.colours, view.colours)
+        self.assertEqual((pose.name, pose.truth, pose.psnr), ("pose-000", None, None))
+
+    def test_the_scheme_is_chosen_as_by_the_command(self):
+        files = rendered(ROOM, "--targets", "5", "--size", "40x30")
+        (frame,) = viewfuse.Scene(ROOM).render(targets="5", size=SMALL)
+        np.testing.assert_array_equal(frame.picture, decoded(files["005.png"]))
+        expected, low, high = frame.expected
+        self.assertTrue(low < expected < high)
+
+    def test_paths(self):
+        scene = viewfuse.Scene(ROOM)
+        for path, name in [({"orbit": 2}, "orbit-001"), ({"between": ("3", "7", 2)}, "between-001")]:
+            frames = scene.render("mean", size=SMALL, **path)
+            self.assertEqual((len(frames), frames[1].name), (2, name))
+
+    def test_a_network(self):
+        options = ["--targets", "48", "--sources", "16,72,136", "--size", "16x16"]
+        files = rendered(CAR, *options, "--model", NETWORK)
+        (frame,) = viewfuse.Scene(CAR).render(targets="48", sources="16,72,136", size=(16, 16), model=NETWORK)
+        np.testing.assert_array_equal(frame.picture, decoded(files["000048.png"]))
+
+
+class Scores(unittest.TestCase):
+    def test_by_definition(self):
+        noise = np.random.default_rng(0)
+        truth = noise.integers(0, 256, (20, 30, 3), np.uint8)
+        other = noise.integers(0, 256, (20, 30, 3), np.uint8)
+        error = ((other.astype(float) - truth) ** 2).mean()
+        self.assertAlmostEqual(viewfuse.psnr(other, truth), 10 * np.log10(255**2 / error), places=9)
+        self.assertEqual((viewfuse.psnr(truth, truth), viewfuse.ssim(truth, truth)), (np.inf, 1.0))
+        # Slices are not contiguous.
+        wide = np.concatenate([other, truth], axis=1)
+        self.assertEqual(viewfuse.psnr(wide[:, :30], truth), viewfuse.psnr(other, truth))
+        self.assertEqual(viewfuse.ssim(wide[:, :30], truth), viewfuse.ssim(other, truth))
+        self.assertIsNone(viewfuse.ssim(truth[:6], other[:6]))
+
+    def test_what_is_no_pair(self):
+        picture = np.zeros((4, 5, 3), np.uint8)
+        for wrong in [picture.astype(float), picture[..., 0], picture[..., :2], [[1]], None]:
+            with self.assertRaisesRegex(TypeError, "a picture is an array of uint8, height x width x 3, not "):
+                viewfuse.psnr(picture, wrong)
+        with self.assertRaisesRegex(ValueError, "not of 5x4 and 4x4"):
+            viewfuse.ssim(picture, picture[:, :4])
+
+
+class Errors(unittest.TestCase):
+    def refused(self, call, *arguments):
+        """The text of the ValueError, which is that of the command."""
+        with self.assertRaises(ValueError) as caught:
+            call()
+        printed = run(*arguments).stderr.strip()
+        self.assertTrue(printed.startswith(f"error: {caught.exception}"), f"{caught.exception}\n{printed}")
+
+    def test_the_texts_are_those_of_the_command(self):
+        scene = viewfuse.Scene(ROOM)
+        self.refused(lambda: viewfuse.Scene("nowhere"), "inspect", "nowhere")
+        self.refused(lambda: viewfuse.Scene(HERE), "inspect", HERE)
+        weights = ["weights", ROOM, "--targets"]
+        self.refused(lambda: scene.weights("mean", targets="77"), *weights, "77")
+        self.refused(lambda: scene.weights("mean"), "weights", ROOM)
+        self.refused(lambda: scene.weights("mean", targets="5", sources="5"), *weights, "5", "--sources", "5")
+        render = ["render", ROOM, "--targets", "5", "-o", "nowhere"]
+        self.refused(lambda: scene.render(targets="5", size=(10, 90)), *render, "--size", "10x90")
+        self.refused(lambda: scene.render(targets="5", model="nothing.pth"), *render, "--model", "nothing.pth")
+        self.refused(lambda: scene.render(targets="5", sources="4"), *render, "--sources", "4")
+
+    def test_arguments(self):
+        scene = viewfuse.Scene(ROOM)
+        for keywords, text in [
+            ({"schemes": "best"}, "best"),
+            ({"orbit": 1, "spiral": 1}, "one choice"),
+            ({"orbit": 0}, "orbit: 0"),
+            ({"poses": np.eye(4)}, "N x 4 x 4"),
+            ({"poses": np.zeros((0, 4, 4))}, "N x 4 x 4"),
+            ({"poses": np.ones((1, 4, 4))}, r"poses\[0\]: the last row"),
+            ({"poses": np.full((1, 4, 4), np.nan)}, r"poses\[0\]: .* not finite"),
+        ]:
+            with self.assertRaisesRegex(ValueError, text):
+                scene.weights(**{"schemes": "mean", **keywords})
+        for keywords in [{"target": "5"}, {"targets": 5}, {"between": ("3", "7")}]:
+            with self.assertRaises((TypeError, ValueError)):
+                scene.weights("mean", **keywords)
+        for keywords in [{"device": "abacus"}, {"background": "plaid"}, {"leave_out": 1.0}, {"size": (0, 1)}]:
+            with self.assertRaises(ValueError):
+                scene.render("mean", targets="5", **keywords)
+        with self.assertRaises(viewfuse.Error):
+            scene.render("mean", targets="5", device="vulkan:there is no such device")
+        self.assertTrue(issubclass(viewfuse.Error, Exception) and not issubclass(viewfuse.Error, ValueError))
+
+    def test_a_file_that_cannot_be_written(self):
+        (frame,) = viewfuse.Scene(ROOM).render("mean", targets="5", sources="4,6", size=SMALL)
+        with self.assertRaises(OSError):
+            frame.save("/nowhere/view.png")
+
+    def test_warnings_are_python_s(self):
+        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            # Few sources far apart: copies of the nearest photograph may be better.
+            viewfuse.Scene(ROOM).render(targets="5", sources="0,3,7,10", size=SMALL)
+            for warning in caught:
+                self.assertIs(warning.category, UserWarning)
+
+    def test_ctrl_c(self):
+        scene = viewfuse.Scene(ROOM)
+        threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        start = time.monotonic()
+        with self.assertRaises(KeyboardInterrupt):
+            # Minutes of work.
+            scene.render("error:alpha=1", orbit=2000, device="cpu")
+        self.assertLess(time.monotonic() - start, 20)
+
+    def test_other_threads_run(self):
+        scene, count, is_done = viewfuse.Scene(ROOM), [0], threading.Event()
+
+        def other():
+            while not is_done.wait(0.001):
+                count[0] += 1
+
+        thread = threading.Thread(target=other)
+        thread.start()
+        start = time.monotonic()
+        scene.render("mean", targets="5", size=(80, 60))
+        is_done.set()
+        thread.join()
+        # A thousand a second, were the machine idle.
+        self.assertGreater(count[0], 10 * (time.monotonic() - start))
+
+
+class Stubs(unittest.TestCase):
+    def test_they_are_what_there_is(self):
+        file = Path(viewfuse.__file__).with_name("__init__.pyi")
+        self.assertTrue(file.is_file() and file.with_name("py.typed").is_file())
+        tree = ast.parse(file.read_text())
+        stated = {}
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                stated[node.name] = {item.name for item in node.body if isinstance(item, ast.FunctionDef)}
+            elif isinstance(node, ast.FunctionDef):
+                stated[node.name] = set()
+        there = {name for name in vars(viewfuse) if not name.startswith("_") and name != "viewfuse"}
+        self.assertEqual(set(stated), there)
+        for name in ["Scene", "Weights", "Frame"]:
+            own = vars(getattr(viewfuse, name))
+            public = {item for item in own if not item.startswith("_")}
+            self.assertEqual({item for item in stated[name] if not item.startswith("_")}, public, name)
+            for item in stated[name]:
+                self.assertTrue(hasattr(getattr(viewfuse, name), item), f"{name}.{item}")
+            for item in public:
+                self.assertTrue(own[item].__doc__, f"{name}.{item} has no documentation")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,195 @@
+"""Few-shot novel view synthesis: scenes, weights and pictures as numpy arrays."""
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any, Optional, Union, final
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+__version__: str
+
+class Error(Exception):
+    """Work failed although its input was good: a device, for example. Bad input is a ValueError."""
+
+@final
+class Scene:
+    """A scene: posed photographs, of which the poses and the headers of the photographs have been read and checked.
+
+    Matrices are in the coordinates of the scene's files, with OpenCV axes: x to the right of the image, y down, z forward.
+    Each access makes a new array.
+    """
+
+    def __init__(self, path: Union[str, PathLike[str]]) -> None:
+        """Opens a folder, or a file that describes one, in any of the layouts. ValueError if it is none."""
+    @property
+    def path(self) -> Path:
+        """The folder or file."""
+    @property
+    def layout(self) -> str:
+        """The layout's name."""
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings of reading, a line each."""
+    @property
+    def names(self) -> list[str]:
+        """The views' names: first those with photographs, then target poses without."""
+    @property
+    def has_photograph(self) -> NDArray[np.bool_]:
+        """Whether each view has a photograph: [view]."""
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """Width and height of each view in pixels: [view][2]."""
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Camera-to-world matrices: [view][4][4]."""
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """Camera matrices in pixels: [view][3][3]. The origin is the outer corner of the top left pixel."""
+    def photograph(self, view: str) -> NDArray[np.uint8]:
+        """Decodes the photograph of one view, undistorted, with its mask as alpha: [height][width][4]."""
+    def weights(
+        self,
+        schemes: Union[None, str, Sequence[str]] = None,
+        *,
+        targets: Optional[str] = None,
+        sources: Optional[str] = None,
+        views: Optional[int] = None,
+        orbit: Optional[int] = None,
+        between: Optional[tuple[str, str, int]] = None,
+        spiral: Optional[int] = None,
+        camera_path: Union[None, str, PathLike[str]] = None,
+        poses: Optional[ArrayLike] = None,
+    ) -> Weights:
+        """Weighs the sources for targets under a scheme or several; without any, under every one that needs no file.
+
+        The keywords are those of `render`.
+        """
+    def render(
+        self,
+        weights: Optional[str] = None,
+        *,
+        size: Optional[tuple[int, int]] = None,
+        model: Union[None, str, PathLike[str]] = None,
+        device: str = "auto",
+        background: str = "auto",
+        leave_out: float = 0.01,
+        seed: int = 0,
+        targets: Optional[str] = None,
+        sources: Optional[str] = None,
+        views: Optional[int] = None,
+        orbit: Optional[int] = None,
+        between: Optional[tuple[str, str, int]] = None,
+        spiral: Optional[int] = None,
+        camera_path: Union[None, str, PathLike[str]] = None,
+        poses: Optional[ArrayLike] = None,
+    ) -> list[Frame]:
+        """Renders targets; all frames stay in memory. Ctrl-C ends it with KeyboardInterrupt.
+
+        weights: the scheme; "auto" (the default without a model) chooses the best for the scene.
+        size: width and height; by default the views' size, at most 512 pixels on a side.
+        model: a checkpoint of a PixelNeRF or a GeNVS; by default the training-free field.
+        device: auto, cpu, vulkan, vulkan:NUMBER or vulkan:NAME.
+        background: auto, none, black, white, or "RED,GREEN,BLUE" (0 to 255).
+        leave_out: sources of least weight are left out while their weights together stay at or below this.
+        seed: of every random draw (the training-free field makes none).
+        targets, sources: lists of views, as the command takes them: "2,5,8", "0..9/3", "all".
+        views: at most so many sources, as far apart as possible.
+        orbit, between, spiral, camera_path: targets along a path of cameras, one of the four.
+        poses: targets by camera-to-world matrices, [target][4][4], with the intrinsics of the first source.
+        """
+    def __len__(self) -> int:
+        """The number of views."""
+    def __repr__(self) -> str: ...
+
+@final
+class Weights:
+    """Weights of the sources for targets under schemes."""
+
+    @property
+    def schemes(self) -> list[str]:
+        """The text forms of the schemes."""
+    @property
+    def targets(self) -> list[str]:
+        """Names of the targets."""
+    @property
+    def sources(self) -> list[str]:
+        """Names of the sources."""
+    @property
+    def values(self) -> NDArray[np.float32]:
+        """[scheme][target][source]; those of a scheme for a target sum to 1."""
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """Camera-to-world matrices of the targets, as those of the scene: [target][4][4]."""
+    def __array__(self, dtype: Optional[DTypeLike] = None, copy: Optional[bool] = None) -> NDArray[Any]:
+        """The values: numpy.asarray(weights)."""
+    def __repr__(self) -> str: ...
+
+@final
+class Frame:
+    """A rendered view, as arrays that share no memory with one another."""
+
+    @property
+    def name(self) -> str:
+        """The target's name."""
+    @property
+    def scheme(self) -> str:
+        """The weighting scheme, in its text form."""
+    @property
+    def colours(self) -> NDArray[np.float32]:
+        """Red, green, blue in [0, 1] and opacity, not rounded: [height][width][4]."""
+    @property
+    def picture(self) -> NDArray[np.uint8]:
+        """The picture: [height][width][3]."""
+    @property
+    def depths(self) -> Optional[NDArray[np.float32]]:
+        """Depth along the principal axis in the units of the scene's files, 0 where there is no surface: [height][width].
+
+        None for fields without depths (GeNVS).
+        """
+    @property
+    def confidences(self) -> Optional[NDArray[np.float32]]:
+        """How far each pixel can be relied on, in [0, 1]: [height][width]. None for fields that do not tell."""
+    @property
+    def sources(self) -> list[str]:
+        """Names of the sources."""
+    @property
+    def weights(self) -> NDArray[np.float32]:
+        """The sources' weights: [source]; they sum to 1."""
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """Camera-to-world matrix, as those of the scene: [4][4]."""
+    @property
+    def intrinsics(self) -> NDArray[np.float64]:
+        """The camera's matrix in pixels of this picture: [3][3]."""
+    @property
+    def truth(self) -> Optional[NDArray[np.uint8]]:
+        """The photograph at the target: [height][width][3]. None without one."""
+    @property
+    def seen(self) -> Optional[NDArray[np.uint8]]:
+        """Where the photograph shows the whole pixel (above 0): [height][width]. None where it does everywhere."""
+    @property
+    def psnr(self) -> Optional[float]:
+        """Peak signal to noise ratio against the photograph where it is seen, decibels. None without one."""
+    @property
+    def ssim(self) -> Optional[float]:
+        """Structural similarity with the photograph. None without one, or if the picture is smaller than 7x7."""
+    @property
+    def expected(self) -> Optional[tuple[float, float, float]]:
+        """The PSNR to expect and the ends of the interval that holds four of five, decibels.
+
+        None unless the scheme was chosen for the scene.
+        """
+    @property
+    def seconds(self) -> float:
+        """Time for this view alone."""
+    def save(self, path: Union[str, PathLike[str]]) -> None:
+        """Writes the picture as a PNG, whole or not at all: the bytes that the command writes. OSError if it cannot."""
+    def __repr__(self) -> str: ...
+
+def psnr(prediction: NDArray[np.uint8], truth: NDArray[np.uint8]) -> float:
+    """Peak signal to noise ratio of two pictures [height][width][3] in decibels; infinite if they are equal."""
+
+def ssim(prediction: NDArray[np.uint8], truth: NDArray[np.uint8]) -> Optional[float]:
+    """Structural similarity of two pictures [height][width][3] (uniform 7x7 window); None if they are smaller than that."""
