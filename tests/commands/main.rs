@@ -17,6 +17,7 @@ mod moving;
 mod outputs;
 mod pareto;
 mod protocols;
+mod python;
 mod readme;
 mod render;
 mod report;
@@ -58,6 +59,7 @@ fn main() -> ExitCode {
         outputs::trials(),
         pareto::trials(),
         protocols::trials(),
+        python::trials(),
         readme::trials(),
         render::trials(),
         report::trials(),

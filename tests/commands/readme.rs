@@ -64,13 +64,15 @@ fn commands() -> Vec<String> {
 }
 
 /// Lines of `sh` blocks that are not run here: how they begin, and why.
-const NOT_RUN: [(&str, &str); 11] = [
+const NOT_RUN: [(&str, &str); 13] = [
     ("#", "a comment"),
     ("tests/run", "it runs this test"),
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
     ("cargo run --release -- view ", "it runs until Ctrl-C; `view.rs` runs it"),
     ("cargo install", "it would change the machine"),
+    ("pip install", "it would change the machine"),
+    ("host/python/test", "`python.rs` runs it where it is asked for"),
     ("viewfuse ", "on files of a person, or hours of training"),
     ("VIEWFUSE_FUZZ_SECONDS=", "`fuzz` runs a part of it; the whole takes minutes"),
     ("seq ", "GNU parallel may not be there; the tests of protocols run shards"),

@@ -2,7 +2,8 @@
 
 use crate::error::Failure;
 use glam::DVec3;
-use numpy::{AllowTypeChange, PyArrayLike3};
+use numpy::ndarray::ArrayViewD;
+use numpy::{AllowTypeChange, PyArrayLikeDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
@@ -93,20 +94,15 @@ fn count(name: &str, value: &Bound<'_, PyAny>) -> PyResult<usize> {
     }
 }
 
-/// One 4x4 matrix or several; an array of float64 is only read.
+/// Several 4x4 matrices; an array of float64 is read where it is.
 fn matrices(value: &Bound<'_, PyAny>) -> PyResult<Vec<[[f64; 4]; 4]>> {
-    let wrong = |shape: &[usize]| {
-        PyErr::from(Failure::Input(format!("poses: an array of shape {shape:?}; it must be N x 4 x 4, N at least 1")))
-    };
-    let array: PyArrayLike3<'_, f64, AllowTypeChange> = value.extract()?;
+    let array: PyArrayLikeDyn<'_, f64, AllowTypeChange> = value.extract()?;
     let view = array.as_array();
-    match *view.shape() {
-        [count, 4, 4] if count > 0 => {}
-        ref shape => return Err(wrong(shape)),
+    if !matches!(*view.shape(), [count, 4, 4] if count > 0) {
+        let text = format!("poses: an array of shape {:?}; it must be N x 4 x 4, N at least 1", view.shape());
+        return Err(Failure::Input(text).into());
     }
-    let matrix = |m: numpy::ndarray::ArrayView2<'_, f64>| {
-        std::array::from_fn(|row| std::array::from_fn(|column| m[[row, column]]))
-    };
+    let matrix = |m: ArrayViewD<'_, f64>| std::array::from_fn(|row| std::array::from_fn(|column| m[[row, column]]));
     Ok(view.outer_iter().map(matrix).collect())
 }
 

@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 ROOM = REPOSITORY / "tests/data/room"
 TOY = REPOSITORY / "tests/data/toy"
 CAR = REPOSITORY / "tests/data/car"
-NETWORK = REPOSITORY / "tests/data/pixelnerf_small.safetensors"
+NETWORK = REPOSITORY / "host/models/pixelnerf_cars.safetensors"
 SMALL = (40, 30)
 
 
@@ -92,7 +92,7 @@ class Scenes(unittest.TestCase):
     def test_views(self):
         scene = viewfuse.Scene(ROOM)
         count = len(scene)
-        self.assertEqual((count, scene.layout, scene.path), (11, "NeRF", ROOM))
+        self.assertEqual((count, scene.layout, scene.path), (11, "transforms", ROOM))
         self.assertEqual(len(scene.names), count)
         for array, shape, kind in [
             (scene.poses, (count, 4, 4), np.float64),
@@ -186,6 +186,9 @@ class Pictures(unittest.TestCase):
             ]:
                 self.assertEqual((array.shape, array.dtype), (shape, kind))
                 self.assertTrue(array.flags.c_contiguous and array.flags.writeable)
+            # The memory is what was rendered into: numpy did not copy it.
+            for array in [frame.colours, frame.picture, frame.depths, frame.confidences, frame.truth]:
+                self.assertFalse(array.flags.owndata)
             # One array each, not a copy at each look.
             self.assertIs(frame.colours, frame.colours)
             np.testing.assert_array_equal(frame.picture, decoded(files[f"{frame.name}.png"]))
@@ -255,7 +258,7 @@ class Errors(unittest.TestCase):
         with self.assertRaises(ValueError) as caught:
             call()
         printed = run(*arguments).stderr.strip()
-        self.assertTrue(printed.startswith(f"error: {caught.exception}"), f"{caught.exception}\n{printed}")
+        self.assertTrue(printed.startswith(f"viewfuse: {caught.exception}"), f"{caught.exception}\n{printed}")
 
     def test_the_texts_are_those_of_the_command(self):
         scene = viewfuse.Scene(ROOM)
@@ -296,15 +299,19 @@ class Errors(unittest.TestCase):
     def test_a_file_that_cannot_be_written(self):
         (frame,) = viewfuse.Scene(ROOM).render("mean", targets="5", sources="4,6", size=SMALL)
         with self.assertRaises(OSError):
-            frame.save("/nowhere/view.png")
+            frame.save(Path(__file__) / "view.png")
 
     def test_warnings_are_python_s(self):
-        with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
+        scene = viewfuse.Scene(ROOM)
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            # Few sources far apart: copies of the nearest photograph may be better.
-            viewfuse.Scene(ROOM).render(targets="5", sources="0,3,7,10", size=SMALL)
-            for warning in caught:
-                self.assertIs(warning.category, UserWarning)
+            scene.render("mean", targets="5", sources="4,6", size=SMALL)
+        # A room has no background.
+        self.assertEqual([warning.category for warning in caught], [UserWarning])
+        self.assertIn(f"{ROOM}: the photographs' borders are not of one colour", str(caught[0].message))
+        with warnings.catch_warnings(), self.assertRaises(UserWarning):
+            warnings.simplefilter("error")
+            scene.render("mean", targets="5", sources="4,6", size=SMALL)
 
     def test_ctrl_c(self):
         scene = viewfuse.Scene(ROOM)
