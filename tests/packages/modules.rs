@@ -11,7 +11,7 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
 /// Crates whose modules have an order.
-const CRATES: [&str; 14] = [
+const CRATES: [&str; 15] = [
     "core",
     "vulkan",
     "host/job",
@@ -26,6 +26,7 @@ const CRATES: [&str; 14] = [
     "host/check",
     "host/train",
     "host/view",
+    "host/python",
 ];
 
 /// What stands in a list for all modules that it does not name.
