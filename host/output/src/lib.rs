@@ -15,7 +15,7 @@
 //! y4m      video without compression
 //! video    the frames of a run as one file of any format
 //! weights  the weights of many targets: JSON, NumPy's arrays
-//! selected the few sources that targets need: JSON, lines
+//! selected  the few sources that targets need: JSON, lines
 //! journal  what an interrupted run continues from
 //! run      all of it in a folder
 //! folder   checks of that folder before work begins
