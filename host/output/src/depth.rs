@@ -1,7 +1,7 @@
 //! Depth maps as files: 16-bit PNG for viewers, OpenEXR and NumPy's arrays with the depths as they were computed.
 //!
 //! All hold depths along the principal axis, row-major, 0 where there is no surface: PNG in steps of
-//! [`depth_step`](crate::record::depth_step), the others as `f32`. [`RunWriter`](crate::run::RunWriter) writes them in units of
+//! [`depth_step`], the others as `f32`. [`RunWriter`](crate::run::RunWriter) writes them in units of
 //! the scene's files.
 
 use crate::png::write_png;
@@ -16,7 +16,7 @@ use viewfuse_scene::numpy::npy;
 /// A format of depth maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthFormat {
-    /// 16-bit grey PNG, in steps of [`depth_step`](crate::record::depth_step).
+    /// 16-bit grey PNG, in steps of [`depth_step`].
     Png,
     /// OpenEXR with one channel `Z` of `f32`.
     #[cfg(feature = "exr")]
@@ -74,7 +74,7 @@ pub fn write_depth(path: &Path, format: DepthFormat, depths: &[f32], size: [u32;
     }
 }
 
-/// Depths in steps of [`depth_step`](crate::record::depth_step).
+/// Depths in steps of [`depth_step`].
 pub fn depth_map(depths: &[f32], [width, height]: [u32; 2]) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     let step = depth_step(depths);
     let depth = |x: u32, y: u32| Luma([(depths[(y * width + x) as usize] / step).round() as u16]);

@@ -18,7 +18,7 @@ pub struct RenderOptions {
     pub leave_out: f32,
     /// Transmittance of early termination.
     pub early_termination: f32,
-    /// Values of the field's scalars ([`Tunable`]); those that are not named take their defaults.
+    /// Values of the field's scalars ([`Tunable`](crate::Tunable)); those that are not named take their defaults.
     pub settings: Vec<Setting>,
 }
 
