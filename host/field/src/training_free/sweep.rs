@@ -4,10 +4,12 @@
 //! ```text
 //! matching    costs of the planes in a frustum
 //! search      surface points of a scene whose files do not tell its depths
+//! unseen      parts of a picture that its photograph does not show
 //! ```
 
 mod matching;
 mod search;
+mod unseen;
 
 use super::exposure;
 use super::space::Space;
@@ -120,6 +122,11 @@ impl Sweep {
             false => self.matching(device, has_silhouettes).find_space(&reduced(search::SIDE)?, progress)?,
         };
         let small = reduced(self.match_side)?;
+        // With silhouettes, alpha 0 is the background.
+        let pictures: Vec<SourceImage> = match has_silhouettes {
+            true => sources.images.clone(),
+            false => sources.images.iter().map(|image| unseen::filled(image).into_owned()).collect(),
+        };
         let texels: Vec<[f32; 4]> = small.iter().flat_map(|image| image.texels.iter().copied()).collect();
         Ok(Views {
             settings: *self,
@@ -127,7 +134,7 @@ impl Sweep {
             device,
             has_silhouettes,
             background: sources.background,
-            pictures: Images::upload(device, &sources.images)?,
+            pictures: Images::upload(device, &pictures)?,
             matched: Images::upload(device, &small)?,
             disparities: device.zeros(texels.len())?,
             steps: vec![0.0; sources.images.len()],
