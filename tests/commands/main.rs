@@ -1,5 +1,6 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
+mod browser;
 mod check;
 mod clouds;
 mod compare;

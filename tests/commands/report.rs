@@ -4,24 +4,18 @@
 //! say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they fail instead. Pictures of the page, to be looked at, are left in
 //! `tmp/report` of the target folder.
 
-mod browser;
-
 use super::BINARY;
-pub(super) use browser::Browser;
+use super::browser::{self, Browser, InBrowser};
 use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, done, names_in, toy};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::trials::trial;
 
 const SMALL: &str =
     "--size 24x24 --device cpu --weights mean --weights distance:power=2 --weights error:alpha=1,angle=full";
-
-/// A test that needs the browser.
-type InBrowser = fn(&Browser);
 
 pub(crate) fn trials() -> Vec<Trial> {
     let mut trials = vec![
@@ -31,20 +25,12 @@ pub(crate) fn trials() -> Vec<Trial> {
         trial("commands::report::a_received_folder_shows_only_its_own", a_received_folder_shows_only_its_own),
         trial("commands::report::damaged_numbers_are_refused", damaged_numbers_are_refused),
     ];
-    let browser = Browser::find().map(Arc::new);
     let tests: [(&str, InBrowser); 3] = [
         ("report::browser::a_person_sees_what_was_measured", a_person_sees_what_was_measured),
         ("report::browser::the_looks_at_the_page_can_fail", the_looks_at_the_page_can_fail),
         ("report::browser::light_and_dark", light_and_dark),
     ];
-    trials.extend(tests.map(|(name, test)| {
-        let found = browser.clone();
-        let trial = Trial::test(name, move || {
-            test(&*found?);
-            Ok(())
-        });
-        needing(browser.as_ref().err().cloned(), is_required("VIEWFUSE_REQUIRE_BROWSER"), trial)
-    }));
+    trials.extend(browser::trials(tests));
     trials
 }
 

@@ -8,7 +8,7 @@ mod devtools;
 mod program;
 
 use super::BINARY;
-use super::report::Browser;
+use super::browser::{self, Browser, InBrowser};
 use devtools::{Chromium, Tab};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
@@ -16,15 +16,11 @@ use program::{Program, request};
 use serde_json::json;
 use std::fs;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_tests::command::{assert_refused, files_below, names_in, run, toy};
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::trials::{is_required, needing, trial};
-
-/// A test that needs the browser.
-type InBrowser = fn(&Browser);
+use viewfuse_tests::trials::{needing, trial};
 
 /// So many moves are sent in the test of memory, unless `VIEWFUSE_VIEW_MOVES` says otherwise.
 const MOVES: usize = 400;
@@ -41,7 +37,6 @@ pub(crate) fn trials() -> Vec<Trial> {
     ];
     let no_count = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
     trials.push(needing(no_count, false, trial("commands::view::memory_does_not_grow", memory_does_not_grow)));
-    let browser = Browser::find().map(Arc::new);
     let tests: [(&str, InBrowser); 5] = [
         ("view::browser::a_hand_turns_the_view", a_hand_turns_the_view),
         ("view::browser::pictures_follow_the_hand", pictures_follow_the_hand),
@@ -49,14 +44,7 @@ pub(crate) fn trials() -> Vec<Trial> {
         ("view::browser::a_phone_shows_all_of_it", a_phone_shows_all_of_it),
         ("view::browser::a_view_is_taken_elsewhere", a_view_is_taken_elsewhere),
     ];
-    trials.extend(tests.map(|(name, test)| {
-        let found = browser.clone();
-        let trial = Trial::test(name, move || {
-            test(&*found?);
-            Ok(())
-        });
-        needing(browser.as_ref().err().cloned(), is_required("VIEWFUSE_REQUIRE_BROWSER"), trial)
-    }));
+    trials.extend(browser::trials(tests));
     trials
 }
 
@@ -392,7 +380,7 @@ fn pictures_follow_the_hand(browser: &Browser) {
     tab.wait_for(FIRST);
     let first = start.elapsed();
     let [x, y] = tab.middle_of("#picture");
-    // Until the size of coarse pictures has settled.
+    // Until the size of coarse pictures no longer changes.
     tab.drag([x, y], [x + 40.0, y], 40);
     tab.evaluate("weightsTold = 0; tellWeightsBefore = tellWeights; tellWeights = (own, number) => { weightsTold += 1; tellWeightsBefore(own, number); }");
     tab.mouse("mousePressed", [x, y], json!({}));

@@ -1,7 +1,7 @@
 //! A browser without a window that is driven as a hand does it: Chromium's DevTools protocol through a pipe, JSON messages
 //! that end in a zero byte.
 
-use super::super::report::Browser;
+use super::super::browser::Browser;
 use serde_json::{Value, json};
 use std::cell::{Cell, RefCell};
 use std::io::{BufRead, BufReader, Write};

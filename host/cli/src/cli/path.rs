@@ -21,7 +21,7 @@ pub(crate) struct PathOptions {
     /// Number of targets of --between
     #[arg(long, value_name = "N", value_parser = parse_count, requires = "between", help_heading = CAMERAS)]
     frames: Option<usize>,
-    /// This many targets on a spiral, for cameras side by side that look the same way
+    /// This many targets on a spiral, for forward-facing cameras
     #[arg(long, value_name = "N", value_parser = parse_count, conflicts_with_all = ["orbit", "between"], help_heading = CAMERAS)]
     spiral: Option<usize>,
     #[arg(long, value_name = "FILE", conflicts_with_all = ["orbit", "between", "spiral"], help = file_help(), help_heading = CAMERAS)]

@@ -15,13 +15,13 @@ const TURNS: f32 = 2.0;
 const TURNS_TOWARDS: f32 = 0.5;
 /// Share of the cameras' offsets from their middle that a spiral's radii exceed, as in LLFF.
 const QUANTILE: f32 = 0.9;
-/// Share of the farther of two bounds in the depth that a spiral looks at, as in LLFF.
+/// Share of the far bound's disparity in that of the point on a spiral's principal axes, as in LLFF.
 const FAR_SHARE: f32 = 0.75;
-/// Least length of the mean viewing direction of cameras that look the same way: 45 degrees from it on average.
+/// Least length of the mean principal axis of forward-facing cameras: 45 degrees from it on average.
 const LEAST_COMMON: f32 = 0.7;
 
 /// `count` cameras on a full circle around the focus of some cameras (at least one), at their mean height and distance,
-/// all looking at the focus with the rig's up direction; frame 0 is on the side of the first camera.
+/// their principal axes through the focus, with the rig's up direction; frame 0 is on the side of the first camera.
 ///
 /// # Errors
 /// [`PoseError`] if the circle degenerates (all cameras at the focus, or straight above it).
@@ -44,7 +44,7 @@ pub fn orbit(cameras: &[Camera], pinhole: Pinhole, count: usize) -> Result<Vec<C
 
 /// `count` cameras from the first to the last one, both included (one alone is the first).
 ///
-/// If both look at a point in front of them, the centre goes around it, the shorter way about `up` (unit): height,
+/// If both principal axes meet in a point in front of them, the centre goes around it, the shorter way about `up` (unit): height,
 /// distance from the axis and angle change at constant rates, and the point moves in the pictures as little as the ends
 /// demand. Otherwise, and where an end is straight above the point, the centre moves on a line and the rotation at a
 /// constant rate (slerp). Focal length and principal point change with the step; the size is that of the first.
@@ -77,12 +77,12 @@ struct Around {
     across: [DVec3; 2],
     /// Of the first camera and of the last: height above the subject, distance from the axis, angle.
     places: [DVec3; 2],
-    /// Of both: the rotation relative to looking at the subject.
+    /// Of both: the rotation relative to a principal axis through the subject.
     turns: [DQuat; 2],
 }
 
 impl Around {
-    /// `None` without a point that both look at, and if one of them is straight above it.
+    /// `None` without a point where both principal axes meet, and if one of them is straight above it.
     fn of(first: &Camera, last: &Camera, up: Vec3) -> Option<Around> {
         let subject = common_subject(first, last)?;
         let axis = up.as_dvec3();
@@ -95,8 +95,8 @@ impl Around {
         let place = |offset: DVec3, flat: DVec3, angle: f64| DVec3::new(offset.dot(axis), flat.length(), angle);
         let places = [place(from, flat_from, 0.0), place(to, flat_to, angle)];
         let turn = |camera: &Camera| {
-            let looking = Pose::look_at(camera.pose.centre_world(), subject, up).ok()?;
-            Some(rotation(&looking).inverse() * rotation(&camera.pose))
+            let centred = Pose::look_at(camera.pose.centre_world(), subject, up).ok()?;
+            Some(rotation(&centred).inverse() * rotation(&camera.pose))
         };
         Some(Around { subject, up, across, places, turns: [turn(first)?, turn(last)?] })
     }
@@ -106,16 +106,16 @@ impl Around {
         let (sine, cosine) = place.z.sin_cos();
         let flat = (self.across[0] * cosine + self.across[1] * sine) * place.y;
         let centre = self.subject.as_dvec3() + self.up.as_dvec3() * place.x + flat;
-        let looking = Pose::look_at(centre.as_vec3(), self.subject, self.up)?;
-        pose_of(rotation(&looking) * self.turns[0].slerp(self.turns[1], step), centre)
+        let centred = Pose::look_at(centre.as_vec3(), self.subject, self.up)?;
+        pose_of(rotation(&centred) * self.turns[0].slerp(self.turns[1], step), centre)
     }
 }
 
-/// `count` cameras on LLFF's spiral for cameras side by side: around their middle, two turns within the offsets that nine
-/// of ten cameras do not exceed, all looking at one point ahead of it. Its depth is between the near and far `bounds` of
+/// `count` cameras on LLFF's spiral for forward-facing cameras: around their middle, two turns within the offsets that nine
+/// of ten cameras do not exceed, their principal axes through one point ahead of it. Its depth is between the near and far `bounds` of
 /// the views, nearer to the far one; without bounds, that of the cameras' focus.
 ///
-/// `None` if the cameras do not look the same way, or are all in one place.
+/// `None` if the cameras are not forward-facing, or are all in one place.
 pub fn spiral(cameras: &[Camera], pinhole: Pinhole, bounds: &[[f32; 2]], count: usize) -> Option<Vec<Camera>> {
     let number = cameras.len().max(1) as f32;
     let mean = |of: &dyn Fn(&Camera) -> Vec3| cameras.iter().map(of).sum::<Vec3>() / number;

@@ -1,13 +1,16 @@
 //! A browser without a window.
 
 use image::RgbImage;
+use libtest_mimic::Trial;
 use serde_json::Value;
 use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+use viewfuse_tests::trials::{is_required, needing};
 
 /// What people call it, in the order in which it is looked for.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
@@ -16,6 +19,22 @@ const PATIENCE: Duration = Duration::from_secs(120);
 /// Chromium or Chrome.
 pub(crate) struct Browser {
     program: PathBuf,
+}
+
+/// A test that looks at pages.
+pub(super) type InBrowser = fn(&Browser);
+
+/// The trials of tests that look at pages; ignored without a browser, unless one is required.
+pub(super) fn trials<const N: usize>(tests: [(&str, InBrowser); N]) -> [Trial; N] {
+    let browser = Browser::find().map(Arc::new);
+    tests.map(|(name, test)| {
+        let found = browser.clone();
+        let trial = Trial::test(name, move || {
+            test(&*found?);
+            Ok(())
+        });
+        needing(browser.as_ref().err().cloned(), is_required("VIEWFUSE_REQUIRE_BROWSER"), trial)
+    })
 }
 
 /// What a page looks like.
@@ -84,7 +103,8 @@ impl Browser {
         let probe = folder.path().join("probe.html");
         // A closing tag would end the script that holds the page.
         let text = serde_json::to_string(page).expect("JSON").replace("</", "<\\/");
-        fs::write(&probe, include_str!("probe.html").replacen("= PAGE;", &format!("= {text};"), 1)).expect("a file");
+        fs::write(&probe, include_str!("browser/probe.html").replacen("= PAGE;", &format!("= {text};"), 1))
+            .expect("a file");
         let (page, messages) = self.run(&["--dump-dom".to_owned(), format!("file://{}", probe.display())]);
         let seen = page.split_once("<pre id=\"seen\">").and_then(|(_, rest)| rest.split_once("</pre>"));
         let json = seen.unwrap_or_else(|| panic!("nothing is seen: {messages}")).0;
