@@ -1,6 +1,7 @@
 //! Fields as a whole, on the CPU: pictures of scenes whose geometry is known, extremes, and what may be left out.
 
 mod auto;
+mod budget;
 mod genvs;
 mod pixelnerf;
 mod plane_sweep;

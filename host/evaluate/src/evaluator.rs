@@ -10,6 +10,7 @@ use std::collections::hash_map::Entry;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::Renderer;
+use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
@@ -153,8 +154,10 @@ impl Evaluator<'_> {
             let start = Instant::now();
             stage.weigh(weighting, progress)?;
             let encode_share = start.elapsed() / targets.len().max(1) as u32;
+            let mut bounded = Vec::new();
             for &target in targets {
                 let frame = stage.frame(weighting, &target_of(scene, target), progress)?;
+                bounded.extend(frame.kept.clone());
                 if let Some(truth) = &frame.truth {
                     let time = encode_share + frame.time.saturating_sub(frame.encode);
                     shared += frame.encode;
@@ -164,6 +167,7 @@ impl Evaluator<'_> {
                     scores.push(score(&weighting.to_string(), target, values, time));
                 }
             }
+            kept_in_words(&bounded).iter().for_each(|words| progress.note(&format!("{weighting}: {words}")));
         }
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
@@ -215,6 +219,21 @@ impl Evaluator<'_> {
         }
         Ok(scores)
     }
+}
+
+/// How pictures keep a bound: how many do, and with which efforts; `None` without a bound.
+fn kept_in_words(pictures: &[Kept]) -> Option<String> {
+    let kept = pictures.iter().filter(|picture| picture.is_kept).count();
+    let mut efforts: Vec<(&str, usize)> = Vec::new();
+    for Kept { effort, .. } in pictures {
+        match efforts.iter_mut().find(|(own, _)| own == effort) {
+            Some((_, count)) => *count += 1,
+            None => efforts.push((effort, 1)),
+        }
+    }
+    let efforts: Vec<String> = efforts.iter().map(|(effort, count)| format!("{count} with {effort}")).collect();
+    let words = || format!("the bound is kept by {kept} of {} pictures: {}", pictures.len(), efforts.join("; "));
+    (!pictures.is_empty()).then(words)
 }
 
 /// Sets of sources, each with the targets that are rendered from it.

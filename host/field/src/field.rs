@@ -78,6 +78,35 @@ pub trait Prepared {
     /// comparison little.
     fn simplify(&mut self) {}
 
+    /// The ways in which the field can render, the cheapest first, the exact one last: what a bound on the error or on the
+    /// time chooses from. Empty for a field with one way.
+    fn efforts(&self) -> Vec<Effort> {
+        Vec::new()
+    }
+
+    /// Renders what follows with one of [`Prepared::efforts`], by index; others are ignored.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn set_effort(&mut self, _effort: usize) -> Result<Encodings, FieldError> {
+        Ok(Encodings::Kept)
+    }
+
+    /// Colours and opacities of some pixels of a target, row-major indices, with nothing left out: what
+    /// [`Prepared::render`] would give with the last of [`Prepared::efforts`]. `None` for fields whose pixels are not
+    /// independent of one another. All [`Request::views`] are encoded.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn exact_pixels(
+        &mut self,
+        _request: &Request<'_>,
+        _pixels: &[u32],
+        _progress: &dyn Progress,
+    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
+        Ok(None)
+    }
+
     /// What is known of where the surfaces are; nothing by default.
     fn surfaces(&self) -> Surfaces {
         Surfaces::default()
@@ -96,6 +125,39 @@ pub trait Prepared {
     fn record(&self) -> Record {
         Record::default()
     }
+}
+
+/// A way in which a field can render.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effort {
+    /// What it does, in a few words.
+    pub name: String,
+    /// The root mean square difference of its pictures from the exact ones that is typical of it, colours from 0 to 1: where
+    /// a search begins. 0 for the exact one.
+    pub typical_error: f32,
+    /// Its work as a share of the exact one's, likewise.
+    pub typical_work: f32,
+}
+
+impl Effort {
+    /// An effort that leaves something out.
+    pub fn new(name: impl Into<String>, typical_error: f32, typical_work: f32) -> Effort {
+        Effort { name: name.into(), typical_error, typical_work }
+    }
+
+    /// The one that leaves nothing out.
+    pub fn exact() -> Effort {
+        Effort { name: "exact".to_owned(), typical_error: 0.0, typical_work: 1.0 }
+    }
+}
+
+/// Whether the encodings of views serve another effort.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encodings {
+    /// They do.
+    Kept,
+    /// Views must be encoded again.
+    Dropped,
 }
 
 /// A scalar of a field that can be chosen for a scene.

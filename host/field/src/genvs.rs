@@ -6,6 +6,7 @@
 
 mod architecture;
 mod denoiser;
+mod efforts;
 mod encoder;
 mod feature_image;
 mod memory;
@@ -104,6 +105,8 @@ impl Genvs {
             near_far: NoDepths::check(near_far).map_err(FieldError::unsuitable)?,
             memory_estimate: self.memory_estimate(device, &sizes),
             earlier: None,
+            plan: self.options.plan,
+            features: None,
             counts: Counts::default(),
         })
     }

@@ -15,6 +15,7 @@
 //! family            one row a learned field
 //! enlarged          previews: small pictures, enlarged
 //! scores            PSNR and SSIM of what a photograph shows
+//! budget            how much of a field's work a bound on the error or on the time needs
 //! render            the render loop, from a scene to pictures
 //! point_cloud       the sources' depths as one cloud of points
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
@@ -26,6 +27,7 @@
 
 pub mod any;
 pub mod auto;
+pub mod budget;
 pub mod enlarged;
 pub mod error;
 pub mod family;
@@ -46,8 +48,8 @@ pub mod training_free;
 pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
-    About, DepthMap, Encoding, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting, SourceSide, Surfaces,
-    Tunable,
+    About, DepthMap, Effort, Encoding, Encodings, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting,
+    SourceSide, Surfaces, Tunable,
 };
 pub use record::{Denoising, LeftOut, Record};
 pub use renderer::{On, Renderer};

@@ -5,6 +5,7 @@
 //! the published network takes their mean.
 
 pub mod architecture;
+mod efforts;
 mod encoder;
 mod memory;
 mod network;
@@ -12,6 +13,7 @@ mod open;
 mod options;
 mod parameters;
 mod pass;
+mod picture;
 mod probes;
 pub mod reference;
 pub mod test_networks;
@@ -21,15 +23,17 @@ pub use open::{COMPUTABLE, open};
 pub use options::{LEAST_OPACITY, LEAST_SHARE, Omissions, PixelNerfOptions, Sampling};
 
 use super::learned::{default_near_far, over_white};
-use super::{About, Encoding, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide};
+use super::{
+    About, Effort, Encoding, Encodings, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide,
+};
 use encoder::{ViewLatents, encode};
 use network::{Network, Workspace};
 use parameters::{DeviceParameters, HostParameters};
-use pass::{Evaluated, Renderer, rays_at_once};
+use pass::{Evaluated, Renderer};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
-use viewfuse_device::{Device, DeviceError, Pixels};
+use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
@@ -58,6 +62,8 @@ struct Views<'a, D: Device> {
     background: [f32; 3],
     memory_estimate: u64,
     counts: Counts,
+    /// The field's own, or those of an effort.
+    options: PixelNerfOptions,
 }
 
 /// Counts of computed and omitted work so far.
@@ -117,6 +123,7 @@ impl PixelNerf {
             background: sources.background,
             memory_estimate: self.memory_estimate(device, &sizes),
             counts: Counts::default(),
+            options: self.options,
         })
     }
 }
@@ -158,6 +165,37 @@ impl<D: Device> Views<'_, D> {
         })
     }
 
+    /// What renders a target's rays with these options.
+    fn renderer<'r>(
+        &'r self,
+        views: &'r network::Views<'r, D>,
+        request: &Request<'_>,
+        options: PixelNerfOptions,
+        progress: &'r dyn Progress,
+    ) -> Renderer<'r, D> {
+        let [near, far] = self.near_far;
+        let (camera, pixel_centre) = (request.camera.block(0), self.field.architecture.pixel_centre);
+        let PixelNerfOptions { sampling, omissions } = options;
+        Renderer {
+            device: self.device,
+            coarse: self.network(Pass::Coarse),
+            fine: self.network(Pass::Fine),
+            views,
+            sampling,
+            omissions,
+            early_termination: request.early_termination,
+            cast: CastBlock { camera, near, far, pixel_centre, along_axis: 0 },
+            background: self.background,
+            progress,
+        }
+    }
+
+    /// Buffers for a target's points.
+    fn workspace(&self, request: &Request<'_>, most_points: usize) -> Result<Workspace<D>, DeviceError> {
+        let PixelNerf { architecture, options, .. } = self.field;
+        Workspace::new(self.device, architecture, request.views.len(), most_points, options.omissions.latent_layers)
+    }
+
     fn encode_view(&mut self, view: usize) -> Result<(), DeviceError> {
         let PixelNerf { architecture, options, .. } = self.field;
         let maps = options.omissions.latent_layers;
@@ -176,28 +214,13 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let PixelNerf { architecture, options: PixelNerfOptions { sampling, omissions }, .. } = self.field;
-        let (device, target) = (self.device, request.camera);
+        let options = self.options;
+        let PixelNerfOptions { sampling, omissions } = options;
+        let Request { camera, .. } = request;
+        let most_points = (camera.pinhole.width() * camera.pinhole.height() * sampling.coarse_count) as usize;
         let views = self.used(request.views, &request.view_weights())?;
-        let [near, far] = self.near_far;
-        let camera = target.block(0);
-        let renderer = Renderer {
-            device,
-            coarse: self.network(Pass::Coarse),
-            fine: self.network(Pass::Fine),
-            views: &views,
-            sampling: *sampling,
-            omissions: *omissions,
-            early_termination: request.early_termination,
-            cast: CastBlock { camera, near, far, pixel_centre: architecture.pixel_centre, along_axis: 0 },
-            background: self.background,
-            progress,
-        };
-        let (width, height) = (target.pinhole.width(), target.pinhole.height());
-        let pixels: Vec<u32> = (0..width * height).collect();
-        let most_points = pixels.len() * sampling.coarse_count as usize;
-        let (view_count, maps) = (request.views.len(), omissions.latent_layers);
-        let mut workspace = Workspace::new(device, architecture, view_count, most_points, maps)?;
+        let renderer = self.renderer(&views, request, options, progress);
+        let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
         let step = omissions.empty_space;
         let seen = match step > 1 {
@@ -209,34 +232,51 @@ impl<D: Device> Prepared for Views<'_, D> {
             }
             false => None,
         };
-        let at_once = rays_at_once(device, sampling);
-        progress.expect(pixels.len().div_ceil(at_once));
-        let mut tiles: Vec<Pixels<D>> = Vec::new();
-        for some in pixels.chunks(at_once) {
-            tiles.push(renderer.render(&mut workspace, some, seen.as_ref(), &mut evaluated)?);
-            progress.step();
-        }
-        let mut rendered = Rendered { colours: Vec::new(), depths: Vec::new(), confidences: Vec::new(), width, height };
-        for tile in tiles {
-            rendered.colours.extend(device.download(&tile.colours)?);
-            rendered.depths.extend(device.download(&tile.depths)?);
-        }
+        let mut rendered = renderer.picture(&mut workspace, seen.as_ref(), &mut evaluated)?;
         along_axis(&mut rendered, &renderer.cast);
-        self.counts.add(view_count * architecture.injected_count, maps, &evaluated);
+        let rows_a_sample = request.views.len() * self.field.architecture.injected_count;
+        self.counts.add(rows_a_sample, omissions.latent_layers, &evaluated);
         Ok(rendered)
+    }
+
+    fn efforts(&self) -> Vec<Effort> {
+        efforts::of(&self.field.options).into_iter().map(|(effort, _)| effort).collect()
+    }
+
+    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        if let Some((_, options)) = efforts::of(&self.field.options).get(effort) {
+            self.options = *options;
+        }
+        Ok(Encodings::Kept)
+    }
+
+    fn exact_pixels(
+        &mut self,
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
+        let options = efforts::exact(&self.field.options);
+        let most_points = pixels.len() * options.sampling.coarse_count as usize;
+        let views = self.used(request.views, &request.view_weights())?;
+        let renderer = self.renderer(&views, request, options, progress);
+        let mut workspace = self.workspace(request, most_points)?;
+        let mut evaluated = [Evaluated::default(); 2];
+        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
+        Ok(Some(colours))
     }
 
     fn record(&self) -> Record {
         let Counts { latent_rows, mapped_rows, passes: [coarse, fine] } = self.counts;
-        let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, .. } =
-            self.field.options.omissions;
+        let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, .. } =
+            self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
         let left_out = vec![
             line("latent layers at points", latent_layers, mapped_rows, latent_rows, "rounding"),
             line(
                 "first-pass samples",
-                empty_space > 1,
+                empty_space > 1 || interpolation > 0.0,
                 omitted(coarse),
                 coarse.samples,
                 "objects between the probes; see `viewfuse pareto`",

@@ -1,7 +1,7 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{DepthMap, Encoding, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
+use super::field::{DepthMap, Effort, Encoding, Encodings, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
 use super::record::{LeftOut, Record};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
@@ -17,7 +17,9 @@ pub struct Session<'a> {
     prepared: Box<dyn Prepared + 'a>,
     /// `[view]`.
     encoded: Vec<bool>,
-    is_weighed: bool,
+    /// The weights of the weighting that began, if encodings depend on it.
+    relevance: Option<Vec<SourceWeights>>,
+    effort: Option<usize>,
 }
 
 impl<'a> Session<'a> {
@@ -32,7 +34,7 @@ impl<'a> Session<'a> {
     ) -> Result<Session<'a>, FieldError> {
         let prepared = renderer.prepare(sources, progress)?;
         let encoded = vec![false; sources.images.len()];
-        Ok(Session { renderer, prepared, encoded, is_weighed: false })
+        Ok(Session { renderer, prepared, encoded, relevance: None, effort: None })
     }
 
     /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the weights of
@@ -44,7 +46,7 @@ impl<'a> Session<'a> {
         if self.prepared.depends_on_weighting() {
             self.encoded.fill(false);
             self.prepared.weigh(relevance)?;
-            self.is_weighed = true;
+            self.relevance = Some(relevance.to_vec());
         }
         match self.prepared.encoding() {
             Encoding::All => self.encode_all(progress),
@@ -73,7 +75,7 @@ impl<'a> Session<'a> {
     /// # Errors
     /// [`FieldError`].
     pub fn encode(&mut self, weights: &SourceWeights, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.prepared.depends_on_weighting() && !self.is_weighed {
+        if self.prepared.depends_on_weighting() && self.relevance.is_none() {
             self.weigh(&even(self.encoded.len()), progress)?;
         }
         let mut is_new = false;
@@ -101,6 +103,45 @@ impl<'a> Session<'a> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
         self.prepared.render(&Request { camera, weights, views, early_termination }, progress)
+    }
+
+    /// The ways in which the field can render; see [`Prepared::efforts`].
+    pub fn efforts(&self) -> Vec<Effort> {
+        self.prepared.efforts()
+    }
+
+    /// Renders what follows with one of [`Session::efforts`]. Views that another effort needs otherwise are encoded again.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        if self.effort == Some(effort) {
+            return Ok(());
+        }
+        self.effort = Some(effort);
+        if self.prepared.set_effort(effort)? == Encodings::Dropped {
+            self.encoded.fill(false);
+            if let Some(relevance) = self.relevance.take() {
+                self.weigh(&relevance, progress)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Exact colours of some pixels; see [`Prepared::exact_pixels`].
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn exact_pixels(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
+        self.encode(weights, progress)?;
+        let views = &self.views(weights);
+        self.prepared.exact_pixels(&Request { camera, weights, views, early_termination: 0.0 }, pixels, progress)
     }
 
     /// The field's scalars that can be chosen for a scene.

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
 use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
+use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Setting};
 use viewfuse_scene::few_shot::FewShot;
@@ -205,6 +206,9 @@ pub struct FrameRecord {
     pub seconds: f64,
     /// The part of it for encoding sources that no earlier frame used.
     pub encode_seconds: f64,
+    /// How it keeps the bound on its error or its time; null without a bound.
+    #[serde(default)]
+    pub kept: Option<Kept>,
 }
 
 impl FrameRecord {
@@ -231,6 +235,7 @@ impl FrameRecord {
             depth_step: (!frame.depths.is_empty()).then(|| space.file_length(depth_step(&frame.depths))),
             seconds: frame.time.as_secs_f64(),
             encode_seconds: frame.encode.as_secs_f64(),
+            kept: frame.kept.clone(),
         }
     }
 }

@@ -30,7 +30,7 @@ pub(crate) fn cheaper(field: &AnyField) -> Option<AnyField> {
 
 /// The options of coarse pictures.
 pub(crate) fn options(options: &RenderOptions) -> RenderOptions {
-    RenderOptions { leave_out: options.leave_out.max(LEAVE_OUT), ..options.clone() }
+    RenderOptions { leave_out: options.leave_out.max(LEAVE_OUT), bound: None, ..options.clone() }
 }
 
 /// The sources with a longest side of at most `side` pixels.

@@ -14,7 +14,7 @@ mod tables;
 
 use super::metrics_options::MetricOptions;
 use super::model::ModelOptions;
-use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
 use super::terminal::Terminal;
 use super::weighting::{many_help, open_all, or_every_scheme};
@@ -66,6 +66,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    bound: BoundOptions,
+    #[command(flatten)]
     model: ModelOptions,
     #[command(flatten)]
     metrics: MetricOptions,
@@ -110,7 +112,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), None);
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     let field = arguments.model.open(arguments.seed, None)?;
-    let options = arguments.picture.to_render_options(arguments.model.exact, &field.about())?;
+    let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &field.about())?);
     let Chosen { device, reason } = arguments.device.open()?;
     // All are opened before the first is computed: a wrong path shows at once.
     let paths = arguments.paths()?;

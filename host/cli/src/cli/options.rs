@@ -1,7 +1,7 @@
 //! Options that several commands share.
 
 use super::environment::device_options;
-use super::parse::{parse_count, parse_seconds, parse_share, parse_size};
+use super::parse::{parse_count, parse_error, parse_seconds, parse_share, parse_size};
 use super::wrong;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Args, Command};
@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::About;
+use viewfuse_field::budget::Bound;
 use viewfuse_field::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
 use viewfuse_scene::few_shot::{PathChoice, Selection};
 use viewfuse_scene::photographs::BackgroundChoice;
@@ -47,6 +48,29 @@ impl PictureOptions {
         let leave_out = if exact { 0.0 } else { self.leave_out };
         let (size, background) = (self.size, self.background);
         Ok(RenderOptions { size, background, leave_out, early_termination, ..RenderOptions::default() })
+    }
+}
+
+/// Options that a bound replaces: it chooses what is left out.
+const CHOSEN_BY_A_BOUND: [&str; 8] =
+    ["exact", "compute", "probe_step", "probe_error", "sampler", "steps", "tolerance", "half_volumes"];
+
+/// A bound on the error or the time of each picture.
+#[derive(Args)]
+pub(crate) struct BoundOptions {
+    /// Leave out what the pictures do not need for this root mean square difference from the exact ones, in decibels (40dB)
+    /// or with colours from 0 to 1 (0.01)
+    #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND)]
+    max_error: Option<f32>,
+    /// Leave out what does not fit into this time for each picture: seconds, or milliseconds as 250ms
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error")]
+    max_time: Option<Duration>,
+}
+
+impl BoundOptions {
+    /// The options with this bound.
+    pub(crate) fn bounded(&self, options: RenderOptions) -> RenderOptions {
+        RenderOptions { bound: self.max_error.map(Bound::Error).or(self.max_time.map(Bound::Time)), ..options }
     }
 }
 

@@ -21,9 +21,27 @@ pub(super) fn parse_share(text: &str) -> Result<f32, String> {
 
 /// A time.
 pub(super) fn parse_seconds(text: &str) -> Result<Duration, String> {
-    match text.parse::<f64>() {
+    let (number, unit) = match (text.strip_suffix("ms"), text.strip_suffix('s')) {
+        (Some(number), _) => (number, 1.0e-3),
+        (None, Some(number)) => (number, 1.0),
+        (None, None) => (text, 1.0),
+    };
+    match number.trim().parse::<f64>().map(|number| unit * number) {
         Ok(seconds) if (0.001..=86_400.0).contains(&seconds) => Ok(Duration::from_secs_f64(seconds)),
-        _ => Err("a number of seconds from 0.001 to 86400".to_owned()),
+        _ => Err("a number of seconds from 0.001 to 86400, or milliseconds as 250ms".to_owned()),
+    }
+}
+
+/// A root mean square difference of colours from 0 to 1: a number, or decibels below 1.
+pub(super) fn parse_error(text: &str) -> Result<f32, String> {
+    let lower = text.to_ascii_lowercase();
+    let value = match lower.strip_suffix("db") {
+        Some(decibels) => decibels.trim().parse::<f64>().ok().map(|decibels| 10.0_f64.powf(-decibels / 20.0)),
+        None => lower.parse::<f64>().ok(),
+    };
+    match value {
+        Some(error) if (1.0e-6..=0.5).contains(&error) => Ok(error as f32),
+        _ => Err("a root mean square difference from 0.000001 to 0.5, or decibels from 6.1dB to 120dB".to_owned()),
     }
 }
 

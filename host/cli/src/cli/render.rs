@@ -5,7 +5,7 @@ mod outputs;
 mod stream;
 
 use super::model::{GENVS, ModelOptions, parse_level};
-use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::path::PathOptions;
 use super::terminal::Terminal;
@@ -21,6 +21,7 @@ use std::time::Instant;
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::Setting;
 use viewfuse_field::auto::{self, Candidate, Expected};
+use viewfuse_field::budget::{Estimate, Kept};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::Progress;
@@ -59,10 +60,12 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
+    bound: BoundOptions,
+    #[command(flatten)]
     model: ModelOptions,
     /// Start each frame from the one before with noise of this level, about the size of the differences between frames: for
     /// orbits
-    #[arg(long, value_name = "LEVEL", value_parser = parse_level, requires = "model", conflicts_with = "exact", help_heading = GENVS)]
+    #[arg(long, value_name = "LEVEL", value_parser = parse_level, requires = "model", conflicts_with_all = ["exact", "max_error", "max_time"], help_heading = GENVS)]
     reuse: Option<f32>,
     #[command(flatten)]
     device: DeviceOptions,
@@ -99,7 +102,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let about = field.about();
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, about.least_sources)?;
-    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let rate = arguments.outputs.rate(job.frames_per_second);
     if !is_stream {
         check_writable(&arguments.output.join(RECORD))?;
@@ -243,5 +246,23 @@ fn summary(frame: &FrameRecord, folder: &Path) -> String {
         1 => format!("  1 source left out (weight {:.4})", frame.left_out_weight),
         count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
     };
-    format!("{}{score}{expected}{left_out}", folder.join(format!("{}.png", frame.target)).display())
+    let kept = frame.kept.as_ref().map_or_else(String::new, kept);
+    format!("{}{score}{expected}{left_out}{kept}", folder.join(format!("{}.png", frame.target)).display())
+}
+
+/// How a frame keeps its bound.
+fn kept(kept: &Kept) -> String {
+    let decibels = |error: f64| -20.0 * error.max(1.0e-6).log10();
+    let error = match kept.error {
+        Some(Estimate { value: 0.0, .. }) | None => String::new(),
+        Some(Estimate { value, upper, .. }) => {
+            format!(", about {:.1} dB from exact (at least {:.1})", decibels(value), decibels(upper))
+        }
+    };
+    let missed = match (kept.is_kept, kept.most_seconds) {
+        (false, Some(most)) => format!("; MORE than the {most} s that were asked for"),
+        (false, None) => "; MORE error than was asked for".to_owned(),
+        (true, _) => String::new(),
+    };
+    format!("  {}{error}, {:.2} s{missed}", kept.effort, kept.seconds)
 }

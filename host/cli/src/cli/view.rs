@@ -1,7 +1,7 @@
 //! `viewfuse view`.
 
 use super::model::ModelOptions;
-use super::options::{DeviceOptions, PictureOptions, SourceOptions};
+use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::Args;
@@ -27,6 +27,8 @@ pub(crate) struct Arguments {
     weights: WeightingSpec,
     #[command(flatten)]
     picture: PictureOptions,
+    #[command(flatten)]
+    bound: BoundOptions,
     #[command(flatten)]
     model: ModelOptions,
     #[command(flatten)]
@@ -60,7 +62,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
-    let options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let Chosen { device, reason } = arguments.device.open()?;
     let commands = commands(arguments, given, &scene, &sources);
     on_threads(arguments.picture.threads, || {

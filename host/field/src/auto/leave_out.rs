@@ -66,7 +66,7 @@ pub(super) struct Outcome {
 pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOptions {
     let camera = stage.scene().views.first().map(|view| view.camera);
     let size = camera.map(|camera| scaled_size(&camera, SIDE.min(stage.side())).into());
-    RenderOptions { size, settings: Vec::new(), ..options.clone() }
+    RenderOptions { size, settings: Vec::new(), bound: None, ..options.clone() }
 }
 
 impl<'a> Trials<'a> {

@@ -1,19 +1,20 @@
 //! Source views on a device, with their volumes.
 
+use super::efforts;
 use super::encoder::SIDE_STEP;
 use super::feature_image;
 use super::parts::Parts;
 use super::ray_sampling::RaySampling;
-use super::sampling::Start;
+use super::sampling::{Plan, Start};
 use super::volume::Volume;
-use super::{COLOUR_CHANNELS, Genvs, Omissions, Rays};
+use super::{COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, Rays};
 use crate::learned::over_white;
-use crate::{Encoding, FieldError, LeftOut, Prepared, Record, Rendered, Request};
+use crate::{Effort, Encoding, Encodings, FieldError, LeftOut, Prepared, Record, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
-use viewfuse_nn::image::Size;
+use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
 use viewfuse_scene::photographs::SourceImage;
 
@@ -29,7 +30,19 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) memory_estimate: u64,
     /// The last frame's picture, and its size.
     pub(super) earlier: Option<(Size, D::Buffer<f32>)>,
+    /// The denoiser's run: the field's own, or that of an effort.
+    pub(super) plan: Plan,
+    /// The last frame's feature image: another effort for the same frame uses it again.
+    pub(super) features: Option<(Seen, Image<D>)>,
     pub(super) counts: Counts,
+}
+
+/// What a feature image depends on, for encoded views.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Seen {
+    camera: CameraBlock,
+    views: Vec<usize>,
+    weights: Vec<f32>,
 }
 
 /// A source as the encoder's input: over white, padded to multiples of the encoder's output stride.
@@ -138,15 +151,22 @@ impl<D: Device> Prepared for Views<'_, D> {
             channels: COLOUR_CHANNELS as u32,
         };
         let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
-        self.fill_seen(request.views, &camera, &ray_sampling)?;
-        let views = self.used(request.views, &request.view_weights())?;
         let mut scratch = Scratch::new(device);
-        let features = self.parts.features(device, &mut scratch, &views, &camera, &ray_sampling, progress)?;
+        let seen = Seen { camera, views: request.views.to_vec(), weights: request.view_weights() };
+        let features = match self.features.take() {
+            Some((of, features)) if of == seen => features,
+            _ => {
+                self.fill_seen(request.views, &camera, &ray_sampling)?;
+                let views = self.used(request.views, &seen.weights)?;
+                self.parts.features(device, &mut scratch, &views, &camera, &ray_sampling, progress)?
+            }
+        };
         let start = match (&self.earlier, field.options.omissions.reuse) {
             (Some((of_size, picture)), Some(level)) if *of_size == size => Start::Picture { picture, level },
             _ => Start::Noise,
         };
-        let sampled = self.parts.picture(device, &mut scratch, &features, &field.options.plan, start, progress)?;
+        let sampled = self.parts.picture(device, &mut scratch, &features, &self.plan, start, progress)?;
+        self.features = Some((seen, features));
         self.counts.calls += u64::from(sampled.call_count());
         self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
         let values = device.download(&sampled.picture)?;
@@ -154,6 +174,20 @@ impl<D: Device> Prepared for Views<'_, D> {
             self.earlier = Some((size, sampled.picture));
         }
         Ok(cropped(&values, size, target))
+    }
+
+    fn efforts(&self) -> Vec<Effort> {
+        match self.field.architecture.denoiser {
+            Some(_) => efforts::of(&self.field.options.plan).into_iter().map(|(effort, _)| effort).collect(),
+            None => Vec::new(),
+        }
+    }
+
+    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        if let Some((_, plan)) = efforts::of(&self.field.options.plan).into_iter().nth(effort) {
+            self.plan = plan;
+        }
+        Ok(Encodings::Kept)
     }
 
     fn record(&self) -> Record {
@@ -186,7 +220,8 @@ impl<D: Device> Prepared for Views<'_, D> {
             ),
         ];
         let has_denoiser = architecture.denoiser.is_some();
-        let denoising = has_denoiser.then(|| options.denoising(calls, planned_calls.saturating_sub(calls)));
+        let run = GenvsOptions { plan: self.plan, ..*options };
+        let denoising = has_denoiser.then(|| run.denoising(calls, planned_calls.saturating_sub(calls)));
         let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
         Record { left_out, denoising, memory_estimate, near_far }
     }

@@ -22,6 +22,16 @@ pub struct Sampling {
     pub near_far: Option<[f32; 2]>,
 }
 
+impl Sampling {
+    /// Samples on a ray in the first and in the second pass, which evaluates those of the first again.
+    pub(super) fn counts(&self) -> [u32; 2] {
+        match self.importance_count + self.depth_count {
+            0 => [self.coarse_count, 0],
+            added => [self.coarse_count, self.coarse_count + added],
+        }
+    }
+}
+
 impl Default for Sampling {
     /// As published (`conf/exp/srn.conf`), but around the mean depth.
     fn default() -> Sampling {
@@ -53,6 +63,11 @@ pub struct Omissions {
     /// The largest change of the probes' colours, root mean square, `1` from black to white: the largest threshold of a
     /// part's opacity that stays within it replaces [`LEAST_SHARE`]. 0: always [`LEAST_SHARE`].
     pub probe_error: f32,
+    /// Samples on a probe; 0: as many as in the first pass.
+    pub probe_samples: u32,
+    /// Rays between alike neighbours: a pixel is interpolated where the colours and opacities around it differ by no more
+    /// than this in any channel. 0: every pixel has its ray.
+    pub interpolation: f32,
     /// Second-pass samples on rays whose first pass has an opacity below [`LEAST_OPACITY`].
     pub empty_rays: bool,
     /// Second-pass samples in parts of a ray that the first pass found empty, one part to either side included.
@@ -73,17 +88,21 @@ impl Omissions {
         latent_layers: false,
         empty_space: 0,
         probe_error: 0.0,
+        probe_samples: 0,
+        interpolation: 0.0,
         empty_rays: false,
         empty_parts: false,
         hidden_samples: false,
     };
 
-    /// The default omissions.
+    /// The default omissions: all but those that only a bound on the error switches on.
     pub const ALL: Omissions = Omissions {
         unused_views: true,
         latent_layers: true,
         empty_space: 4,
         probe_error: 1.0 / 128.0,
+        probe_samples: 0,
+        interpolation: 0.0,
         empty_rays: true,
         empty_parts: true,
         hidden_samples: true,

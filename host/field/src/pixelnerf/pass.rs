@@ -40,6 +40,7 @@ pub(super) struct Evaluated {
 pub(super) struct Seen<D: Device> {
     /// `[ray][part]` of weight and transmittance in front.
     pub(super) values: D::Buffer<[f32; 2]>,
+    pub(super) part_count: u32,
     pub(super) columns: u32,
     pub(super) rows: u32,
     /// A part is empty if its opacity is below this.
@@ -94,7 +95,8 @@ impl<D: Device> Renderer<'_, D> {
     ) -> Result<Pixels<D>, FieldError> {
         let device = self.device;
         let rays = self.rays(pixels)?;
-        let coarse = self.first_pass(workspace, &rays, seen, &mut evaluated[0])?;
+        let count = self.sampling.coarse_count;
+        let coarse = self.first_pass(workspace, &rays, count, seen, &mut evaluated[0])?;
         let mut found = self.pixels(pixels.len())?;
         self.composite(&coarse, rays.count, &mut found)?;
         let block = self.fine_block();
@@ -128,21 +130,23 @@ impl<D: Device> Renderer<'_, D> {
         Ok(found)
     }
 
-    /// Evenly spaced samples; with probes, only those in the sample mask of the probes around a ray.
+    /// This many evenly spaced samples; with probes, only those in the sample mask of the probes around a ray.
     pub(super) fn first_pass(
         &self,
         workspace: &mut Workspace<D>,
         rays: &Rays<D>,
+        sample_count: u32,
         seen: Option<&Seen<D>>,
         evaluated: &mut Evaluated,
     ) -> Result<Samples<D>, FieldError> {
-        let block = self.coarse_block();
+        let Sampling { seed, jitter, .. } = self.sampling;
+        let block = CoarseBlock { seed: words(seed), sample_count, jitter };
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
         self.device.coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)?;
         let mask = seen.map(|seen| {
             let block = SampleMaskBlock {
                 sample_count: block.sample_count,
-                part_count: block.sample_count,
+                part_count: seen.part_count,
                 least_share: seen.least_share,
                 // Samples that are hidden on the probes' rays may be visible on a ray beside their surfaces.
                 termination: -1.0,
@@ -232,11 +236,6 @@ impl<D: Device> Renderer<'_, D> {
 
     pub(super) fn zeros<T: viewfuse_device::Element>(&self, count: usize) -> Result<D::Buffer<T>, FieldError> {
         Ok(self.device.zeros(count)?)
-    }
-
-    fn coarse_block(&self) -> CoarseBlock {
-        let Sampling { seed, coarse_count, jitter, .. } = self.sampling;
-        CoarseBlock { seed: words(seed), sample_count: coarse_count, jitter }
     }
 
     fn fine_block(&self) -> FineBlock {

@@ -24,13 +24,16 @@ impl<D: Device> Renderer<'_, D> {
         let place = |index: u32, side: u32| (index * step).min(side - 1);
         let pixels: Vec<u32> =
             (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
-        let count = self.sampling.coarse_count;
+        let count = match self.omissions.probe_samples {
+            0 => self.sampling.coarse_count,
+            given => given,
+        };
         let mut values = self.zeros(pixels.len() * count as usize)?;
         let mut first_ray = 0;
         let mut changes = [0.0; SHARES.len()];
         for some in pixels.chunks(rays_at_once(self.device, &self.sampling)) {
             let rays = self.rays(some)?;
-            let samples = self.first_pass(workspace, &rays, None, evaluated)?;
+            let samples = self.first_pass(workspace, &rays, count, None, evaluated)?;
             self.device.weigh_samples(&samples.block(first_ray), rays.count, &samples.values, &mut values)?;
             first_ray += rays.count;
             if self.omissions.probe_error > 0.0 {
@@ -44,7 +47,8 @@ impl<D: Device> Renderer<'_, D> {
         }
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
         let harmless = changes.iter().position(|change| *change < most);
-        Ok(Seen { values, columns, rows, least_share: harmless.map_or(LEAST_SHARE, |index| SHARES[index]) })
+        let least_share = harmless.map_or(LEAST_SHARE, |index| SHARES[index]);
+        Ok(Seen { values, part_count: count, columns, rows, least_share })
     }
 }
 

@@ -1,5 +1,6 @@
 //! The result of a render: a picture with its weights and scores.
 
+use crate::budget::Kept;
 use crate::scores::{psnr_of_seen, ssim_of_seen};
 use image::{GrayImage, RgbImage};
 use std::time::Duration;
@@ -32,6 +33,8 @@ pub struct Frame {
     pub time: Duration,
     /// The part of it for encoding sources that no earlier frame used.
     pub encode: Duration,
+    /// How the frame keeps the run's bound, if there is one.
+    pub kept: Option<Kept>,
 }
 
 /// A photograph at the target, and the scores of the prediction.

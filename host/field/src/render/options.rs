@@ -1,6 +1,7 @@
 //! The options of a render, and the sizes that follow from them.
 
 use super::RenderError;
+use crate::budget::Bound;
 use crate::{Renderer, Setting};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{Album, BackgroundChoice, longest_side};
@@ -20,6 +21,8 @@ pub struct RenderOptions {
     pub early_termination: f32,
     /// Values of the field's scalars ([`Tunable`](crate::Tunable)); those that are not named take their defaults.
     pub settings: Vec<Setting>,
+    /// A bound on each picture's error or time, which chooses what else to leave out.
+    pub bound: Option<Bound>,
 }
 
 /// Default of the largest share of the weight that is left out: it bounds the change of a fusion of all
@@ -38,6 +41,7 @@ impl Default for RenderOptions {
             leave_out: DEFAULT_LEAVE_OUT,
             early_termination: DEFAULT_EARLY_TERMINATION,
             settings: Vec::new(),
+            bound: None,
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Sources on a device, from which targets are rendered.
 
 use super::{Frame, RenderError, RenderOptions, Truth, working_side};
-use crate::{DepthMap, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
+use crate::budget::{Controller, View};
+use crate::{DepthMap, Effort, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
@@ -36,6 +37,8 @@ pub struct Stage<'a> {
     /// The sources at working size.
     pub images: Arc<SourceImages>,
     session: Session<'a>,
+    /// Keeps the options' bound.
+    controller: Option<Controller>,
     /// Times of the stages so far.
     pub costs: StageCosts,
 }
@@ -89,7 +92,8 @@ impl<'a> Stage<'a> {
             .map_err(|error| RenderError::of(error, scene))?;
         session.tune(&options.settings);
         let views = sources.to_vec();
-        Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, costs })
+        let controller = options.bound.map(|bound| Controller::new(bound, session.efforts()));
+        Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, controller, costs })
     }
 
     /// Begins a weighting for the following frames: encodes the sources if the field does so before the frames, each
@@ -99,9 +103,12 @@ impl<'a> Stage<'a> {
     /// [`RenderError`].
     pub fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
         let relevance = self.relevance(weighting);
-        let session = &mut self.session;
-        timed(&mut self.costs.encode, || session.weigh(&relevance, progress))
-            .map_err(|error| RenderError::of(error, self.scene))
+        let (session, first) = (&mut self.session, self.controller.as_ref().map(Controller::first));
+        let weigh = || {
+            first.map_or(Ok(()), |first| session.set_effort(first, progress))?;
+            session.weigh(&relevance, progress)
+        };
+        timed(&mut self.costs.encode, weigh).map_err(|error| RenderError::of(error, self.scene))
     }
 
     /// Encodes all sources that are not encoded yet, so that what follows does not change how they are.
@@ -112,6 +119,19 @@ impl<'a> Stage<'a> {
         let session = &mut self.session;
         timed(&mut self.costs.encode, || session.encode_all(progress))
             .map_err(|error| RenderError::of(error, self.scene))
+    }
+
+    /// The ways in which the field can render; see [`Prepared::efforts`](crate::Prepared::efforts).
+    pub fn efforts(&self) -> Vec<Effort> {
+        self.session.efforts()
+    }
+
+    /// Renders what follows with one of [`Stage::efforts`]; without effect where the options have a bound, which chooses.
+    ///
+    /// # Errors
+    /// [`RenderError`].
+    pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), RenderError> {
+        self.session.set_effort(effort, progress).map_err(|error| RenderError::of(error, self.scene))
     }
 
     /// The field's scalars that can be chosen for a scene.
@@ -209,11 +229,21 @@ impl<'a> Stage<'a> {
         let start = Instant::now();
         let weights = weighting.weigh(&self.sources, &target.camera.pose);
         let omission = weights.without_least(self.options.leave_out);
-        let failed = |error| RenderError::of(error, self.scene);
-        let mut encode = Duration::ZERO;
-        timed(&mut encode, || self.session.encode(&omission.weights, progress)).map_err(failed)?;
         let early_termination = self.options.early_termination;
-        let rendered = self.session.render(camera, &omission.weights, early_termination, progress).map_err(failed)?;
+        let (rendered, kept, encode) = match &mut self.controller {
+            Some(controller) => {
+                let view = View { camera, all: &weights, used: &omission.weights, early_termination };
+                let bounded = controller.render(&mut self.session, view, progress);
+                bounded.map(|(rendered, kept, encode)| (rendered, Some(kept), encode))
+            }
+            None => {
+                let mut encode = Duration::ZERO;
+                timed(&mut encode, || self.session.encode(&omission.weights, progress))
+                    .and_then(|()| self.session.render(camera, &omission.weights, early_termination, progress))
+                    .map(|rendered| (rendered, None, encode))
+            }
+        }
+        .map_err(|error| RenderError::of(error, self.scene))?;
         let time = start.elapsed();
         let Rendered { colours, depths, confidences, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);
@@ -222,7 +252,7 @@ impl<'a> Stage<'a> {
             None => None,
         };
         let target = target.clone();
-        Ok(Frame { target, weights, omission, colours, picture, depths, confidences, truth, time, encode })
+        Ok(Frame { target, weights, omission, colours, picture, depths, confidences, truth, time, encode, kept })
     }
 
     /// A view's photograph at a size, over the run's background.

@@ -3,21 +3,24 @@
 
 mod bounds;
 
-use crate::{DepthMap, Encoding, FieldError, Prepared, Rendered, Request};
+use crate::{DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request};
 use std::ops::Range;
-use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::visual_hull::ray_marching::MarchBlock;
 use viewfuse_core::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
 use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 use viewfuse_device::{Device, HullScene, Pixels};
-use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
 /// Rows rendered between two checks of the interrupt flag.
 const BAND_ROWS: u32 = 16;
 /// Rows around a band that its depths depend on: the window's and the neighbours' reach.
 const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
+/// Shares of the sources' side, with the error and the work that are typical of them (the example `efforts` of
+/// `viewfuse-evaluate`).
+const EFFORTS: [(f32, f32, f32); 3] = [(0.25, 0.065, 0.15), (0.5, 0.04, 0.35), (0.75, 0.028, 0.7)];
 
 /// Density from silhouettes and photo-consistency, colour by weighted fusion with visibility.
 #[derive(Clone, Copy, Debug)]
@@ -51,11 +54,20 @@ struct NotWeighed;
 pub(super) struct Views<'a, D: Device> {
     field: &'a Hull,
     device: &'a D,
+    /// The sources' cameras.
+    cameras: Vec<Camera>,
+    whole: Silhouettes<D>,
+    /// Smaller sources, for less effort.
+    reduced: Option<Silhouettes<D>>,
+    background: [f32; 3],
+    depths: Option<Depths<D>>,
+}
+
+/// Sources of one size on the device.
+struct Silhouettes<D: Device> {
     scene: HullScene<D>,
     entries: D::Buffer<f32>,
     texel_count: usize,
-    background: [f32; 3],
-    depths: Option<Depths<D>>,
 }
 
 /// Depth maps under a weighting, concatenated.
@@ -104,7 +116,17 @@ impl Hull {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Views<'a, D>, FieldError> {
-        let (cameras, texels) = joined(&sources.images);
+        let whole = Silhouettes::upload(device, &sources.images, progress)?;
+        let cameras = sources.images.iter().map(|image| image.camera).collect();
+        let background = sources.background;
+        Ok(Views { field: self, device, cameras, whole, reduced: None, background, depths: None })
+    }
+}
+
+impl<D: Device> Silhouettes<D> {
+    /// Uploads images and finds the object.
+    fn upload(device: &D, images: &[SourceImage], progress: &dyn Progress) -> Result<Silhouettes<D>, FieldError> {
+        let (cameras, texels) = joined(images);
         let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
         let scene = HullScene {
@@ -126,8 +148,14 @@ impl Hull {
             progress.step();
         }
         device.finish()?;
-        let (texel_count, background) = (texels.len(), sources.background);
-        Ok(Views { field: self, device, scene, entries, texel_count, background, depths: None })
+        Ok(Silhouettes { scene, entries, texel_count: texels.len() })
+    }
+}
+
+impl<D: Device> Views<'_, D> {
+    /// The sources of the current effort.
+    fn silhouettes(&self) -> &Silhouettes<D> {
+        self.reduced.as_ref().unwrap_or(&self.whole)
     }
 }
 
@@ -141,8 +169,8 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        let (device, texel_count) = (self.device, self.texel_count);
-        let view_count = self.scene.object.view_count as usize;
+        let Silhouettes { scene, texel_count, .. } = self.silhouettes();
+        let (device, texel_count, view_count) = (self.device, *texel_count, scene.object.view_count as usize);
         // The last weighting's buffers are freed before new ones are allocated.
         self.depths = None;
         let pair_weights: Vec<f32> =
@@ -157,11 +185,12 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        let Views { field, device, scene, entries, depths, .. } = self;
+        let Views { field, device, whole, reduced, depths, .. } = self;
+        let Silhouettes { scene, entries, .. } = reduced.as_ref().unwrap_or(whole);
         let Some(Depths { maps, sweep: Some(Sweep { pair_weights, nothing, first_guess }) }) = depths else {
             return Err(FieldError::unsuitable(NotWeighed));
         };
-        let HullScene { object_buffer: object, views, texels, .. } = &*scene;
+        let HullScene { object_buffer: object, views, texels, .. } = scene;
         // The widest of a sweep's three buffers is bound as a whole.
         let most_values = field.most_band_values.min(device.most_elements::<[f32; 2]>());
         let camera = &scene.cameras[view];
@@ -183,6 +212,34 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(())
     }
 
+    fn efforts(&self) -> Vec<Effort> {
+        let side = self.cameras.iter().map(longest_side).max().unwrap_or(1) as f32;
+        let named = |(share, error, work): (f32, f32, f32)| {
+            Effort::new(format!("sources at {} pixels", (share * side).round()), error, work)
+        };
+        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
+    }
+
+    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        let device = self.device;
+        self.depths = None;
+        self.reduced = match EFFORTS.get(effort) {
+            None => None,
+            Some((share, ..)) => {
+                let HullScene { texels, cameras, .. } = &self.whole.scene;
+                let texels = device.download(texels)?;
+                let reduced = |(camera, block): (&Camera, &CameraBlock)| {
+                    let own = texels[block.first_texel as usize..].iter().take((block.width * block.height) as usize);
+                    let side = (share * longest_side(camera) as f32).round().max(1.0) as u32;
+                    SourceImage { camera: *camera, texels: own.copied().collect() }.reduced(side)
+                };
+                let images: Result<Vec<SourceImage>, _> = self.cameras.iter().zip(cameras).map(reduced).collect();
+                Some(Silhouettes::upload(device, &images.map_err(FieldError::unsuitable)?, &Silent)?)
+            }
+        };
+        Ok(Encodings::Dropped)
+    }
+
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
         let depths = self.depths.as_ref().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
         let maps = self.device.download(&depths.maps)?;
@@ -191,11 +248,12 @@ impl<D: Device> Prepared for Views<'_, D> {
             let depths = own.map(|depth| if *depth < NO_SURFACE { *depth } else { 0.0 }).collect();
             DepthMap { camera: CameraBlock { first_texel: 0, ..*camera }, depths, confidences: Vec::new() }
         };
-        Ok(self.scene.cameras.iter().map(map).collect())
+        Ok(self.silhouettes().scene.cameras.iter().map(map).collect())
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let Views { device, scene, background, depths, .. } = self;
+        let Views { device, whole, reduced, background, depths, .. } = self;
+        let scene = &reduced.as_ref().unwrap_or(whole).scene;
         let depths = depths.as_mut().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
         depths.sweep = None;
         let &Request { camera: target, early_termination, .. } = request;
@@ -209,7 +267,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         for first_row in (0..height).step_by(band_rows as usize) {
             progress.check()?;
             let row_count = band_rows.min(height - first_row);
-            let HullScene { object_buffer: object, views, footprints, texels, .. } = &*scene;
+            let HullScene { object_buffer: object, views, footprints, texels, .. } = scene;
             let Pixels { colours, depths: pixel_depths } = &mut pixels;
             device.march_rays(
                 &target,

@@ -13,7 +13,9 @@ mod unseen;
 
 use super::exposure;
 use super::space::Space;
-use crate::{DepthMap, Encoding, FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
+use crate::{
+    DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable,
+};
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::plane_sweep::blend::BlendBlock;
@@ -29,6 +31,10 @@ use viewfuse_weighting::sources::SourceWeights;
 const NEIGHBOURS: usize = 4;
 /// Most planes of a frustum in pictures that are only compared with one another.
 const TRIAL_PLANES: u32 = 32;
+
+/// Shares of the side at which views are compared and of the planes, with the error and the work that are typical of them
+/// (the example `efforts` of `viewfuse-evaluate`).
+const EFFORTS: [(f32, f32, f32, f32); 3] = [(0.25, 0.5, 0.05, 0.1), (0.5, 1.0, 0.028, 0.3), (0.75, 1.0, 0.0148, 0.6)];
 
 const NEAR_COST: &str = "near cost";
 const DISSENT_SHARE: &str = "dissent share";
@@ -76,6 +82,8 @@ pub(super) struct Views<'a, D: Device> {
     background: [f32; 3],
     /// At the size of the pictures.
     pictures: Images<D>,
+    /// The sources at the field's own size of the comparison.
+    small: Vec<SourceImage>,
     /// At the size of the comparison.
     matched: Images<D>,
     /// `[view][row][column]` of the matched ones: disparity and confidence.
@@ -127,7 +135,7 @@ impl Sweep {
             true => sources.images.clone(),
             false => sources.images.iter().map(|image| unseen::filled(image).into_owned()).collect(),
         };
-        let texels: Vec<[f32; 4]> = small.iter().flat_map(|image| image.texels.iter().copied()).collect();
+        let texels = joined_texels(&small);
         Ok(Views {
             settings: *self,
             defaults: *self,
@@ -142,8 +150,14 @@ impl Sweep {
             space,
             texels,
             gains: None,
+            small,
         })
     }
+}
+
+/// The texels of all images.
+fn joined_texels(images: &[SourceImage]) -> Vec<[f32; 4]> {
+    images.iter().flat_map(|image| image.texels.iter().copied()).collect()
 }
 
 /// The views with a weight above 0, the greatest weights first. `cameras` are those of the texels, `maps` those of the
@@ -248,6 +262,34 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn simplify(&mut self) {
         self.settings.plane_count = self.settings.plane_count.min(TRIAL_PLANES);
+    }
+
+    fn efforts(&self) -> Vec<Effort> {
+        let Sweep { plane_count, match_side, .. } = self.defaults;
+        let named = |(side, planes, error, work): (f32, f32, f32, f32)| {
+            let [side, planes] = [match_side as f32 * side, plane_count as f32 * planes].map(f32::round);
+            Effort::new(format!("matching at {side} pixels, {planes} planes"), error, work)
+        };
+        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
+    }
+
+    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        let (side, planes) = EFFORTS.get(effort).map_or((1.0, 1.0), |(side, planes, ..)| (*side, *planes));
+        let Sweep { plane_count, match_side, .. } = self.defaults;
+        let match_side = (match_side as f32 * side).round() as u32;
+        let plane_count = (plane_count as f32 * planes).round() as u32;
+        if (self.settings.match_side, self.settings.plane_count) == (match_side, plane_count) {
+            return Ok(Encodings::Kept);
+        }
+        self.settings = Sweep { plane_count, match_side, ..self.settings };
+        let images = self.small.iter().map(|image| image.reduced(match_side));
+        let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
+        self.matched = Images::upload(self.device, &images)?;
+        self.texels = joined_texels(&images);
+        self.disparities = self.device.zeros(self.texels.len())?;
+        self.steps.fill(0.0);
+        self.gains = None;
+        Ok(Encodings::Dropped)
     }
 
     fn surfaces(&self) -> Surfaces {

@@ -65,7 +65,7 @@ pub(super) fn run(
     folder.map_or(Ok(()), |folder| check_writable(&folder.join(SETTINGS)))?;
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
-    let render_options = arguments.picture.to_render_options(arguments.model.exact, &about)?;
+    let render_options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let scenes: Vec<Scene> = arguments.paths()?.iter().map(Scene::open).collect::<Result<_, _>>()?;
     folder.map_or(Ok(()), |folder| keep_folder_apart(&scenes, folder))?;
     let draws = Draws {

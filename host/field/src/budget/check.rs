@@ -1,0 +1,157 @@
+//! Estimates a picture's error from few exact pixels.
+//!
+//! Errors are where colours change: pixels are drawn with probabilities that follow the contrast around them, and each
+//! squared difference counts by the inverse of its probability, which makes the estimate unbiased whatever the
+//! probabilities are (importance sampling).
+
+use super::Estimate;
+use crate::Rendered;
+use viewfuse_core::random::uniform;
+
+/// Share of the draws that goes to all pixels alike: what is missing altogether leaves no contrast.
+const EVEN_SHARE: f64 = 0.25;
+/// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 15 degrees of freedom,
+/// and somewhat more because squared differences are skewed.
+const STANDARD_ERRORS: f64 = 2.0;
+
+/// A drawn pixel, and the inverse of its probability over the number of pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Draw {
+    pub(super) pixel: u32,
+    pub(super) weight: f64,
+}
+
+/// `count` pixels of a picture, with repetition, along the rows at equal steps of cumulative probability from a random
+/// begin: neighbours are seldom drawn together.
+pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
+    let contrasts = contrasts(picture);
+    let sum: f64 = contrasts.iter().sum();
+    let even = 1.0 / contrasts.len().max(1) as f64;
+    let share = if sum > 0.0 { EVEN_SHARE } else { 1.0 };
+    let step = 1.0 / count.max(1) as f64;
+    let mut next = step * f64::from(uniform(seed, count as u32, 0));
+    let (mut draws, mut reached) = (Vec::with_capacity(count), 0.0);
+    for (pixel, contrast) in contrasts.iter().enumerate() {
+        let contrast = if sum > 0.0 { contrast / sum } else { 0.0 };
+        let probability = share * even + (1.0 - share) * contrast;
+        reached += probability;
+        while next < reached && draws.len() < count {
+            draws.push(Draw { pixel: pixel as u32, weight: even / probability });
+            next += step;
+        }
+    }
+    draws
+}
+
+/// Squared contrast of each pixel with its neighbours, the largest of the channels.
+fn contrasts(picture: &Rendered) -> Vec<f64> {
+    let (width, height) = (picture.width as usize, picture.height as usize);
+    let contrast = |index: usize| {
+        let (column, row) = (index % width, index / width);
+        let mut range = [[f32::MAX; 4], [f32::MIN; 4]];
+        for row in row.saturating_sub(1)..(row + 2).min(height) {
+            for colour in
+                &picture.colours[row * width + column.saturating_sub(1)..row * width + (column + 2).min(width)]
+            {
+                for channel in 0..4 {
+                    range[0][channel] = range[0][channel].min(colour[channel]);
+                    range[1][channel] = range[1][channel].max(colour[channel]);
+                }
+            }
+        }
+        let largest = (0..4).map(|channel| range[1][channel] - range[0][channel]).fold(0.0, f32::max);
+        f64::from(largest).powi(2)
+    };
+    (0..picture.colours.len()).map(contrast).collect()
+}
+
+/// Mean square over red, green and blue of the difference of two colours.
+pub(super) fn square(a: &[f32; 4], b: &[f32; 4]) -> f64 {
+    (0..3).map(|channel| f64::from(a[channel] - b[channel]).powi(2)).sum::<f64>() / 3.0
+}
+
+/// The weighted squared differences of the draws so far.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sample {
+    terms: Vec<f64>,
+}
+
+impl Sample {
+    /// Adds draws with the exact colours of their pixels.
+    pub(super) fn add(&mut self, picture: &Rendered, draws: &[Draw], exact: &[[f32; 4]]) {
+        let term =
+            |(draw, exact): (&Draw, &[f32; 4])| draw.weight * square(&picture.colours[draw.pixel as usize], exact);
+        self.terms.extend(draws.iter().zip(exact).map(term));
+    }
+
+    /// The error; infinite without draws, or if a difference is not finite.
+    pub(super) fn estimate(&self) -> Estimate {
+        let count = self.terms.len() as f64;
+        let mean = self.terms.iter().sum::<f64>() / count;
+        let variance = self.terms.iter().map(|term| (term - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let upper = mean + STANDARD_ERRORS * (variance / count).sqrt();
+        let finite = |value: f64| if value.is_finite() { value.sqrt() } else { f64::INFINITY };
+        Estimate { value: finite(mean), upper: finite(upper), pixels: self.terms.len() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc of radius 10 in the middle of 64x64 pixels, with an edge two pixels wide.
+    fn disc(shift: f32, brightness: f32) -> Rendered {
+        let colour = |index: u32| {
+            let (x, y) = ((index % 64) as f32 - 32.0 - shift, (index / 64) as f32 - 32.0);
+            let inside = (0.5 * (10.0 - x.hypot(y)) + 0.5).clamp(0.0, 1.0);
+            [brightness * inside, 0.5 * inside, 0.2, inside]
+        };
+        let colours = (0..64 * 64).map(colour).collect();
+        Rendered { colours, depths: Vec::new(), confidences: Vec::new(), width: 64, height: 64 }
+    }
+
+    fn estimated(picture: &Rendered, truth: &Rendered, seed: u64) -> Estimate {
+        let draws = draw(picture, 16, seed);
+        let exact: Vec<[f32; 4]> = draws.iter().map(|draw| truth.colours[draw.pixel as usize]).collect();
+        let mut sample = Sample::default();
+        sample.add(picture, &draws, &exact);
+        let estimate = sample.estimate();
+        assert_eq!((estimate.pixels, draws.len()), (16, 16));
+        estimate
+    }
+
+    #[test]
+    fn the_estimate_is_unbiased_and_its_upper_end_holds() {
+        // An edge that is moved, and a disc that is darker.
+        for truth in [disc(0.3, 1.0), disc(0.0, 0.97)] {
+            let picture = disc(0.0, 1.0);
+            let squares = picture.colours.iter().zip(&truth.colours).map(|(a, b)| square(a, b));
+            let error = (squares.sum::<f64>() / 4096.0).sqrt();
+            let estimates: Vec<Estimate> = (0..400).map(|seed| estimated(&picture, &truth, seed)).collect();
+            let mean = estimates.iter().map(|estimate| estimate.value.powi(2)).sum::<f64>() / 400.0;
+            assert!((mean.sqrt() / error - 1.0).abs() < 0.05, "{} {error}", mean.sqrt());
+            let missed = estimates.iter().filter(|estimate| estimate.upper < error).count();
+            assert!(missed <= 40, "{missed} of 400 below the true error");
+        }
+    }
+
+    #[test]
+    fn a_flat_picture_is_drawn_evenly() {
+        let flat = disc(1000.0, 1.0);
+        let draws = draw(&flat, 8, 1);
+        assert!(draws.iter().all(|draw| (draw.weight - 1.0).abs() < 1.0e-9), "{draws:?}");
+        let rows: Vec<u32> = draws.iter().map(|draw| draw.pixel / 512).collect();
+        assert_eq!(rows, (0..8).collect::<Vec<u32>>());
+    }
+
+    #[test]
+    fn nothing_known_is_no_estimate() {
+        assert_eq!(Sample::default().estimate().upper, f64::INFINITY);
+        let mut picture = disc(0.0, 1.0);
+        let draws = draw(&picture, 4, 0);
+        picture.colours[draws[0].pixel as usize][0] = f32::NAN;
+        let mut sample = Sample::default();
+        sample.add(&picture, &draws, &[[0.0; 4]; 4]);
+        assert_eq!(sample.estimate().upper, f64::INFINITY);
+    }
+}

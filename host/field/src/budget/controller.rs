@@ -1,0 +1,325 @@
+//! The search for an effort, and what it keeps from picture to picture.
+
+use super::check::{Sample, draw};
+use super::deadline::Deadline;
+use super::{Bound, Estimate, Kept, Tried, embedded};
+use crate::{Effort, FieldError, Rendered, Session};
+use std::time::{Duration, Instant};
+use viewfuse_core::camera::Camera;
+use viewfuse_job::progress::Progress;
+use viewfuse_weighting::sources::SourceWeights;
+
+/// A search begins where the typical error, scaled, is below the bound by this factor: most first checks then succeed.
+const MARGIN: f64 = 1.15;
+/// Exact pixels of a round of a check, and the most rounds until a check is decided.
+const ROUND: usize = 16;
+const ROUNDS: usize = 4;
+/// Pictures are compared whose typical errors differ by at least this factor.
+const LEAST_RATIO: f32 = 1.5;
+/// An effort is tried if it is expected to take this share of the time that is left.
+const TIME_SHARE: f64 = 0.75;
+/// The share of the time that must be left for estimating the error of a picture with a bounded time.
+const CHECK_SHARE: f64 = 0.25;
+
+/// What a picture is rendered from.
+#[derive(Clone, Copy)]
+pub(crate) struct View<'a> {
+    /// The camera, of the picture's size.
+    pub(crate) camera: &'a Camera,
+    /// All weights, for the exact picture.
+    pub(crate) all: &'a SourceWeights,
+    /// The weights without the least.
+    pub(crate) used: &'a SourceWeights,
+    /// Transmittance of early termination, but for the exact picture.
+    pub(crate) early_termination: f32,
+}
+
+/// Keeps a bound over the pictures of a run.
+pub(crate) struct Controller {
+    bound: Bound,
+    efforts: Vec<Effort>,
+    /// Estimated over typical errors in this scene.
+    scale: Option<f64>,
+    /// Seconds of each effort's last picture, without encoding.
+    seconds: Vec<Option<f64>>,
+    /// The effort that was chosen by comparing two, its estimate, and the pictures until the next comparison.
+    compared: Option<(usize, Estimate, u32)>,
+    pictures: u64,
+}
+
+/// A picture that keeps a bound, or does not, and the time of encoding in it.
+pub(crate) type Bounded = (Rendered, Kept, Duration);
+
+/// The state of one picture's search.
+struct Search<'s, 'a> {
+    session: &'s mut Session<'a>,
+    view: View<'s>,
+    start: Instant,
+    encode: Duration,
+    tried: Vec<Tried>,
+}
+
+impl Controller {
+    /// For these efforts of a field. Without any, the field has a single way to render.
+    pub(crate) fn new(bound: Bound, mut efforts: Vec<Effort>) -> Controller {
+        if efforts.is_empty() {
+            efforts.push(Effort::exact());
+        }
+        let seconds = vec![None; efforts.len()];
+        Controller { bound, efforts, scale: None, seconds, compared: None, pictures: 0 }
+    }
+
+    /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
+    pub(crate) fn first(&self) -> usize {
+        match self.bound {
+            Bound::Error(most) => self.cheapest_within(f64::from(most)),
+            Bound::Time(_) => 0,
+        }
+    }
+
+    /// Renders a picture within the bound. An error that is too large is never delivered: at worst the picture is exact. A
+    /// time that is too short gives the cheapest picture.
+    pub(crate) fn render(
+        &mut self,
+        session: &mut Session<'_>,
+        view: View<'_>,
+        progress: &dyn Progress,
+    ) -> Result<Bounded, FieldError> {
+        self.pictures += 1;
+        let (start, encode) = (Instant::now(), Duration::ZERO);
+        let mut search = Search { session, view, start, encode, tried: Vec::new() };
+        let (rendered, effort, error, is_kept) = match self.bound {
+            Bound::Error(most) => {
+                let (rendered, effort, estimate) = self.within_error(&mut search, f64::from(most), progress)?;
+                (rendered, effort, Some(estimate), estimate.upper <= f64::from(most))
+            }
+            Bound::Time(most) => self.within_time(&mut search, most, progress)?,
+        };
+        let (most_error, most_seconds) = match self.bound {
+            Bound::Error(most) => (Some(most), None),
+            Bound::Time(most) => (None, Some(most.as_secs_f64())),
+        };
+        let seconds = search.start.elapsed().as_secs_f64();
+        let (effort, tried) = (self.efforts[effort].name.clone(), search.tried);
+        Ok((rendered, Kept { most_error, most_seconds, effort, error, seconds, is_kept, tried }, search.encode))
+    }
+
+    fn within_error(
+        &mut self,
+        search: &mut Search<'_, '_>,
+        most: f64,
+        progress: &dyn Progress,
+    ) -> Result<(Rendered, usize, Estimate), FieldError> {
+        // A quarter of the bound is left to early termination, at most.
+        let termination = search.view.early_termination.min(0.25 * most as f32);
+        if self.compared.is_some() {
+            return self.by_comparison(search, most, termination, None, progress);
+        }
+        let mut effort = self.cheapest_within(most);
+        loop {
+            let rendered = self.picture(search, effort, termination, progress)?;
+            if self.is_exact(effort) {
+                return Ok((rendered, effort, Estimate::EXACT));
+            }
+            let Some(estimate) = self.check(search, &rendered, ROUNDS, most, progress)? else {
+                return self.by_comparison(search, most, termination, Some((rendered, effort)), progress);
+            };
+            self.learn(effort, estimate);
+            if estimate.upper <= most {
+                return Ok((rendered, effort, estimate));
+            }
+            search.tried.push(self.tried(effort, Some(estimate)));
+            effort = self.cheapest_within(most).max(effort + 1);
+        }
+    }
+
+    /// For fields whose pixels cannot be computed alone: compares pictures of two efforts. `known` is the picture of an
+    /// effort, with the same early termination.
+    fn by_comparison(
+        &mut self,
+        search: &mut Search<'_, '_>,
+        most: f64,
+        termination: f32,
+        known: Option<(Rendered, usize)>,
+        progress: &dyn Progress,
+    ) -> Result<(Rendered, usize, Estimate), FieldError> {
+        if let Some((effort, estimate, pictures_left)) = &mut self.compared {
+            let (effort, estimate) = (*effort, *estimate);
+            if *pictures_left > 0 {
+                *pictures_left -= 1;
+                return Ok((self.picture(search, effort, termination, progress)?, effort, estimate));
+            }
+        }
+        // Both pictures leave out the same views, which the comparison would not see.
+        let known = known.filter(|_| search.view.used == search.view.all);
+        search.view.used = search.view.all;
+        let begin = match (&known, &self.compared) {
+            (Some((_, effort)), _) | (None, Some((effort, ..))) => *effort,
+            (None, None) => self.cheapest_within(most),
+        };
+        let mut effort = begin.max(1);
+        let mut below = self.below(effort);
+        let (mut cheaper, mut found) = match known {
+            Some((rendered, 0)) => (rendered, None),
+            known => (self.picture(search, below, termination, progress)?, known.map(|(rendered, _)| rendered)),
+        };
+        loop {
+            let rendered = match found.take() {
+                Some(rendered) => rendered,
+                None => self.picture(search, effort, termination, progress)?,
+            };
+            if self.is_exact(effort) {
+                return Ok(self.compared_to(rendered, effort, Estimate::EXACT));
+            }
+            let typical = |effort: usize| f64::from(self.efforts[effort].typical_error);
+            let mut estimate = embedded::estimate(&rendered, &cheaper, typical(below) / typical(effort));
+            estimate.upper += f64::from(termination);
+            self.learn(effort, estimate);
+            if estimate.upper <= most {
+                return Ok(self.compared_to(rendered, effort, estimate));
+            }
+            search.tried.push(self.tried(effort, Some(estimate)));
+            (cheaper, below) = (rendered, effort);
+            effort = self.cheapest_within(most).max(effort + 1);
+        }
+    }
+
+    /// Keeps the choice for some pictures: one after the first comparison, then twice as many.
+    fn compared_to(&mut self, rendered: Rendered, effort: usize, estimate: Estimate) -> (Rendered, usize, Estimate) {
+        let pictures = u32::try_from(self.pictures).unwrap_or(u32::MAX);
+        self.compared = Some((effort, estimate, pictures));
+        (rendered, effort, estimate)
+    }
+
+    fn within_time(
+        &mut self,
+        search: &mut Search<'_, '_>,
+        most: Duration,
+        progress: &dyn Progress,
+    ) -> Result<(Rendered, usize, Option<Estimate>, bool), FieldError> {
+        let end = search.start + most;
+        let left = || end.saturating_duration_since(Instant::now()).as_secs_f64();
+        let mut effort = self.best_within(left()).unwrap_or(0);
+        let mut best = (self.picture(search, effort, search.view.early_termination, progress)?, effort);
+        let deadline = Deadline { progress, end };
+        while let Some(better) = self.best_within(left()).filter(|better| *better > effort) {
+            effort = better;
+            match self.picture(search, effort, search.view.early_termination, &deadline) {
+                Ok(rendered) => {
+                    search.tried.push(self.tried(best.1, None));
+                    best = (rendered, effort);
+                }
+                Err(error) => {
+                    if !matches!(error, FieldError::Interrupted(_)) || progress.is_cancelled() {
+                        return Err(error);
+                    }
+                    search.tried.push(self.tried(effort, None));
+                    break;
+                }
+            }
+        }
+        let (rendered, effort) = best;
+        let is_kept = search.start.elapsed() <= most;
+        if self.is_exact(effort) {
+            return Ok((rendered, effort, Some(Estimate::EXACT), is_kept));
+        }
+        let mut estimate = None;
+        if left() > CHECK_SHARE * most.as_secs_f64() {
+            match self.check(search, &rendered, 1, 0.0, &deadline) {
+                Ok(found) => estimate = found,
+                Err(FieldError::Interrupted(_)) if !progress.is_cancelled() => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok((rendered, effort, estimate, is_kept))
+    }
+
+    /// A picture of an effort; its time is kept.
+    fn picture(
+        &mut self,
+        search: &mut Search<'_, '_>,
+        effort: usize,
+        early_termination: f32,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, FieldError> {
+        let is_exact = self.is_exact(effort);
+        let Search { session, view, encode, .. } = search;
+        let (weights, early_termination) = if is_exact { (view.all, 0.0) } else { (view.used, early_termination) };
+        let start = Instant::now();
+        session.set_effort(effort, progress)?;
+        session.encode(weights, progress)?;
+        *encode += start.elapsed();
+        let start = Instant::now();
+        let rendered = session.render(view.camera, weights, early_termination, progress)?;
+        self.seconds[effort] = Some(start.elapsed().as_secs_f64());
+        Ok(rendered)
+    }
+
+    /// Estimates a picture's error, in rounds until it is clearly on one side of `most`; `None` if the field cannot compute
+    /// pixels alone.
+    fn check(
+        &self,
+        search: &mut Search<'_, '_>,
+        rendered: &Rendered,
+        rounds: usize,
+        most: f64,
+        progress: &dyn Progress,
+    ) -> Result<Option<Estimate>, FieldError> {
+        let mut sample = Sample::default();
+        for round in 0..rounds {
+            let draws = draw(rendered, ROUND, self.pictures * ROUNDS as u64 + round as u64);
+            let pixels: Vec<u32> = draws.iter().map(|draw| draw.pixel).collect();
+            let Search { session, view, .. } = search;
+            let Some(exact) = session.exact_pixels(view.camera, view.all, &pixels, progress)? else {
+                return Ok(None);
+            };
+            sample.add(rendered, &draws, &exact);
+            let estimate = sample.estimate();
+            if estimate.upper <= most || estimate.value > most || round + 1 == rounds {
+                return Ok(Some(estimate));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The cheapest effort whose error is expected to be below the bound.
+    fn cheapest_within(&self, most: f64) -> usize {
+        let scale = MARGIN * self.scale.unwrap_or(1.0);
+        let is_within = |effort: &Effort| f64::from(effort.typical_error) * scale <= most;
+        self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
+    }
+
+    /// The best effort that is expected to take less than the time that is left; none before a time was measured.
+    fn best_within(&self, left: f64) -> Option<usize> {
+        let (_, measured) = (0..).zip(&self.seconds).filter(|(_, seconds)| seconds.is_some()).last()?;
+        let index = self.seconds.iter().rposition(Option::is_some)?;
+        let rate = measured.as_ref()? / f64::from(self.efforts[index].typical_work);
+        let expected = |effort: usize| match self.seconds[effort] {
+            Some(seconds) => seconds,
+            None => rate * f64::from(self.efforts[effort].typical_work),
+        };
+        (0..self.efforts.len()).rev().find(|effort| expected(*effort) <= TIME_SHARE * left)
+    }
+
+    /// The best effort below another one whose error is typically larger by a factor that a comparison can tell.
+    fn below(&self, effort: usize) -> usize {
+        let least = LEAST_RATIO * self.efforts[effort].typical_error;
+        (0..effort).rev().find(|below| self.efforts[*below].typical_error >= least).unwrap_or(0)
+    }
+
+    /// Updates the scale of errors by half, in logarithms: single estimates are uncertain.
+    fn learn(&mut self, effort: usize, estimate: Estimate) {
+        let found = estimate.value / f64::from(self.efforts[effort].typical_error);
+        if found.is_finite() && found > 0.0 {
+            self.scale = Some(self.scale.map_or(found, |scale| (scale * found).sqrt()));
+        }
+    }
+
+    fn is_exact(&self, effort: usize) -> bool {
+        effort + 1 == self.efforts.len()
+    }
+
+    fn tried(&self, effort: usize, error: Option<Estimate>) -> Tried {
+        Tried { effort: self.efforts[effort].name.clone(), error }
+    }
+}

@@ -1,0 +1,62 @@
+//! The ways to render a picture, from the cheapest to the exact one.
+
+use super::options::{Omissions, PixelNerfOptions, Sampling};
+use crate::Effort;
+
+/// Samples of a single pass in 64ths of those of the first, with the largest difference between the rays
+/// around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
+/// (the example `efforts` of `viewfuse-evaluate`).
+const ONE_PASS: [(u32, f32, f32, f32); 8] = [
+    (12, 0.25, 0.036, 0.018),
+    (16, 0.2, 0.026, 0.02),
+    (24, 0.2, 0.016, 0.022),
+    (32, 0.2, 0.0105, 0.024),
+    (40, 0.15, 0.0084, 0.028),
+    (48, 0.12, 0.007, 0.033),
+    (64, 0.08, 0.0053, 0.043),
+    (128, 0.04, 0.0041, 0.09),
+];
+/// The same with both passes.
+const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
+    (
+        "both passes, empty space left out",
+        Omissions { interpolation: 0.05, probe_error: 1.0 / 512.0, ..ALL },
+        0.0021,
+        0.32,
+    ),
+    ("both passes, empty parts left out", Omissions { interpolation: 0.02, empty_space: 0, ..ALL }, 0.0014, 0.42),
+];
+const ALL: Omissions = Omissions::ALL;
+
+/// The efforts of a network with these options, the cheapest first. Counts of samples are shares of the options'. Whether
+/// latent layers are applied on the grid does not change: views are encoded for it.
+pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> {
+    let full = options.sampling;
+    let keep = |omissions: Omissions| Omissions {
+        unused_views: options.omissions.unused_views,
+        latent_layers: options.omissions.latent_layers,
+        ..omissions
+    };
+    let one_pass = ONE_PASS.map(|(share, interpolation, error, work)| {
+        let coarse_count = (full.coarse_count * share).div_ceil(64).max(1);
+        let sampling = Sampling { coarse_count, importance_count: 0, depth_count: 0, ..full };
+        let probe_samples = coarse_count.div_ceil(2).max(full.coarse_count.div_ceil(4));
+        let omissions = keep(Omissions { probe_samples, interpolation, ..ALL });
+        (
+            Effort::new(format!("{coarse_count} samples, one pass"), error, work),
+            PixelNerfOptions { sampling, omissions },
+        )
+    });
+    let two_passes = TWO_PASSES.map(|(name, omissions, error, work)| {
+        (Effort::new(name, error, work), PixelNerfOptions { sampling: full, omissions: keep(omissions) })
+    });
+    let mut efforts: Vec<_> = one_pass.into_iter().chain(two_passes).collect();
+    efforts.push((Effort::exact(), exact(options)));
+    efforts
+}
+
+/// Nothing is left out of a picture but what costs only rounding.
+pub(super) fn exact(options: &PixelNerfOptions) -> PixelNerfOptions {
+    let Omissions { unused_views, latent_layers, .. } = options.omissions;
+    PixelNerfOptions { omissions: Omissions { unused_views, latent_layers, ..Omissions::NONE }, ..*options }
+}

@@ -1,0 +1,219 @@
+//! Bounds on the error and on the time, over all fields.
+
+use std::time::{Duration, Instant};
+use viewfuse::device::choice::AnyDevice;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::budget::{Bound, Kept};
+use viewfuse::field::family::{self, Family};
+use viewfuse::field::options::FieldOptions;
+use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::{AnyField, Renderer};
+use viewfuse::job::progress::Silent;
+use viewfuse::nn::checkpoint::Checkpoint;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{FewShot, Selection};
+use viewfuse::weighting::Weighting;
+use viewfuse_tests::places;
+
+/// The most pictures whose error exceeds its bound.
+const MOST_MISSED: f64 = 0.05;
+
+fn scene(name: &str) -> Scene {
+    Scene::open(&places::data(name)).expect("a scene")
+}
+
+fn job(scene: &Scene, sources: &str, targets: &str) -> FewShot {
+    let selection =
+        Selection { targets: Some(targets.to_owned()), sources: Some(sources.to_owned()), ..Selection::default() };
+    selection.resolve(scene, 2).expect("views")
+}
+
+fn network(name: &str, seed: u64) -> AnyField {
+    let checkpoint = match name.split_once(':') {
+        Some((name, width)) => {
+            let all = Family::ALL.into_iter().flat_map(|family| family.test_networks());
+            let network = all.into_iter().find(|network| network.name == name).expect("a test network");
+            (network.checkpoint)(Some(width.parse().expect("a width")))
+        }
+        None => Checkpoint::open(&places::data("../../host/models").join(name)).expect("a checkpoint"),
+    };
+    family::open(checkpoint, &FieldOptions { seed, ..FieldOptions::default() }).expect("a network")
+}
+
+/// A field with its subject.
+struct Case {
+    name: String,
+    field: AnyField,
+    scene: Scene,
+    job: FewShot,
+    side: u32,
+    /// Bounds on the error in decibels.
+    bounds: &'static [f32],
+}
+
+fn cases() -> Vec<Case> {
+    let mut cases = Vec::new();
+    let mut case = |name: &str, field: AnyField, folder: &str, sources: &str, targets: &str, side, bounds| {
+        let scene = scene(folder);
+        let job = job(&scene, sources, targets);
+        cases.push(Case { name: name.to_owned(), field, scene, job, side, bounds });
+    };
+    for seed in [1, 2] {
+        for (sources, targets) in [("16,72,136", "48,104,160,200"), ("48,160,200", "16,88,136")] {
+            let (car, bounds) = ("car", &[30.0, 35.0, 40.0, 45.0][..]);
+            case("pixelnerf, cars", network("pixelnerf_cars.safetensors", seed), car, sources, targets, 32, bounds);
+            case("pixelnerf, body", network("body:16", seed), car, sources, targets, 32, bounds);
+            case("pixelnerf, mist", network("formula:16", seed), car, sources, targets, 24, bounds);
+        }
+        let bounds = &[28.0, 34.0, 40.0];
+        case("genvs, cars", network("genvs_cars.safetensors", seed), "car", "16,72,136", "48,160", 32, bounds);
+    }
+    let bounds = &[22.0, 25.0, 28.0, 31.0];
+    case("sweep", AnyField::default(), "room", "all/2", "1,3,5,7", 96, bounds);
+    case("sweep", AnyField::default(), "room", "0,2,3,5", "1,4", 96, bounds);
+    case("hull", AnyField::default(), "toy", "0..19/3", "20..23", 64, bounds);
+    case("hull", AnyField::default(), "toy", "0..19/2", "20..23", 64, bounds);
+    cases
+}
+
+/// All targets of a case, with an effort or a bound.
+fn frames(case: &Case, renderer: &dyn Renderer, effort: Option<usize>, bound: Option<Bound>) -> (Vec<Frame>, f64) {
+    let aspect = f64::from(case.scene.views[0].camera.pinhole.height())
+        / f64::from(case.scene.views[0].camera.pinhole.width());
+    let size = Some([case.side, (f64::from(case.side) * aspect).round() as u32]);
+    // The exact picture leaves out nothing; a bound may choose to.
+    let early_termination = if bound.is_some() && case.field.about().ends_rays { 1.0 / 256.0 } else { 0.0 };
+    let leave_out = if bound.is_some() { 0.01 } else { 0.0 };
+    let options = RenderOptions { size, bound, early_termination, leave_out, ..RenderOptions::default() };
+    let weighting = Weighting::open("error:alpha=1").expect("a scheme");
+    let targets = case.job.targets.iter().filter_map(|target| target.truth);
+    let shown = case.job.sources.iter().copied().chain(targets);
+    let album = open_album(&case.scene, shown, renderer, &options, &Silent).expect("photographs");
+    let mut stage =
+        Stage::prepare(&case.scene, &album, &case.job.sources, renderer, &options, &Silent).expect("prepared");
+    let start = Instant::now();
+    if let Some(effort) = effort {
+        stage.set_effort(effort, &Silent).expect("an effort");
+    }
+    stage.weigh(&weighting, &Silent).expect("weighed");
+    let frame = |target| stage.frame(&weighting, target, &Silent).expect("a frame");
+    let frames: Vec<Frame> = case.job.targets.iter().map(frame).collect();
+    (frames, start.elapsed().as_secs_f64())
+}
+
+/// Root mean square over pixels and channels.
+fn difference(a: &Frame, b: &Frame) -> f64 {
+    let square = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|c| f64::from(a[c] - b[c]).powi(2)).sum::<f64>();
+    let sum: f64 = a.colours.iter().zip(&b.colours).map(square).sum();
+    (sum / (3 * a.colours.len()) as f64).sqrt()
+}
+
+/// The results of a kind of case under a bound.
+#[derive(Default)]
+struct Group {
+    pictures: usize,
+    missed: usize,
+    /// How far below the bound errors are, decibels; exact pictures not counted.
+    overshoot: Vec<f64>,
+    seconds: f64,
+    /// `[effort]`: seconds of all pictures, and how many miss the bound.
+    fixed: Vec<(f64, usize)>,
+}
+
+#[test]
+fn errors_stay_below_their_bounds() {
+    let device = AnyDevice::Cpu(Cpu);
+    let mut groups: Vec<(String, f32, Group)> = Vec::new();
+    for case in cases() {
+        let renderer = case.field.on(&device);
+        let efforts: Vec<(Vec<Frame>, f64)> = {
+            let mut all = Vec::new();
+            let count = effort_count(&case, renderer.as_ref());
+            for effort in 0..count {
+                all.push(frames(&case, renderer.as_ref(), Some(effort), None));
+            }
+            all
+        };
+        let (exact, _) = efforts.last().expect("an effort");
+        for &decibels in case.bounds {
+            let most = 10.0_f32.powf(-decibels / 20.0);
+            let (pictures, seconds) = frames(&case, renderer.as_ref(), None, Some(Bound::Error(most)));
+            let at = groups.iter().position(|(name, own, _)| *name == case.name && *own == decibels);
+            let at = at.unwrap_or_else(|| {
+                groups.push((case.name.clone(), decibels, Group::default()));
+                groups.len() - 1
+            });
+            let group = &mut groups[at].2;
+            group.seconds += seconds;
+            group.fixed.resize(efforts.len(), (0.0, 0));
+            for ((frames, seconds), fixed) in efforts.iter().zip(&mut group.fixed) {
+                fixed.0 += seconds;
+                fixed.1 += frames.iter().zip(exact).filter(|(a, b)| difference(a, b) > f64::from(most)).count();
+            }
+            for (picture, exact) in pictures.iter().zip(exact) {
+                let error = difference(picture, exact);
+                let kept = picture.kept.as_ref().expect("a bound");
+                assert_eq!((kept.most_error, kept.is_kept), (Some(most), true), "{kept:?}");
+                group.pictures += 1;
+                group.missed += usize::from(error > f64::from(most));
+                if error > 0.0 {
+                    group.overshoot.push(-20.0 * error.log10() - f64::from(decibels));
+                }
+                if kept.effort == "exact" {
+                    assert_eq!(error, 0.0, "{}", case.name);
+                }
+            }
+        }
+    }
+    println!("field, bound dB: pictures, missed, mean overshoot dB, seconds, of exact, of the best fixed effort");
+    let (mut pictures, mut missed, mut overshoot) = (0, 0, Vec::new());
+    let (mut seconds, mut best_fixed) = (0.0, 0.0);
+    for (name, decibels, group) in &groups {
+        let exact = group.fixed.last().map_or(f64::NAN, |fixed| fixed.0);
+        let best = group.fixed.iter().find(|fixed| fixed.1 == 0).map_or(f64::NAN, |fixed| fixed.0);
+        let mean = group.overshoot.iter().sum::<f64>() / group.overshoot.len() as f64;
+        println!(
+            "{name}, {decibels}: {}, {}, {mean:.1}, {:.2}, {:.2}, {:.2}",
+            group.pictures,
+            group.missed,
+            group.seconds,
+            group.seconds / exact,
+            group.seconds / best
+        );
+        pictures += group.pictures;
+        missed += group.missed;
+        seconds += group.seconds;
+        best_fixed += best;
+        overshoot.extend(&group.overshoot);
+    }
+    let mean = overshoot.iter().sum::<f64>() / overshoot.len() as f64;
+    println!("all: {pictures} pictures, {missed} missed, overshoot {mean:.1} dB, {:.2} of the best fixed efforts' time", seconds / best_fixed);
+    assert!(pictures >= 200, "{pictures}");
+    assert!(missed as f64 <= MOST_MISSED * pictures as f64, "{missed} of {pictures} exceed their bound");
+    assert!(mean < 10.0, "bounds are not used: {mean} dB");
+}
+
+/// The number of efforts of a case's field.
+fn effort_count(case: &Case, renderer: &dyn Renderer) -> usize {
+    let options = RenderOptions { size: None, ..RenderOptions::default() };
+    let album =
+        open_album(&case.scene, case.job.sources.iter().copied(), renderer, &options, &Silent).expect("photographs");
+    let stage = Stage::prepare(&case.scene, &album, &case.job.sources, renderer, &options, &Silent).expect("prepared");
+    stage.efforts().len()
+}
+
+#[test]
+fn a_time_is_kept_where_it_can_be() {
+    let device = AnyDevice::Cpu(Cpu);
+    for case in cases().into_iter().filter(|case| case.name == "pixelnerf, cars" || case.name == "sweep").take(2) {
+        let renderer = case.field.on(&device);
+        let kept = |most: Duration| -> Vec<Kept> {
+            let (frames, _) = frames(&case, renderer.as_ref(), None, Some(Bound::Time(most)));
+            frames.into_iter().filter_map(|frame| frame.kept).collect()
+        };
+        let generous = kept(Duration::from_secs(600));
+        assert!(generous.iter().all(|kept| kept.is_kept && kept.effort == "exact"), "{generous:?}");
+        let none = kept(Duration::from_micros(1));
+        assert!(none.iter().all(|kept| !kept.is_kept && kept.effort != "exact" && kept.error.is_none()), "{none:?}");
+    }
+}
