@@ -61,7 +61,7 @@ fn cases() -> Vec<Case> {
     for seed in [1, 2] {
         for (sources, targets) in [("16,72,136", "48,104,160,200"), ("48,160,200", "16,88,136")] {
             let (car, bounds) = ("car", &[30.0, 35.0, 40.0, 45.0][..]);
-            case("pixelnerf, cars", network("pixelnerf_cars.safetensors", seed), car, sources, targets, 32, bounds);
+            case("pixelnerf, cars", network("pixelnerf_cars.safetensors", seed), car, sources, targets, 48, bounds);
             case("pixelnerf, body", network("body:16", seed), car, sources, targets, 32, bounds);
             case("pixelnerf, mist", network("formula:16", seed), car, sources, targets, 24, bounds);
         }
@@ -71,15 +71,15 @@ fn cases() -> Vec<Case> {
     let bounds = &[22.0, 25.0, 28.0, 31.0];
     case("sweep", AnyField::default(), "room", "all/2", "1,3,5,7", 96, bounds);
     case("sweep", AnyField::default(), "room", "0,2,3,5", "1,4", 96, bounds);
-    case("hull", AnyField::default(), "toy", "0..19/3", "20..23", 64, bounds);
-    case("hull", AnyField::default(), "toy", "0..19/2", "20..23", 64, bounds);
+    // Small sources with silhouettes have one effort: these pictures are exact.
+    case("hull", AnyField::default(), "toy", "0..19/3", "20..23", 64, &[31.0]);
     cases
 }
 
 /// All targets of a case, with an effort or a bound.
 fn frames(case: &Case, renderer: &dyn Renderer, effort: Option<usize>, bound: Option<Bound>) -> (Vec<Frame>, f64) {
-    let aspect = f64::from(case.scene.views[0].camera.pinhole.height())
-        / f64::from(case.scene.views[0].camera.pinhole.width());
+    let aspect =
+        f64::from(case.scene.views[0].camera.pinhole.height()) / f64::from(case.scene.views[0].camera.pinhole.width());
     let size = Some([case.side, (f64::from(case.side) * aspect).round() as u32]);
     // The exact picture leaves out nothing; a bound may choose to.
     let early_termination = if bound.is_some() && case.field.about().ends_rays { 1.0 / 256.0 } else { 0.0 };
@@ -129,7 +129,7 @@ fn errors_stay_below_their_bounds() {
         let efforts: Vec<(Vec<Frame>, f64)> = {
             let mut all = Vec::new();
             let count = effort_count(&case, renderer.as_ref());
-            for effort in 0..count {
+            for effort in 0..count.max(1) {
                 all.push(frames(&case, renderer.as_ref(), Some(effort), None));
             }
             all
@@ -155,7 +155,10 @@ fn errors_stay_below_their_bounds() {
                 let kept = picture.kept.as_ref().expect("a bound");
                 assert_eq!((kept.most_error, kept.is_kept), (Some(most), true), "{kept:?}");
                 group.pictures += 1;
-                group.missed += usize::from(error > f64::from(most));
+                if error > f64::from(most) {
+                    println!("{}, {decibels} dB: error {error:.5}, {kept:?}", case.name);
+                    group.missed += 1;
+                }
                 if error > 0.0 {
                     group.overshoot.push(-20.0 * error.log10() - f64::from(decibels));
                 }
@@ -187,7 +190,10 @@ fn errors_stay_below_their_bounds() {
         overshoot.extend(&group.overshoot);
     }
     let mean = overshoot.iter().sum::<f64>() / overshoot.len() as f64;
-    println!("all: {pictures} pictures, {missed} missed, overshoot {mean:.1} dB, {:.2} of the best fixed efforts' time", seconds / best_fixed);
+    println!(
+        "all: {pictures} pictures, {missed} missed, overshoot {mean:.1} dB, {:.2} of the best fixed efforts' time",
+        seconds / best_fixed
+    );
     assert!(pictures >= 200, "{pictures}");
     assert!(missed as f64 <= MOST_MISSED * pictures as f64, "{missed} of {pictures} exceed their bound");
     assert!(mean < 10.0, "bounds are not used: {mean} dB");

@@ -92,9 +92,14 @@ pub trait Prepared {
         Ok(Encodings::Kept)
     }
 
+    /// Whether the field can render pixels alone, by [`Prepared::exact_pixels`], because they are independent of one another.
+    fn renders_pixels(&self) -> bool {
+        false
+    }
+
     /// Colours and opacities of some pixels of a target, row-major indices, with nothing left out: what
-    /// [`Prepared::render`] would give with the last of [`Prepared::efforts`]. `None` for fields whose pixels are not
-    /// independent of one another. All [`Request::views`] are encoded.
+    /// [`Prepared::render`] would give with the last of [`Prepared::efforts`]. Called only if [`Prepared::renders_pixels`];
+    /// all [`Request::views`] are encoded.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -103,8 +108,8 @@ pub trait Prepared {
         _request: &Request<'_>,
         _pixels: &[u32],
         _progress: &dyn Progress,
-    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
-        Ok(None)
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        Ok(Vec::new())
     }
 
     /// What is known of where the surfaces are; nothing by default.

@@ -250,12 +250,16 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(Encodings::Kept)
     }
 
+    fn renders_pixels(&self) -> bool {
+        true
+    }
+
     fn exact_pixels(
         &mut self,
         request: &Request<'_>,
         pixels: &[u32],
         progress: &dyn Progress,
-    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
         let options = efforts::exact(&self.field.options);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
         let views = self.used(request.views, &request.view_weights())?;
@@ -263,7 +267,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
         let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
-        Ok(Some(colours))
+        Ok(colours)
     }
 
     fn record(&self) -> Record {

@@ -110,22 +110,28 @@ impl<'a> Session<'a> {
         self.prepared.efforts()
     }
 
-    /// Renders what follows with one of [`Session::efforts`]. Views that another effort needs otherwise are encoded again.
+    /// Renders what follows with one of [`Session::efforts`]. Views that this effort needs otherwise are encoded again.
     ///
     /// # Errors
     /// [`FieldError`].
-    pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.effort == Some(effort) {
-            return Ok(());
+    pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<Encodings, FieldError> {
+        if self.effort == Some(effort) || effort >= self.prepared.efforts().len() {
+            return Ok(Encodings::Kept);
         }
         self.effort = Some(effort);
-        if self.prepared.set_effort(effort)? == Encodings::Dropped {
+        let encodings = self.prepared.set_effort(effort)?;
+        if encodings == Encodings::Dropped {
             self.encoded.fill(false);
             if let Some(relevance) = self.relevance.take() {
                 self.weigh(&relevance, progress)?;
             }
         }
-        Ok(())
+        Ok(encodings)
+    }
+
+    /// See [`Prepared::renders_pixels`].
+    pub fn renders_pixels(&self) -> bool {
+        self.prepared.renders_pixels()
     }
 
     /// Exact colours of some pixels; see [`Prepared::exact_pixels`].
@@ -138,7 +144,7 @@ impl<'a> Session<'a> {
         weights: &SourceWeights,
         pixels: &[u32],
         progress: &dyn Progress,
-    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
         self.prepared.exact_pixels(&Request { camera, weights, views, early_termination: 0.0 }, pixels, progress)

@@ -4,6 +4,7 @@ use super::environment::device_options;
 use super::model::NetworkOptions;
 use super::options::{PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
+use super::parse::parse_seconds;
 use super::table::table;
 use super::terminal::Terminal;
 use super::{on_threads, say, wrong};
@@ -63,9 +64,24 @@ pub(crate) struct Arguments {
     /// Measure, besides exact, only settings whose words begin with this; may be given several times
     #[arg(long, value_name = "WORDS")]
     only: Vec<String>,
+    /// Show another program beside: its name, and its seconds for the same pictures; may be given several times
+    #[arg(long, value_name = "NAME=SECONDS", value_parser = parse_beside)]
+    beside: Vec<Beside>,
     /// Folder for the results; made if missing
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+}
+
+/// Another program that makes the exact pictures.
+#[derive(Clone)]
+struct Beside {
+    name: String,
+    seconds: f64,
+}
+
+fn parse_beside(text: &str) -> Result<Beside, String> {
+    let (name, seconds) = text.rsplit_once('=').ok_or("a name and a time, as PyTorch=5.8")?;
+    Ok(Beside { name: name.to_owned(), seconds: parse_seconds(seconds)?.as_secs_f64() })
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
@@ -119,6 +135,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     }
     drop(progress);
 
+    if let Some(exact) = record.devices.first().and_then(|device| device.points.first()).map(|point| point.seconds) {
+        let beside = arguments.beside.iter().map(|beside| DeviceRecord::beside(&beside.name, beside.seconds, exact));
+        record.devices.extend(beside);
+    }
     let title = title(&record);
     if !record.devices.is_empty() {
         // All are computed before the first is written; the record is written last.
@@ -129,7 +149,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         write_whole(&json, &whole)?;
     }
     say(format_args!("{title}\n"))?;
-    record.devices.iter().try_for_each(print_device)?;
+    let is_measured = |device: &&DeviceRecord| !arguments.beside.iter().any(|beside| beside.name == device.device);
+    record.devices.iter().filter(is_measured).try_for_each(print_device)?;
     notes.iter().try_for_each(say)?;
     if !record.devices.is_empty() {
         say(format_args!("{}, {}, {}", csv.display(), svg.display(), json.display()))?;

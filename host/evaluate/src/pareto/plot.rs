@@ -5,6 +5,7 @@ mod axis;
 mod labels;
 
 use super::record::{DeviceRecord, PointRecord};
+use super::settings::BOUNDED;
 use axis::Scale;
 use labels::{Labels, Space};
 use plotters::coord::Shift;
@@ -37,14 +38,29 @@ const RING: i32 = 8;
 type Failure = Box<dyn Error>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
-/// Draws the points of all devices. Points whose time or difference is NaN are left out.
+/// Draws the points of all devices. Points whose time or difference is NaN are left out. Settings that are chosen by a bound
+/// ([`BOUNDED`]) are a line of their own.
 ///
 /// # Errors
 /// [`PlotError`]; none is known to happen.
 pub fn svg(title: &str, devices: &[DeviceRecord]) -> Result<String, PlotError> {
+    let lines: Vec<DeviceRecord> = devices.iter().flat_map(lines_of).collect();
     let mut picture = String::new();
-    draw(&mut picture, title, devices).map_err(|error| PlotError(error.to_string()))?;
+    draw(&mut picture, title, &lines).map_err(|error| PlotError(error.to_string()))?;
     Ok(picture)
+}
+
+/// A device's fixed settings, and those that a bound chooses, if there are any.
+fn lines_of(device: &DeviceRecord) -> Vec<DeviceRecord> {
+    let (mut bounded, fixed): (Vec<PointRecord>, Vec<PointRecord>) =
+        device.points.iter().cloned().partition(|point| point.setting.starts_with(BOUNDED));
+    let fixed = DeviceRecord { points: fixed, ..device.clone() };
+    if bounded.is_empty() {
+        return vec![fixed];
+    }
+    bounded.iter_mut().for_each(|point| point.best = true);
+    let name = format!("{}, chosen by a bound on the error", device.device);
+    vec![fixed, DeviceRecord { device: name, points: bounded, ..device.clone() }]
 }
 
 fn draw(picture: &mut String, title: &str, devices: &[DeviceRecord]) -> Result<(), Failure> {

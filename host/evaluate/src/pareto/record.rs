@@ -123,6 +123,32 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 impl DeviceRecord {
+    /// Another program that makes the exact pictures in this time, where this one takes `exact_seconds`.
+    pub fn beside(name: &str, seconds: f64, exact_seconds: f64) -> DeviceRecord {
+        let versus_exact = DifferenceRecord { root_mean_square: Some(0.0), psnr: None, largest: Some(0.0) };
+        let point = PointRecord {
+            setting: name.to_owned(),
+            best: true,
+            seconds,
+            seconds_range: [seconds; 2],
+            encode_seconds: 0.0,
+            gain: exact_seconds / seconds,
+            versus_exact,
+            truth_psnr: None,
+            truth_loss: None,
+            left_out: Vec::new(),
+            denoising: None,
+            repeatable: true,
+        };
+        DeviceRecord {
+            device: name.to_owned(),
+            exact_versus_first: None,
+            fastest_without_loss: None,
+            fastest_of_same_look: None,
+            points: vec![point],
+        }
+    }
+
     /// The record of a device's points, the exact one first.
     pub fn of(device: String, points: &[Point], exact_versus_first: Option<Difference>) -> Self {
         let exact_seconds = points.first().map_or(f64::NAN, |exact| exact.seconds);

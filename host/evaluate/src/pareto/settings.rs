@@ -5,6 +5,7 @@ mod genvs;
 use super::Setting;
 use genvs::of_genvs;
 use viewfuse_field::AnyField;
+use viewfuse_field::budget::Bound;
 use viewfuse_field::genvs::Genvs;
 use viewfuse_field::pixelnerf::{Omissions, PixelNerf, PixelNerfOptions, Sampling};
 use viewfuse_field::render::RenderOptions;
@@ -15,9 +16,25 @@ pub const EXACT: &str = "exact";
 /// Name of the setting that skips everything that a run skips by default.
 pub const ALL: &str = "all";
 
-/// The settings of a field for this many targets. `options` give what `all` skips, the size and the background. A field
-/// without a list of its own has two settings: nothing skipped, and `options` as they are.
+/// The settings whose names begin with this leave the choice to a bound on the error.
+pub const BOUNDED: &str = "at most ";
+/// The bounds, decibels from the exact pictures.
+const BOUNDS: [u32; 6] = [25, 30, 35, 40, 45, 50];
+
+/// The settings of a field for this many targets: its own list, and bounds on the error for which it chooses what to leave out.
+/// `options` give what `all` skips, the size and the background.
 pub fn of(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Setting> {
+    let bounded = |decibels: u32| {
+        let bound = Some(Bound::Error(10.0_f32.powf(-(decibels as f32) / 20.0)));
+        let options = RenderOptions { bound, ..options.clone() };
+        Setting { words: format!("{BOUNDED}{decibels} dB"), field: field.clone(), options }
+    };
+    fixed(field, options, target_count).into_iter().chain(BOUNDS.map(bounded)).collect()
+}
+
+/// The settings of a field's own list for this many targets. `options` give what `all` skips, the size and the background. A field
+/// without a list of its own has two settings: nothing skipped, and `options` as they are.
+fn fixed(field: &AnyField, options: &RenderOptions, target_count: usize) -> Vec<Setting> {
     if let Some(field) = field.downcast_ref::<TrainingFree>() {
         of_training_free(field, options)
     } else if let Some(field) = field.downcast_ref::<PixelNerf>() {

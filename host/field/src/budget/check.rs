@@ -10,9 +10,9 @@ use viewfuse_core::random::uniform;
 
 /// Share of the draws that goes to all pixels alike: what is missing altogether leaves no contrast.
 const EVEN_SHARE: f64 = 0.25;
-/// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 15 degrees of freedom,
-/// and somewhat more because squared differences are skewed.
-const STANDARD_ERRORS: f64 = 2.0;
+/// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 23 degrees of freedom is
+/// 1.7; squared differences are skewed.
+const STANDARD_ERRORS: f64 = 2.5;
 
 /// A drawn pixel, and the inverse of its probability over the number of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +82,12 @@ impl Sample {
         let term =
             |(draw, exact): (&Draw, &[f32; 4])| draw.weight * square(&picture.colours[draw.pixel as usize], exact);
         self.terms.extend(draws.iter().zip(exact).map(term));
+    }
+
+    /// Adds what is expected before the first draw, as if it had been drawn this many times: without it, a few draws that
+    /// meet none of the large differences would promise too much.
+    pub(super) fn expect(&mut self, error: f64, times: usize) {
+        self.terms.extend(vec![error * error; times]);
     }
 
     /// The error; infinite without draws, or if a difference is not finite.

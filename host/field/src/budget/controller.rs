@@ -3,17 +3,28 @@
 use super::check::{Sample, draw};
 use super::deadline::Deadline;
 use super::{Bound, Estimate, Kept, Tried, embedded};
-use crate::{Effort, FieldError, Rendered, Session};
+use crate::{Effort, Encodings, FieldError, Rendered, Session};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
 use viewfuse_weighting::sources::SourceWeights;
 
 /// A search begins where the typical error, scaled, is below the bound by this factor: most first checks then succeed.
-const MARGIN: f64 = 1.15;
-/// Exact pixels of a round of a check, and the most rounds until a check is decided.
-const ROUND: usize = 16;
-const ROUNDS: usize = 4;
+const MARGIN: f64 = 1.25;
+/// Exact pixels of a round of a check: as many as take this share of the picture's work, in these bounds; and the most rounds
+/// until a check is decided.
+const CHECK_WORK: f64 = 0.2;
+const ROUND: [usize; 2] = [24, 256];
+const ROUNDS: usize = 3;
+/// What is expected counts as much as this many draws.
+const EXPECTED_DRAWS: usize = 8;
+/// The least scale: few draws often miss the few largest differences, so that low estimates prove little.
+const LEAST_SCALE: f64 = 0.9;
+/// Pictures that keep another picture's choice have this much more error at most.
+const OTHER_PICTURES: f64 = 1.3;
+/// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not typical.
+const CHEAP: f32 = 0.1;
+const MOST_SKIPPED: usize = 3;
 /// Pictures are compared whose typical errors differ by at least this factor.
 const LEAST_RATIO: f32 = 1.5;
 /// An effort is tried if it is expected to take this share of the time that is left.
@@ -38,6 +49,10 @@ pub(crate) struct View<'a> {
 pub(crate) struct Controller {
     bound: Bound,
     efforts: Vec<Effort>,
+    /// Whether errors are estimated from exact pixels; otherwise by comparing two pictures.
+    by_pixels: bool,
+    /// Whether another effort encodes the sources again.
+    encodes_again: bool,
     /// Estimated over typical errors in this scene.
     scale: Option<f64>,
     /// Seconds of each effort's last picture, without encoding.
@@ -60,13 +75,22 @@ struct Search<'s, 'a> {
 }
 
 impl Controller {
-    /// For these efforts of a field. Without any, the field has a single way to render.
-    pub(crate) fn new(bound: Bound, mut efforts: Vec<Effort>) -> Controller {
+    /// For these efforts of a field, which can render pixels alone or not. Without any, the field has a single way to render.
+    pub(crate) fn new(bound: Bound, mut efforts: Vec<Effort>, by_pixels: bool) -> Controller {
         if efforts.is_empty() {
             efforts.push(Effort::exact());
         }
         let seconds = vec![None; efforts.len()];
-        Controller { bound, efforts, scale: None, seconds, compared: None, pictures: 0 }
+        Controller {
+            bound,
+            efforts,
+            by_pixels,
+            encodes_again: false,
+            scale: None,
+            seconds,
+            compared: None,
+            pictures: 0,
+        }
     }
 
     /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
@@ -112,8 +136,8 @@ impl Controller {
     ) -> Result<(Rendered, usize, Estimate), FieldError> {
         // A quarter of the bound is left to early termination, at most.
         let termination = search.view.early_termination.min(0.25 * most as f32);
-        if self.compared.is_some() {
-            return self.by_comparison(search, most, termination, None, progress);
+        if !self.by_pixels {
+            return self.by_comparison(search, most, termination, progress);
         }
         let mut effort = self.cheapest_within(most);
         loop {
@@ -121,28 +145,27 @@ impl Controller {
             if self.is_exact(effort) {
                 return Ok((rendered, effort, Estimate::EXACT));
             }
-            let Some(estimate) = self.check(search, &rendered, ROUNDS, most, progress)? else {
-                return self.by_comparison(search, most, termination, Some((rendered, effort)), progress);
-            };
+            let estimate = self.check(search, &rendered, effort, ROUNDS, most, progress)?;
             self.learn(effort, estimate);
             if estimate.upper <= most {
                 return Ok((rendered, effort, estimate));
             }
             search.tried.push(self.tried(effort, Some(estimate)));
-            effort = self.cheapest_within(most).max(effort + 1);
+            effort = self.after(effort, most);
         }
     }
 
-    /// For fields whose pixels cannot be computed alone: compares pictures of two efforts. `known` is the picture of an
-    /// effort, with the same early termination.
+    /// For fields whose pixels cannot be computed alone: compares pictures of two efforts.
     fn by_comparison(
         &mut self,
         search: &mut Search<'_, '_>,
         most: f64,
         termination: f32,
-        known: Option<(Rendered, usize)>,
         progress: &dyn Progress,
     ) -> Result<(Rendered, usize, Estimate), FieldError> {
+        // Both pictures leave out the same views, which the comparison would not see.
+        search.view.used = search.view.all;
+        let known = self.compared.map(|(effort, ..)| effort);
         if let Some((effort, estimate, pictures_left)) = &mut self.compared {
             let (effort, estimate) = (*effort, *estimate);
             if *pictures_left > 0 {
@@ -150,44 +173,51 @@ impl Controller {
                 return Ok((self.picture(search, effort, termination, progress)?, effort, estimate));
             }
         }
-        // Both pictures leave out the same views, which the comparison would not see.
-        let known = known.filter(|_| search.view.used == search.view.all);
-        search.view.used = search.view.all;
-        let begin = match (&known, &self.compared) {
-            (Some((_, effort)), _) | (None, Some((effort, ..))) => *effort,
-            (None, None) => self.cheapest_within(most),
-        };
-        let mut effort = begin.max(1);
+        let mut effort = known.unwrap_or_else(|| self.cheapest_within(most));
+        if self.is_exact(effort) {
+            let rendered = self.picture(search, effort, termination, progress)?;
+            return Ok(self.compared_to(rendered, [effort; 2], [Estimate::EXACT; 2]));
+        }
+        effort = effort.max(1);
         let mut below = self.below(effort);
-        let (mut cheaper, mut found) = match known {
-            Some((rendered, 0)) => (rendered, None),
-            known => (self.picture(search, below, termination, progress)?, known.map(|(rendered, _)| rendered)),
-        };
+        let mut cheaper = self.picture(search, below, termination, progress)?;
         loop {
-            let rendered = match found.take() {
-                Some(rendered) => rendered,
-                None => self.picture(search, effort, termination, progress)?,
-            };
-            if self.is_exact(effort) {
-                return Ok(self.compared_to(rendered, effort, Estimate::EXACT));
-            }
+            let rendered = self.picture(search, effort, termination, progress)?;
             let typical = |effort: usize| f64::from(self.efforts[effort].typical_error);
-            let mut estimate = embedded::estimate(&rendered, &cheaper, typical(below) / typical(effort));
-            estimate.upper += f64::from(termination);
+            let found = embedded::estimate(&rendered, &cheaper, typical(below) / typical(effort));
+            let variation = if self.encodes_again { OTHER_PICTURES } else { 1.0 };
+            let with_termination = |estimate: Estimate| Estimate {
+                upper: variation * estimate.upper + f64::from(termination),
+                ..estimate
+            };
+            let of_cheaper = with_termination(found.cheaper);
+            if self.is_exact(effort) {
+                self.learn(below, of_cheaper);
+                return Ok(self.compared_to(rendered, [effort; 2], [Estimate::EXACT; 2]));
+            }
+            let estimate = with_termination(found.better);
             self.learn(effort, estimate);
             if estimate.upper <= most {
-                return Ok(self.compared_to(rendered, effort, estimate));
+                // The next pictures take the cheaper effort if that is enough for them.
+                let next = if of_cheaper.upper <= most { (below, of_cheaper) } else { (effort, estimate) };
+                return Ok(self.compared_to(rendered, [effort, next.0], [estimate, next.1]));
             }
             search.tried.push(self.tried(effort, Some(estimate)));
             (cheaper, below) = (rendered, effort);
-            effort = self.cheapest_within(most).max(effort + 1);
+            effort = self.after(effort, most);
         }
     }
 
-    /// Keeps the choice for some pictures: one after the first comparison, then twice as many.
-    fn compared_to(&mut self, rendered: Rendered, effort: usize, estimate: Estimate) -> (Rendered, usize, Estimate) {
+    /// Keeps the choice for some pictures: one after the first comparison, then twice as many; for the whole run if another
+    /// effort encodes the sources again. The efforts and estimates are those of this picture, and of the next ones.
+    fn compared_to(
+        &mut self,
+        rendered: Rendered,
+        [effort, next]: [usize; 2],
+        [estimate, of_next]: [Estimate; 2],
+    ) -> (Rendered, usize, Estimate) {
         let pictures = u32::try_from(self.pictures).unwrap_or(u32::MAX);
-        self.compared = Some((effort, estimate, pictures));
+        self.compared = Some((next, of_next, if self.encodes_again { u32::MAX } else { pictures }));
         (rendered, effort, estimate)
     }
 
@@ -224,9 +254,9 @@ impl Controller {
             return Ok((rendered, effort, Some(Estimate::EXACT), is_kept));
         }
         let mut estimate = None;
-        if left() > CHECK_SHARE * most.as_secs_f64() {
-            match self.check(search, &rendered, 1, 0.0, &deadline) {
-                Ok(found) => estimate = found,
+        if self.by_pixels && left() > CHECK_SHARE * most.as_secs_f64() {
+            match self.check(search, &rendered, effort, 1, 0.0, &deadline) {
+                Ok(found) => estimate = Some(found),
                 Err(FieldError::Interrupted(_)) if !progress.is_cancelled() => {}
                 Err(error) => return Err(error),
             }
@@ -246,7 +276,7 @@ impl Controller {
         let Search { session, view, encode, .. } = search;
         let (weights, early_termination) = if is_exact { (view.all, 0.0) } else { (view.used, early_termination) };
         let start = Instant::now();
-        session.set_effort(effort, progress)?;
+        self.encodes_again |= session.set_effort(effort, progress)? == Encodings::Dropped;
         session.encode(weights, progress)?;
         *encode += start.elapsed();
         let start = Instant::now();
@@ -255,36 +285,48 @@ impl Controller {
         Ok(rendered)
     }
 
-    /// Estimates a picture's error, in rounds until it is clearly on one side of `most`; `None` if the field cannot compute
-    /// pixels alone.
+    /// Estimates the error of an effort's picture from exact pixels, in rounds until it is clearly on one side of `most`.
     fn check(
         &self,
         search: &mut Search<'_, '_>,
         rendered: &Rendered,
+        effort: usize,
         rounds: usize,
         most: f64,
         progress: &dyn Progress,
-    ) -> Result<Option<Estimate>, FieldError> {
+    ) -> Result<Estimate, FieldError> {
+        let Effort { typical_error, typical_work, .. } = self.efforts[effort];
+        let affordable = CHECK_WORK * f64::from(typical_work) * rendered.colours.len() as f64;
+        let count = (affordable as usize).clamp(ROUND[0], ROUND[1]);
         let mut sample = Sample::default();
+        sample.expect(f64::from(typical_error) * self.scale.unwrap_or(1.0), EXPECTED_DRAWS);
+        let mut estimate = Estimate { value: f64::INFINITY, upper: f64::INFINITY, pixels: 0 };
         for round in 0..rounds {
-            let draws = draw(rendered, ROUND, self.pictures * ROUNDS as u64 + round as u64);
+            let draws = draw(rendered, count, self.pictures * ROUNDS as u64 + round as u64);
             let pixels: Vec<u32> = draws.iter().map(|draw| draw.pixel).collect();
             let Search { session, view, .. } = search;
-            let Some(exact) = session.exact_pixels(view.camera, view.all, &pixels, progress)? else {
-                return Ok(None);
-            };
+            let exact = session.exact_pixels(view.camera, view.all, &pixels, progress)?;
             sample.add(rendered, &draws, &exact);
-            let estimate = sample.estimate();
-            if estimate.upper <= most || estimate.value > most || round + 1 == rounds {
-                return Ok(Some(estimate));
+            estimate = sample.estimate();
+            if estimate.upper <= most || estimate.value > most {
+                break;
             }
         }
-        Ok(None)
+        Ok(Estimate { pixels: estimate.pixels.saturating_sub(EXPECTED_DRAWS), ..estimate })
+    }
+
+    /// The effort to try after one whose error is too large.
+    fn after(&self, effort: usize, most: f64) -> usize {
+        let next = self.cheapest_within(most).max(effort + 1);
+        let near = (effort + 1..=effort + MOST_SKIPPED).rev();
+        let cheap = near.into_iter().find(|near| self.efforts.get(*near).is_some_and(|own| own.typical_work <= CHEAP));
+        cheap.map_or(next, |cheap| next.min(cheap))
     }
 
     /// The cheapest effort whose error is expected to be below the bound.
     fn cheapest_within(&self, most: f64) -> usize {
-        let scale = MARGIN * self.scale.unwrap_or(1.0);
+        let margin = if self.by_pixels { MARGIN } else { MARGIN * embedded::SAFETY };
+        let scale = margin * self.scale.unwrap_or(1.0);
         let is_within = |effort: &Effort| f64::from(effort.typical_error) * scale <= most;
         self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
     }
@@ -311,7 +353,8 @@ impl Controller {
     fn learn(&mut self, effort: usize, estimate: Estimate) {
         let found = estimate.value / f64::from(self.efforts[effort].typical_error);
         if found.is_finite() && found > 0.0 {
-            self.scale = Some(self.scale.map_or(found, |scale| (scale * found).sqrt()));
+            let scale = self.scale.map_or(found, |scale| (scale * found).sqrt());
+            self.scale = Some(scale.max(LEAST_SCALE));
         }
     }
 

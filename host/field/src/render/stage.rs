@@ -92,7 +92,7 @@ impl<'a> Stage<'a> {
             .map_err(|error| RenderError::of(error, scene))?;
         session.tune(&options.settings);
         let views = sources.to_vec();
-        let controller = options.bound.map(|bound| Controller::new(bound, session.efforts()));
+        let controller = options.bound.map(|bound| Controller::new(bound, session.efforts(), session.renders_pixels()));
         Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, controller, costs })
     }
 
@@ -105,7 +105,9 @@ impl<'a> Stage<'a> {
         let relevance = self.relevance(weighting);
         let (session, first) = (&mut self.session, self.controller.as_ref().map(Controller::first));
         let weigh = || {
-            first.map_or(Ok(()), |first| session.set_effort(first, progress))?;
+            if let Some(first) = first {
+                session.set_effort(first, progress)?;
+            }
             session.weigh(&relevance, progress)
         };
         timed(&mut self.costs.encode, weigh).map_err(|error| RenderError::of(error, self.scene))
@@ -131,7 +133,8 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`RenderError`].
     pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), RenderError> {
-        self.session.set_effort(effort, progress).map_err(|error| RenderError::of(error, self.scene))
+        let set = self.session.set_effort(effort, progress);
+        set.map(|_| ()).map_err(|error| RenderError::of(error, self.scene))
     }
 
     /// The field's scalars that can be chosen for a scene.

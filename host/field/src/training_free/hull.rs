@@ -20,7 +20,9 @@ const BAND_ROWS: u32 = 16;
 const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
 /// Shares of the sources' side, with the error and the work that are typical of them (the example `efforts` of
 /// `viewfuse-evaluate`).
-const EFFORTS: [(f32, f32, f32); 3] = [(0.25, 0.065, 0.15), (0.5, 0.04, 0.35), (0.75, 0.028, 0.7)];
+const EFFORTS: [(f32, f32, f32); 2] = [(0.25, 0.065, 0.2), (0.5, 0.04, 0.4)];
+/// Sources with a longer side than this take most of the time; smaller ones take less than the picture.
+const LEAST_REDUCED: u32 = 256;
 
 /// Density from silhouettes and photo-consistency, colour by weighted fusion with visibility.
 #[derive(Clone, Copy, Debug)]
@@ -213,7 +215,11 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn efforts(&self) -> Vec<Effort> {
-        let side = self.cameras.iter().map(longest_side).max().unwrap_or(1) as f32;
+        let side = self.cameras.iter().map(longest_side).max().unwrap_or(1);
+        if side < LEAST_REDUCED {
+            return Vec::new();
+        }
+        let side = side as f32;
         let named = |(share, error, work): (f32, f32, f32)| {
             Effort::new(format!("sources at {} pixels", (share * side).round()), error, work)
         };

@@ -23,7 +23,7 @@ use viewfuse_core::plane_sweep::disparity::TEMPERATURE;
 use viewfuse_core::plane_sweep::frustum::SweptView;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
+use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
 /// Most other sources that a source is compared with, those with the greatest weights: run time is linear in the
@@ -193,6 +193,16 @@ fn swept(
 }
 
 impl<D: Device> Views<'_, D> {
+    /// The settings with shares of the side at which the sources are compared, and of the planes.
+    fn at(&self, share: f32, planes: f32) -> Sweep {
+        let side = self.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let reduced = (share * side as f32).round().max(1.0) as u32;
+        // The whole side is the settings' own: targets may be larger than the sources.
+        let match_side = if share < 1.0 { reduced } else { self.defaults.match_side };
+        let plane_count = (self.defaults.plane_count as f32 * planes).round() as u32;
+        Sweep { plane_count, match_side, ..self.settings }
+    }
+
     /// Planes for a camera.
     fn range(&self, camera: &CameraBlock) -> Range {
         Range::new(self.space.disparities(camera), self.settings.plane_count)
@@ -265,24 +275,21 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn efforts(&self) -> Vec<Effort> {
-        let Sweep { plane_count, match_side, .. } = self.defaults;
-        let named = |(side, planes, error, work): (f32, f32, f32, f32)| {
-            let [side, planes] = [match_side as f32 * side, plane_count as f32 * planes].map(f32::round);
-            Effort::new(format!("matching at {side} pixels, {planes} planes"), error, work)
+        let named = |(share, planes, error, work): (f32, f32, f32, f32)| {
+            let Sweep { plane_count, match_side, .. } = self.at(share, planes);
+            Effort::new(format!("matching at {match_side} pixels, {plane_count} planes"), error, work)
         };
         EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
     }
 
     fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        let (side, planes) = EFFORTS.get(effort).map_or((1.0, 1.0), |(side, planes, ..)| (*side, *planes));
-        let Sweep { plane_count, match_side, .. } = self.defaults;
-        let match_side = (match_side as f32 * side).round() as u32;
-        let plane_count = (plane_count as f32 * planes).round() as u32;
-        if (self.settings.match_side, self.settings.plane_count) == (match_side, plane_count) {
+        let (share, planes) = EFFORTS.get(effort).map_or((1.0, 1.0), |(share, planes, ..)| (*share, *planes));
+        let settings = self.at(share, planes);
+        if settings == self.settings {
             return Ok(Encodings::Kept);
         }
-        self.settings = Sweep { plane_count, match_side, ..self.settings };
-        let images = self.small.iter().map(|image| image.reduced(match_side));
+        self.settings = settings;
+        let images = self.small.iter().map(|image| image.reduced(settings.match_side));
         let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
         self.matched = Images::upload(self.device, &images)?;
         self.texels = joined_texels(&images);
