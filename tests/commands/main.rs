@@ -1,6 +1,7 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
 mod browser;
+mod budget;
 mod check;
 mod clouds;
 mod compare;
@@ -43,6 +44,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let trials = [
         trials(),
+        budget::trials(),
         check::trials(),
         clouds::trials(),
         compare::trials(),

@@ -97,8 +97,8 @@ pub trait Prepared {
         false
     }
 
-    /// Colours and opacities of some pixels of a target, row-major indices, with nothing left out: what
-    /// [`Prepared::render`] would give with the last of [`Prepared::efforts`]. Called only if [`Prepared::renders_pixels`];
+    /// Colours and opacities of some pixels of a target, row-major indices: what [`Prepared::render`] would give with the last of
+    /// [`Prepared::efforts`], or with another one whose typical error is at most `tolerance`. Called only if [`Prepared::renders_pixels`];
     /// all [`Request::views`] are encoded.
     ///
     /// # Errors
@@ -107,6 +107,7 @@ pub trait Prepared {
         &mut self,
         _request: &Request<'_>,
         _pixels: &[u32],
+        _tolerance: f32,
         _progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
         Ok(Vec::new())

@@ -258,9 +258,10 @@ impl<D: Device> Prepared for Views<'_, D> {
         &mut self,
         request: &Request<'_>,
         pixels: &[u32],
+        tolerance: f32,
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
-        let options = efforts::exact(&self.field.options);
+        let options = efforts::of_pixels(&self.field.options, tolerance);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
         let views = self.used(request.views, &request.view_weights())?;
         let renderer = self.renderer(&views, request, options, progress);

@@ -1,0 +1,83 @@
+//! `--max-error` and `--max-time`.
+
+use super::{BINARY, done};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use viewfuse_tests::command::{assert_wrong_arguments, run, toy};
+
+viewfuse_tests::trials![
+    a_bound_on_the_error_is_kept_and_recorded,
+    a_time_that_is_too_short_is_said,
+    an_evaluation_says_how_its_bound_is_kept,
+    wrong_bounds_are_refused,
+];
+
+const NETWORK: &str = "--targets 20,21 --views 3 --size 32x32 --model body:16 --device cpu";
+
+fn frames(folder: &Path) -> Vec<Value> {
+    let record: Value =
+        serde_json::from_slice(&fs::read(folder.join("out/run.json")).expect("a record")).expect("JSON");
+    record["frames"].as_array().expect("frames").clone()
+}
+
+fn a_bound_on_the_error_is_kept_and_recorded() {
+    let folder = toy();
+    let printed = done(folder.path(), &format!("render toy {NETWORK} --max-error 30dB -o out"));
+    for frame in frames(folder.path()) {
+        let kept = &frame["kept"];
+        let most = kept["most_error"].as_f64().expect("a bound");
+        assert!((most - 10.0_f64.powf(-1.5)).abs() < 1.0e-6, "{kept}");
+        assert!(kept["error"]["upper"].as_f64().expect("an estimate") <= most, "{kept}");
+        assert_eq!(kept["is_kept"], true);
+        let effort = kept["effort"].as_str().expect("an effort");
+        assert!(printed.contains(effort), "{printed}");
+    }
+    // The same bound as a number gives the same pictures.
+    let picture = || fs::read(folder.path().join("out/000020.png")).expect("a picture");
+    let before = picture();
+    fs::remove_dir_all(folder.path().join("out")).expect("removed");
+    done(folder.path(), &format!("render toy {NETWORK} --max-error 0.0316228 -o out"));
+    assert!(before == picture());
+    // Nothing may be left out for a bound that only the exact picture keeps.
+    fs::remove_dir_all(folder.path().join("out")).expect("removed");
+    done(folder.path(), &format!("render toy {NETWORK} --max-error 119dB -o out"));
+    assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
+}
+
+fn a_time_that_is_too_short_is_said() {
+    let folder = toy();
+    let printed = done(folder.path(), &format!("render toy {NETWORK} --max-time 1ms -o out"));
+    assert_eq!(printed.matches("MORE than the 0.001 s that were asked for").count(), 2, "{printed}");
+    fs::remove_dir_all(folder.path().join("out")).expect("removed");
+    let printed = done(folder.path(), &format!("render toy {NETWORK} --max-time 600 -o out"));
+    assert!(!printed.contains("MORE"), "{printed}");
+    assert!(frames(folder.path()).iter().all(|frame| frame["kept"]["effort"] == "exact"));
+}
+
+fn an_evaluation_says_how_its_bound_is_kept() {
+    let folder = toy();
+    let outcome = run(BINARY, folder.path(), &format!("evaluate toy {NETWORK} --weights mean --max-error 30dB"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let all = format!("{}{}", outcome.stdout, outcome.stderr);
+    // Each of the two targets is left out by itself.
+    assert_eq!(all.matches("mean: the bound is kept by 1 of 1 pictures: ").count(), 2, "{all}");
+}
+
+fn wrong_bounds_are_refused() {
+    let folder = toy();
+    let wrong = |options: &str, parts: &[&str]| {
+        assert_wrong_arguments(BINARY, folder.path(), &format!("render toy --targets 20 {options} -o out"), parts);
+    };
+    for error in ["0", "-3", "3dB", "200dB", "nan", "much", "dB"] {
+        wrong(&format!("--max-error={error}"), &["--max-error", error]);
+    }
+    for time in ["0", "-1s", "fast", "nan", "1e9"] {
+        wrong(&format!("--max-time={time}"), &["--max-time", time]);
+    }
+    wrong("--max-error 40dB --max-time 1s", &["--max-error", "--max-time"]);
+    for other in ["--exact", "--compute space", "--probe-step 8", "--steps 3", "--half-volumes", "--reuse 2"] {
+        let option = other.split(' ').next().unwrap_or(other);
+        wrong(&format!("--model body:16 --max-error 40dB {other}"), &["--max-error", option]);
+    }
+}
