@@ -24,6 +24,10 @@ const EXPECTED_DRAWS: usize = 8;
 const LEAST_SCALE: f64 = 0.9;
 /// Pictures that keep another picture's choice have this much more error at most.
 const OTHER_PICTURES: f64 = 1.3;
+/// A picture whose error is below the bound by this factor lets the next one begin with less effort.
+const FAR_LESS: f64 = 1.6;
+/// After an exact picture, only one of so many tries less.
+const EXACT_PICTURES: u64 = 8;
 /// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not typical.
 const CHEAP: f32 = 0.1;
 const MOST_SKIPPED: usize = 3;
@@ -61,6 +65,8 @@ pub(crate) struct Controller {
     seconds: Vec<Option<f64>>,
     /// The effort that was chosen by comparing two, its estimate, and the pictures until the next comparison.
     compared: Option<(usize, Estimate, u32)>,
+    /// The effort of the last picture that was checked by pixels, and its estimate.
+    last: Option<(usize, Estimate)>,
     pictures: u64,
 }
 
@@ -91,6 +97,7 @@ impl Controller {
             scale: None,
             seconds,
             compared: None,
+            last: None,
             pictures: 0,
         }
     }
@@ -141,15 +148,17 @@ impl Controller {
         if !self.by_pixels {
             return self.by_comparison(search, most, termination, progress);
         }
-        let mut effort = self.cheapest_within(most);
+        let mut effort = self.begin(most);
         loop {
             let rendered = self.picture(search, effort, termination, progress)?;
             if self.is_exact(effort) {
+                self.last = Some((effort, Estimate::EXACT));
                 return Ok((rendered, effort, Estimate::EXACT));
             }
             let estimate = self.check(search, &rendered, effort, ROUNDS, most, progress)?;
             self.learn(effort, estimate);
             if estimate.upper <= most {
+                self.last = Some((effort, estimate));
                 return Ok((rendered, effort, estimate));
             }
             search.tried.push(self.tried(effort, Some(estimate)));
@@ -301,7 +310,7 @@ impl Controller {
         let affordable = CHECK_WORK * f64::from(typical_work) * rendered.colours.len() as f64;
         let count = (affordable as usize).clamp(ROUND[0], ROUND[1]);
         let mut sample = Sample::default();
-        sample.expect(f64::from(typical_error) * self.scale.unwrap_or(1.0), EXPECTED_DRAWS);
+        sample.expect(f64::from(typical_error), EXPECTED_DRAWS);
         let mut estimate = Estimate { value: f64::INFINITY, upper: f64::INFINITY, pixels: 0 };
         for round in 0..rounds {
             let draws = draw(rendered, count, self.pictures * ROUNDS as u64 + round as u64);
@@ -315,6 +324,20 @@ impl Controller {
             }
         }
         Ok(Estimate { pixels: estimate.pixels.saturating_sub(EXPECTED_DRAWS), ..estimate })
+    }
+
+    /// The effort that a picture's search begins with: that of the picture before, or one less if that had far less error than
+    /// the bound.
+    fn begin(&self, most: f64) -> usize {
+        match self.last {
+            None => self.cheapest_within(most),
+            Some((effort, _)) if self.is_exact(effort) => match self.pictures % EXACT_PICTURES {
+                0 => self.cheapest_within(most).min(effort),
+                _ => effort,
+            },
+            Some((effort, estimate)) if FAR_LESS * estimate.upper <= most => effort.saturating_sub(1),
+            Some((effort, _)) => effort,
+        }
     }
 
     /// The effort to try after one whose error is too large.
