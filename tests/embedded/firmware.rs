@@ -19,6 +19,7 @@ use viewfuse_tests::emulator::image::Image;
 use viewfuse_tests::emulator::list::{Difference, Line, compare, gathered, parsed};
 use viewfuse_tests::emulator::trace::{Call, calls};
 use viewfuse_tests::places::repository;
+use viewfuse_tests::source::files;
 use viewfuse_tests::trials::{is_required, needing};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_FIRMWARE";
@@ -80,6 +81,7 @@ pub(crate) fn trials() -> Vec<Trial> {
         Trial::test("a_trace_without_return_is_rejected", a_trace_without_return_is_rejected),
         Trial::test("a_trace_of_risc_v_is_read", a_trace_of_risc_v_is_read),
         Trial::test("both_workspaces_lock_the_same_mathematics", both_workspaces_lock_the_same_mathematics),
+        Trial::test("every_function_of_the_list_has_a_worst_case", every_function_of_the_list_has_a_worst_case),
     ];
     for (board, firmware) in BOARDS.iter().zip(&firmware) {
         // For speed on one of them: what is compared are the compiler's choices, not the processor's.
@@ -214,5 +216,31 @@ fn bits_equal_the_hosts(firmware: &Firmware, profile: &'static str, program: &st
 fn a_program_that_panics_is_noticed(firmware: &Firmware) -> Result<(), Failed> {
     let path = firmware.folder(PROFILES[0])?.join("fails");
     assert!(firmware.emulator()?.run(&path).is_err_and(|error| error.contains("failed")));
+    Ok(())
+}
+
+/// Core's README says what bounds the loops of every function that the firmware's list names.
+fn every_function_of_the_list_has_a_worst_case() -> Result<(), Failed> {
+    let readme = std::fs::read_to_string(repository().join("core/README.md"))?;
+    let table =
+        readme.split("### Worst cases").nth(1).and_then(|rest| rest.split("\n## ").next()).ok_or("no worst cases")?;
+    let mut functions = Vec::new();
+    for path in files(&repository().join("tests/firmware/list/src"), "rs") {
+        let source = std::fs::read_to_string(&path)?;
+        for import in source.split("use viewfuse_core::").skip(1).filter_map(|rest| rest.split(';').next()) {
+            let items =
+                import.split_once('{').map_or(import.rsplit("::").next().unwrap_or_default(), |(_, items)| items);
+            let names = items.split(|character: char| !(character.is_alphanumeric() || character == '_'));
+            functions.extend(
+                names.filter(|name| name.starts_with(char::is_lowercase) && *name != "self").map(str::to_owned),
+            );
+        }
+    }
+    functions.sort_unstable();
+    functions.dedup();
+    assert!(functions.len() > 20, "{functions:?}");
+    for function in functions {
+        assert!(table.contains(&format!("`{function}`")), "{function} has no worst case in core/README.md");
+    }
     Ok(())
 }
