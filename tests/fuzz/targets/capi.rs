@@ -2,6 +2,7 @@
 //!
 //! A function may read and write what its documentation says and nothing else: what fails writes nothing, what succeeds
 //! writes its output only, and weights are weights.
+#![expect(unsafe_code, reason = "the C interface is called")]
 
 use super::guarded::Guarded;
 use super::{Target, Verdict};

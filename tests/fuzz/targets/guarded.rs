@@ -1,4 +1,5 @@
 //! Memory between two pages that nobody may touch: a step over either end of it ends the process.
+#![expect(unsafe_code, reason = "pages are protected")]
 
 use region::{Allocation, Protection};
 
