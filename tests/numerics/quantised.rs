@@ -103,6 +103,7 @@ fn weights_change_within_the_bound() {
             assert_eq!(broken, 0, "{model}: of 60 draws");
             assert!(seen > 1.0e-7, "nothing was rounded");
             assert!(seen < 0.02, "{model}: {seen}");
+            assert!(bound.weight < 0.05, "{model}: the bound is of no use: {bound:?}");
         }
     }
 }

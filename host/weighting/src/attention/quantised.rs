@@ -3,15 +3,16 @@
 //! A row of weights becomes whole numbers from -127 to 127 times one scale, the largest weight's part of 127. Everything is
 //! computed in `f64`.
 //!
-//! The bound: let `W'` be the weights that are used instead of `W`, and the inputs be known to `e`. Then a layer's outputs
-//! are known to
+//! The bound: the network with the rounded weights is evaluated in `f64` beside the exact one; that is the larger part of the
+//! change. What remains is how far a processor's numbers may be from that: with inputs known to `e`, a layer's outputs are
+//! known to
 //!
 //! ```text
-//! |y' - y| <= |W - W'| |x| + |W'| (e + step / 2) + rounding,     step = max (|x| + e) / 32767
+//! |y' - y| <= |W'| (e + step / 2) + rounding,     step = max (|x| + e) / 32767
 //! ```
 //!
-//! A ReLU does not make this larger. The same for keys, products and offsets bounds each logit's change by some `d`. A weight
-//! `w` then changes at most as if its logit rose by its `d` while all others fell by theirs, or the other way round.
+//! A ReLU does not make this larger. The same for keys, products and offsets bounds each logit, and so each weight of the
+//! softmax.
 
 use viewfuse_core::attention::quantised::{
     FOUR, LEAST_INPUT, MOST_LEVEL, QuantisedAttention, QuantisedLinear, feature_error,
@@ -67,20 +68,26 @@ impl Layer {
         layer
     }
 
-    /// The outputs of exact inputs, with how far those of the quantised layer may be from them.
+    /// The outputs of exact inputs.
+    fn apply(&self, inputs: &[f64]) -> Vec<f64> {
+        let row = |(row, bias): (&Vec<f64>, &f64)| bias + row.iter().zip(inputs).map(|(w, x)| w * x).sum::<f64>();
+        self.rows.iter().zip(&self.bias).map(row).collect()
+    }
+
+    /// The outputs with other weights, by output and input, and how far those of a processor may be from them.
     fn known(&self, used: impl Fn(usize, usize) -> f64, inputs: &[Known]) -> Vec<Known> {
         let inputs = as_levels(inputs);
-        let row = |(output, row): (usize, &Vec<f64>)| {
-            let (mut value, mut error, mut size) = (self.bias[output], 0.0, self.bias[output].abs());
-            for (input, (weight, x)) in row.iter().zip(&inputs).enumerate() {
+        let row = |(output, bias): (usize, &f64)| {
+            let (mut value, mut error, mut size) = (*bias, 0.0, bias.abs());
+            for (input, x) in inputs.iter().enumerate() {
                 let used = used(output, input);
-                value += weight * x.value;
-                error += (weight - used).abs() * x.value.abs() + used.abs() * x.error;
+                value += used * x.value;
+                error += used.abs() * x.error;
                 size += used.abs() * (x.value.abs() + x.error);
             }
             Known { value, error: error + ROUNDING * size }
         };
-        self.rows.iter().enumerate().map(row).collect()
+        self.bias.iter().enumerate().map(row).collect()
     }
 }
 
@@ -154,6 +161,40 @@ pub struct Change {
     pub weight: f64,
 }
 
+/// A network's three layers and the offset in `f64`.
+struct Network {
+    first: Layer,
+    second: Layer,
+    key: Layer,
+    offset: Layer,
+}
+
+impl Network {
+    fn of(embedding: &FourierEmbedding) -> Network {
+        let [key, offset] = Layer::folded(embedding);
+        Network {
+            first: Layer::of(&embedding.first.weight, &embedding.first.bias),
+            second: Layer::of(&embedding.second.weight, &embedding.second.bias),
+            key,
+            offset,
+        }
+    }
+
+    fn hidden(&self, features: &[f64]) -> Vec<f64> {
+        let rectified = |x: Vec<f64>| x.into_iter().map(|x| x.max(0.0)).collect::<Vec<f64>>();
+        rectified(self.second.apply(&rectified(self.first.apply(features))))
+    }
+
+    fn known_hidden(&self, quantised: &QuantisedAttention, features: &[f64]) -> Vec<Known> {
+        let feature =
+            |(feature, value): (usize, &f64)| Known { value: *value, error: f64::from(feature_error(feature)) };
+        let features: Vec<Known> = features.iter().enumerate().map(feature).collect();
+        let rectified = |x: Vec<Known>| x.into_iter().map(Known::rectified).collect::<Vec<Known>>();
+        let first = rectified(self.first.known(used(&quantised.first), &features));
+        rectified(self.second.known(used(&quantised.second), &first))
+    }
+}
+
 /// Bounds the change of the weights of these sources for this target, from the parameters and the poses alone.
 pub fn change_bound<const S: usize>(
     embedding: &FourierEmbedding,
@@ -161,54 +202,50 @@ pub fn change_bound<const S: usize>(
     sources: &Sources<S>,
     target: &Pose,
 ) -> Change {
-    let first = Layer::of(&embedding.first.weight, &embedding.first.bias);
-    let second = Layer::of(&embedding.second.weight, &embedding.second.bias);
-    let [key, offset] = Layer::folded(embedding);
-    let hidden = |pose: &Pose| -> Vec<Known> {
-        let features = pose_features(pose.centre_world(), -pose.forward_world());
-        let features: Vec<Known> = features
-            .iter()
-            .zip(0..)
-            .map(|(value, feature)| Known { value: f64::from(*value), error: f64::from(feature_error(feature)) })
-            .collect();
-        let hidden: Vec<Known> =
-            first.known(used(&quantised.first), &features).into_iter().map(Known::rectified).collect();
-        second.known(used(&quantised.second), &hidden).into_iter().map(Known::rectified).collect()
-    };
-    let of_target = as_levels(&hidden(target));
-    let logit = |view: u32| {
-        let of_source = hidden(sources.pose(view));
-        let keys = as_levels(&key.known(used(&quantised.key), &of_source));
-        let scale = f64::from(quantised.offset_scale);
-        let weight = |_, input: usize| scale * f64::from(quantised.offset[input]);
-        let offset = offset.known(weight, &of_source)[0];
-        let (mut logit, mut size) = (offset, offset.value.abs());
-        for (x, key) in of_target.iter().zip(&keys) {
+    let network = Network::of(embedding);
+    let features = |pose: &Pose| pose_features(pose.centre_world(), -pose.forward_world()).map(f64::from);
+    let exact_target = network.hidden(&features(target));
+    let known_target = as_levels(&network.known_hidden(quantised, &features(target)));
+    let offset_weight = |_, input: usize| f64::from(quantised.offset_scale) * f64::from(quantised.offset[input]);
+    let (mut exact, mut known) = (Vec::new(), Vec::new());
+    for view in 0..sources.count() {
+        let features = features(sources.pose(view));
+        let hidden = network.hidden(&features);
+        let keys = network.key.apply(&hidden);
+        let offset = network.offset.apply(&hidden)[0];
+        exact.push(offset + exact_target.iter().zip(&keys).map(|(x, key)| x * key).sum::<f64>());
+        let hidden = network.known_hidden(quantised, &features);
+        let keys = as_levels(&network.key.known(used(&quantised.key), &hidden));
+        let mut logit = network.offset.known(offset_weight, &hidden)[0];
+        let mut size = logit.value.abs();
+        for (x, key) in known_target.iter().zip(&keys) {
             logit.value += x.value * key.value;
             logit.error += x.value.abs() * key.error + (key.value.abs() + key.error) * x.error;
             size += (x.value.abs() + x.error) * (key.value.abs() + key.error);
         }
-        Known { value: logit.value, error: logit.error + ROUNDING * size }
-    };
-    let logits: Vec<Known> = (0..sources.count()).map(logit).collect();
+        known.push(Known { value: logit.value, error: logit.error + ROUNDING * size });
+    }
+    let logit = exact.iter().zip(&known).map(|(exact, known)| (known.value - exact).abs() + known.error);
     Change {
-        logit: logits.iter().fold(0.0, |most, logit| most.max(logit.error)),
-        weight: (0..logits.len()).fold(0.0, |most, view| most.max(weight_change(&logits, view))),
+        logit: logit.fold(0.0, f64::max),
+        weight: (0..exact.len()).map(|view| weight_change(&exact, &known, view)).fold(0.0, f64::max),
     }
 }
 
-/// The most that one weight of a softmax changes.
-fn weight_change(logits: &[Known], view: usize) -> f64 {
-    let weight = |sign: f64| {
+/// The most that one weight of a softmax changes: its logit at one end of what is known, all others at the other end.
+fn weight_change(exact: &[f64], known: &[Known], view: usize) -> f64 {
+    let weight = |logits: &[f64]| {
+        let largest = logits.iter().fold(f64::NEG_INFINITY, |largest, logit| largest.max(*logit));
+        (logits[view] - largest).exp() / logits.iter().map(|logit| (logit - largest).exp()).sum::<f64>()
+    };
+    let before = weight(exact);
+    let at = |sign: f64| {
         let shifted = |(other, logit): (usize, &Known)| {
             logit.value + if other == view { sign * logit.error } else { -sign * logit.error }
         };
-        let shifted: Vec<f64> = logits.iter().enumerate().map(shifted).collect();
-        let largest = shifted.iter().fold(f64::NEG_INFINITY, |largest, logit| largest.max(*logit));
-        let sum: f64 = shifted.iter().map(|logit| (logit - largest).exp()).sum();
-        (shifted[view] - largest).exp() / sum
+        weight(&known.iter().enumerate().map(shifted).collect::<Vec<f64>>())
     };
-    (weight(1.0) - weight(0.0)).max(weight(0.0) - weight(-1.0))
+    (at(1.0) - before).abs().max((at(-1.0) - before).abs())
 }
 
 /// Rust's source of the parameters: a constant named `ATTENTION`, for a firmware that depends on `viewfuse-core`. `origin`
