@@ -120,7 +120,7 @@ fn every_kind_of_number_depends_on_the_inputs() -> Result<(), Failed> {
         let mut names: Vec<&str> = list.iter().map(|(name, _)| name.as_str()).collect();
         names.sort_unstable();
         names.dedup();
-        assert!(names.len() > 5);
+        assert!(names.len() > 3);
         for name in names {
             let same = list.iter().zip(&other).filter(|(line, _)| line.0 == name).all(|(line, other)| line == other);
             assert_eq!(same, INDEPENDENT.contains(&name), "{name}");
