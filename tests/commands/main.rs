@@ -1,6 +1,5 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
-mod api;
 mod browser;
 mod budget;
 mod check;
@@ -45,7 +44,6 @@ fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let trials = [
         trials(),
-        api::trials(),
         budget::trials(),
         check::trials(),
         clouds::trials(),
