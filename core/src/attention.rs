@@ -8,6 +8,8 @@
 //! Layer parameters are row-major `[output][input]` like PyTorch's; every sum starts from the bias and runs over the
 //! inputs in order.
 
+pub mod quantised;
+
 use crate::math::{abs, max, sin_cos, sqrt, two_product, two_sum};
 use crate::pages::{Fetch, StartingAt};
 use crate::pose::Pose;

@@ -12,6 +12,7 @@ use glam::Vec3;
 
 /// Why intrinsics are not those of a pinhole camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PinholeError {
     /// A focal length is not a number from [`SHORTEST_FOCAL`] to [`LONGEST_FOCAL`].
     Focal,
@@ -40,6 +41,7 @@ pub const LONGEST_FOCAL: f32 = 1.0e9;
 
 /// Intrinsics of a camera without distortion, checked when built.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pinhole {
     focal: [f32; 2],
     principal: [f32; 2],
@@ -114,10 +116,13 @@ impl Pinhole {
 
 /// A half line in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Ray {
     /// Where it starts, in world coordinates.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub origin_world: Vec3,
     /// Unit vector along it, in world coordinates.
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     pub direction_world: Vec3,
 }
 
@@ -131,6 +136,7 @@ impl Ray {
 
 /// Where a point appears in an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Projection {
     /// Continuous image coordinate to the right, in pixels. 0 where the point is behind the camera.
     pub x: f32,
@@ -146,6 +152,7 @@ pub struct Projection {
 
 /// A pinhole camera with its pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Camera {
     /// The camera's centre and orientation.
     pub pose: Pose,

@@ -12,6 +12,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// The state of compositing along a ray: `C` accumulated channels and the depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Compositor<const C: usize> {
     accumulated: [f32; C],
     weighted_depth: f32,
@@ -53,6 +54,7 @@ impl RayBlock {
 
 /// The composited pixel of a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Composite<const C: usize> {
     /// Accumulated channels, composited over the background.
     pub channels: [f32; C],

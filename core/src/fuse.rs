@@ -19,6 +19,46 @@ pub fn fuse_views<const S: usize, const C: usize>(weights: &Weights<S>, latents:
     sum
 }
 
+/// What a sensor gives as a whole number; exact as an `f32`.
+pub trait Reading: Copy {
+    /// The number.
+    fn number(self) -> f32;
+}
+
+macro_rules! readings {
+    ($($whole:ty),*) => {
+        $(impl Reading for $whole {
+            #[inline(always)]
+            fn number(self) -> f32 {
+                self as f32
+            }
+        })*
+    };
+}
+
+readings!(u8, i8, u16, i16);
+
+/// As [`fuse_views`] for readings that are whole numbers: `readings[view][channel]` to `[channel]`, with the same bits as
+/// for these numbers as `f32`, and without a copy of them.
+#[inline]
+pub fn fuse_readings<T: Reading, const S: usize, const C: usize>(
+    weights: &Weights<S>,
+    readings: &[[T; C]; S],
+) -> [f32; C] {
+    let mut sum = [0.0; C];
+    let mut view = 0;
+    while view < weights.count() {
+        let (share, reading) = (weights.get(view), &readings[view as usize]);
+        let mut channel = 0;
+        while channel < C {
+            sum[channel] += share * reading[channel].number();
+            channel += 1;
+        }
+        view += 1;
+    }
+    sum
+}
+
 /// A dispatch of [`fuse_element`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -60,6 +100,7 @@ pub fn fuse_element(
 
 /// A sum over views that is renormalised over those that see the point, taken one view at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VisibleFusion<const C: usize> {
     sum: [f32; C],
     seen_weight: f32,

@@ -44,6 +44,7 @@ impl VolumeBlock {
 
 /// The cell of a volume around a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct VolumePlace {
     /// Column, row and depth node before the point; -1 where the point lies before the first one.
     pub lower: [i32; 3],

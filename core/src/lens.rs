@@ -89,6 +89,7 @@ impl Real for f64 {
 
 /// How a lens maps angles to radii before its own distortion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Projection {
     /// The tangent of the angle: straight lines stay straight.
     Perspective,
@@ -98,6 +99,7 @@ pub enum Projection {
 
 /// Why coefficients are not a lens.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LensError {
     /// The coefficient with this index is not finite, or larger than [`LARGEST_COEFFICIENT`].
     Coefficient(usize),
@@ -115,6 +117,7 @@ impl core::error::Error for LensError {}
 
 /// A lens, checked when built.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lens {
     projection: Projection,
     coefficients: [f64; 8],
@@ -122,6 +125,7 @@ pub struct Lens {
 
 /// An ideal point and its residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Undistorted<T> {
     /// The ideal point, normalised.
     pub point: [T; 2],

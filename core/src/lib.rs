@@ -19,7 +19,7 @@
 //! random            random draws for (seed, pixel, sample)         uniform, normal
 //! rays, depths      target rays and samples along them             TargetRay, RayPoint, stratified_depth, inverse_cdf
 //! lookup            interpolation in grids                         bilinear, trilinear
-//! fuse              weighted sums of the views' latents            fuse_views, fuse_visible
+//! fuse              weighted sums of the views' latents            fuse_views, fuse_visible, fuse_readings
 //! composite         compositing of the samples along a ray         Compositor<C>
 //! sample_mask       which samples can be left out                  is_sampled
 //! network           layers                                         linear, convolve, group_norm, attend, resample

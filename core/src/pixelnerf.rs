@@ -137,6 +137,7 @@ impl GatherBlock {
 
 /// Where a view's grid is looked up for a point: nodes and shares of columns and of rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct GridPlace {
     /// Indices of the first numbers of the nodes: upper left, upper right, lower left, lower right.
     pub nodes: [usize; 4],

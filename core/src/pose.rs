@@ -20,6 +20,7 @@ pub const LARGEST_COORDINATE: f32 = 1.0e30;
 
 /// Why a 4x4 matrix is not a camera pose. Rows and columns count from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PoseError {
     /// An entry is NaN or infinite.
     NotFinite {
@@ -66,10 +67,15 @@ impl core::error::Error for PoseError {}
 ///
 /// The rotation is kept as given, not re-orthonormalised, so that formulas on it reproduce published values.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Pose {
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     right_world: Vec3,
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     down_world: Vec3,
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     forward_world: Vec3,
+    #[cfg_attr(feature = "defmt", defmt(Debug2Format))]
     centre_world: Vec3,
 }
 

@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 /// A ray of a target with its near and far bounds, as plain data. World coordinates; `near` and `far` are distances from
 /// the origin in lengths of `direction`, `far` at least `near`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct TargetRay {
     /// The ray's origin.
@@ -54,6 +55,7 @@ pub fn cast_ray(block: &CastBlock, pixel: u32) -> TargetRay {
 
 /// A point on a ray at which a field is evaluated, as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct RayPoint {
     /// World coordinates.

@@ -49,6 +49,7 @@ use core::str::FromStr;
 
 /// When a step is corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Corrected {
     /// Never.
     Never,
@@ -80,6 +81,7 @@ macro_rules! samplers {
     })+) => {
         /// A sampler; see the module.
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub enum Sampler {
             $($(#[$attribute])+ $sampler,)+
         }
@@ -280,6 +282,7 @@ impl fmt::Display for Sampler {
 
 /// No sampler has this name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct UnknownSampler;
 
 impl fmt::Display for UnknownSampler {
@@ -306,6 +309,7 @@ impl FromStr for Sampler {
 
 /// The levels at which results are known, the newest first; they fall from call to call.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct History {
     levels: [f32; MOST_RESULTS],
     count: u32,

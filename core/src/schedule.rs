@@ -29,6 +29,7 @@ pub const LARGEST_LEVEL: f32 = 1.0e30;
 
 /// Why two noise levels do not make a schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ScheduleError {
     /// A level lies outside [`SMALLEST_LEVEL`] to [`LARGEST_LEVEL`] or is NaN.
     Level,
@@ -51,6 +52,7 @@ impl core::error::Error for ScheduleError {}
 
 /// Noise levels from `sigma_max` down to `sigma_min`, evenly spaced in the seventh root (rho = 7), then 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct NoiseSchedule {
     sigma_min: f32,
     sigma_max: f32,
@@ -138,6 +140,7 @@ fn add(a: (f32, f32), b: (f32, f32)) -> (f32, f32) {
 
 /// The four factors around the network at one noise level, for [`SIGMA_DATA`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct Preconditioning {
     /// `c_skip`: factor of the noisy picture (the skip connection), in `[0, 1]`.
@@ -185,6 +188,7 @@ impl Preconditioning {
 
 /// The two factors of a step between noise levels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct HeunStep {
     /// `n / s`: what remains of the noise.

@@ -5,6 +5,7 @@ use core::fmt;
 
 /// Why poses cannot be sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SourcesError {
     /// There are no sources.
     Empty,
@@ -32,6 +33,7 @@ impl core::error::Error for SourcesError {}
 
 /// Between one and `S` source poses, in the order of the views.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sources<const S: usize> {
     poses: [Pose; S],
     count: u32,

@@ -53,6 +53,7 @@ macro_rules! schemes {
     })+) => {
         /// The formulas of camera weighting. Weights are proportional to `1 / (e + 1e-6)`, except for the Gaussian.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u32)]
         pub enum Formula {
             $($(#[doc = $doc])+ $formula = $number,)+
@@ -159,6 +160,7 @@ schemes! {
 
 /// Which angle between two cameras error weighting uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u32)]
 pub enum AngleKind {
     /// Between the principal axes, as the paper defines it.

@@ -9,6 +9,7 @@ use crate::math::{exp, max, min};
 ///
 /// Invariant: every value is finite and at least 0, and the sum (in view order) is 1 to within `S * 2^-24`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Weights<const S: usize> {
     values: [f32; S],
     count: u32,
@@ -16,6 +17,7 @@ pub struct Weights<const S: usize> {
 
 /// The outcome of leaving views out; see [`Weights::without_least`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Omission<const S: usize> {
     /// The weights that remain, renormalised; views left out have weight 0.
     pub weights: Weights<S>,

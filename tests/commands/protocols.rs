@@ -3,12 +3,22 @@
 mod baselines;
 mod benchmarks;
 mod choice;
+#[cfg(unix)]
+mod cluster;
 mod folders;
 mod summaries;
 
 pub(crate) fn trials() -> Vec<libtest_mimic::Trial> {
-    [baselines::trials(), benchmarks::trials(), choice::trials(), folders::trials(), summaries::trials()]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        baselines::trials(),
+        benchmarks::trials(),
+        choice::trials(),
+        #[cfg(unix)]
+        cluster::trials(),
+        folders::trials(),
+        summaries::trials(),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }

@@ -75,9 +75,9 @@ const NOT_RUN: [(&str, &str); 13] = [
     ("host/python/test", "`python.rs` runs it where it is asked for"),
     ("viewfuse ", "on files of a person, or hours of training"),
     ("VIEWFUSE_FUZZ_SECONDS=", "`fuzz` runs a part of it; the whole takes minutes"),
-    ("seq ", "GNU parallel may not be there; the tests of protocols run shards"),
-    ("srun ", "Slurm is not there"),
-    ("  --shard ", "Slurm is not there"),
+    ("seq ", "`protocols/cluster.rs` runs it where GNU parallel is"),
+    ("srun ", "`protocols/cluster.rs` runs it where Slurm is"),
+    ("  --shard ", "the same"),
 ];
 
 /// The arguments of the command, and the features of the package that it needs.

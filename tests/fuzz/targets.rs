@@ -1,7 +1,9 @@
-//! What is fed with broken input: everything that reads what somebody else may have written.
+//! What is fed with broken input: everything that reads what somebody else may have written, and the C interface.
 
+mod capi;
 mod checkpoints;
 mod fall;
+mod guarded;
 mod images;
 mod parsers;
 mod records;
@@ -47,7 +49,7 @@ pub(crate) trait Target {
 type Row = (&'static str, fn() -> Box<dyn Target>);
 
 /// All targets.
-pub(crate) const ALL: [Row; 19] = [
+pub(crate) const ALL: [Row; 20] = [
     ("images", || Box::new(images::Images::new())),
     ("transforms", || Box::new(scenes::transforms())),
     ("srn", || Box::new(scenes::srn())),
@@ -67,6 +69,7 @@ pub(crate) const ALL: [Row; 19] = [
     ("state", || Box::new(state::State::new())),
     ("specs", || Box::new(parsers::Specs)),
     ("views", || Box::new(parsers::Views::new())),
+    ("capi", || Box::new(capi::Face::new())),
 ];
 
 /// The targets that only fall, to see that it is noticed.

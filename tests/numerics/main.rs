@@ -15,6 +15,7 @@ mod network;
 mod plane_sweep;
 mod points;
 mod published;
+mod quantised;
 mod rays;
 mod sampler;
 mod sampling;

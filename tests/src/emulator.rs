@@ -1,10 +1,12 @@
-//! A Cortex-M4F for tests: builds the programs of `tests/firmware`, runs them in QEMU and reads what they print and
+//! Microcontrollers for tests: builds the programs of `tests/firmware`, runs them in QEMU and reads what they print and
 //! which instructions they executed.
 
+pub mod board;
 pub mod image;
 pub mod list;
 pub mod trace;
 
+use board::Board;
 use image::Image;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -12,15 +14,14 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use trace::Call;
 
-const EMULATOR: &str = "qemu-system-arm";
-const TARGET: &str = "thumbv7em-none-eabihf";
 /// Where the library's sources are if not at the compiler's own place for them: their folder, or an archive of it.
 const SOURCES: &str = "VIEWFUSE_RUST_LIBRARY";
 /// A program takes a second, more on a busy machine; a hard fault would otherwise wait for ever.
 const TIME_LIMIT: Duration = Duration::from_secs(900);
 
-/// What was found that the firmware needs.
+/// What was found that the firmware of a board needs.
 pub struct Emulator {
+    board: Board,
     library: Library,
     /// Where to build.
     folder: PathBuf,
@@ -43,13 +44,13 @@ impl Emulator {
     ///
     /// # Errors
     /// What is missing, in a few words.
-    pub fn find(folder: &Path) -> Result<Emulator, String> {
-        let there = Command::new(EMULATOR).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
+    pub fn find(board: Board, folder: &Path) -> Result<Emulator, String> {
+        let there = Command::new(board.emulator).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status();
         if !there.is_ok_and(|status| status.success()) {
-            return Err(format!("no {EMULATOR}"));
+            return Err(format!("no {}", board.emulator));
         }
-        let library = Library::find()?;
-        Ok(Emulator { library, folder: folder.join("firmware") })
+        let library = Library::find(board.target)?;
+        Ok(Emulator { board, library, folder: folder.join("firmware") })
     }
 
     /// Whether Rust's library is compiled along with the programs, and for size where they are. One that came compiled is
@@ -65,7 +66,7 @@ impl Emulator {
     pub fn build(&self, repository: &Path, profile: &str) -> Result<PathBuf, String> {
         let mut cargo = Command::new(env!("CARGO"));
         cargo
-            .args(["build", "--quiet", "--locked", "--target", TARGET, "--profile", profile, "--target-dir"])
+            .args(["build", "--quiet", "--locked", "--target", self.board.target, "--profile", profile, "--target-dir"])
             .arg(&self.folder)
             .current_dir(repository.join("tests/firmware"));
         // Flags for the host's processor are none for this one.
@@ -89,7 +90,7 @@ impl Emulator {
         if !output.status.success() {
             return Err(String::from_utf8_lossy(&output.stderr).into_owned());
         }
-        Ok(self.folder.join(TARGET).join(profile))
+        Ok(self.folder.join(self.board.target).join(profile))
     }
 
     /// Unpacks the library's sources, once, and returns their folder.
@@ -115,7 +116,7 @@ impl Emulator {
     /// # Errors
     /// If it does not end, or ends with a failure.
     pub fn run(&self, program: &Path) -> Result<String, String> {
-        let mut machine = machine(program);
+        let mut machine = self.machine(program);
         machine.stdout(Stdio::piped());
         let text = supervised(machine, |child| child.stdout.take(), io::read_to_string)?;
         text.map_err(|error| format!("{}: {error}", program.display()))
@@ -126,18 +127,33 @@ impl Emulator {
     /// # Errors
     /// As [`Emulator::run`], or if the trace is not what it should be.
     pub fn trace(&self, program: &Path, image: &Image) -> Result<Vec<Call>, String> {
-        let mut machine = machine(program);
+        let mut machine = self.machine(program);
         // One instruction a block, and none without its line: what ran and the registers before it.
         machine.args(["-accel", "tcg,one-insn-per-tb=on", "-d", "exec,cpu,nochain"]);
         // The trace would go to the standard error otherwise, which has no buffer: that takes thirty times as long.
         machine.args(["-D", "/dev/stdout"]).stdout(Stdio::piped());
-        supervised(machine, |child| child.stdout.take(), |stream| trace::calls(io::BufReader::new(stream), image))?
+        let registers = self.board.registers;
+        let read = |stream| trace::calls(io::BufReader::with_capacity(1 << 20, stream), registers, image);
+        supervised(machine, |child| child.stdout.take(), read)?
+    }
+
+    /// The board with a program in it.
+    fn machine(&self, program: &Path) -> Command {
+        let name = program.file_name().unwrap_or_default().to_string_lossy();
+        let mut machine = Command::new(self.board.emulator);
+        machine
+            .args(self.board.machine(&name))
+            .args(["-nographic", "-monitor", "none", "-serial", "none"])
+            .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
+            .arg(program)
+            .stdin(Stdio::null());
+        machine
     }
 }
 
 impl Library {
-    fn find() -> Result<Library, String> {
-        let libraries = PathBuf::from(asked("rustc", &["--print", "target-libdir", "--target", TARGET])?);
+    fn find(target: &str) -> Result<Library, String> {
+        let libraries = PathBuf::from(asked("rustc", &["--print", "target-libdir", "--target", target])?);
         if libraries.is_dir() {
             return Ok(Library::Installed);
         }
@@ -149,7 +165,7 @@ impl Library {
             Some(folder) if folder.join("core").is_dir() => Ok(Library::Sources(folder)),
             Some(archive) if archive.is_file() => Ok(Library::Archive(archive)),
             Some(other) => Err(format!("{SOURCES}: no sources in {}", other.display())),
-            None => Err(format!("no Rust library for {TARGET}")),
+            None => Err(format!("no Rust library for {target}")),
         }
     }
 }
@@ -161,24 +177,13 @@ fn asked(program: &str, arguments: &[&str]) -> Result<String, String> {
     text.lines().next().map(str::to_owned).ok_or_else(|| format!("{program} says nothing"))
 }
 
-/// The board with a program in it.
-fn machine(program: &Path) -> Command {
-    let mut machine = Command::new(EMULATOR);
-    machine
-        .args(["-M", "mps2-an386", "-nographic", "-monitor", "none", "-serial", "none"])
-        .args(["-semihosting-config", "enable=on,target=native", "-kernel"])
-        .arg(program)
-        .stdin(Stdio::null());
-    machine
-}
-
 /// Runs a command to its end, reading one of its streams meanwhile.
 fn supervised<Stream: Send, T: Send>(
     mut command: Command,
     stream: impl FnOnce(&mut Child) -> Option<Stream>,
     read: impl FnOnce(Stream) -> T + Send,
 ) -> Result<T, String> {
-    let mut child = command.spawn().map_err(|error| format!("{EMULATOR} does not start: {error}"))?;
+    let mut child = command.spawn().map_err(|error| format!("the emulator does not start: {error}"))?;
     let stream = stream(&mut child).ok_or("the stream is not there")?;
     let (status, text) = std::thread::scope(|scope| {
         let reader = scope.spawn(|| read(stream));

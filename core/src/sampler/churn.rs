@@ -8,6 +8,7 @@ use core::f32::consts::SQRT_2;
 
 /// How much noise is added, and where.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Churn {
     /// `S_churn`: amount over the whole run, at least 0; 0 for none.
     pub amount: f32,
@@ -21,6 +22,7 @@ pub struct Churn {
 
 /// Where a step begins after noise was added.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Churned {
     /// The level then.
     pub level: f32,

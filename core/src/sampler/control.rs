@@ -23,6 +23,7 @@ pub const UNDECIDED_ABOVE: f32 = 0.2 * SIGMA_DATA;
 
 /// Whether a step is taken, and how long the next one (or the same one once more) should be.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Verdict {
     /// Whether the step is good enough.
     pub is_accepted: bool,

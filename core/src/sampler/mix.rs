@@ -10,6 +10,7 @@ pub const MOST_RESULTS: usize = 4;
 /// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. A picture with
 /// coefficient 0 is not read. Also the block of the kernel `mix_pictures`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(C)]
 pub struct Mix {
     /// Of the state.

@@ -7,6 +7,7 @@ use core::fmt;
 
 /// The properties of a scheme, one row each.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Row {
     /// The formula, whose number kernels and the C face know it by.
     pub formula: Formula,
@@ -26,6 +27,7 @@ pub struct Row {
 
 /// A number that a scheme takes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Parameter {
     /// Its key in text.
     pub key: &'static str,
@@ -41,6 +43,7 @@ pub struct Parameter {
 
 /// A choice among a few options; the first is the default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Choice {
     /// Its key in text.
     pub key: &'static str,
@@ -84,6 +87,7 @@ impl Formula {
 
 /// Why a scheme is not valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SchemeError {
     /// No formula has this number.
     Formula(u32),
@@ -129,6 +133,7 @@ impl fmt::Display for Choice {
 /// A weighting scheme given by a formula: the formula, its choice and its parameter, which are in their ranges. What a
 /// formula does not use is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Scheme {
     pub(super) formula: Formula,
     pub(super) choice: u32,

@@ -11,6 +11,7 @@
 //! | `multihead_attention.*`, `weight_calculation_layer.*` | published relative-pose self attention |
 
 mod c_header;
+pub mod quantised;
 
 pub use c_header::c_header;
 

@@ -27,7 +27,7 @@ const RUN: &str = "evaluate toy --protocol random --trials 6 --targets-per-trial
      --weights mean --weights error:alpha=1 --weights l1";
 
 /// Lines of all journals without what time and place say, by number of job.
-fn finished(folder: &Path) -> Vec<Value> {
+pub(super) fn finished(folder: &Path) -> Vec<Value> {
     let mut lines = Vec::new();
     for name in names_in(folder).iter().filter(|name| name.ends_with(".jsonl")) {
         for line in fs::read_to_string(folder.join(name)).expect("a journal").lines() {

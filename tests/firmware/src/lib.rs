@@ -5,8 +5,17 @@
 #![forbid(unsafe_code)]
 
 use core::panic::PanicInfo;
-use cortex_m_semihosting::debug;
-use cortex_m_semihosting::hio::{self, HostStream};
+#[cfg(target_arch = "arm")]
+use cortex_m_semihosting as semihosting;
+#[cfg(target_arch = "riscv32")]
+use riscv_semihosting as semihosting;
+use semihosting::debug;
+use semihosting::hio::{self, HostStream};
+
+#[cfg(target_arch = "arm")]
+pub use cortex_m_rt::entry;
+#[cfg(target_arch = "riscv32")]
+pub use riscv_rt::entry;
 
 /// The emulator's standard output.
 pub struct Output(HostStream);

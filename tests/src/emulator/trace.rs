@@ -1,10 +1,11 @@
 //! What measured calls took, from the emulator's trace.
 //!
-//! The trace has, for each instruction, a line with its address, then the registers before it. A call is counted from
+//! The trace has, for each instruction, the registers before it, its address among them. A call is counted from
 //! the first instruction of a function named `measured_...` to the one that returns from it, both included, by
-//! comparing addresses with the return address that the link register held at the start. Nothing in the program
+//! comparing addresses with the return address that the processor held at the start. Nothing in the program
 //! measures, so nothing is to be subtracted.
 
+use super::board::Registers;
 use super::image::Image;
 use std::collections::BTreeSet;
 use std::io::BufRead;
@@ -34,25 +35,62 @@ struct Open {
     functions: BTreeSet<usize>,
 }
 
+/// What the registers say before an instruction.
+#[derive(Clone, Copy, Default)]
+struct State {
+    address: u32,
+    stack: u32,
+    /// Where a function that was just called returns to.
+    link: u32,
+}
+
+/// Eight hexadecimal digits behind a name.
+fn register(line: &str, name: &str) -> Option<u32> {
+    let (_, behind) = line.split_once(name)?;
+    u32::from_str_radix(behind.trim_start().get(..8)?, 16).ok()
+}
+
+impl Registers {
+    /// Takes what a line says; `Some(true)` if the state is whole with it, `None` if it is not understood.
+    fn take(self, line: &str, state: &mut State) -> Option<bool> {
+        match self {
+            Registers::Arm if line.starts_with("R12=") => {
+                state.stack = register(line, "R13=")?;
+                state.link = register(line, "R14=")? & !1;
+                state.address = register(line, "R15=")?;
+                Some(true)
+            }
+            Registers::RiscV if line.starts_with(" pc ") => {
+                state.address = register(line, " pc ")?;
+                Some(false)
+            }
+            Registers::RiscV if line.starts_with(" x0/zero") => {
+                state.link = register(line, "x1/ra")?;
+                state.stack = register(line, "x2/sp")?;
+                Some(true)
+            }
+            _ => Some(false),
+        }
+    }
+}
+
 /// The measured calls of a trace, in their order.
 ///
 /// # Errors
 /// A line that is not understood, an instruction outside any function, a call that does not return.
-pub fn calls(trace: impl BufRead, image: &Image) -> Result<Vec<Call>, String> {
+pub fn calls(mut trace: impl BufRead, registers: Registers, image: &Image) -> Result<Vec<Call>, String> {
     let mut calls = Vec::new();
     let mut open: Option<Open> = None;
-    for line in trace.lines() {
-        let line = line.map_err(|error| error.to_string())?;
-        // The third line of registers is the one with the stack pointer, the link register and the address.
-        let Some(registers) = line.strip_prefix("R12=") else { continue };
-        let not_understood = || format!("not understood: {line}");
-        let register = |name: &str| {
-            let (_, behind) = registers.split_once(name)?;
-            u32::from_str_radix(behind.get(..8)?, 16).ok()
-        };
-        let stack = register("R13=").ok_or_else(not_understood)?;
-        let link = register("R14=").ok_or_else(not_understood)? & !1;
-        let address = register("R15=").ok_or_else(not_understood)?;
+    let (mut line, mut state) = (String::new(), State::default());
+    loop {
+        line.clear();
+        if trace.read_line(&mut line).map_err(|error| error.to_string())? == 0 {
+            break;
+        }
+        if !registers.take(&line, &mut state).ok_or_else(|| format!("not understood: {line}"))? {
+            continue;
+        }
+        let State { address, stack, link } = state;
         if open.as_ref().is_some_and(|call| call.return_address == address && call.stack_before == stack) {
             calls.extend(open.take().map(|call| call.closed(image)));
         }

@@ -10,37 +10,50 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_nn::checkpoint::{Checkpoint, Precision};
+use viewfuse_weighting::attention::quantised::{quantised, rust_source};
 use viewfuse_weighting::attention::{AttentionModel, c_header};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse convert pixel_nerf_latest pixelnerf.safetensors --half\n  \
-    viewfuse convert weighting.safetensors attention.h\n      learned attention, for firmware that links the C face\n\n\
+    viewfuse convert weighting.safetensors attention.h\n      learned attention, for firmware that links the C face\n  \
+    viewfuse convert weighting.safetensors attention.rs\n      the same with 8 bits a weight, for firmware in Rust\n\n\
     Input formats are safetensors, torch.save (new and old), and networks written by Python's pickle (.pkl), such as \
     snapshots of EDM's training. No code in a file is executed.")]
 pub(crate) struct Arguments {
     /// The checkpoint
     input: PathBuf,
-    /// The output, as safetensors; for learned attention with the Fourier embedding also a C header
-    #[arg(value_name = "OUT.safetensors|OUT.h")]
+    /// The output, as safetensors; for learned attention with the Fourier embedding also a C header, or Rust with 8 bits
+    #[arg(value_name = "OUT.safetensors|OUT.h|OUT.rs")]
     output: PathBuf,
     /// Round floating point numbers to half precision (f16)
     #[arg(long)]
     half: bool,
 }
 
-/// Learned attention for the C face.
-fn header(arguments: &Arguments) -> anyhow::Result<ExitCode> {
+/// Learned attention for firmware: for the C face, or in Rust with 8 bits a weight.
+fn for_firmware(arguments: &Arguments, is_rust: bool) -> anyhow::Result<ExitCode> {
     let Arguments { input, output, .. } = arguments;
     check_writable(output)?;
     let AttentionModel::Fourier(embedding) = AttentionModel::open(input)? else {
-        bail!("{}: the C face supports only attention with the Fourier embedding (paper.0.weight)", input.display());
+        bail!("{}: firmware supports only attention with the Fourier embedding (paper.0.weight)", input.display());
     };
     let name = input.file_name().unwrap_or(input.as_os_str()).to_string_lossy();
-    write_whole(output, c_header(&embedding, &name).as_bytes())?;
-    say(format_args!(
-        "written    {}: viewfuse_attention_parameters for viewfuse_attend_8, _16 and _32",
-        output.display()
-    ))?;
+    let (text, what) = match is_rust {
+        true => {
+            let parameters = quantised(&embedding);
+            let bytes = size_of_val(&parameters);
+            (
+                rust_source(&parameters, &name),
+                format!("ATTENTION, {bytes} bytes, for quantised_attention and SourceKeys"),
+            )
+        }
+        false => {
+            let what = "viewfuse_attention_parameters for viewfuse_attend_8, _16 and _32";
+            (c_header(&embedding, &name), what.to_owned())
+        }
+    };
+    write_whole(output, text.as_bytes())?;
+    say(format_args!("written    {}: {what}", output.display()))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -48,13 +61,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let output = &arguments.output;
     keep_input(&arguments.input, output)?;
     let ends_in = |name: &str| output.extension().is_some_and(|extension| extension == name);
-    if ends_in("h") && !arguments.half {
-        return header(arguments);
+    if (ends_in("h") || ends_in("rs")) && !arguments.half {
+        return for_firmware(arguments, ends_in("rs"));
     }
     ensure!(
         ends_in("safetensors"),
-        "{}: output formats are safetensors, and a C header for learned attention; give a name that ends in .safetensors, \
-         or in .h without --half",
+        "{}: output formats are safetensors, and a C header or Rust for learned attention; give a name that ends in \
+         .safetensors, or in .h or .rs without --half",
         output.display()
     );
     check_writable(output)?;

@@ -8,6 +8,7 @@
 pub mod attended;
 pub mod denoised;
 pub mod formulas;
+pub mod quantised;
 pub mod rig;
 pub mod sampled;
 

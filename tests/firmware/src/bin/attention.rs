@@ -5,7 +5,7 @@
 use viewfuse_firmware::{Output, finish};
 use viewfuse_list::{Inputs, attended::attention};
 
-#[cortex_m_rt::entry]
+#[viewfuse_firmware::entry]
 fn main() -> ! {
     let mut output = Output::open();
     attention(core::hint::black_box(Inputs::STANDARD), &mut |name, value| output.number(name, value));

@@ -5,9 +5,9 @@
 #![no_main]
 
 use core::hint::black_box;
-use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding, cross_attention};
+use viewfuse_core::attention::quantised::{QuantisedAttention, SourceKeys, quantised_attention};
 use viewfuse_core::composite::Composite;
-use viewfuse_core::fuse::{fuse_views, fuse_visible};
+use viewfuse_core::fuse::{fuse_readings, fuse_views, fuse_visible};
 use viewfuse_core::math::sqrt;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::schedule::NoiseSchedule;
@@ -16,10 +16,10 @@ use viewfuse_core::weighting::{Scheme, weigh};
 use viewfuse_core::weights::Weights;
 use viewfuse_firmware::finish;
 use viewfuse_list::Inputs;
-use viewfuse_list::attended::fourier;
 use viewfuse_list::denoised::{denoiser_step, noise};
 use viewfuse_list::formulas::{CHANNELS, SAMPLES, composite_ray, latents, samples, stratified, visibility};
-use viewfuse_list::rig::{Rig, VIEWS, schemes};
+use viewfuse_list::quantised::{ATTENTION, bytes, further_target, words};
+use viewfuse_list::rig::{Rig, VIEWS, measured_schemes};
 
 // SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
@@ -31,15 +31,36 @@ fn measured_weigh(scheme: Scheme, sources: &Sources<VIEWS>, target: &Pose) -> We
 // SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn measured_embed(embedding: &FourierEmbedding, pose: &Pose) -> [f32; EMBEDDING] {
-    embedding.embed(pose)
+fn measured_attend(parameters: &QuantisedAttention, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
+    quantised_attention(parameters, sources, target)
 }
 
 // SAFETY: no other symbol of the program has this name.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn measured_attend(embedding: &FourierEmbedding, sources: &Sources<VIEWS>, target: &Pose) -> Weights<VIEWS> {
-    cross_attention(embedding, sources, target)
+fn measured_keys(parameters: &QuantisedAttention, sources: &Sources<VIEWS>) -> SourceKeys<VIEWS> {
+    SourceKeys::new(parameters, sources)
+}
+
+// SAFETY: no other symbol of the program has this name.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_further(keys: &SourceKeys<VIEWS>, parameters: &QuantisedAttention, target: &Pose) -> Weights<VIEWS> {
+    keys.weigh(parameters, target)
+}
+
+// SAFETY: no other symbol of the program has this name.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_fuse_u8(weights: &Weights<VIEWS>, readings: &[[u8; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
+    fuse_readings(weights, readings)
+}
+
+// SAFETY: no other symbol of the program has this name.
+#[unsafe(no_mangle)]
+#[inline(never)]
+fn measured_fuse_i16(weights: &Weights<VIEWS>, readings: &[[i16; CHANNELS]; VIEWS]) -> [f32; CHANNELS] {
+    fuse_readings(weights, readings)
 }
 
 // SAFETY: no other symbol of the program has this name.
@@ -88,11 +109,11 @@ fn measured_sqrt(x: f32) -> f32 {
     sqrt(x)
 }
 
-#[cortex_m_rt::entry]
+#[viewfuse_firmware::entry]
 fn main() -> ! {
     let inputs = black_box(Inputs::STANDARD);
     let Rig { sources, target } = Rig::around(inputs, 2.0);
-    for (_, scheme) in schemes() {
+    for (_, scheme) in measured_schemes() {
         black_box(measured_weigh(black_box(scheme), &sources, &target));
     }
     let weights = weigh(Scheme::ERROR, &sources, &target);
@@ -103,8 +124,10 @@ fn main() -> ! {
     black_box(measured_depths(inputs.seed));
     black_box(measured_step(&NoiseSchedule::published(), 12, &noise(inputs)));
     black_box(measured_sqrt(inputs.phase));
-    let embedding = fourier(inputs);
-    black_box(measured_embed(&embedding, &target));
-    black_box(measured_attend(&embedding, &sources, &target));
+    black_box(measured_fuse_u8(&weights, &bytes(inputs)));
+    black_box(measured_fuse_i16(&weights, &words(inputs)));
+    black_box(measured_attend(&ATTENTION, &sources, &target));
+    let keys = measured_keys(&ATTENTION, &sources);
+    black_box(measured_further(&keys, &ATTENTION, &further_target(inputs)));
     finish()
 }

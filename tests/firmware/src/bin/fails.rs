@@ -5,7 +5,7 @@
 use viewfuse_list::Inputs;
 use viewfuse_list::formulas::latents;
 
-#[cortex_m_rt::entry]
+#[viewfuse_firmware::entry]
 fn main() -> ! {
     let latents = latents(core::hint::black_box(Inputs::STANDARD));
     // No such view.

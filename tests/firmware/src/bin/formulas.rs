@@ -5,7 +5,7 @@
 use viewfuse_firmware::{Output, finish};
 use viewfuse_list::{Inputs, formulas::formulas};
 
-#[cortex_m_rt::entry]
+#[viewfuse_firmware::entry]
 fn main() -> ! {
     let mut output = Output::open();
     // A black box: otherwise the compiler could compute the list itself.

@@ -1,0 +1,311 @@
+//! The recipes of host/evaluate/README.md for many machines, run as they stand there: GNU parallel, and Slurm on one node;
+//! the manifest for Kubernetes against the types of its API. A worker that is killed is noticed, and the same recipe goes on.
+//!
+//! Where GNU parallel or Slurm are missing, these tests are ignored and say so; with `VIEWFUSE_REQUIRE_CLUSTER=1` they fail.
+
+use super::folders::finished;
+use crate::BINARY;
+use k8s_openapi::api::batch::v1::Job;
+use libtest_mimic::Trial;
+use serde_json::Value;
+use std::fs;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+use tempfile::TempDir;
+use viewfuse_tests::command::done;
+use viewfuse_tests::places::repository;
+use viewfuse_tests::trials::{is_required, needing, trial};
+
+const REQUIRED: &str = "VIEWFUSE_REQUIRE_CLUSTER";
+const PATIENCE: Duration = Duration::from_secs(300);
+/// What the recipes do, made small.
+const SMALL: &str = "--protocol random --trials 4 --targets-per-trial 1 --size 24x24 --device cpu --weights mean";
+
+pub(crate) fn trials() -> Vec<Trial> {
+    let missing = |programs: &[&str]| {
+        let paths = std::env::var_os("PATH").unwrap_or_default();
+        let is_there = |program: &&str| std::env::split_paths(&paths).any(|folder| folder.join(program).is_file());
+        programs.iter().find(|program| !is_there(program)).map(|program| format!("no {program}"))
+    };
+    let slurm = missing(&["slurmctld", "slurmd", "sbatch"]).or_else(|| {
+        let user = Command::new("id").arg("-u").output().map(|output| output.stdout);
+        (!user.is_ok_and(|user| user == b"0\n")).then(|| "Slurm's node needs root".to_owned())
+    });
+    let module = |name: &str| format!("{}::{name}", module_path!());
+    vec![
+        trial(&module("the_manifest_is_a_job_of_kubernetes"), the_manifest_is_a_job_of_kubernetes),
+        trial(&module("a_wrong_manifest_is_rejected"), a_wrong_manifest_is_rejected),
+        needing(missing(&["parallel"]), is_required(REQUIRED), trial(&module("gnu_parallel"), gnu_parallel)),
+        needing(slurm, is_required(REQUIRED), trial(&module("slurm"), slurm_on_one_node)),
+    ]
+}
+
+/// The block of code that begins like this, of the README.
+fn recipe(start: &str) -> String {
+    let path = repository().join("host/evaluate/README.md");
+    let text = fs::read_to_string(&path).expect("the README");
+    let blocks = text.split("\n```").map(|block| block.split_once('\n').map_or("", |(_, code)| code));
+    blocks.into_iter().find(|code| code.starts_with(start)).unwrap_or_else(|| panic!("no {start}")).to_owned() + "\n"
+}
+
+/// A folder with two scenes of cars, and the command under its name.
+struct Place {
+    folder: TempDir,
+    /// Where programs are looked for.
+    path: String,
+}
+
+impl Place {
+    fn new() -> Place {
+        let folder = tempfile::tempdir().expect("a folder");
+        done(
+            BINARY,
+            folder.path(),
+            "scenes make cars data --train 0 --val 0 --test 2 --views 4 --test-views 6 --size 64",
+        );
+        fs::create_dir(folder.path().join("bin")).expect("a folder");
+        std::os::unix::fs::symlink(BINARY, folder.path().join("bin/viewfuse")).expect("a link");
+        let path = std::env::var("PATH").unwrap_or_default();
+        Place { path: format!("{}:{path}", folder.path().join("bin").display()), folder }
+    }
+
+    /// A recipe as a script: the same with small pictures, into another folder.
+    fn script(&self, start: &str, out: &str) -> PathBuf {
+        let code = recipe(start);
+        assert!(code.contains("--protocol random -o runs/random"), "{code}");
+        let code = code.replace("--protocol random -o runs/random", &format!("{SMALL} -o {out}"));
+        let path = self.folder.path().join(format!("{}.sh", out.replace('/', "-")));
+        fs::write(&path, code).expect("a script");
+        path
+    }
+
+    fn command(&self, program: &str) -> Command {
+        let mut command = Command::new(program);
+        command.current_dir(self.folder.path()).env("PATH", &self.path).stdin(Stdio::null());
+        command
+    }
+
+    /// The jobs that are done in a folder.
+    fn jobs(&self, out: &str) -> Vec<Value> {
+        let folder = self.folder.path().join(out);
+        if folder.is_dir() { finished(&folder) } else { Vec::new() }
+    }
+
+    /// The numbers of one process.
+    fn alone(&self) -> Vec<Value> {
+        done(BINARY, self.folder.path(), &format!("evaluate data/cars --split test {SMALL} -o alone"));
+        let jobs = self.jobs("alone");
+        assert_eq!(jobs.len(), 8);
+        jobs
+    }
+
+    /// The same command without shards computes what is missing, which is nothing.
+    fn assert_whole(&self, out: &str, expected: &[Value]) {
+        assert_eq!(self.jobs(out), expected);
+        let text = done(BINARY, self.folder.path(), &format!("evaluate data/cars --split test {SMALL} -o {out}"));
+        assert!(text.contains("mean"), "{text}");
+        assert_eq!(self.jobs(out), expected);
+    }
+
+    /// Processes of the command that run in this place.
+    fn workers(&self) -> Vec<u32> {
+        let own = |process: &u32| {
+            let link = |name: &str| fs::read_link(format!("/proc/{process}/{name}")).unwrap_or_default();
+            link("cwd") == self.folder.path().canonicalize().expect("a folder")
+                && link("exe") == Path::new(BINARY).canonicalize().expect("the command")
+        };
+        let processes = fs::read_dir("/proc").expect("processes").flatten();
+        processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).filter(own).collect()
+    }
+
+    /// Kills one worker as soon as there is one.
+    fn kill_one(&self, is_over: &mut dyn FnMut() -> bool) -> bool {
+        let start = Instant::now();
+        while !is_over() && start.elapsed() < PATIENCE {
+            if let Some(worker) = self.workers().first() {
+                let killed = Command::new("kill").args(["-KILL", &worker.to_string()]).status();
+                return killed.is_ok_and(|status| status.success());
+            }
+            sleep(Duration::from_millis(2));
+        }
+        false
+    }
+}
+
+fn gnu_parallel() {
+    let place = Place::new();
+    let expected = place.alone();
+    let script = place.script("# GNU parallel", "runs/parallel");
+    let run = || {
+        let mut command = place.command("sh");
+        command.arg(&script).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a shell")
+    };
+    // GNU parallel's exit code is how many of its jobs failed.
+    let mut first = run();
+    assert!(place.kill_one(&mut || first.try_wait().expect("a process").is_some()), "there was no worker to kill");
+    assert_eq!(first.wait().expect("an end").code(), Some(1));
+    assert!(place.jobs("runs/parallel").len() < expected.len(), "the killed worker's jobs are missing");
+    assert_eq!(run().wait().expect("an end").code(), Some(0));
+    place.assert_whole("runs/parallel", &expected);
+}
+
+/// Slurm's two daemons, which end with this value.
+struct Slurm {
+    daemons: Vec<Child>,
+    settings: PathBuf,
+}
+
+impl Slurm {
+    fn start(place: &Place) -> Slurm {
+        let folder = place.folder.path().join("slurm");
+        ["state", "spool"].iter().for_each(|name| fs::create_dir_all(folder.join(name)).expect("a folder"));
+        let host = Command::new("hostname").arg("-s").output().expect("a name").stdout;
+        let host = String::from_utf8(host).expect("a name").trim().to_owned();
+        // Two ports that are free now.
+        let free = [(); 2].map(|()| TcpListener::bind("127.0.0.1:0").expect("a port"));
+        let [controls, node] = free.map(|listener| listener.local_addr().expect("a port").port());
+        let settings = folder.join("slurm.conf");
+        let text = format!(
+            "ClusterName=viewfuse\nSlurmctldHost={host}(127.0.0.1)\nSlurmctldPort={controls}\nSlurmdPort={node}\n\
+             AuthType=auth/none\nCredType=cred/none\nSlurmUser=root\nSlurmdUser=root\n\
+             StateSaveLocation={0}/state\nSlurmdSpoolDir={0}/spool\n\
+             SlurmctldPidFile={0}/slurmctld.pid\nSlurmdPidFile={0}/slurmd.pid\n\
+             ProctrackType=proctrack/linuxproc\nTaskPlugin=task/none\nMpiDefault=none\nReturnToService=2\n\
+             SelectType=select/cons_tres\nSelectTypeParameters=CR_CPU\nJobAcctGatherType=jobacct_gather/none\n\
+             AccountingStorageType=accounting_storage/none\nNodeName={host} NodeAddr=127.0.0.1 CPUs=2\n\
+             PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP\n",
+            folder.display()
+        );
+        fs::write(&settings, text).expect("settings");
+        let daemon = |name: &str| {
+            let log = fs::File::create(folder.join(format!("{name}.log"))).expect("a log");
+            let mut command = place.command(name);
+            command.args(["-D", "-f"]).arg(&settings).stdout(Stdio::null()).stderr(log).spawn().expect("a daemon")
+        };
+        let slurm = Slurm { daemons: vec![daemon("slurmctld"), daemon("slurmd")], settings };
+        let start = Instant::now();
+        while !slurm.asked(place, "sinfo", &["-h", "-o", "%T"]).contains("idle") {
+            assert!(start.elapsed() < PATIENCE, "the node does not come up: {}", folder.display());
+            sleep(Duration::from_millis(100));
+        }
+        slurm
+    }
+
+    /// What a program of Slurm prints.
+    fn asked(&self, place: &Place, program: &str, arguments: &[&str]) -> String {
+        let output = place.command(program).args(arguments).env("SLURM_CONF", &self.settings).output().expect("Slurm");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    }
+
+    /// Hands a script in and returns the job's number.
+    fn submitted(&self, place: &Place, script: &Path) -> String {
+        let job = self.asked(place, "sbatch", &["--parsable", &script.display().to_string()]).trim().to_owned();
+        assert!(job.parse::<u32>().is_ok(), "sbatch says {job:?}");
+        job
+    }
+
+    fn is_over(&self, place: &Place, job: &str) -> bool {
+        self.asked(place, "squeue", &["-h", "-j", job]).is_empty()
+    }
+
+    /// Waits for a job's end and returns how many of its tasks are in each state.
+    fn ended(&self, place: &Place, job: &str) -> [usize; 2] {
+        let start = Instant::now();
+        while !self.is_over(place, job) {
+            assert!(start.elapsed() < PATIENCE, "the job does not end: {}", self.asked(place, "squeue", &[]));
+            sleep(Duration::from_millis(200));
+        }
+        let tasks = self.asked(place, "scontrol", &["show", "job", job]);
+        ["JobState=COMPLETED", "JobState=FAILED"].map(|state| tasks.matches(state).count())
+    }
+}
+
+impl Drop for Slurm {
+    fn drop(&mut self) {
+        // The node first: it reports to the other.
+        for daemon in self.daemons.iter_mut().rev() {
+            let _ = Command::new("kill").arg(daemon.id().to_string()).status();
+            let _ = daemon.wait();
+        }
+    }
+}
+
+fn slurm_on_one_node() {
+    let place = Place::new();
+    let expected = place.alone();
+    let slurm = Slurm::start(&place);
+    let script = place.script("#!/bin/sh\n# Slurm", "runs/slurm");
+    let job = slurm.submitted(&place, &script);
+    assert!(place.kill_one(&mut || slurm.is_over(&place, &job)), "there was no worker to kill");
+    assert_eq!(slurm.ended(&place, &job), [7, 1], "one of eight tasks failed");
+    assert!(place.jobs("runs/slurm").len() < expected.len(), "the killed worker's jobs are missing");
+    let again = slurm.submitted(&place, &script);
+    assert_eq!(slurm.ended(&place, &again), [8, 0]);
+    place.assert_whole("runs/slurm", &expected);
+}
+
+/// The keys of a value that another one lacks: what a reader of known fields passed over.
+fn lost(given: &Value, kept: &Value, path: &str, lost_keys: &mut Vec<String>) {
+    match (given, kept) {
+        (Value::Object(given), Value::Object(kept)) => given.iter().for_each(|(key, value)| match kept.get(key) {
+            Some(kept) => lost(value, kept, &format!("{path}.{key}"), lost_keys),
+            None => lost_keys.push(format!("{path}.{key}")),
+        }),
+        (Value::Array(given), Value::Array(kept)) if given.len() == kept.len() => {
+            given.iter().zip(kept).for_each(|(given, kept)| lost(given, kept, path, lost_keys));
+        }
+        _ if given == kept => {}
+        _ => lost_keys.push(path.to_owned()),
+    }
+}
+
+/// A manifest as the API's type, where every field is one that the API knows.
+fn manifest(text: &str) -> Result<Job, String> {
+    let given: Value = serde_norway::from_str(text).map_err(|error| error.to_string())?;
+    let job: Job = serde_json::from_value(given.clone()).map_err(|error| error.to_string())?;
+    let kept = serde_json::to_value(&job).map_err(|error| error.to_string())?;
+    let mut unknown = Vec::new();
+    lost(&given, &kept, "", &mut unknown);
+    if unknown.is_empty() { Ok(job) } else { Err(format!("unknown fields: {unknown:?}")) }
+}
+
+fn the_manifest_is_a_job_of_kubernetes() {
+    let text = recipe("# Kubernetes");
+    let job = manifest(&text).unwrap_or_else(|error| panic!("{error}"));
+    let spec = job.spec.expect("a spec");
+    // What the API's server checks beyond the types.
+    assert_eq!(spec.completion_mode.as_deref(), Some("Indexed"));
+    let pod = spec.template.spec.expect("a pod");
+    assert!(
+        matches!(pod.restart_policy.as_deref(), Some("OnFailure" | "Never")),
+        "a Job's pods are not always restarted"
+    );
+    let container = &pod.containers[0];
+    let command = container.command.as_ref().expect("a command").join(" ");
+    let count = spec.completions.expect("how many shards");
+    assert!(command.contains(&format!("--shard \"$JOB_COMPLETION_INDEX/{count}\"")), "{command}");
+    let volumes: Vec<String> = pod.volumes.unwrap_or_default().into_iter().map(|volume| volume.name).collect();
+    let mounts = container.volume_mounts.as_ref().expect("mounts");
+    assert!(mounts.iter().all(|mount| volumes.contains(&mount.name)) && mounts.len() == 2, "{volumes:?}");
+    assert!(mounts.iter().all(|mount| command.contains(&mount.mount_path)), "{command}");
+}
+
+fn a_wrong_manifest_is_rejected() {
+    let right = recipe("# Kubernetes");
+    for (from, to, said) in [
+        ("completionMode", "completionsMode", "completionsMode"),
+        ("completions: 8", "completions: eight", "eight"),
+        ("kind: Job", "kind: Jobs", "Jobs"),
+        ("apiVersion: batch/v1", "apiVersion: v1", "v1"),
+        ("restartPolicy", "restart", "restart"),
+        ("      containers:", "      container:", "container"),
+        ("mountPath: /runs", "path: /runs", ""),
+    ] {
+        assert!(right.contains(from), "{from}");
+        let error = manifest(&right.replacen(from, to, 1)).expect_err(to);
+        assert!(error.contains(said), "{to}: {error}");
+    }
+}

@@ -1,0 +1,165 @@
+//! What calls take on each board: instructions, stack and code, counted in the emulators' traces, and the tables of core's
+//! README, which this test writes with `VIEWFUSE_WRITE_TABLES=1` and compares otherwise.
+
+use super::{Firmware, PROFILES};
+use libtest_mimic::Failed;
+use std::path::PathBuf;
+use std::sync::Arc;
+use viewfuse_core::attention::quantised::QuantisedAttention;
+use viewfuse_list::rig::measured_schemes;
+use viewfuse_tests::emulator::image::Image;
+use viewfuse_tests::emulator::trace::Call;
+use viewfuse_tests::places::repository;
+
+/// What the default scheme may take for 8 sources on the first board.
+const MOST_INSTRUCTIONS: u64 = 6000;
+const MOST_STACK: u32 = 2048;
+/// What attention with 8 bits may take there, and have of parameters.
+const MOST_ATTENDING: u64 = 300_000;
+const MOST_PARAMETERS: usize = 20_000;
+/// What the firmware without attention may have there of code and constants.
+const MOST_BYTES: u64 = 32 * 1024;
+
+/// A row of a table: what it is about, and its numbers; what is not measured has none.
+type Row = (String, Vec<Option<u64>>);
+
+/// What a call is in the tables.
+fn title(call: &Call, weighed: &mut impl Iterator<Item = &'static str>) -> Option<String> {
+    Some(match call.name.as_str() {
+        "weigh" => format!("weights of 8 sources, {}", weighed.next()?),
+        "attend" => "attention weights of 8 sources, 8 bits".into(),
+        "keys" => "of these, what the sources are to every target".into(),
+        "further" => "attention weights for a further target, 8 bits".into(),
+        "fuse" => "fusing 8 x 16 latents".into(),
+        "fuse_visible" => "fusing 8 x 16 latents with visibility".into(),
+        "fuse_u8" => "fusing 8 x 16 readings, `u8`".into(),
+        "fuse_i16" => "fusing 8 x 16 readings, `i16`".into(),
+        "ray" => "one composited ray of 64 samples".into(),
+        "depths" => "64 stratified depths with random numbers".into(),
+        "step" => "one denoiser step of 16 values, without the network".into(),
+        "sqrt" => "one square root".into(),
+        _ => return None,
+    })
+}
+
+/// The measured calls of a program.
+fn measured(firmware: &Firmware, profile: &'static str, program: &str) -> Result<Vec<Call>, Failed> {
+    let path = firmware.folder(profile)?.join(program);
+    Ok(firmware.emulator()?.trace(&path, &Image::open(&path)?)?)
+}
+
+fn named<'a>(calls: &'a [Call], name: &str) -> Result<&'a Call, Failed> {
+    Ok(calls.iter().find(|call| call.name == name).ok_or_else(|| format!("no call {name}"))?)
+}
+
+/// Instructions, stack and code of a call.
+fn numbers(call: &Call) -> [Option<u64>; 3] {
+    [Some(call.instructions), Some(u64::from(call.stack)), Some(call.code)]
+}
+
+pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed> {
+    let small = boards.iter().map(|board| measured(board, PROFILES[0], "calls")).collect::<Result<Vec<_>, _>>()?;
+    assert_eq!(small[0], measured(&boards[0], PROFILES[0], "calls")?, "the counts repeat exactly");
+    let fast = measured(&boards[0], PROFILES[1], "calls")?;
+    within_limits(&small[0])?;
+
+    let mut weighed = measured_schemes().into_iter().map(|(name, _)| name);
+    let (mut three, mut speed) = (Vec::new(), Vec::new());
+    for (index, call) in small[0].iter().enumerate() {
+        let title = title(call, &mut weighed).ok_or("a call without a title")?;
+        assert!(small.iter().chain([&fast]).all(|calls| calls[index].name == call.name));
+        three.push((title.clone(), small.iter().flat_map(|calls| numbers(&calls[index])).collect()));
+        // Not the code: what the compiler copies into its callers changes with every version.
+        speed.push((title, numbers(&fast[index])[..2].to_vec()));
+    }
+    assert_eq!(weighed.next(), None, "every scheme was measured");
+
+    // Parameters of 32 bits, where there is an FPU.
+    let floats = PROFILES.map(|profile| measured(&boards[0], profile, "embeddings"));
+    let [small_floats, fast_floats] = floats;
+    let (small_floats, fast_floats) = (small_floats?, fast_floats?);
+    for (name, title) in
+        [("attend", "attention weights of 8 sources, 32 bits"), ("embed", "one pose embedded, 32 bits")]
+    {
+        let nothing = [None; 3].repeat(boards.len() - 1);
+        let row = numbers(named(&small_floats, name)?).into_iter().chain(nothing).collect();
+        three.push((title.to_owned(), row));
+        speed.push((title.to_owned(), numbers(named(&fast_floats, name)?)[..2].to_vec()));
+    }
+
+    let mut whole = Vec::new();
+    for board in boards {
+        let image = Image::open(&board.folder(PROFILES[0])?.join("formulas"))?;
+        println!("{}, all without attention: {} bytes: {:?}", board.board.processor, image.bytes(), image.sections);
+        whole.extend([None, None, Some(image.bytes())]);
+    }
+    assert!(whole[2] <= Some(MOST_BYTES), "{whole:?}");
+    three.push(("all but attention, with the program that prints it".to_owned(), whole));
+    let is_small = boards.iter().all(|board| board.emulator().is_ok_and(|emulator| emulator.compiles_the_library()));
+
+    let processors: Vec<&str> = boards.iter().map(|board| board.board.processor).collect();
+    let columns = processors.iter().map(|name| format!(" {name}: instructions | stack | code |")).collect::<String>();
+    the_readme_says_so(&format!("| for size |{columns}"), &three, is_small)?;
+    the_readme_says_so(&format!("| for speed | {}: instructions | stack |", processors[0]), &speed, is_small)
+}
+
+/// The limits of the first board.
+fn within_limits(calls: &[Call]) -> Result<(), Failed> {
+    let default = &calls[0];
+    assert_eq!(default.name, "weigh");
+    assert!(default.instructions <= MOST_INSTRUCTIONS && default.stack <= MOST_STACK, "{default:?}");
+    assert!(default.instructions > 100, "nothing was computed: {default:?}");
+    let (attend, further) = (named(calls, "attend")?, named(calls, "further")?);
+    assert!(attend.instructions <= MOST_ATTENDING, "{attend:?}");
+    assert!(10 * further.instructions <= attend.instructions, "{further:?} of {attend:?}");
+    assert!(further.instructions > 1000, "nothing was computed: {further:?}");
+    assert!(size_of::<QuantisedAttention>() <= MOST_PARAMETERS);
+    Ok(())
+}
+
+fn cell(number: &Option<u64>) -> String {
+    number.map_or_else(|| "-".to_owned(), |number| number.to_string())
+}
+
+/// A table as Markdown.
+fn markdown(heading: &str, rows: &[Row]) -> String {
+    let line = format!("|{}\n", "---|".repeat(heading.matches('|').count() - 1));
+    let row = |(title, numbers): &Row| {
+        numbers.iter().fold(format!("| {title} |"), |line, number| format!("{line} {} |", cell(number))) + "\n"
+    };
+    [format!("{heading}\n"), line].into_iter().chain(rows.iter().map(row)).collect()
+}
+
+fn readme() -> PathBuf {
+    repository().join("core/README.md")
+}
+
+/// The table of core's README with this heading is this one, to a fifth: another compiler gives a few instructions more or
+/// less. The code (every third number) is as small as it says only where Rust's library is compiled for size as well.
+fn the_readme_says_so(heading: &str, rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
+    let table = markdown(heading, rows);
+    println!("\n{table}");
+    let text = std::fs::read_to_string(readme())?;
+    let (before, behind) = text.split_once(&format!("{heading}\n")).ok_or_else(|| format!("no table {heading}"))?;
+    let (old, rest) = behind.split_once("\n\n").ok_or("the table does not end")?;
+    if std::env::var("VIEWFUSE_WRITE_TABLES").is_ok_and(|value| value == "1") {
+        std::fs::write(readme(), [before, table.trim_end(), "\n\n", rest].concat())?;
+        return Ok(());
+    }
+    let lines: Vec<&str> = old.lines().skip(1).collect();
+    assert_eq!(lines.len(), rows.len(), "rows of the table {heading}");
+    for (line, (title, numbers)) in lines.into_iter().zip(rows) {
+        let said: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
+        assert_eq!((said[0], said.len()), (title.as_str(), 1 + numbers.len()), "{line}");
+        for (place, (said, measured)) in said[1..].iter().zip(numbers).enumerate() {
+            let is_close = match (said.parse::<u64>().ok(), measured) {
+                (Some(said), Some(measured)) => {
+                    said.abs_diff(*measured) <= measured / 5 || (place % 3 == 2 && !library_is_small)
+                }
+                (said, measured) => said == *measured,
+            };
+            assert!(is_close, "{line}: measured {numbers:?}");
+        }
+    }
+    Ok(())
+}
