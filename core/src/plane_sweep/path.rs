@@ -3,6 +3,7 @@
 
 use super::{MOST_GROUPS, PLANES, Planes};
 use crate::math::min;
+use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
 /// Cost of a step to a neighbouring plane.
@@ -84,7 +85,7 @@ impl Line {
 
     /// Advances to a pixel with these costs, `costs[first..][group]`; the aggregated ones are [`Line::costs`].
     #[inline]
-    pub fn advance(&mut self, costs: &[Planes], first: usize, group_count: usize) {
+    pub fn advance(&mut self, costs: &(impl Fetch<Planes> + ?Sized), first: usize, group_count: usize) {
         let jump = self.least + JUMP_COST;
         let mut joined = [[0.0; PLANES]; MOST_GROUPS];
         let mut least = f32::MAX;
@@ -93,7 +94,7 @@ impl Line {
             let before = self.costs[group];
             let left = if group > 0 { self.costs[group - 1][PLANES - 1] } else { f32::MAX };
             let right = if group + 1 < group_count { self.costs[group + 1][0] } else { f32::MAX };
-            let own = costs[first + group];
+            let own = costs.fetch(first + group);
             let mut beside = [0.0; PLANES];
             beside[0] = min(left, before[1]);
             beside[PLANES - 1] = min(before[PLANES - 2], right);
@@ -128,12 +129,12 @@ impl Line {
 
 /// The mean of the four directions' costs at a pixel: `paths[direction][line][step][group]`.
 #[inline]
-pub fn joined_cost(block: &CostBlock, paths: &[Planes], pixel: u32, group: u32) -> Planes {
+pub fn joined_cost(block: &CostBlock, paths: &(impl Fetch<Planes> + ?Sized), pixel: u32, group: u32) -> Planes {
     let (column, row) = (pixel % block.width, pixel / block.width);
     let mut sum = [0.0; PLANES];
     let mut direction = 0;
     while direction < DIRECTIONS {
-        let path = &paths[block.place(direction, column, row) + group as usize];
+        let path = paths.fetch(block.place(direction, column, row) + group as usize);
         let mut plane = 0;
         while plane < PLANES {
             sum[plane] += path[plane];
