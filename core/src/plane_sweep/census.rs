@@ -4,7 +4,6 @@ use super::evidence::{UNSEEN, ViewPair};
 use super::frustum::FrustumBlock;
 use super::{MOST_MATCHED, PLANES, Planes};
 use crate::math::{abs, clamp, max, min};
-use crate::pages::Fetch;
 
 /// Reach of the census window, in pixels to each side.
 pub const REACH: u32 = 2;
@@ -29,8 +28,8 @@ pub const OUTSIDE_COST: f32 = 0.5;
 pub fn census_cost(
     frustum: &FrustumBlock,
     pairs: &[ViewPair],
-    grey: &(impl Fetch<Planes> + ?Sized),
-    evidence: &(impl Fetch<Planes> + ?Sized),
+    grey: &[Planes],
+    evidence: &[Planes],
     pixel: u32,
     group: u32,
 ) -> [Planes; 2] {
@@ -42,13 +41,6 @@ pub fn census_cost(
     let mut sum = [0.0; PLANES];
     let mut count = [0.0; PLANES];
     let mut texture = [0.0; PLANES];
-    // Compared with all twelve neighbours: read once.
-    let mut middle = [[UNSEEN; PLANES]; MOST_MATCHED];
-    let mut slot = 0;
-    while slot < frustum.view_count as usize {
-        middle[slot] = grey.fetch(slot * slice + here);
-        slot += 1;
-    }
     // The half of the window before the pixel: the other half gives the same comparisons with the opposite sign.
     let mut offset = 0;
     while offset < 12 {
@@ -59,7 +51,7 @@ pub fn census_cost(
             let mut valid = [[0.0; PLANES]; MOST_MATCHED];
             let mut slot = 0;
             while slot < frustum.view_count as usize {
-                let (own, other) = (&middle[slot], &grey.fetch(slot * slice + there));
+                let (own, other) = (&grey[slot * slice + here], &grey[slot * slice + there]);
                 let mut plane = 0;
                 while plane < PLANES {
                     lighter[slot][plane] = clamp((own[plane] - other[plane]) * (1.0 / CONTRAST), -1.0, 1.0);
@@ -85,8 +77,8 @@ pub fn census_cost(
         }
         offset += 1;
     }
-    let (difference, weight) = (evidence.fetch(4 * here), evidence.fetch(4 * here + 1));
-    let (dissent, hull) = (evidence.fetch(4 * here + 2), evidence.fetch(4 * here + 3));
+    let (difference, weight) = (&evidence[4 * here], &evidence[4 * here + 1]);
+    let (dissent, hull) = (&evidence[4 * here + 2], &evidence[4 * here + 3]);
     let mut cost = [0.0; PLANES];
     let mut share = [0.0; PLANES];
     let mut plane = 0;

@@ -129,12 +129,12 @@ impl Line {
 
 /// The mean of the four directions' costs at a pixel: `paths[direction][line][step][group]`.
 #[inline]
-pub fn joined_cost(block: &CostBlock, paths: &(impl Fetch<Planes> + ?Sized), pixel: u32, group: u32) -> Planes {
+pub fn joined_cost(block: &CostBlock, paths: &[Planes], pixel: u32, group: u32) -> Planes {
     let (column, row) = (pixel % block.width, pixel / block.width);
     let mut sum = [0.0; PLANES];
     let mut direction = 0;
     while direction < DIRECTIONS {
-        let path = paths.fetch(block.place(direction, column, row) + group as usize);
+        let path = &paths[block.place(direction, column, row) + group as usize];
         let mut plane = 0;
         while plane < PLANES {
             sum[plane] += path[plane];

@@ -2,7 +2,6 @@
 
 use super::frustum::FrustumBlock;
 use super::{PLANES, Planes};
-use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
 /// The three windows, as plain data.
@@ -53,17 +52,12 @@ impl WindowBlock {
 /// `costs[row][column][group][cost times weight, weight]`. `pixel` is counted in the image. From the middle outwards, the
 /// smaller window first.
 #[inline]
-pub fn row_sums(
-    block: &WindowBlock,
-    costs: &(impl Fetch<Planes> + ?Sized),
-    pixel: u32,
-    group: u32,
-) -> [[Planes; 2]; 3] {
+pub fn row_sums(block: &WindowBlock, costs: &[Planes], pixel: u32, group: u32) -> [[Planes; 2]; 3] {
     let column = (pixel % block.width) as i32;
     let first = (pixel - pixel % block.width) as usize;
     let groups = block.group_count as usize;
     let at = |x: i32| 2 * ((first + x as usize) * groups + group as usize);
-    let mut sums = [[costs.fetch(at(column)), costs.fetch(at(column) + 1)]; 3];
+    let mut sums = [[costs[at(column)], costs[at(column) + 1]]; 3];
     let mut running = sums[0];
     let mut window = 0;
     let mut reach = 0;
@@ -71,12 +65,12 @@ pub fn row_sums(
         while reach < block.reach[window] as i32 {
             reach += 1;
             if column - reach >= 0 {
-                add(&mut running[0], &costs.fetch(at(column - reach)));
-                add(&mut running[1], &costs.fetch(at(column - reach) + 1));
+                add(&mut running[0], &costs[at(column - reach)]);
+                add(&mut running[1], &costs[at(column - reach) + 1]);
             }
             if column + reach < block.width as i32 {
-                add(&mut running[0], &costs.fetch(at(column + reach)));
-                add(&mut running[1], &costs.fetch(at(column + reach) + 1));
+                add(&mut running[0], &costs[at(column + reach)]);
+                add(&mut running[1], &costs[at(column + reach) + 1]);
             }
         }
         sums[window] = running;
@@ -87,7 +81,7 @@ pub fn row_sums(
 
 /// The cost of a group of planes at a pixel: the three windows' means, from `sums[row][column][group][window][2]`.
 #[inline]
-pub fn window_cost(block: &WindowBlock, sums: &(impl Fetch<Planes> + ?Sized), pixel: u32, group: u32) -> Planes {
+pub fn window_cost(block: &WindowBlock, sums: &[Planes], pixel: u32, group: u32) -> Planes {
     let (column, row) = ((pixel % block.width) as i32, (pixel / block.width) as i32);
     let (width, height) = (block.width as i32, block.height as i32);
     let groups = block.group_count as usize;
@@ -107,8 +101,8 @@ pub fn window_cost(block: &WindowBlock, sums: &(impl Fetch<Planes> + ?Sized), pi
         let mut weight = [0.0; PLANES];
         let mut y = first;
         while y <= last {
-            add(&mut cost, &sums.fetch(at(y) + 2 * window));
-            add(&mut weight, &sums.fetch(at(y) + 2 * window + 1));
+            add(&mut cost, &sums[at(y) + 2 * window]);
+            add(&mut weight, &sums[at(y) + 2 * window + 1]);
             y += 1;
         }
         let prior = PRIOR_WEIGHT * area;

@@ -69,12 +69,10 @@ fn census_cost_is_core_s() {
     let FrustumBlock { camera, group_count, first_row, .. } = swept.frustum;
     let count = swept.band_len();
     let above = 2 * (first_row * camera.width * group_count) as usize;
-    let mut costs = groups(&vec![NOTHING; above + 2 * count]);
-    let (grey_groups, evidence_groups) = (groups(&grey), groups(&evidence));
+    let mut costs = vec![NOTHING; above + 2 * count];
     dispatch(swept.frustum, count as u32, |id, push| {
-        plane_sweep::census_cost(id, push, &swept.pairs, &grey_groups, &evidence_groups, &mut costs);
+        plane_sweep::census_cost(id, push, &swept.pairs, &grey, &evidence, &mut costs);
     });
-    let costs = planes_of(&costs);
     let cost =
         |(pixel, group)| census::census_cost(&swept.frustum, &swept.pairs, &grey[..], &evidence[..], pixel, group);
     let expected: Vec<Planes> = elements(group_count, count).flat_map(cost).collect();
@@ -89,17 +87,16 @@ fn windows_are_core_s() {
     let (volume, weighted) = planes(3, &swept);
     let weighted: Vec<Planes> = weighted.iter().flat_map(|cost| [*cost, cost.map(|cost| 2.0 * cost)]).collect();
     let count = group_count(&volume);
-    let (given, mut sums) = (groups(&weighted), groups(&vec![NOTHING; 6 * count]));
-    dispatch(block, count as u32, |id, push| plane_sweep::row_sums(id, push, &given, &mut sums));
+    let mut sums = vec![NOTHING; 6 * count];
+    dispatch(block, count as u32, |id, push| plane_sweep::row_sums(id, push, &weighted, &mut sums));
     let sum = |(pixel, group)| row_sums(&block, &weighted[..], pixel, group);
     let expected: Vec<Planes> = elements(block.group_count, count).flat_map(sum).flatten().collect();
-    assert_eq!(planes_of(&sums), expected);
+    assert_eq!(sums, expected);
 
-    let mut means = groups(&vec![NOTHING; count]);
+    let mut means = vec![NOTHING; count];
     dispatch(block, count as u32, |id, push| plane_sweep::window_cost(id, push, &sums, &mut means));
-    let sums = planes_of(&sums);
     let mean = |(pixel, group)| window_cost(&block, &sums[..], pixel, group);
-    assert_eq!(planes_of(&means), elements(block.group_count, count).map(mean).collect::<Vec<Planes>>());
+    assert_eq!(means, elements(block.group_count, count).map(mean).collect::<Vec<Planes>>());
 }
 
 #[test]
@@ -118,13 +115,13 @@ fn paths_are_core_s() {
             expected.extend((0..block.group_count as usize).map(|group| state.costs(group)));
         }
     }
-    assert_eq!(planes_of(&paths), expected);
-
-    let mut costs = groups(&vec![NOTHING; count]);
-    dispatch(block, count as u32, |id, push| plane_sweep::join_paths(id, push, &paths, &mut costs));
     let paths = planes_of(&paths);
+    assert_eq!(paths, expected);
+
+    let mut costs = vec![NOTHING; count];
+    dispatch(block, count as u32, |id, push| plane_sweep::join_paths(id, push, &paths, &mut costs));
     let joined = |(pixel, group)| joined_cost(&block, &paths[..], pixel, group);
-    assert_eq!(planes_of(&costs), elements(block.group_count, count).map(joined).collect::<Vec<Planes>>());
+    assert_eq!(costs, elements(block.group_count, count).map(joined).collect::<Vec<Planes>>());
 }
 
 #[test]

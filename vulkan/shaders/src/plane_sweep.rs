@@ -54,9 +54,9 @@ pub fn census_cost(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<FrustumBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] pairs: &[ViewPair],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] grey: &[PlaneVectors],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] evidence: &[PlaneVectors],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] costs: &mut [PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] grey: &[Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] evidence: &[Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] costs: &mut [Planes],
 ) {
     if id.x >= push.piece.count {
         return;
@@ -64,11 +64,11 @@ pub fn census_cost(
     let frustum = &push.parameters;
     let element = push.piece.first + id.x;
     let (pixel, group) = (element / frustum.group_count, element % frustum.group_count);
-    let [cost, weight] = census::census_cost(frustum, pairs, &Groups(grey), &Groups(evidence), pixel, group);
+    let [cost, weight] = census::census_cost(frustum, pairs, grey, evidence, pixel, group);
     let first = frustum.first_row * frustum.camera.width * frustum.group_count;
     let at = 2 * (first + element) as usize;
-    costs[at] = plane_vectors(&cost);
-    costs[at + 1] = plane_vectors(&weight);
+    costs[at] = cost;
+    costs[at + 1] = weight;
 }
 
 /// Costs summed over a row's part of the windows around group and pixel number `first + id.x`.
@@ -76,20 +76,20 @@ pub fn census_cost(
 pub fn row_sums(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<WindowBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] costs: &[PlaneVectors],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] sums: &mut [PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] costs: &[Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] sums: &mut [Planes],
 ) {
     if id.x >= push.piece.count {
         return;
     }
     let block = &push.parameters;
     let element = push.piece.first + id.x;
-    let found = window::row_sums(block, &Groups(costs), element / block.group_count, element % block.group_count);
+    let found = window::row_sums(block, costs, element / block.group_count, element % block.group_count);
     let mut window = 0;
     while window < 3 {
         let at = 6 * element as usize + 2 * window;
-        sums[at] = plane_vectors(&found[window][0]);
-        sums[at + 1] = plane_vectors(&found[window][1]);
+        sums[at] = found[window][0];
+        sums[at + 1] = found[window][1];
         window += 1;
     }
 }
@@ -99,16 +99,16 @@ pub fn row_sums(
 pub fn window_cost(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<WindowBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] sums: &[PlaneVectors],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] means: &mut [PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] sums: &[Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] means: &mut [Planes],
 ) {
     if id.x >= push.piece.count {
         return;
     }
     let block = &push.parameters;
     let element = push.piece.first + id.x;
-    let mean = window::window_cost(block, &Groups(sums), element / block.group_count, element % block.group_count);
-    means[element as usize] = plane_vectors(&mean);
+    means[element as usize] =
+        window::window_cost(block, sums, element / block.group_count, element % block.group_count);
 }
 
 /// The joined costs of line number `first + id.x`.
@@ -144,16 +144,15 @@ pub fn follow_paths(
 pub fn join_paths(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<CostBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] paths: &[PlaneVectors],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] costs: &mut [PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] paths: &[Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] costs: &mut [Planes],
 ) {
     if id.x >= push.piece.count {
         return;
     }
     let block = &push.parameters;
     let element = push.piece.first + id.x;
-    let joined = path::joined_cost(block, &Groups(paths), element / block.group_count, element % block.group_count);
-    costs[element as usize] = plane_vectors(&joined);
+    costs[element as usize] = path::joined_cost(block, paths, element / block.group_count, element % block.group_count);
 }
 
 /// Disparity and confidence of pixel number `first + id.x` of a view.
