@@ -15,7 +15,8 @@
 //!   elements of a dispatch.
 //! - `twin`: the CPU runs a faster form of its own (`host/device/src/cpu/`); the body is then the definition that the form
 //!   is tested against. Without it the CPU calls the body or its parts for every element.
-//! - `tiled`: a workgroup computes a tile together, in memory that it shares. The definition is the body here too.
+//! - `tiled`: a workgroup computes a tile together, in memory that it shares. The definition is the body here too. There
+//!   is an entry point for each [`Form`] of a tile, with the same bits in its outputs; a device takes the fastest.
 //! - Arrays stand in the order of their bindings. `Element` is what a buffer on the host holds; `as EntryElement` is there
 //!   where the entry point takes several of them at once. The kinds of arrays are
 //!
@@ -39,7 +40,7 @@
 
 mod kernel;
 
-pub use kernel::{Access, Array, Kernel, Layout, Piece, SHARED_BYTES, WORKGROUP, tile_elements};
+pub use kernel::{Access, Array, Form, Kernel, Layout, Piece, SHARED_BYTES, WORKGROUP, tile_elements};
 
 // What the rows name.
 pub use crate::attention::{EMBEDDING, FourierEmbedding};
@@ -51,6 +52,7 @@ pub use crate::finite::FINITE_RUN;
 pub use crate::fuse::FuseBlock;
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
 pub use crate::half_precision::word_count;
+pub use crate::limits::ChainBlock;
 pub use crate::network::attend::MatrixBlock;
 pub use crate::network::convolve::ConvolveBlock;
 pub use crate::network::depthwise::DepthwiseBlock;
@@ -137,8 +139,8 @@ macro_rules! for_each_kernel {
                 write visible: f32,
             }
             /// Latents where points appear in a view: its part of `gathered[view][point][channel]`, from the view's
-            /// `grid[row][column][channel]`. An element is a channel of a point.
-            GatherLatents gather_latents(block: GatherBlock) [0..block.point_count * block.channel_count]
+            /// `grid[row][column][channel]`. An element is four channels of a point.
+            GatherLatents gather_latents(block: GatherBlock) [0..block.point_count * block.four_count()]
             by pixelnerf::gathered_value, twin {
                 read views: CameraBlock,
                 read points: RayPoint,
@@ -514,6 +516,17 @@ macro_rules! for_each_kernel {
             AddNoise add_noise(block: NoiseBlock; element_count) [0..element_count] by sampler::noisy_element {
                 read picture: f32,
                 write noisy: f32,
+            }
+            /// Numbers copied, to measure how fast a device reads and writes. An element is four numbers.
+            CopyNumbers copy_numbers(; element_count) [0..element_count] by limits::copied, twin {
+                read numbers: [f32; 4],
+                write copies: [f32; 4],
+            }
+            /// Numbers multiplied and added to, to measure how fast a device computes: `ends[element]` from
+            /// `starts[element]`. An element is several chains.
+            MultiplyAdd multiply_add(block: ChainBlock; element_count) [0..element_count] by limits::chained, twin {
+                read starts: f32,
+                write ends: f32,
             }
         }
     };

@@ -29,6 +29,7 @@
 //! sampler           samplers with few calls of the denoiser        Sampler, Mix, History, Churn, verdict
 //! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
 //! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend
+//! limits            what a device can do at most                   chained, copied
 //! metrics           picture quality                                psnr, ssim
 //! kernels           the list of kernels, one row each              Kernel, for_each_kernel
 //! ```
@@ -49,6 +50,7 @@ pub mod genvs;
 pub mod half_precision;
 pub mod kernels;
 pub mod lens;
+pub mod limits;
 pub mod lookup;
 pub mod math;
 pub mod metrics;

@@ -133,6 +133,12 @@ impl GatherBlock {
     pub fn first(&self) -> usize {
         self.view as usize * self.point_count as usize * self.channel_count as usize
     }
+
+    /// Fours of a point's channels, the last of which may be fewer.
+    #[inline]
+    pub fn four_count(&self) -> u32 {
+        self.channel_count.div_ceil(4)
+    }
 }
 
 /// Where a view's grid is looked up for a point: nodes and shares of columns and of rows.

@@ -122,7 +122,7 @@ fn stages(criterion: &mut Criterion) {
     group.bench_function("random points of the object's box, 20 views", |bencher| {
         bencher.iter(|| {
             for point in &points {
-                black_box(sample(&object, &views, &footprints, &texels[..], &depths[..], weights, *point));
+                black_box(sample(&object, &views[..], &footprints, &texels[..], &depths[..], weights, *point));
             }
         });
     });

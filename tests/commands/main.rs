@@ -1,5 +1,6 @@
 //! The command `viewfuse` from start to end on the sample scene: what it prints, and what it writes.
 
+mod bench;
 mod browser;
 mod budget;
 mod check;
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let trials = [
         trials(),
+        bench::trials(),
         budget::trials(),
         check::trials(),
         clouds::trials(),
@@ -120,6 +122,7 @@ fn help_fits_and_gives_examples() {
         "devices",
         "verify",
         "check",
+        "bench",
     ];
     for name in commands {
         let help = done(here, &format!("{name} --help"));

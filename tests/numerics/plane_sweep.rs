@@ -94,7 +94,7 @@ fn blended(swept: &Swept, block: &BlendBlock, costs: &[Planes]) -> Vec<Blended> 
     (0..block.target.width * block.target.height)
         .map(|pixel| {
             let at = [pixel % block.target.width, pixel / block.target.width].map(|side| side as f32 + 0.5);
-            blend(block, &swept.views, &swept.texels[..], &swept.disparities[..], costs, at)
+            blend(block, &swept.views[..], &swept.texels[..], &swept.disparities[..], &costs[..], at)
         })
         .collect()
 }
@@ -148,7 +148,7 @@ fn the_order_of_views_does_not_matter() {
         turned.pairs.reverse();
         let found = |swept: &Swept, pixel| {
             let Swept { frustum, views, pairs, texels, disparities } = swept;
-            evidence(frustum, views, pairs, &texels[..], &disparities[..], pixel, 0)
+            evidence(frustum, &views[..], pairs, &texels[..], &disparities[..], pixel, 0)
         };
         let mut compared = 0;
         for pixel in 0..swept.frustum.camera.width * swept.frustum.camera.height {
@@ -197,7 +197,7 @@ fn census_does_not_mind_exposure() {
     let mut swept = Swept::new(2, 60);
     let (grey, evidence) = stairs(&mut swept);
     let cost = |grey: &[Planes]| -> Vec<[Planes; 2]> {
-        (0..16).map(|pixel| census_cost(&swept.frustum, &swept.pairs, grey, &evidence, pixel, 0)).collect()
+        (0..16).map(|pixel| census_cost(&swept.frustum, &swept.pairs, &grey[..], &evidence[..], pixel, 0)).collect()
     };
     let before = cost(&grey);
     let with = |change: fn(f32) -> f32| {
@@ -372,7 +372,7 @@ fn equal_costs_are_far_and_unsure() {
 fn what_is_not_seen_is_not_compared() {
     let swept = facing(4);
     let Swept { frustum, views, pairs, texels, disparities } = &swept;
-    let found = evidence(frustum, views, pairs, &texels[..], &disparities[..], 0, 0);
+    let found = evidence(frustum, &views[..], pairs, &texels[..], &disparities[..], 0, 0);
     let last = PLANES - 1;
     // The corner lies beyond the images of the cameras to the right and below on every plane but the first.
     assert_eq!([0, 1, 2, 3].map(|view| found.grey[view][last] == UNSEEN), [true, false, true, false]);

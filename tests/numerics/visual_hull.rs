@@ -67,7 +67,7 @@ fn hull_alpha_agrees() {
     let case: Case = |actual, expected, results| {
         for point in expected.points(2000) {
             for least in [0.02, 0.3] {
-                let found = hull_alpha(&actual.object, &actual.views, &actual.texels[..], point, least);
+                let found = hull_alpha(&actual.object, &actual.views[..], &actual.texels[..], point, least);
                 results.push(found, oracle::hull_alpha(&expected.scene(), camera_oracle::point(point.into()), least));
             }
         }
@@ -101,7 +101,7 @@ fn sample_agrees() {
     let case: Case = |actual, expected, results| {
         for point in expected.points(4000) {
             let World { object, views, footprints, texels, depths, weights, .. } = actual;
-            let found = sample(object, views, footprints, &texels[..], &depths[..], weights, point);
+            let found = sample(object, &views[..], footprints, &texels[..], &depths[..], weights, point);
             let World { footprints, depths, weights, .. } = expected;
             let place = camera_oracle::point(point.into());
             let wanted = oracle::sample(&expected.scene(), footprints, depths, weights, place);
@@ -126,7 +126,7 @@ fn hull_entry_ends_at_any_focal_length() {
     world.texels.iter_mut().for_each(|texel| texel[3] = 0.15);
     let World { object, views, texels, .. } = &world;
     let pixel = views[0].width * views[0].height / 2;
-    assert_eq!(hull_entry(object, views, &texels[..], 0, pixel), NO_SURFACE);
+    assert_eq!(hull_entry(object, &views[..], &texels[..], 0, pixel), NO_SURFACE);
 }
 
 /// Cameras a million units away, where depths are an eighth apart, with such a lens that steps are shorter.
@@ -144,6 +144,6 @@ fn hull_entry_ends_at_any_distance() {
     world.texels.iter_mut().for_each(|texel| texel[3] = 0.15);
     let World { object, views, texels, .. } = &world;
     for pixel in 0..views[0].width * views[0].height {
-        assert_eq!(hull_entry(object, views, &texels[..], 0, pixel), NO_SURFACE);
+        assert_eq!(hull_entry(object, &views[..], &texels[..], 0, pixel), NO_SURFACE);
     }
 }

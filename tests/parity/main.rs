@@ -4,6 +4,7 @@
 //! `VIEWFUSE_REQUIRE_VULKAN=1` asks for it, failing ones.
 
 mod faulty;
+mod forms;
 
 use faulty::Faulty;
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
     match vulkan_devices() {
         Ok((instance, adapters)) => {
             for adapter in adapters {
+                trials.extend(forms::trials(&instance, &adapter));
                 let (instance, name) = (instance.clone(), adapter.name.clone());
                 trials.extend(trials_of(&Candidate {
                     open: move || {

@@ -36,6 +36,10 @@ LEVELS = ((64, 3), (128, 4), (256, 6))
 WIDTH, BLOCKS, INJECTED, OCTAVES, FREQUENCY = 512, 5, 3, 6, 1.5
 
 
+# Where tensors are: --device.
+DEVICE = torch.device("cpu")
+
+
 # Parameters
 
 
@@ -59,7 +63,7 @@ def by_formula(name, shape, gain=1.0):
         u = np.float32(math.sqrt(3 / math.prod(shape[1:]))) * u
     else:
         u = 1 + np.float32(0.125) * u
-    return torch.from_numpy(u * np.float32(gain)).reshape(shape)
+    return torch.from_numpy(u * np.float32(gain)).reshape(shape).to(DEVICE)
 
 
 def architecture():
@@ -102,7 +106,7 @@ def parameters(model):
         return {name: by_formula(name, shape, gain(name)) for name, shape in architecture()}, 0.0
     with safe_open(model, "pt") as file:
         pixel_centre = float((file.metadata() or {}).get("viewfuse.pixel_centre", 0))
-    return {name: tensor.float() for name, tensor in load_file(model).items()}, pixel_centre
+    return {name: tensor.float().to(DEVICE) for name, tensor in load_file(model).items()}, pixel_centre
 
 
 # Network
@@ -222,7 +226,8 @@ def uniform_pairs(seed, pixels, samples):
                 y = (y << np.uint32(rotation) | y >> np.uint32(32 - rotation)) ^ x
             x = x + key[(group + 1) % 3]
             y = y + key[(group + 2) % 3] + np.uint32(group + 1)
-    return [torch.from_numpy((word >> np.uint32(8)).astype(np.float32) * np.float32(2**-24)) for word in (x, y)]
+    numbers = [(word >> np.uint32(8)).astype(np.float32) * np.float32(2**-24) for word in (x, y)]
+    return [torch.from_numpy(number).to(DEVICE) for number in numbers]
 
 
 def in_parts(rays, parts, inside, count):
@@ -269,7 +274,7 @@ def read_scene(folder, numbers):
             raise SystemExit(f"{name}.png has {pixels.shape[1]}x{pixels.shape[0]} pixels; square ones are needed")
         over_white = pixels[..., :3] * pixels[..., 3:] + 1 - pixels[..., 3:]
         images.append(torch.from_numpy(2 * over_white - 1).permute(2, 0, 1))
-    return torch.stack(images), torch.stack(poses), focal, torch.tensor([x, y])
+    return torch.stack(images).to(DEVICE), torch.stack(poses).to(DEVICE), focal, torch.tensor([x, y])
 
 
 def cast_rays(pose, focal, centre, scale, size, pixel_centre, near_far):
@@ -286,6 +291,13 @@ def cast_rays(pose, focal, centre, scale, size, pixel_centre, near_far):
 # Commands
 
 
+def now():
+    """Seconds, after all that was asked for is done."""
+    if DEVICE.type == "cuda":
+        torch.cuda.synchronize()
+    return time.perf_counter()
+
+
 def render(options):
     network = PixelNerf(*parameters(options.model))
     images, poses, focal, centre = read_scene(options.scene, [*options.sources, options.target])
@@ -294,9 +306,11 @@ def render(options):
         weights = torch.tensor([float(weight) for weight in options.weights.split(",")])
     network.set_views(poses[:-1], focal, centre, weights)
     torch.rand(64, 64) @ torch.rand(64, 64)  # starts the threads
-    start = time.perf_counter()
+    if DEVICE.type == "cuda":
+        network.encode(images[:-1])  # a GPU's libraries choose at the first use
+    start = now()
     network.encode(images[:-1])
-    encode_time = time.perf_counter() - start
+    encode_time = now() - start
     size = options.size or network.side
     rays = cast_rays(poses[-1], focal, centre, size / network.side, size, network.pixel_centre, options.near_far)
     pixels = np.arange(len(rays))
@@ -304,7 +318,7 @@ def render(options):
         pixels = pixels[np.arange(options.rays) * len(rays) // options.rays]
     rays = rays[pixels]
     picture = np.full((size**2, 3), np.nan, np.float32)
-    start = time.perf_counter()
+    start = now()
     # As many rays at a time as make four batches of the second pass: depths and weights need little memory then.
     for some in np.array_split(np.arange(len(rays)), -(-len(rays) * sum(options.samples) // (4 * options.batch))):
         some_rays, some_pixels = rays[some], pixels[some]
@@ -313,13 +327,14 @@ def render(options):
         if sum(options.samples[1:]) > 0:
             depths = fine_depths(some_rays, coarse, seen, depth, some_pixels, options.samples, options.seed)
             _, colours, _ = network.look(network.fine(), some_rays, depths, options.batch)
-        picture[some_pixels] = colours
-    render_time = time.perf_counter() - start
+        picture[some_pixels] = colours.cpu()
+    render_time = now() - start
     result = {
         "torch": torch.__version__,
         "blas": "mkl" if torch.backends.mkl.is_available() else "other",
         "instructions": torch.backends.cpu.get_cpu_capability(),
         "threads": torch.get_num_threads(),
+        "device": torch.cuda.get_device_name() if DEVICE.type == "cuda" else "cpu",
         "python": platform.python_version(),
         "encode": encode_time,
         "render": render_time,
@@ -395,7 +410,13 @@ def main():
     parser.add_argument("--threads", type=int, help="default: all cores")
     parser.add_argument("--output", help="write the picture here (.png)")
     parser.add_argument("--compare", metavar="PNG", help="compare with a picture of viewfuse")
+    parser.add_argument("--device", default="cpu", help="cpu, or cuda")
     options = parser.parse_args()
+    global DEVICE
+    DEVICE = torch.device(options.device)
+    torch.set_default_device(DEVICE)
+    # The same precision as everywhere else.
+    torch.backends.cudnn.allow_tf32 = False
     if options.threads:
         torch.set_num_threads(options.threads)
     with torch.inference_mode():

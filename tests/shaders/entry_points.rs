@@ -2,9 +2,11 @@
 //! exists, and store in the right place what core computes. Bits, not tolerances. Kernels that compute tiles wait for one
 //! another at barriers and cannot run so: their cases of parity cover them.
 
+mod limits;
 mod lists;
 mod networks;
 mod plane_sweep;
+mod vectors;
 mod visual_hull;
 mod volumes;
 
@@ -293,16 +295,17 @@ fn points_are_core_s() {
     let world = World::new(1);
     let (views, view_count) = (&world.views, world.views.len() as u32);
     let there = points_of(&world, 40);
+    let (words, at) = (vectors::cameras(views), vectors::points(&there));
     let block = EmbedBlock { point_count: 40, frequency_count: 3, frequency: 1.5 };
     let count = view_count * 40 * block.row_len();
     let mut embedded = vec![UNTOUCHED; count as usize];
-    dispatch(block, count, |id, push| points::embed_points(id, push, views, &there, &mut embedded));
+    dispatch(block, count, |id, push| points::embed_points(id, push, &words, &at, &mut embedded));
     let expected: Vec<f32> = (0..count as usize).map(|at| embedded_value(&views[..], &there[..], &block, at)).collect();
     assert_eq!(embedded, expected);
 
     let (weights, count) = (numbers(18, view_count as usize), 40 * view_count);
     let mut visible = vec![UNTOUCHED; count as usize];
-    dispatch(view_count, count, |id, push| points::visible_weights(id, push, views, &weights, &there, &mut visible));
+    dispatch(view_count, count, |id, push| points::visible_weights(id, push, &words, &weights, &at, &mut visible));
     let weight = |at: u32| {
         let point = &there[(at / view_count) as usize];
         visible_weight(&views[..], &weights[..], view_count, point, at % view_count)
@@ -311,7 +314,7 @@ fn points_are_core_s() {
 
     let raw = numbers(19, 160);
     let mut samples = vec![[UNTOUCHED; 4]; 40];
-    dispatch((), 40, |id, push| points::radiance(id, &push.piece, &raw, &there, &mut samples));
+    dispatch((), 40, |id, push| points::radiance(id, &push.piece, &raw, &at, &mut samples));
     for (at, point) in there.iter().enumerate() {
         assert_eq!(samples[point.sample as usize], radiance(&raw[at * 4..], point));
     }
@@ -320,26 +323,28 @@ fn points_are_core_s() {
 #[test]
 fn gather_latents_is_core_s() {
     let world = World::new(1);
-    let (views, there, grid) = (&world.views, points_of(&world, 40), numbers(20, 5 * 6 * 3));
-    let residual = numbers(21, views.len() * 120);
+    let (views, there, grid) = (&world.views, points_of(&world, 40), numbers(20, 5 * 6 * 6));
+    let (words, at) = (vectors::cameras(views), vectors::points(&there));
+    let residual = numbers(21, views.len() * 240);
     for has_residual in [0, 1] {
         let block = GatherBlock {
             view: 1,
             point_count: 40,
-            channel_count: 3,
+            // A four and two more.
+            channel_count: 6,
             height: 5,
             width: 6,
             has_residual,
             pixel_centre: 0.0,
         };
-        let mut gathered = vec![UNTOUCHED; views.len() * 120];
-        dispatch(block, 120, |id, push| {
-            points::gather_latents(id, push, views, &there, &grid, &residual, &mut gathered);
+        let mut gathered = vec![UNTOUCHED; views.len() * 240];
+        dispatch(block, 80, |id, push| {
+            points::gather_latents(id, push, &words, &at, &grid, &residual, &mut gathered);
         });
-        let own = StartingAt { all: &residual[..], first: 120 };
+        let own = StartingAt { all: &residual[..], first: 240 };
         let expected: Vec<f32> =
-            (0..120).map(|at| gathered_value(&views[..], &there[..], &grid[..], &own, &block, at)).collect();
-        assert_eq!(gathered[120..240], expected);
-        assert_eq!(gathered.iter().filter(|value| **value == UNTOUCHED).count(), gathered.len() - 120);
+            (0..240).map(|at| gathered_value(&views[..], &there[..], &grid[..], &own, &block, at)).collect();
+        assert_eq!(gathered[240..480], expected);
+        assert_eq!(gathered.iter().filter(|value| **value == UNTOUCHED).count(), gathered.len() - 240);
     }
 }

@@ -28,18 +28,24 @@ pub fn breaches(module: &Module) -> Vec<String> {
         breaches.unless(entry.operands[0] == Operand::ExecutionModel(ExecutionModel::GLCompute), || {
             format!("{name}: not a compute shader")
         });
-        breaches.unless(Kernel::ALL.iter().any(|kernel| kernel.name() == name), || format!("{name}: not a kernel"));
+        breaches.unless(entry_points().any(|(_, known)| known == name), || format!("{name}: not a kernel"));
         let double = entries.insert(name.clone(), id_of(entry, 1));
         breaches.unless(double.is_none(), || format!("{name}: two entry points"));
     }
-    for kernel in Kernel::ALL {
-        match entries.get(kernel.name()) {
-            Some(entry) => breaches.look_at_kernel(module, kernel, *entry),
-            None => breaches.said.push(format!("{}: no entry point", kernel.name())),
+    for (kernel, name) in entry_points() {
+        match entries.get(name) {
+            Some(entry) => breaches.look_at_kernel(module, kernel, name, *entry),
+            None => breaches.said.push(format!("{name}: no entry point")),
         }
     }
     breaches.look_at_arithmetic(module);
     breaches.said
+}
+
+/// Every entry point that should be there: one for each kernel and form.
+pub fn entry_points() -> impl Iterator<Item = (Kernel, &'static str)> {
+    let of_kernel = |kernel: Kernel| kernel.forms().iter().map(move |form| (kernel, kernel.entry_point(*form)));
+    Kernel::ALL.into_iter().flat_map(of_kernel)
 }
 
 struct Breaches<'a> {
@@ -96,8 +102,7 @@ impl Breaches<'_> {
         }
     }
 
-    fn look_at_kernel(&mut self, module: &Module, kernel: Kernel, entry: Word) {
-        let name = kernel.name();
+    fn look_at_kernel(&mut self, module: &Module, kernel: Kernel, name: &str, entry: Word) {
         let sizes: Vec<&[Operand]> = module
             .execution_modes
             .iter()
@@ -128,13 +133,12 @@ impl Breaches<'_> {
         self.unless(specialised == kernel.has_pages(), || {
             format!("{name}: {} the specialisation constant", if specialised { "uses" } else { "does not use" })
         });
-        self.look_at_buffers(kernel, &buffers);
+        self.look_at_buffers(kernel, name, &buffers);
         self.look_at_accesses(name, &functions);
-        self.look_at_sharing(kernel, &shared, &functions);
+        self.look_at_sharing(kernel, name, &shared, &functions);
     }
 
-    fn look_at_buffers(&mut self, kernel: Kernel, buffers: &[Word]) {
-        let name = kernel.name();
+    fn look_at_buffers(&mut self, kernel: Kernel, name: &str, buffers: &[Word]) {
         let mut bound = BTreeMap::new();
         for buffer in buffers {
             let set = self.declarations.decorated(*buffer, Decoration::DescriptorSet);
@@ -190,8 +194,7 @@ impl Breaches<'_> {
     }
 
     /// Tiles are computed in memory that the workgroup really shares; other kernels have none, and wait for nobody.
-    fn look_at_sharing(&mut self, kernel: Kernel, shared: &[Word], functions: &[&Function]) {
-        let name = kernel.name();
+    fn look_at_sharing(&mut self, kernel: Kernel, name: &str, shared: &[Word], functions: &[&Function]) {
         let bytes: usize = shared.iter().map(|variable| self.declarations.variable_bytes(*variable)).sum();
         self.unless((bytes > 0) == kernel.is_tiled() && bytes <= SHARED_BYTES, || {
             format!("{name}: {bytes} bytes of a workgroup's memory")

@@ -80,6 +80,17 @@ pub struct Adapter {
     pub(crate) offset_alignment: u64,
     pub(crate) extensions: Vec<&'static std::ffi::CStr>,
     pub(crate) has_memory_budget: bool,
+    pub(crate) identity: Identity,
+}
+
+/// What compiled pipelines and measurements depend on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Identity {
+    pub(crate) vendor: u32,
+    pub(crate) device: u32,
+    pub(crate) driver: u32,
+    /// `pipelineCacheUUID`.
+    pub(crate) cache: [u8; 16],
 }
 
 impl Instance {
@@ -174,7 +185,20 @@ impl Adapter {
             offset_alignment: own.min_storage_buffer_offset_alignment,
             extensions,
             has_memory_budget,
+            identity: Identity {
+                vendor: properties.vendor_id,
+                device: properties.device_id,
+                driver: properties.driver_version,
+                cache: properties.pipeline_cache_uuid,
+            },
         }
+    }
+
+    /// A name for what the device remembers: letters, digits and hyphens. Another driver has another one.
+    pub fn memory_name(&self) -> String {
+        let Identity { vendor, device, cache, .. } = self.identity;
+        let cache: String = cache.iter().map(|byte| format!("{byte:02x}")).collect();
+        format!("{vendor:x}-{device:x}-{cache}")
     }
 
     /// Chooses among [`Instance::adapters`]: by number, by a part of the name (in any case), or, for an empty text, any. Of

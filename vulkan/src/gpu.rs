@@ -1,21 +1,20 @@
 //! A device that runs kernels.
 
 use crate::adapter::{Adapter, AdapterKind, Limits};
-use crate::buffer::{Array, Bound, ranges};
+use crate::buffer::Array;
 use crate::error::VulkanError;
+use crate::forms::Choices;
 use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
-use crate::kernel::{Access, Kernel, Layout, Piece, WORKGROUP};
-use crate::pipelines::{Pipeline, Pipelines};
+use crate::kernel::{Access, Form, Kernel};
+use crate::pipelines::Pipelines;
 use crate::submissions::{Done, Submission, Submissions};
 use ash::vk;
-use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
-use viewfuse_core::pages::MOST_PAGES;
 
 /// Bytes of the widest element of an array in pages.
-const WIDEST_PAGED: u64 = 16;
+pub(crate) const WIDEST_PAGED: u64 = 16;
 
 /// Options of an opened device.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +29,8 @@ pub struct GpuOptions {
     pub closing: Duration,
     /// Limits that apply where they are lower than the device's own, so that tests can split work on any device.
     pub limits: Limits,
+    /// The form of all tiled kernels; `None` for the fastest, which is measured. The results are the same bits.
+    pub form: Option<Form>,
 }
 
 impl Default for GpuOptions {
@@ -37,7 +38,7 @@ impl Default for GpuOptions {
     fn default() -> GpuOptions {
         let limits =
             Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
-        GpuOptions { time_limit: None, barriers: true, closing: Duration::from_secs(10), limits }
+        GpuOptions { time_limit: None, barriers: true, closing: Duration::from_secs(10), limits, form: None }
     }
 }
 
@@ -73,17 +74,23 @@ pub struct Gpu {
     state: Mutex<State>,
     pub(crate) handle: Arc<Handle>,
     pub(crate) page_shift: u32,
-    barriers: bool,
+    pub(crate) barriers: bool,
+    pub(crate) form: Option<Form>,
+    pub(crate) is_software: bool,
 }
 
 pub(crate) struct State {
-    submissions: Submissions,
-    pipelines: Pipelines,
+    pub(crate) submissions: Submissions,
+    pub(crate) pipelines: Pipelines,
+    /// Forms of tiled kernels, as far as they are known.
+    pub(crate) choices: Choices,
+    /// How long elements took.
+    pub(crate) rates: [Rate; Kernel::ALL.len()],
     pub(crate) upload: Option<Memory>,
     pub(crate) download: Option<Memory>,
     /// The number of the interval of commands since the last barrier.
     stretch: u64,
-    tallies: [Tally; Kernel::ALL.len()],
+    pub(crate) tallies: [Tally; Kernel::ALL.len()],
     /// Whether the device failed: then the content of its memory is undefined.
     failed: Option<VulkanError>,
 }
@@ -120,13 +127,22 @@ impl Gpu {
         let state = State {
             submissions,
             pipelines,
+            choices: Choices::default(),
+            rates: [Rate::default(); Kernel::ALL.len()],
             upload: None,
             download: None,
             stretch: 1,
             tallies: [Tally::default(); Kernel::ALL.len()],
             failed: None,
         };
-        Ok(Gpu { state: Mutex::new(state), handle, page_shift: page_len.ilog2().min(31), barriers: options.barriers })
+        Ok(Gpu {
+            state: Mutex::new(state),
+            handle,
+            page_shift: page_len.ilog2().min(31),
+            barriers: options.barriers,
+            form: options.form,
+            is_software: adapter.kind == AdapterKind::Software,
+        })
     }
 
     /// The driver's name for it.
@@ -145,64 +161,6 @@ impl Gpu {
         usize::try_from(most).unwrap_or(usize::MAX) / bytes
     }
 
-    /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its
-    /// bindings, both as in its row.
-    ///
-    /// # Errors
-    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array cannot
-    /// be bound, and others if the device fails, or failed before.
-    pub fn dispatch(
-        &self,
-        kernel: Kernel,
-        parameters: &[u8],
-        elements: Range<u32>,
-        arrays: &[Bound<'_>],
-    ) -> Result<(), VulkanError> {
-        if elements.is_empty() {
-            return Ok(());
-        }
-        self.check_arguments(kernel, parameters, arrays)?;
-        let listed = kernel.arrays().iter().zip(arrays);
-        let page_len = 1_usize << self.page_shift;
-        let needs_pages = listed.clone().any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
-        let page_shift = if needs_pages { self.page_shift } else { 0 };
-        let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
-        self.with_state(|gpu, state| {
-            let pipeline = state.pipelines.get(kernel, page_shift)?;
-            let per_piece = gpu.handle.limits.workgroup_count.saturating_mul(WORKGROUP);
-            let mut dispatches = 0;
-            gpu.record(state, &uses, |device, submission, submissions| {
-                let set = gpu.bind(submission, &pipeline, listed, page_shift)?;
-                submissions.start_clock(submission, kernel);
-                // SAFETY: pipeline, set and constants are of the kernel's layout; the counts are within the limits.
-                unsafe {
-                    let (commands, compute) = (submission.commands, vk::PipelineBindPoint::COMPUTE);
-                    device.cmd_bind_pipeline(commands, compute, pipeline.raw);
-                    device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
-                    for first in elements.clone().step_by(per_piece as usize) {
-                        let piece = Piece { first, count: per_piece.min(elements.end - first) };
-                        let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
-                        let stage = vk::ShaderStageFlags::COMPUTE;
-                        // Pieces write different elements, but the validation layers only see whole arrays. Pieces are
-                        // large, so a barrier between them costs nothing.
-                        if dispatches > 0 && gpu.barriers {
-                            barrier(device, commands);
-                        }
-                        device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
-                        device.cmd_dispatch(commands, piece.count.div_ceil(WORKGROUP), 1, 1);
-                        dispatches += 1;
-                    }
-                }
-                submissions.stop_clock(submission);
-                Ok(())
-            })?;
-            let tally = &mut state.tallies[kernel as usize];
-            tally.dispatches += dispatches;
-            tally.elements += u64::from(elements.end - elements.start);
-            Ok(())
-        })
-    }
-
     /// Waits until all work is done.
     ///
     /// # Errors
@@ -216,7 +174,17 @@ impl Gpu {
         self.lock().tallies[kernel as usize]
     }
 
-    fn lock(&self) -> MutexGuard<'_, State> {
+    /// How many times commands were submitted so far. Dispatches are collected until somebody waits for them.
+    pub fn submission_count(&self) -> u64 {
+        self.lock().submissions.count()
+    }
+
+    /// Whether [`Tally::time`] is measured: the device has timestamps.
+    pub fn has_timestamps(&self) -> bool {
+        self.lock().submissions.has_clock()
+    }
+
+    pub(crate) fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -240,16 +208,15 @@ impl Gpu {
         outcome
     }
 
-    /// Records commands that use these arrays, after a barrier if they depend on commands since the last one, and submits
-    /// them.
+    /// Records commands that use these arrays, after a barrier if they depend on commands since the last one.
     pub(crate) fn record(
         &self,
         state: &mut State,
         uses: &[(&Arc<Array>, Access)],
         commands: impl FnOnce(&ash::Device, &mut Submission, &Submissions) -> Result<(), VulkanError>,
     ) -> Result<(), VulkanError> {
-        let State { submissions, tallies, stretch, .. } = state;
-        let mut submission = submissions.begin(&mut |done| count(tallies, done))?;
+        let State { submissions, tallies, rates, stretch, .. } = state;
+        let mut submission = submissions.take_open(&mut |done| count(tallies, rates, done))?;
         let depends = uses.iter().any(|(array, access)| {
             array.written_in.is(*stretch) || (*access == Access::Write && array.read_in.is(*stretch))
         });
@@ -266,120 +233,45 @@ impl Gpu {
                 Access::Write => array.written_in.set(*stretch),
             }
         }
-        match commands(&self.handle.device, &mut submission, submissions) {
-            Ok(()) => submissions.submit(submission),
-            Err(error) => {
-                submissions.discard(submission);
-                Err(error)
-            }
-        }
-    }
-
-    fn bind<'a>(
-        &self,
-        submission: &Submission,
-        pipeline: &Pipeline,
-        arrays: impl Iterator<Item = (&'a crate::kernel::Array, &'a Bound<'a>)>,
-        page_shift: u32,
-    ) -> Result<vk::DescriptorSet, VulkanError> {
-        let layouts = [pipeline.set_layout];
-        let info =
-            vk::DescriptorSetAllocateInfo::default().descriptor_pool(submission.descriptors).set_layouts(&layouts);
-        // SAFETY: the pool is as large as the largest set, and empty.
-        let set = unsafe { self.handle.device.allocate_descriptor_sets(&info) }
-            .map_err(|result| self.handle.failure("vkAllocateDescriptorSets", result))?[0];
-        let infos: Vec<[vk::DescriptorBufferInfo; 1]> = arrays
-            .flat_map(|(array, bound)| ranges(bound.0, array.layout, page_shift))
-            .map(|range| [vk::DescriptorBufferInfo { buffer: range.buffer, offset: range.offset, range: range.bytes }])
-            .collect();
-        let writes: Vec<_> = (0..)
-            .zip(&infos)
-            .map(|(binding, info)| {
-                vk::WriteDescriptorSet::default()
-                    .dst_set(set)
-                    .dst_binding(binding)
-                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
-                    .buffer_info(info)
-            })
-            .collect();
-        // SAFETY: the ranges lie in their buffers, which the submission holds.
-        unsafe { self.handle.device.update_descriptor_sets(&writes, &[]) };
-        Ok(set)
-    }
-
-    fn check_arguments(&self, kernel: Kernel, parameters: &[u8], arrays: &[Bound<'_>]) -> Result<(), VulkanError> {
-        let refuse = |detail| Err(VulkanError::Arguments { kernel: kernel.name(), detail });
-        if parameters.len() != kernel.parameter_bytes() {
-            return refuse(format!("{} bytes of parameters instead of {}", parameters.len(), kernel.parameter_bytes()));
-        }
-        let listed = kernel.arrays();
-        if arrays.len() != listed.len() {
-            return refuse(format!("{} arrays instead of {}", arrays.len(), listed.len()));
-        }
-        let (range, allocation) = (self.handle.limits.buffer_range, self.handle.limits.allocation);
-        // What makes pages as short as they are.
-        let (page_limit, most_page_bytes) = match range <= allocation {
-            true => ("maxStorageBufferRange", range),
-            false => ("maxMemoryAllocationSize", allocation),
-        };
-        for (array, bound) in listed.iter().zip(arrays) {
-            bound.0.check_owner(&self.handle)?;
-            let (len, stride) = (bound.0.len, bound.0.stride);
-            // Pages are counted in elements: there they must be the kernel's own.
-            let fits = match array.layout {
-                Layout::Whole | Layout::One => array.stride % stride == 0,
-                Layout::Pages => array.stride == stride,
-            };
-            if !fits {
-                return refuse(format!("{} of {stride} bytes an element instead of {}", array.name, array.stride));
-            }
-            let limit = |limit, needed, available| {
-                let pages = if array.layout == Layout::Pages { "a page of " } else { "" };
-                let what = format!("{pages}array {} of kernel {}", array.name, kernel.name());
-                Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available })
-            };
-            let bytes = (len * stride) as u64;
-            if bytes < array.least_bytes as u64 {
-                return refuse(format!("{} has {bytes} bytes instead of {}", array.name, array.least_bytes));
-            }
-            let shared = arrays.iter().filter(|other| Arc::ptr_eq(other.0, bound.0)).count() > 1;
-            if shared && array.access == Access::Write {
-                return refuse(format!("{} is written, and bound a second time", array.name));
-            }
-            let page_bytes = (len.min(1 << self.page_shift) * stride) as u64;
-            match array.layout {
-                Layout::Whole | Layout::One if bytes > range => return limit("maxStorageBufferRange", bytes, range),
-                Layout::Whole | Layout::One if bound.0.chunks.len() > 1 => {
-                    return limit("maxMemoryAllocationSize", bytes, allocation);
-                }
-                // Pages have a least length, for their offsets.
-                Layout::Pages if page_bytes > most_page_bytes => {
-                    return limit(page_limit, page_bytes, most_page_bytes);
-                }
-                Layout::Pages if len > MOST_PAGES << self.page_shift => {
-                    let page_len = len.div_ceil(MOST_PAGES).next_power_of_two() as u64;
-                    return limit(page_limit, page_len * WIDEST_PAGED, most_page_bytes);
-                }
-                _ => {}
-            }
-        }
-        Ok(())
+        let recorded = commands(&self.handle.device, &mut submission, submissions);
+        submissions.go_on(submission).and(recorded)
     }
 }
 
 impl State {
     pub(crate) fn wait(&mut self) -> Result<(), VulkanError> {
-        let State { submissions, tallies, .. } = self;
-        submissions.wait(&mut |done| count(tallies, done))
+        let State { submissions, tallies, rates, .. } = self;
+        submissions.wait(&mut |done| count(tallies, rates, done))
     }
 }
 
-fn count(tallies: &mut [Tally; Kernel::ALL.len()], done: Done) {
-    tallies[done.kernel as usize].time += done.time.unwrap_or_default();
+fn count(tallies: &mut [Tally; Kernel::ALL.len()], rates: &mut [Rate; Kernel::ALL.len()], done: Done) {
+    // Measurements of forms are not work that was asked for.
+    if done.elements > 0 {
+        let time = done.time.unwrap_or_default();
+        tallies[done.kernel as usize].time += time;
+        let rate = &mut rates[done.kernel as usize];
+        *rate = Rate { elements: rate.elements + done.elements, time: rate.time + time };
+    }
+}
+
+/// Elements of a kernel that are done, and the time that they took.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Rate {
+    elements: u64,
+    time: Duration,
+}
+
+impl Rate {
+    /// The time that so many elements are expected to take, if any have been measured.
+    pub(crate) fn time_of(&self, elements: u64) -> Option<Duration> {
+        let share = elements as f64 / self.elements as f64;
+        (self.elements > 0 && !self.time.is_zero()).then(|| self.time.mul_f64(share))
+    }
 }
 
 /// A barrier between all earlier and all later commands.
-fn barrier(device: &ash::Device, commands: vk::CommandBuffer) {
+pub(crate) fn barrier(device: &ash::Device, commands: vk::CommandBuffer) {
     let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
     let written = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
     let used = written | vk::AccessFlags::SHADER_READ | vk::AccessFlags::TRANSFER_READ;

@@ -1,6 +1,6 @@
 //! An opened device: its functions, its queue, its memory.
 
-use crate::adapter::{Adapter, Limits};
+use crate::adapter::{Adapter, Identity, Limits};
 use crate::error::{VulkanError, failed};
 use crate::instance::Instance;
 use ash::vk;
@@ -78,6 +78,11 @@ impl Handle {
             adapter: adapter.clone(),
             instance: instance.clone(),
         })
+    }
+
+    /// What is remembered depends on.
+    pub(crate) fn identity(&self) -> Identity {
+        self.adapter.identity
     }
 
     /// Whether this many more bytes are available.

@@ -9,5 +9,5 @@
 //! [`Piece`]. The specialisation constant 0, where a kernel binds pages, is the binary logarithm of a page's length, or 0
 //! if all of the scene lies on first pages: choosing pages is then left out of the pipeline.
 
-pub use viewfuse_core::kernels::{Access, Array, Kernel, Layout, Piece, SHARED_BYTES, WORKGROUP, tile_elements};
+pub use viewfuse_core::kernels::{Access, Array, Form, Kernel, Layout, Piece, SHARED_BYTES, WORKGROUP, tile_elements};
 pub use viewfuse_core::network::tile::TILE;

@@ -8,8 +8,11 @@
 //! kernel                         the list of kernels: names, arrays, parameters
 //! messages, instance, adapter    the loader, its drivers, their devices and missing requirements
 //! handle, buffer                 an opened device, memory in it
+//! forms                          forms of tiles: what is measured, what is chosen
 //! pipelines, submissions         pipelines of kernels, submitted commands
-//! gpu                            dispatches, split to fit the device
+//! gpu                            an opened device: its state, recorded commands
+//! remembered                     pipelines and forms from one process to the next
+//! dispatch                       dispatches, split to fit the device
 //! transfers                      arrays between host and device
 //! ```
 //!
@@ -17,13 +20,16 @@
 
 mod adapter;
 mod buffer;
+mod dispatch;
 mod error;
+mod forms;
 mod gpu;
 mod handle;
 mod instance;
 pub mod kernel;
 mod messages;
 mod pipelines;
+mod remembered;
 mod submissions;
 mod transfers;
 

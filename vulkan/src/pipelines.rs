@@ -1,15 +1,15 @@
-//! One pipeline per kernel and specialisation, created at its first use.
+//! One pipeline per kernel, form and specialisation, created at its first use.
 
 use crate::error::VulkanError;
 use crate::handle::Handle;
-use crate::kernel::Kernel;
+use crate::kernel::{Form, Kernel};
 use ash::vk;
 use std::collections::HashMap;
 use std::ffi::CString;
 use std::sync::Arc;
 
 /// The kernels, as `cargo shaders` compiles them.
-const MODULE: &[u8] = include_bytes!("kernels.spv");
+pub(crate) const MODULE: &[u8] = include_bytes!("kernels.spv");
 
 /// The pipeline of a kernel.
 #[derive(Clone, Copy)]
@@ -24,7 +24,9 @@ pub(crate) struct Pipelines {
     module: vk::ShaderModule,
     cache: vk::PipelineCache,
     layouts: HashMap<Kernel, (vk::DescriptorSetLayout, vk::PipelineLayout)>,
-    pipelines: HashMap<(Kernel, u32), vk::Pipeline>,
+    /// The data that the cache began with.
+    recalled: Vec<u8>,
+    pipelines: HashMap<(Kernel, Form, u32), vk::Pipeline>,
     handle: Arc<Handle>,
 }
 
@@ -34,6 +36,7 @@ impl Pipelines {
             module: vk::ShaderModule::null(),
             cache: vk::PipelineCache::null(),
             layouts: HashMap::new(),
+            recalled: Vec::new(),
             pipelines: HashMap::new(),
             handle: handle.clone(),
         };
@@ -48,12 +51,34 @@ impl Pipelines {
         Ok(pipelines)
     }
 
+    /// Begins with the data of another process's cache, which is of this device and driver. A driver that does not take it
+    /// goes on without.
+    pub(crate) fn recall(&mut self, data: &[u8]) {
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
+        let Handle { device, .. } = &*self.handle;
+        // SAFETY: the data has the header that the specification demands, of this device.
+        if let Ok(cache) = unsafe { device.create_pipeline_cache(&info, None) } {
+            // SAFETY: pipelines do not need the cache that they were created with.
+            unsafe { device.destroy_pipeline_cache(self.cache, None) };
+            self.cache = cache;
+            self.recalled = data.to_vec();
+        }
+    }
+
+    /// The cache's data, and whether it is other than the data that it began with.
+    pub(crate) fn cached(&self) -> (Vec<u8>, bool) {
+        // SAFETY: the cache is the device's.
+        let data = unsafe { self.handle.device.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
+        let has_new = !self.pipelines.is_empty() && data != self.recalled;
+        (data, has_new)
+    }
+
     /// The pipeline of a kernel for pages of `2^page_shift` elements; 0 leaves the choice of pages out.
-    pub(crate) fn get(&mut self, kernel: Kernel, page_shift: u32) -> Result<Pipeline, VulkanError> {
+    pub(crate) fn get(&mut self, kernel: Kernel, form: Form, page_shift: u32) -> Result<Pipeline, VulkanError> {
         let (set_layout, layout) = self.layouts(kernel)?;
-        let raw = match self.pipelines.get(&(kernel, page_shift)) {
+        let raw = match self.pipelines.get(&(kernel, form, page_shift)) {
             Some(pipeline) => *pipeline,
-            None => self.create(kernel, layout, page_shift)?,
+            None => self.create(kernel, form, layout, page_shift)?,
         };
         Ok(Pipeline { raw, layout, set_layout })
     }
@@ -97,6 +122,7 @@ impl Pipelines {
     fn create(
         &mut self,
         kernel: Kernel,
+        form: Form,
         layout: vk::PipelineLayout,
         page_shift: u32,
     ) -> Result<vk::Pipeline, VulkanError> {
@@ -104,7 +130,7 @@ impl Pipelines {
         let data = page_shift.to_ne_bytes();
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
         // No kernel's name has a zero in it.
-        let name = CString::new(kernel.name()).unwrap_or_default();
+        let name = CString::new(kernel.entry_point(form)).unwrap_or_default();
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(self.module)
@@ -119,7 +145,7 @@ impl Pipelines {
             Ok(pipelines) => pipelines[0],
             Err((_, result)) => return Err(self.handle.failure("vkCreateComputePipelines", result)),
         };
-        self.pipelines.insert((kernel, page_shift), pipeline);
+        self.pipelines.insert((kernel, form, page_shift), pipeline);
         Ok(pipeline)
     }
 }

@@ -1,7 +1,9 @@
 //! Submissions to the queue.
 //!
-//! Up to [`MOST_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next
-//! ones. A submission keeps its resources alive until its fence is signalled.
+//! Commands are recorded one behind the other into the open submission, which is submitted when somebody waits for it, or
+//! when it is full: of dispatches, of time that they are expected to take, or of memory that they hold. Up to
+//! [`MOST_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next ones. A
+//! submission keeps its resources alive until its fence is signalled.
 
 use crate::buffer::Array;
 use crate::error::VulkanError;
@@ -13,12 +15,20 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The most submissions in flight.
-const MOST_IN_FLIGHT: usize = 8;
+const MOST_IN_FLIGHT: usize = 4;
+/// The most dispatches of a submission.
+const MOST_DISPATCHES: usize = 128;
+/// The longest time that a submission is expected to take: far below the time limit, and short enough that a display
+/// that shares the device is not stopped.
+const MOST_TIME: Duration = Duration::from_millis(200);
+/// The most bytes of arrays that a submission holds, counted at each use.
+const MOST_HELD: u64 = 256 << 20;
 
-/// The work of a submission, for statistics.
+/// A dispatch that is done, for statistics.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Done {
     pub(crate) kernel: Kernel,
+    pub(crate) elements: u64,
     /// Time on the device, if it has timestamps.
     pub(crate) time: Option<Duration>,
 }
@@ -30,13 +40,46 @@ pub(crate) struct Submission {
     queries: vk::QueryPool,
     fence: vk::Fence,
     held: Vec<Arc<Array>>,
-    kernel: Option<Kernel>,
+    held_bytes: u64,
+    /// The kernels that are dispatched, and for how many elements.
+    dispatched: Vec<(Kernel, u64)>,
+    /// The time that they are expected to take.
+    expected: Duration,
+    /// Whether anything is recorded.
+    is_used: bool,
+}
+
+impl Submission {
+    fn clear(&mut self) {
+        self.held.clear();
+        self.held_bytes = 0;
+        self.dispatched.clear();
+        self.expected = Duration::ZERO;
+        self.is_used = false;
+    }
+
+    fn is_full(&self) -> bool {
+        self.dispatched.len() >= MOST_DISPATCHES || self.expected >= MOST_TIME || self.held_bytes >= MOST_HELD
+    }
+
+    /// What it does, for an error.
+    fn work(&self) -> String {
+        match (self.dispatched.first(), self.dispatched.last()) {
+            (Some((first, _)), Some((last, _))) if self.dispatched.iter().any(|(kernel, _)| kernel != first) => {
+                format!("{} kernels, from {} to {},", self.dispatched.len(), first.name(), last.name())
+            }
+            (Some((only, _)), _) => format!("kernel {}", only.name()),
+            (None, _) => "a transfer".to_owned(),
+        }
+    }
 }
 
 /// The queue's submissions, in order.
 pub(crate) struct Submissions {
     pool: vk::CommandPool,
     free: Vec<Submission>,
+    /// The one that commands are recorded into.
+    open: Option<Submission>,
     running: VecDeque<Submission>,
     /// Time limit of the oldest; `None` without a limit.
     time_limit: Option<Duration>,
@@ -48,6 +91,8 @@ pub(crate) struct Submissions {
     tick: Option<f32>,
     /// Valid bits of a timestamp.
     tick_mask: u64,
+    /// How many were submitted.
+    count: u64,
     handle: Arc<Handle>,
 }
 
@@ -68,18 +113,29 @@ impl Submissions {
         Ok(Submissions {
             pool,
             free: Vec::new(),
+            open: None,
             running: VecDeque::new(),
             time_limit,
             closing,
             is_late: false,
             tick: timestamps.map(|(period, _)| period),
             tick_mask: timestamps.map_or(0, |(_, bits)| u64::MAX >> (64 - bits.clamp(1, 64))),
+            count: 0,
             handle: handle.clone(),
         })
     }
 
-    /// Starts recording. If all submissions are in flight, it waits for the oldest first.
-    pub(crate) fn begin(&mut self, done: &mut impl FnMut(Done)) -> Result<Submission, VulkanError> {
+    /// How many were submitted so far.
+    pub(crate) fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The open submission, or a new one. If all are in flight, it waits for the oldest first. It comes back through
+    /// [`Submissions::go_on`].
+    pub(crate) fn take_open(&mut self, done: &mut impl FnMut(Done)) -> Result<Submission, VulkanError> {
+        if let Some(open) = self.open.take() {
+            return Ok(open);
+        }
         if self.running.len() >= MOST_IN_FLIGHT {
             self.wait_for_oldest(done)?;
         }
@@ -91,7 +147,15 @@ impl Submissions {
         // SAFETY: the commands are not in flight; the pool allows to record them again.
         let begun = unsafe { self.handle.device.begin_command_buffer(submission.commands, &info) };
         match begun {
-            Ok(()) => Ok(submission),
+            Ok(()) => {
+                if self.tick.is_some() {
+                    let count = 2 * MOST_DISPATCHES as u32;
+                    let Handle { device, .. } = &*self.handle;
+                    // SAFETY: the commands are being recorded; the pool has so many queries.
+                    unsafe { device.cmd_reset_query_pool(submission.commands, submission.queries, 0, count) };
+                }
+                Ok(submission)
+            }
             Err(result) => {
                 self.free.push(submission);
                 Err(self.handle.failure("vkBeginCommandBuffer", result))
@@ -99,20 +163,36 @@ impl Submissions {
         }
     }
 
-    /// Takes back a submission whose recording failed.
-    pub(crate) fn discard(&mut self, mut submission: Submission) {
+    /// Takes back the open submission, and submits it if it is full. What was recorded before a failure stays recorded:
+    /// a command that failed was not.
+    pub(crate) fn go_on(&mut self, submission: Submission) -> Result<(), VulkanError> {
+        let is_full = submission.is_full();
+        self.open = Some(submission);
+        if is_full { self.flush() } else { Ok(()) }
+    }
+
+    /// Submits what is recorded.
+    pub(crate) fn flush(&mut self) -> Result<(), VulkanError> {
+        match self.open.take() {
+            Some(open) if open.is_used => self.submit(open),
+            open => {
+                self.open = open;
+                Ok(())
+            }
+        }
+    }
+
+    /// Takes back a submission that could not be submitted.
+    fn discard(&mut self, mut submission: Submission) {
         let no_flags = vk::DescriptorPoolResetFlags::empty();
-        // A set that was allocated before the failure would leave no space for the next one. By the specification this call
-        // cannot fail; if it does, the next allocation reports it.
+        // By the specification this call cannot fail; if it does, the next allocation reports it.
         // SAFETY: the submission is not in flight.
         let _ = unsafe { self.handle.device.reset_descriptor_pool(submission.descriptors, no_flags) };
-        submission.held.clear();
-        submission.kernel = None;
+        submission.clear();
         self.free.push(submission);
     }
 
-    /// Submits recorded commands.
-    pub(crate) fn submit(&mut self, submission: Submission) -> Result<(), VulkanError> {
+    fn submit(&mut self, submission: Submission) -> Result<(), VulkanError> {
         let commands = [submission.commands];
         let info = [vk::SubmitInfo::default().command_buffers(&commands)];
         let Handle { device, queue, .. } = &*self.handle;
@@ -127,14 +207,18 @@ impl Submissions {
                 })
         };
         match submitted {
-            Ok(()) => self.running.push_back(submission),
+            Ok(()) => {
+                self.count += 1;
+                self.running.push_back(submission);
+            }
             Err(_) => self.discard(submission),
         }
         submitted
     }
 
-    /// Waits until all submissions are done.
+    /// Submits what is recorded, and waits until all submissions are done.
     pub(crate) fn wait(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
+        self.flush()?;
         while !self.running.is_empty() {
             self.wait_for_oldest(done)?;
         }
@@ -154,13 +238,15 @@ impl Submissions {
         waited.map_err(|result| match result {
             vk::Result::TIMEOUT => VulkanError::TimeLimit {
                 device: self.handle.name.clone(),
-                work: oldest.kernel.map_or("a transfer".to_owned(), |kernel| format!("kernel {}", kernel.name())),
+                work: oldest.work(),
                 limit: self.time_limit.unwrap_or_default(),
             },
             result => self.handle.failure("vkWaitForFences", result),
         })?;
-        if let Some(kernel) = oldest.kernel {
-            done(Done { kernel, time: self.time_of(oldest)? });
+        let ticks = self.ticks(oldest)?;
+        for (index, (kernel, elements)) in oldest.dispatched.iter().enumerate() {
+            let time = ticks.get(2 * index..2 * index + 2).map(|ticks| self.time_between(ticks[0], ticks[1]));
+            done(Done { kernel: *kernel, elements: *elements, time });
         }
         let no_flags = vk::DescriptorPoolResetFlags::empty();
         // SAFETY: the submission is done.
@@ -170,51 +256,61 @@ impl Submissions {
         fences.map_err(|result| self.handle.failure("vkResetFences", result))?;
         descriptors.map_err(|result| self.handle.failure("vkResetDescriptorPool", result))?;
         if let Some(mut oldest) = self.running.pop_front() {
-            oldest.held.clear();
-            oldest.kernel = None;
+            oldest.clear();
             self.free.push(oldest);
         }
         self.handle.check_messages()
     }
 
-    fn time_of(&self, submission: &Submission) -> Result<Option<Duration>, VulkanError> {
-        let Some(tick) = self.tick else { return Ok(None) };
-        let mut ticks = [0_u64; 2];
+    /// The timestamps of a submission that is done, two for each dispatch; none where the device has none.
+    fn ticks(&self, submission: &Submission) -> Result<Vec<u64>, VulkanError> {
+        if self.tick.is_none() || submission.dispatched.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut ticks = vec![0_u64; 2 * submission.dispatched.len()];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        // SAFETY: both queries were written by the submission, which is done.
+        // SAFETY: these queries were written by the submission, which is done.
         unsafe { self.handle.device.get_query_pool_results(submission.queries, 0, &mut ticks, flags) }
             .map_err(|result| self.handle.failure("vkGetQueryPoolResults", result))?;
-        let passed = ticks[1].wrapping_sub(ticks[0]) & self.tick_mask;
-        Ok(Some(Duration::from_nanos((passed as f64 * f64::from(tick)) as u64)))
+        Ok(ticks)
     }
 
-    /// Writes the timestamp before a kernel.
-    pub(crate) fn start_clock(&self, submission: &mut Submission, kernel: Kernel) {
-        submission.kernel = Some(kernel);
-        if self.tick.is_some() {
-            let Handle { device, .. } = &*self.handle;
-            // SAFETY: the commands are being recorded; the pool has two queries.
-            unsafe {
-                device.cmd_reset_query_pool(submission.commands, submission.queries, 0, 2);
-                // After all earlier commands: waiting for them is not the kernel's time.
-                let before = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
-                device.cmd_write_timestamp(submission.commands, before, submission.queries, 0);
-            }
-        }
+    fn time_between(&self, start: u64, end: u64) -> Duration {
+        let passed = end.wrapping_sub(start) & self.tick_mask;
+        Duration::from_nanos((passed as f64 * f64::from(self.tick.unwrap_or_default())) as u64)
     }
 
-    /// Writes the timestamp behind it.
-    pub(crate) fn stop_clock(&self, submission: &Submission) {
+    /// Whether the device has timestamps.
+    pub(crate) fn has_clock(&self) -> bool {
+        self.tick.is_some()
+    }
+
+    /// Writes the timestamp before a kernel, after all earlier commands: waiting for them is not its time.
+    pub(crate) fn start_clock(&self, submission: &Submission) {
+        self.write_timestamp(submission, 0);
+    }
+
+    /// Writes the timestamp behind it, and counts it. `expected` is the time that it is expected to take.
+    pub(crate) fn stop_clock(&self, submission: &mut Submission, kernel: Kernel, elements: u64, expected: Duration) {
+        self.write_timestamp(submission, 1);
+        submission.dispatched.push((kernel, elements));
+        submission.expected += expected;
+    }
+
+    fn write_timestamp(&self, submission: &Submission, place: u32) {
         if self.tick.is_some() {
+            let query = 2 * submission.dispatched.len() as u32 + place;
             let bottom = vk::PipelineStageFlags::BOTTOM_OF_PIPE;
-            // SAFETY: as above.
-            unsafe { self.handle.device.cmd_write_timestamp(submission.commands, bottom, submission.queries, 1) };
+            // SAFETY: the commands are being recorded; the pool has two queries for each dispatch, which were reset.
+            unsafe { self.handle.device.cmd_write_timestamp(submission.commands, bottom, submission.queries, query) };
         }
     }
 
     /// Keeps an array alive until the submission is done.
     pub(crate) fn hold(submission: &mut Submission, array: &Arc<Array>) {
+        submission.held_bytes += (array.len * array.stride) as u64;
         submission.held.push(array.clone());
+        submission.is_used = true;
     }
 
     fn create(&self) -> Result<Submission, VulkanError> {
@@ -223,9 +319,11 @@ impl Submissions {
         let bindings = Kernel::ALL.into_iter().map(|kernel| kernel.binding_count()).max().unwrap_or(1);
         let sizes = [vk::DescriptorPoolSize::default()
             .ty(vk::DescriptorType::STORAGE_BUFFER)
-            .descriptor_count(bindings as u32)];
-        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-        let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
+            .descriptor_count((bindings * MOST_DISPATCHES) as u32)];
+        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(MOST_DISPATCHES as u32).pool_sizes(&sizes);
+        let queries = vk::QueryPoolCreateInfo::default()
+            .query_type(vk::QueryType::TIMESTAMP)
+            .query_count(2 * MOST_DISPATCHES as u32);
         let commands = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
         let mut submission = Submission {
             commands: vk::CommandBuffer::null(),
@@ -233,7 +331,10 @@ impl Submissions {
             queries: vk::QueryPool::null(),
             fence: vk::Fence::null(),
             held: Vec::new(),
-            kernel: None,
+            held_bytes: 0,
+            dispatched: Vec::new(),
+            expected: Duration::ZERO,
+            is_used: false,
         };
         // SAFETY: all infos are complete. What was made before a failure is destroyed.
         let made = unsafe {
@@ -273,6 +374,10 @@ impl Submissions {
 
 impl Drop for Submissions {
     fn drop(&mut self) {
+        // Nobody waits for what is recorded only.
+        if let Some(open) = self.open.take() {
+            self.discard(open);
+        }
         // One that exceeded the time limit may still run: it gets a little longer, then its resources are not freed.
         let patience =
             if self.is_late { Some(self.closing) } else { self.time_limit.map(|limit| limit.max(self.closing)) };

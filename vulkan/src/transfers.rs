@@ -2,16 +2,19 @@
 
 use crate::buffer::{Array, Buffer, Stretch};
 use crate::error::VulkanError;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, State};
 use crate::handle::Memory;
 use crate::kernel::Access;
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Bytes of the staging buffer.
 const STAGING: u64 = 16 << 20;
+/// Most bytes that are recorded with the commands: the most of an update.
+const INLINE: usize = 64 << 10;
 
 impl Gpu {
     /// An array with these values.
@@ -21,7 +24,11 @@ impl Gpu {
     pub fn upload<T: Pod>(&self, values: &[T]) -> Result<Buffer<T>, VulkanError> {
         let buffer = self.array::<T>(values.len())?;
         let bytes: &[u8] = bytemuck::cast_slice(values);
+        let is_one_piece = buffer.array.chunks.len() == 1;
         self.with_state(|gpu, state| {
+            if is_one_piece && (1..=INLINE).contains(&bytes.len()) {
+                return gpu.update(state, &buffer.array, bytes);
+            }
             for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
                 let (from, mapped) = gpu.mapped(&mut state.upload)?;
@@ -37,6 +44,19 @@ impl Gpu {
             })
         })?;
         Ok(buffer)
+    }
+
+    /// Records the bytes of a short array with the commands: nobody waits.
+    fn update(&self, state: &mut State, array: &Arc<Array>, bytes: &[u8]) -> Result<(), VulkanError> {
+        // Updates take multiples of four bytes only, of which buffers have enough.
+        let mut padded = bytes.to_vec();
+        padded.resize(bytes.len().next_multiple_of(4), 0);
+        let to = array.chunks[0].buffer;
+        self.record(state, &[(array, Access::Write)], |device, submission, _| {
+            // SAFETY: the buffer is so long, and so is the longest update.
+            unsafe { device.cmd_update_buffer(submission.commands, to, 0, &padded) };
+            Ok(())
+        })
     }
 
     /// An array of zeros.

@@ -11,9 +11,53 @@ pub const WORKGROUP: u32 = 64;
 /// Bytes of memory that every device has for a workgroup.
 pub const SHARED_BYTES: usize = 16 << 10;
 
-/// Elements of a tiled kernel with so many outputs: whole tiles, each invocation 8 times 8 of a tile's outputs.
+/// Elements of a tiled kernel with so many outputs, in [`Form::Single`].
 pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
-    row_count.div_ceil(TILE) * column_count.div_ceil(TILE) * WORKGROUP
+    Form::Single.elements(row_count, column_count)
+}
+
+/// How many of a matrix product's tiles a workgroup computes at once. The sums of an output run along the inner index in
+/// every form: the results are the same bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Form {
+    /// One tile: 64 rows, 64 columns, 64 sums an invocation. The definition of the others, and what small products take.
+    #[default]
+    Single,
+    /// Two tiles beside each other: 64 rows, 128 columns, 128 sums an invocation.
+    Double,
+    /// Two by two tiles: 128 rows, 128 columns, 256 sums an invocation, more than a GPU keeps in registers. For drivers on
+    /// a CPU, where loads are dear.
+    Quadruple,
+}
+
+impl Form {
+    /// Every form.
+    pub const ALL: [Form; 3] = [Form::Single, Form::Double, Form::Quadruple];
+
+    /// Rows and columns in tiles.
+    pub const fn tiles(self) -> [u32; 2] {
+        match self {
+            Form::Single => [1, 1],
+            Form::Double => [1, 2],
+            Form::Quadruple => [2, 2],
+        }
+    }
+
+    /// Elements of a tiled kernel with so many outputs: whole groups of tiles, each invocation 8 times 8 outputs of a tile.
+    pub const fn elements(self, row_count: u32, column_count: u32) -> u32 {
+        let [rows, columns] = self.tiles();
+        row_count.div_ceil(TILE * rows) * column_count.div_ceil(TILE * columns) * WORKGROUP
+    }
+
+    /// Its name in records.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Form::Single => "single",
+            Form::Double => "double",
+            Form::Quadruple => "quadruple",
+        }
+    }
 }
 
 /// The elements of one dispatch; large work is split into several dispatches. Invocation `i` works on element
@@ -136,6 +180,19 @@ macro_rules! list {
                 }
             }
 
+            /// Name of its entry point for a form of tiles; only tiled kernels have others than [`Form::Single`].
+            pub const fn entry_point(self, form: Form) -> &'static str {
+                match form {
+                    Form::Single => self.name(),
+                    Form::Double => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_double"),)+
+                    },
+                    Form::Quadruple => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_quadruple"),)+
+                    },
+                }
+            }
+
             /// What it binds, in the order of the bindings.
             pub const fn arrays(self) -> &'static [Array] {
                 match self {
@@ -177,6 +234,11 @@ macro_rules! list {
 crate::for_each_kernel!(list);
 
 impl Kernel {
+    /// The forms that its entry points have.
+    pub const fn forms(self) -> &'static [Form] {
+        if self.is_tiled() { &Form::ALL } else { &[Form::Single] }
+    }
+
     /// Bytes of its push constants.
     pub const fn push_bytes(self) -> usize {
         self.parameter_bytes() + size_of::<Piece>()

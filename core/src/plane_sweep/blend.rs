@@ -86,10 +86,10 @@ pub fn visibility(
 #[inline]
 pub fn blend(
     block: &BlendBlock,
-    views: &[SweptView],
+    views: &(impl Fetch<SweptView> + ?Sized),
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     disparities: &(impl Fetch<[f32; 2]> + ?Sized),
-    costs: &[Planes],
+    costs: &(impl Fetch<Planes> + ?Sized),
     at: [f32; 2],
 ) -> Blended {
     let groups = block.group_count as usize;
@@ -122,7 +122,7 @@ pub fn blend(
                 let mut hull = 1.0;
                 let mut index = 0;
                 while index < block.view_count as usize {
-                    let view = &views[index];
+                    let view = &views.fetch(index);
                     let camera = &view.camera;
                     let seen = Track::new(&block.target, camera, at[0], at[1]).at(disparity);
                     let first = camera.first_texel as usize;
@@ -172,7 +172,7 @@ pub fn blend(
 
 /// The costs of all planes at an image coordinate of the target: bilinear in the volume.
 #[inline]
-fn pixel_costs(block: &BlendBlock, costs: &[Planes], at: [f32; 2]) -> [Planes; MOST_GROUPS] {
+fn pixel_costs(block: &BlendBlock, costs: &(impl Fetch<Planes> + ?Sized), at: [f32; 2]) -> [Planes; MOST_GROUPS] {
     let (width, height) = (block.volume_width, block.volume_height);
     let groups = block.group_count as usize;
     let (left, right, share_x) = split(at[0] * (width as f32 / block.target.width as f32), width);
@@ -186,7 +186,7 @@ fn pixel_costs(block: &BlendBlock, costs: &[Planes], at: [f32; 2]) -> [Planes; M
     while group < groups {
         let mut corner = 0;
         while corner < 4 {
-            let there = &costs[corners[corner] + group];
+            let there = costs.fetch(corners[corner] + group);
             let mut plane = 0;
             while plane < PLANES {
                 here[group][plane] += shares[corner] * there[plane];

@@ -56,7 +56,7 @@ pub fn planes_behind(surface: f32, disparity: f32, step: f32) -> f32 {
 #[inline]
 pub fn evidence(
     frustum: &FrustumBlock,
-    views: &[SweptView],
+    views: &(impl Fetch<SweptView> + ?Sized),
     pairs: &[ViewPair],
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     disparities: &(impl Fetch<[f32; 2]> + ?Sized),
@@ -70,7 +70,7 @@ pub fn evidence(
     let mut informed = [0.0; PLANES];
     let mut slot = 0;
     while slot < frustum.view_count as usize {
-        let view = &views[slot];
+        let view = &views.fetch(slot);
         let track = frustum.track(&view.camera, pixel);
         let mut plane = 0;
         while plane < PLANES {

@@ -3,6 +3,7 @@
 
 use super::{MOST_GROUPS, PLANES, Planes};
 use crate::math::min;
+use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
 /// Cost of a step to a neighbouring plane.
@@ -84,7 +85,7 @@ impl Line {
 
     /// Advances to a pixel with these costs, `costs[first..][group]`; the aggregated ones are [`Line::costs`].
     #[inline]
-    pub fn advance(&mut self, costs: &[Planes], first: usize, group_count: usize) {
+    pub fn advance(&mut self, costs: &(impl Fetch<Planes> + ?Sized), first: usize, group_count: usize) {
         let jump = self.least + JUMP_COST;
         let mut joined = [[0.0; PLANES]; MOST_GROUPS];
         let mut least = f32::MAX;
@@ -93,7 +94,7 @@ impl Line {
             let before = self.costs[group];
             let left = if group > 0 { self.costs[group - 1][PLANES - 1] } else { f32::MAX };
             let right = if group + 1 < group_count { self.costs[group + 1][0] } else { f32::MAX };
-            let own = costs[first + group];
+            let own = costs.fetch(first + group);
             let mut beside = [0.0; PLANES];
             beside[0] = min(left, before[1]);
             beside[PLANES - 1] = min(before[PLANES - 2], right);

@@ -36,7 +36,7 @@ pub fn look_up_alpha(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized
 #[inline]
 pub fn hull_alpha(
     object: &ObjectBlock,
-    views: &[CameraBlock],
+    views: &(impl Fetch<CameraBlock> + ?Sized),
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     point_world: Vec3,
     least: f32,
@@ -45,10 +45,11 @@ pub fn hull_alpha(
     let mut containing = 0;
     let mut view = 0;
     while view < object.view_count as usize {
-        let seen = views[view].project(point_world);
+        let camera = views.fetch(view);
+        let seen = camera.project(point_world);
         if seen.in_image {
             containing += 1;
-            let here = look_up_alpha(&views[view], texels, seen.x, seen.y);
+            let here = look_up_alpha(&camera, texels, seen.x, seen.y);
             if here < alpha {
                 alpha = here;
                 if alpha < least {
@@ -66,12 +67,12 @@ pub fn hull_alpha(
 #[inline]
 pub fn hull_entry(
     object: &ObjectBlock,
-    views: &[CameraBlock],
+    views: &(impl Fetch<CameraBlock> + ?Sized),
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     view: u32,
     pixel: u32,
 ) -> f32 {
-    let camera = &views[view as usize];
+    let camera = views.fetch(view as usize);
     if texels.fetch((camera.first_texel + pixel) as usize)[3] < LEAST_ALPHA {
         return NO_SURFACE;
     }

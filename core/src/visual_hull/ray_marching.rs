@@ -36,7 +36,7 @@ const _: () = assert!(size_of::<MarchBlock>() == 96);
 #[allow(clippy::too_many_arguments)]
 pub fn march_ray(
     object: &ObjectBlock,
-    views: &[CameraBlock],
+    views: &(impl Fetch<CameraBlock> + ?Sized),
     footprints: &[f32],
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     depths: &(impl Fetch<f32> + ?Sized),

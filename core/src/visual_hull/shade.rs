@@ -99,7 +99,7 @@ pub fn depth_at(view: &CameraBlock, depths: &(impl Fetch<f32> + ?Sized), x: f32,
 #[inline]
 pub fn sample(
     object: &ObjectBlock,
-    views: &[CameraBlock],
+    views: &(impl Fetch<CameraBlock> + ?Sized),
     footprints: &[f32],
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     depths: &(impl Fetch<f32> + ?Sized),
@@ -113,10 +113,11 @@ pub fn sample(
     let mut least_behind = NO_SURFACE;
     let mut view = 0;
     while view < object.view_count as usize {
-        let seen = views[view].project(point_world);
+        let camera = views.fetch(view);
+        let seen = camera.project(point_world);
         if seen.in_image {
             containing += 1;
-            let colour = look_up(&views[view], texels, seen.x, seen.y);
+            let colour = look_up(&camera, texels, seen.x, seen.y);
             let alpha = colour[3];
             hull = min(alpha, hull);
             if hull < EMPTY_ALPHA {
@@ -125,7 +126,7 @@ pub fn sample(
             let weight = weights[view];
             if weight > 0.0 {
                 let footprint = footprints[view];
-                let depth = depth_at(&views[view], depths, seen.x, seen.y, JUMP * footprint);
+                let depth = depth_at(&camera, depths, seen.x, seen.y, JUMP * footprint);
                 let distance = if depth < NO_SURFACE { (depth - seen.depth) / footprint } else { TRUNCATION };
                 let behind = max(-distance, 0.0);
                 least_behind = min(behind * footprint, least_behind);

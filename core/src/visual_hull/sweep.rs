@@ -101,7 +101,7 @@ impl SweepBlock {
 pub fn match_cost(
     object: &ObjectBlock,
     sweep: &SweepBlock,
-    views: &[CameraBlock],
+    views: &(impl Fetch<CameraBlock> + ?Sized),
     texels: &(impl Fetch<[f32; 4]> + ?Sized),
     entries: &(impl Fetch<f32> + ?Sized),
     pair_weights: &[f32],
@@ -130,12 +130,12 @@ impl SweptPixel {
     #[inline]
     pub fn new(
         sweep: &SweepBlock,
-        views: &[CameraBlock],
+        views: &(impl Fetch<CameraBlock> + ?Sized),
         texels: &(impl Fetch<[f32; 4]> + ?Sized),
         entries: &(impl Fetch<f32> + ?Sized),
         pixel: u32,
     ) -> SweptPixel {
-        let camera = &views[sweep.view as usize];
+        let camera = views.fetch(sweep.view as usize);
         let texel = (camera.first_texel + pixel) as usize;
         let (column, row) = (pixel % camera.width, pixel / camera.width);
         SweptPixel {
@@ -172,7 +172,7 @@ impl SweptPixel {
         &self,
         object: &ObjectBlock,
         sweep: &SweepBlock,
-        views: &[CameraBlock],
+        views: &(impl Fetch<CameraBlock> + ?Sized),
         texels: &(impl Fetch<[f32; 4]> + ?Sized),
         entries: &(impl Fetch<f32> + ?Sized),
         pair_weights: &[f32],
@@ -190,15 +190,16 @@ impl SweptPixel {
         let mut containing = 1;
         let mut other = 0;
         while other < object.view_count {
-            let seen = views[other as usize].project(point);
+            let camera = views.fetch(other as usize);
+            let seen = camera.project(point);
             if other != sweep.view && seen.in_image {
                 containing += 1;
-                let colour = look_up(&views[other as usize], texels, seen.x, seen.y);
+                let colour = look_up(&camera, texels, seen.x, seen.y);
                 if colour[3] < SWEPT_ALPHA {
                     return OUTSIDE;
                 }
                 let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
-                let entry = entries.fetch(views[other as usize].texel_at(seen.x, seen.y));
+                let entry = entries.fetch(camera.texel_at(seen.x, seen.y));
                 let share = weight * fade(max(seen.depth - entry, 0.0) * reach);
                 // For a view that does not see the point only the silhouette counts.
                 if share > 0.0 {

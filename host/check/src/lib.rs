@@ -19,6 +19,7 @@
 //! case, cases                   one for each kernel: inputs, dispatch, expected outputs
 //! report, measure               the check of a device's kernels
 //! picture                       a whole picture compared with the CPU's
+//! rates                         rates of kernels beside the device's limits
 //! verify                        this build compared with files of reference values
 //! ```
 #![forbid(unsafe_code)]
@@ -40,6 +41,7 @@ pub mod oracle;
 pub mod picture;
 pub mod point_oracle;
 pub mod poses;
+pub mod rates;
 pub mod ray_oracle;
 pub mod report;
 pub mod sights;

@@ -1,5 +1,6 @@
 //! The command line: what each command takes. What each does is in its own file.
 
+mod bench;
 mod check;
 mod compare;
 mod convert;
@@ -101,6 +102,8 @@ enum Command {
     Verify(verify::Arguments),
     /// Compare every kernel on each device with an evaluation in double precision.
     Check(check::Arguments),
+    /// Measure the rates of kernels beside what each device can do at most.
+    Bench(bench::Arguments),
 }
 
 pub(crate) use ending::INTERRUPTED;
@@ -141,6 +144,7 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
+        Command::Bench(arguments) => bench::run(&arguments),
     }
 }
 

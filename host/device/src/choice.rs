@@ -4,6 +4,7 @@ use super::cpu::Cpu;
 use super::memory::Memory;
 use super::vulkan::Vulkan;
 use std::fmt;
+use std::path::PathBuf;
 use std::str::FromStr;
 use std::sync::Arc;
 use viewfuse_vulkan::{Adapter, GpuOptions, Instance, InstanceOptions, VulkanError};
@@ -82,6 +83,17 @@ pub struct DeviceOptions {
     pub instance: InstanceOptions,
     /// Options of a Vulkan device.
     pub gpu: GpuOptions,
+    /// Folder where Vulkan devices remember what they compiled and measured; without one, each process does it anew.
+    pub memory: Option<PathBuf>,
+}
+
+impl DeviceOptions {
+    fn open(&self, instance: &Arc<Instance>, adapter: &Adapter) -> Result<Vulkan, VulkanError> {
+        match &self.memory {
+            Some(folder) => Vulkan::open_with_memory(instance, adapter, &self.gpu, folder),
+            None => Vulkan::open(instance, adapter, &self.gpu),
+        }
+    }
 }
 
 /// Opens the requested device.
@@ -95,7 +107,7 @@ pub fn open(choice: &DeviceChoice, options: &DeviceOptions) -> Result<Chosen, Vu
         DeviceChoice::Vulkan(wanted) => {
             let (instance, adapters) = vulkan_devices(&options.instance)?;
             let adapter = Adapter::choose(&adapters, wanted)?;
-            let device = Vulkan::open(&instance, adapter, &options.gpu)?;
+            let device = options.open(&instance, adapter)?;
             Ok(Chosen { device: AnyDevice::Vulkan(Box::new(device)), reason: "requested".to_owned() })
         }
         DeviceChoice::Auto => Ok(match automatic(options) {
@@ -132,7 +144,7 @@ pub fn open_several(requested: &[DeviceChoice], options: &DeviceOptions) -> Resu
     match vulkan_devices(&options.instance) {
         Ok((instance, adapters)) => {
             for adapter in &adapters {
-                match Vulkan::open(&instance, adapter, &options.gpu) {
+                match options.open(&instance, adapter) {
                     Ok(device) => several.devices.push(AnyDevice::Vulkan(Box::new(device))),
                     Err(error @ VulkanError::Missing { .. }) => several.notes.push(format!("left aside: {error}")),
                     Err(error) => several.failures.push(error.to_string()),
@@ -155,7 +167,7 @@ fn automatic(options: &DeviceOptions) -> Result<Vulkan, String> {
             reasons.push(format!("{} is not a GPU", adapter.name));
             continue;
         }
-        match Vulkan::open(&instance, adapter, &options.gpu) {
+        match options.open(&instance, adapter) {
             Ok(device) => return Ok(device),
             Err(error) => reasons.push(error.to_string()),
         }

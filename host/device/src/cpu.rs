@@ -6,6 +6,7 @@
 
 mod compositing;
 mod group_norm;
+mod limits;
 mod linear;
 mod lists;
 mod matrices;
@@ -25,6 +26,7 @@ use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use compositing::*;
 use group_norm::*;
+use limits::*;
 use lists::*;
 use matrices::*;
 use network::*;

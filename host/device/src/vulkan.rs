@@ -4,19 +4,26 @@ use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory, Transfers};
 use bytemuck::bytes_of;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_core::for_each_kernel;
 use viewfuse_core::kernels::*;
+use viewfuse_job::files::{read_at_most, write_whole};
 use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
-/// A Vulkan device. Calls return when their work is submitted; only a download waits for it.
+/// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when there is
+/// enough of it.
 pub struct Vulkan {
     gpu: Gpu,
     transfers: Mutex<Transfers>,
+    /// Where it remembers what it measured and compiled.
+    memory: Option<PathBuf>,
 }
 
 /// Elements of a kernel that keep a GPU busy.
 const BUSY_ELEMENTS: usize = 1 << 16;
+/// Most bytes of what a device remembers: more is not its own.
+const MOST_REMEMBERED: u64 = 256 << 20;
 
 impl Vulkan {
     /// Opens a device.
@@ -24,7 +31,38 @@ impl Vulkan {
     /// # Errors
     /// [`VulkanError`].
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Vulkan, VulkanError> {
-        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)?, transfers: Mutex::default() })
+        Ok(Vulkan { gpu: Gpu::open(instance, adapter, options)?, transfers: Mutex::default(), memory: None })
+    }
+
+    /// As [`Vulkan::open`], with a folder where the device remembers compiled pipelines and which forms of its kernels were
+    /// the fastest: they are read now, and written when the device is closed, if there are new ones. A file of another
+    /// driver or of other kernels, and a damaged one, is replaced. A folder that cannot be written costs only time.
+    ///
+    /// # Errors
+    /// [`VulkanError`].
+    pub fn open_with_memory(
+        instance: &Arc<Instance>,
+        adapter: &Adapter,
+        options: &GpuOptions,
+        folder: &Path,
+    ) -> Result<Vulkan, VulkanError> {
+        let mut vulkan = Vulkan::open(instance, adapter, options)?;
+        let file = folder.join(format!("{}.kernels", adapter.memory_name()));
+        if let Ok(bytes) = read_at_most(&file, MOST_REMEMBERED) {
+            vulkan.gpu.recall(&bytes);
+        }
+        vulkan.memory = Some(file);
+        Ok(vulkan)
+    }
+
+    /// How many times commands were submitted so far.
+    pub fn submission_count(&self) -> u64 {
+        self.gpu.submission_count()
+    }
+
+    /// Whether times of kernels are measured.
+    pub fn has_timestamps(&self) -> bool {
+        self.gpu.has_timestamps()
     }
 
     fn counted(&self) -> MutexGuard<'_, Transfers> {
@@ -34,6 +72,15 @@ impl Vulkan {
     /// The dispatches of a kernel, up to the last download.
     pub fn tally(&self, kernel: Kernel) -> Tally {
         self.gpu.tally(kernel)
+    }
+}
+
+impl Drop for Vulkan {
+    fn drop(&mut self) {
+        if let (Some(file), Some(bytes)) = (&self.memory, self.gpu.remembered()) {
+            // What could not be kept is made anew.
+            let _ = write_whole(file, &bytes);
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! The plane sweep. Arrays that may lie in pages are on one and on four.
 
+use super::vectors::{arrays, fours, groups, planes as planes_of, swept_views, twos};
 use super::visual_hull::{page_shift, pages, pages_mut};
 use super::{UNTOUCHED, dispatch};
 use viewfuse::check::swept::{Swept, band, costs};
@@ -28,7 +29,7 @@ fn elements(group_count: u32, count: usize) -> impl Iterator<Item = (u32, u32)> 
     (0..count as u32).map(move |element| (element / group_count, element % group_count))
 }
 
-fn groups(volume: &CostBlock) -> usize {
+fn group_count(volume: &CostBlock) -> usize {
     (volume.width * volume.height * volume.group_count) as usize
 }
 
@@ -43,13 +44,15 @@ fn compare_views_is_core_s() {
     let swept = swept();
     let Swept { frustum, views, pairs, texels, disparities } = &swept;
     let count = swept.band_len();
-    let (mut grey, mut found) = (vec![NOTHING; views.len() * count], vec![NOTHING; 4 * count]);
+    let (mut grey, mut found) = (groups(&vec![NOTHING; views.len() * count]), groups(&vec![NOTHING; 4 * count]));
+    let (words, texel_fours, maps) = (swept_views(views), fours(texels), twos(disparities));
     dispatch(*frustum, count as u32, |id, push| {
-        plane_sweep::compare_views(id, push, views, pairs, texels, disparities, &mut grey, &mut found);
+        plane_sweep::compare_views(id, push, &words, pairs, &texel_fours, &maps, &mut grey, &mut found);
     });
+    let (grey, found) = (planes_of(&grey), planes_of(&found));
     let first = frustum.first_row * frustum.camera.width;
     for (element, (pixel, group)) in elements(frustum.group_count, count).enumerate() {
-        let expected = evidence(frustum, views, pairs, &texels[..], &disparities[..], first + pixel, group);
+        let expected = evidence(frustum, &views[..], pairs, &texels[..], &disparities[..], first + pixel, group);
         for (view, planes) in expected.grey[..views.len()].iter().enumerate() {
             assert_eq!(grey[view * count + element], *planes);
         }
@@ -70,7 +73,8 @@ fn census_cost_is_core_s() {
     dispatch(swept.frustum, count as u32, |id, push| {
         plane_sweep::census_cost(id, push, &swept.pairs, &grey, &evidence, &mut costs);
     });
-    let cost = |(pixel, group)| census::census_cost(&swept.frustum, &swept.pairs, &grey, &evidence, pixel, group);
+    let cost =
+        |(pixel, group)| census::census_cost(&swept.frustum, &swept.pairs, &grey[..], &evidence[..], pixel, group);
     let expected: Vec<Planes> = elements(group_count, count).flat_map(cost).collect();
     assert_eq!(costs[above..], expected);
     assert_eq!(costs[..above], vec![NOTHING; above]);
@@ -82,40 +86,41 @@ fn windows_are_core_s() {
     let block = WindowBlock { reach: [1, 2, 4], ..WindowBlock::new(&swept.frustum, 0.02) };
     let (volume, weighted) = planes(3, &swept);
     let weighted: Vec<Planes> = weighted.iter().flat_map(|cost| [*cost, cost.map(|cost| 2.0 * cost)]).collect();
-    let count = groups(&volume);
+    let count = group_count(&volume);
     let mut sums = vec![NOTHING; 6 * count];
     dispatch(block, count as u32, |id, push| plane_sweep::row_sums(id, push, &weighted, &mut sums));
-    let sum = |(pixel, group)| row_sums(&block, &weighted, pixel, group);
+    let sum = |(pixel, group)| row_sums(&block, &weighted[..], pixel, group);
     let expected: Vec<Planes> = elements(block.group_count, count).flat_map(sum).flatten().collect();
     assert_eq!(sums, expected);
 
     let mut means = vec![NOTHING; count];
     dispatch(block, count as u32, |id, push| plane_sweep::window_cost(id, push, &sums, &mut means));
-    let mean = |(pixel, group)| window_cost(&block, &sums, pixel, group);
+    let mean = |(pixel, group)| window_cost(&block, &sums[..], pixel, group);
     assert_eq!(means, elements(block.group_count, count).map(mean).collect::<Vec<Planes>>());
 }
 
 #[test]
 fn paths_are_core_s() {
     let (block, means) = planes(4, &swept());
-    let count = groups(&block);
-    let mut paths = vec![NOTHING; 4 * count];
-    dispatch(block, block.line_count(), |id, push| plane_sweep::follow_paths(id, push, &means, &mut paths));
+    let count = group_count(&block);
+    let (given, mut paths) = (groups(&means), groups(&vec![NOTHING; 4 * count]));
+    dispatch(block, block.line_count(), |id, push| plane_sweep::follow_paths(id, push, &given, &mut paths));
     let mut expected = Vec::new();
     for line in 0..block.line_count() {
         let (direction, number, step_count) = block.line(line);
         let mut state = Line::START;
         for step in 0..step_count {
             let pixel = block.pixel(direction, number, step);
-            state.advance(&means, (pixel * block.group_count) as usize, block.group_count as usize);
+            state.advance(&means[..], (pixel * block.group_count) as usize, block.group_count as usize);
             expected.extend((0..block.group_count as usize).map(|group| state.costs(group)));
         }
     }
+    let paths = planes_of(&paths);
     assert_eq!(paths, expected);
 
     let mut costs = vec![NOTHING; count];
     dispatch(block, count as u32, |id, push| plane_sweep::join_paths(id, push, &paths, &mut costs));
-    let joined = |(pixel, group)| joined_cost(&block, &paths, pixel, group);
+    let joined = |(pixel, group)| joined_cost(&block, &paths[..], pixel, group);
     assert_eq!(costs, elements(block.group_count, count).map(joined).collect::<Vec<Planes>>());
 }
 
@@ -142,27 +147,29 @@ fn blend_planes_is_core_s() {
     let expected: Vec<([f32; 4], f32, f32)> = (0..count)
         .map(|pixel| {
             let at = [pixel % block.target.width, pixel / block.target.width].map(|side| side as f32 + 0.5);
-            let seen = blend(&block, &views, &texels[..], &disparities[..], &costs, at);
+            let seen = blend(&block, &views[..], &texels[..], &disparities[..], &costs[..], at);
             (seen.colour, seen.depth, seen.confidence)
         })
         .collect();
     assert!(expected.iter().any(|(_, _, confidence)| *confidence > 0.0));
+    let (words, texel_fours, maps, cost_groups) =
+        (swept_views(&views), fours(&texels), twos(&disparities), groups(&costs));
     for shift in [0, page_shift(texels.len())] {
-        let mut colours = vec![[UNTOUCHED; 4]; count as usize];
+        let mut colours = fours(&vec![[UNTOUCHED; 4]; count as usize]);
         let (mut depths, mut confidences) = (vec![UNTOUCHED; count as usize], vec![UNTOUCHED; count as usize]);
         dispatch(block, count, |id, push| {
-            let [ta, tb, tc, td] = pages(&texels, shift);
+            let [ta, tb, tc, td] = pages(&texel_fours, shift);
             let [ca, cb, cc, cd] = pages_mut(&mut colours, shift);
             plane_sweep::blend_planes(
                 id,
                 push,
-                &views,
+                &words,
                 ta,
                 tb,
                 tc,
                 td,
-                &disparities,
-                &costs,
+                &maps,
+                &cost_groups,
                 ca,
                 cb,
                 cc,
@@ -173,7 +180,7 @@ fn blend_planes_is_core_s() {
             );
         });
         let seen: Vec<([f32; 4], f32, f32)> =
-            colours.into_iter().zip(depths).zip(confidences).map(|((colour, d), c)| (colour, d, c)).collect();
+            arrays(&colours).into_iter().zip(depths).zip(confidences).map(|((colour, d), c)| (colour, d, c)).collect();
         assert_eq!(seen, expected);
     }
 }

@@ -1,5 +1,6 @@
 //! The training-free field. Arrays that may lie in pages are on one and on four.
 
+use super::vectors::{arrays, cameras, fours};
 use super::{UNTOUCHED, dispatch, numbers};
 use viewfuse::check::world::World;
 use viewfuse_core::visual_hull::hull::hull_entry;
@@ -43,10 +44,11 @@ fn hull_entry_is_core_s() {
         dispatch(view, count, |id, push| {
             let [ta, tb, tc, td] = pages(&world.texels, shift);
             let [ea, eb, ec, ed] = pages_mut(&mut entries, shift);
-            sweep::hull_entry(id, push, &world.object, &world.views, ta, tb, tc, td, ea, eb, ec, ed, shift);
+            sweep::hull_entry(id, push, &world.object, &cameras(&world.views), ta, tb, tc, td, ea, eb, ec, ed, shift);
         });
-        let expected: Vec<f32> =
-            (0..count).map(|pixel| hull_entry(&world.object, &world.views, &world.texels[..], view, pixel)).collect();
+        let expected: Vec<f32> = (0..count)
+            .map(|pixel| hull_entry(&world.object, &world.views[..], &world.texels[..], view, pixel))
+            .collect();
         assert_eq!(entries[first..first + count as usize], expected);
         assert_eq!(entries.iter().filter(|entry| **entry == UNTOUCHED).count(), entries.len() - count as usize);
     }
@@ -62,17 +64,34 @@ fn match_cost_is_core_s() {
             let pixel = block.first_row * block.width + at / block.plane_count;
             let plane = at % block.plane_count;
             let World { object, views, texels, entries, pair_weights, .. } = &world;
-            match_cost(object, &block, views, &texels[..], &entries[..], pair_weights, pixel, plane)
+            match_cost(object, &block, &views[..], &texels[..], &entries[..], pair_weights, pixel, plane)
         })
         .collect();
+    let (words, texels) = (cameras(&world.views), fours(&world.texels));
     assert!(expected.iter().any(|cost| *cost >= 0.0) && expected.iter().any(|cost| *cost < 0.0));
     for shift in shifts(&world) {
         let mut costs = vec![UNTOUCHED; count as usize];
         dispatch(block, block.width * block.row_count, |id, push| {
-            let [ta, tb, tc, td] = pages(&world.texels, shift);
+            let [ta, tb, tc, td] = pages(&texels, shift);
             let [ea, eb, ec, ed] = pages(&world.entries, shift);
-            let World { object, views, pair_weights, .. } = &world;
-            sweep::match_cost(id, push, object, views, ta, tb, tc, td, ea, eb, ec, ed, pair_weights, &mut costs, shift);
+            let World { object, pair_weights, .. } = &world;
+            sweep::match_cost(
+                id,
+                push,
+                object,
+                &words,
+                ta,
+                tb,
+                tc,
+                td,
+                ea,
+                eb,
+                ec,
+                ed,
+                pair_weights,
+                &mut costs,
+                shift,
+            );
         });
         assert_eq!(costs, expected);
     }
@@ -107,14 +126,33 @@ fn windows_and_depths_are_core_s() {
     let (entries, guess) = (&world.entries[band.clone()], &world.depths[band.clone()]);
     let expected: Vec<f32> =
         (0..count).map(|pixel| pick_depth(&world.object, &block, &means, entries, guess, pixel)).collect();
+    let words = cameras(&world.views);
     for shift in shifts(&world) {
         let mut picked = vec![UNTOUCHED; world.texels.len()];
         dispatch(block, count, |id, push| {
             let [ea, eb, ec, ed] = pages(&world.entries, shift);
             let [ga, gb, gc, gd] = pages(&world.depths, shift);
             let [pa, pb, pc, pd] = pages_mut(&mut picked, shift);
-            let World { object, views, .. } = &world;
-            sweep::pick_depth(id, push, object, views, &means, ea, eb, ec, ed, ga, gb, gc, gd, pa, pb, pc, pd, shift);
+            sweep::pick_depth(
+                id,
+                push,
+                &world.object,
+                &words,
+                &means,
+                ea,
+                eb,
+                ec,
+                ed,
+                ga,
+                gb,
+                gc,
+                gd,
+                pa,
+                pb,
+                pc,
+                pd,
+                shift,
+            );
         });
         assert_eq!(picked[band.clone()], expected);
         assert_eq!(picked.iter().filter(|depth| **depth == UNTOUCHED).count(), picked.len() - count as usize);
@@ -130,24 +168,26 @@ fn march_is_core_s() {
     let expected: Vec<([f32; 4], f32)> = (0..count)
         .map(|pixel| {
             let at = [pixel % block.target.width, pixel / block.target.width].map(|side| side as f32 + 0.5);
-            let seen = march_ray(object, views, footprints, &texels[..], &depths[..], weights, &block, at);
+            let seen = march_ray(object, &views[..], footprints, &texels[..], &depths[..], weights, &block, at);
             ([seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity], seen.depth)
         })
         .collect();
     assert!(expected.iter().any(|(_, depth)| *depth > 0.0));
+    let (words, texel_fours) = (cameras(views), fours(texels));
     for shift in shifts(&world) {
-        let (mut colours, mut seen_depths) = (vec![[UNTOUCHED; 4]; count as usize], vec![UNTOUCHED; count as usize]);
+        let mut colours = fours(&vec![[UNTOUCHED; 4]; count as usize]);
+        let mut seen_depths = vec![UNTOUCHED; count as usize];
         dispatch(block, count, |id, push| {
-            let [ta, tb, tc, td] = pages(texels, shift);
+            let [ta, tb, tc, td] = pages(&texel_fours, shift);
             let [da, db, dc, dd] = pages(depths, shift);
             let [ca, cb, cc, cd] = pages_mut(&mut colours, shift);
             let [pa, pb, pc, pd] = pages_mut(&mut seen_depths, shift);
             ray_marching::march_rays(
-                id, push, object, views, footprints, ta, tb, tc, td, da, db, dc, dd, weights, ca, cb, cc, cd, pa, pb,
+                id, push, object, &words, footprints, ta, tb, tc, td, da, db, dc, dd, weights, ca, cb, cc, cd, pa, pb,
                 pc, pd, shift,
             );
         });
-        let seen: Vec<([f32; 4], f32)> = colours.into_iter().zip(seen_depths).collect();
+        let seen: Vec<([f32; 4], f32)> = arrays(&colours).into_iter().zip(seen_depths).collect();
         assert_eq!(seen, expected);
     }
 }

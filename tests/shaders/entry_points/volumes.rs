@@ -1,5 +1,6 @@
 //! From volumes to a feature image, and the denoiser's inputs.
 
+use super::vectors::{cameras, points};
 use super::{UNTOUCHED, dispatch, numbers, points_of};
 use viewfuse::check::world::World;
 use viewfuse_core::genvs::{
@@ -25,7 +26,8 @@ fn gather_volume_is_core_s() {
         far: 9.0,
     };
     let mut gathered = vec![UNTOUCHED; views.len() * 120];
-    dispatch(block, 120, |id, push| volumes::gather_volume(id, push, views, &there, &volume, &mut gathered));
+    let (words, at) = (cameras(views), points(&there));
+    dispatch(block, 120, |id, push| volumes::gather_volume(id, push, &words, &at, &volume, &mut gathered));
     let expected: Vec<f32> = (0..120).map(|at| volume_value(&views[..], &there[..], &volume[..], &block, at)).collect();
     assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));
     assert_eq!(gathered[120..240], expected);
@@ -53,7 +55,8 @@ fn halves_are_core_s() {
         far: 9.0,
     };
     let mut gathered = vec![UNTOUCHED; views.len() * 120];
-    dispatch(block, 120, |id, push| volumes::gather_volume_f16(id, push, views, &there, &volume, &mut gathered));
+    let (words, at) = (cameras(views), points(&there));
+    dispatch(block, 120, |id, push| volumes::gather_volume_f16(id, push, &words, &at, &volume, &mut gathered));
     let value = |at| volume_value_f16(&views[..], &there[..], &volume[..], &block, at);
     let expected: Vec<f32> = (0..120).map(value).collect();
     assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));

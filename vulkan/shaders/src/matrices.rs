@@ -1,7 +1,7 @@
 //! Matrix products of two computed matrices, and softmax.
 
 use crate::Push;
-use crate::tile::{Shape, Shared, multiply};
+use crate::tile::{Shape, Shared, ShortShared, multiply, multiply_double, multiply_quadruple};
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
@@ -27,6 +27,64 @@ pub fn matrix_product(
         Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
         rows,
         columns,
+        move |row, inner| block.left(&left, row, inner),
+        move |inner, column| block.right(&right, inner, column),
+        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
+    );
+}
+
+/// A part of two tiles of rows and columns: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "matrix_product_double"))]
+#[allow(clippy::too_many_arguments)]
+pub fn matrix_product_double(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<MatrixBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] right: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+    #[spirv(workgroup)] more_columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (left, right) = (Endless(left), Endless(right));
+    multiply_double(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        columns,
+        more_columns,
+        move |row, inner| block.left(&left, row, inner),
+        move |inner, column| block.right(&right, inner, column),
+        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
+    );
+}
+
+/// A part of four tiles of rows and columns: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "matrix_product_quadruple"))]
+#[allow(clippy::too_many_arguments)]
+pub fn matrix_product_quadruple(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<MatrixBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] right: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut ShortShared,
+    #[spirv(workgroup)] more_rows: &mut ShortShared,
+    #[spirv(workgroup)] columns: &mut ShortShared,
+    #[spirv(workgroup)] more_columns: &mut ShortShared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (left, right) = (Endless(left), Endless(right));
+    multiply_quadruple(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        more_rows,
+        columns,
+        more_columns,
         move |row, inner| block.left(&left, row, inner),
         move |inner, column| block.right(&right, inner, column),
         move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),

@@ -1,7 +1,7 @@
 //! Layers of networks.
 
 use crate::Push;
-use crate::tile::{Shape, Shared, multiply};
+use crate::tile::{Shape, Shared, ShortShared, multiply, multiply_double, multiply_quadruple};
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
@@ -34,6 +34,74 @@ pub fn convolve(
         Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
         rows,
         columns,
+        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
+        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
+        move |pixel, channel, sum| {
+            let value = convolved(&bias, &residual, block, pixel, channel, sum);
+            store(outputs, block.place(pixel, channel), value);
+        },
+    );
+}
+
+/// A part of two tiles of pixels and output channels: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "convolve_double"))]
+#[allow(clippy::too_many_arguments)]
+pub fn convolve_double(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<ConvolveBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+    #[spirv(workgroup)] more_columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let channels = block.out_channels;
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
+    multiply_double(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
+        rows,
+        columns,
+        more_columns,
+        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
+        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
+        move |pixel, channel, sum| {
+            let value = convolved(&bias, &residual, block, pixel, channel, sum);
+            store(outputs, block.place(pixel, channel), value);
+        },
+    );
+}
+
+/// A part of four tiles of pixels and output channels: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "convolve_quadruple"))]
+#[allow(clippy::too_many_arguments)]
+pub fn convolve_quadruple(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<ConvolveBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut ShortShared,
+    #[spirv(workgroup)] more_rows: &mut ShortShared,
+    #[spirv(workgroup)] columns: &mut ShortShared,
+    #[spirv(workgroup)] more_columns: &mut ShortShared,
+) {
+    let block = &push.parameters;
+    let channels = block.out_channels;
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
+    multiply_quadruple(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
+        rows,
+        more_rows,
+        columns,
+        more_columns,
         move |pixel, inner| patch_value(&inputs, block, pixel, inner),
         move |inner, channel| weights.fetch((inner * channels + channel) as usize),
         move |pixel, channel, sum| {
@@ -80,6 +148,66 @@ pub fn convolve_transposed(
         Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
         rows,
         columns,
+        move |pixel, inner| block.input(&inputs, pixel, inner),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
+    );
+}
+
+/// A part of two tiles of input pixels and what they become: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "convolve_transposed_double"))]
+#[allow(clippy::too_many_arguments)]
+pub fn convolve_transposed_double(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<TransposedBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+    #[spirv(workgroup)] more_columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count();
+    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
+    multiply_double(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
+        rows,
+        columns,
+        more_columns,
+        move |pixel, inner| block.input(&inputs, pixel, inner),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
+    );
+}
+
+/// A part of four tiles of input pixels and what they become: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "convolve_transposed_quadruple"))]
+#[allow(clippy::too_many_arguments)]
+pub fn convolve_transposed_quadruple(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<TransposedBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut ShortShared,
+    #[spirv(workgroup)] more_rows: &mut ShortShared,
+    #[spirv(workgroup)] columns: &mut ShortShared,
+    #[spirv(workgroup)] more_columns: &mut ShortShared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count();
+    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
+    multiply_quadruple(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
+        rows,
+        more_rows,
+        columns,
+        more_columns,
         move |pixel, inner| block.input(&inputs, pixel, inner),
         move |inner, column| weights.fetch((inner * column_count + column) as usize),
         move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
@@ -139,6 +267,76 @@ pub fn linear(
         Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
         rows,
         columns,
+        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |row, column, sum| {
+            let element = (row * column_count + column) as usize;
+            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
+        },
+    );
+}
+
+/// A part of two tiles of rows and columns: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "linear_double"))]
+#[allow(clippy::too_many_arguments)]
+pub fn linear_double(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<LinearBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+    #[spirv(workgroup)] more_columns: &mut Shared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
+    multiply_double(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        columns,
+        more_columns,
+        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |row, column, sum| {
+            let element = (row * column_count + column) as usize;
+            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
+        },
+    );
+}
+
+/// A part of four tiles of rows and columns: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "linear_quadruple"))]
+#[allow(clippy::too_many_arguments)]
+pub fn linear_quadruple(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<LinearBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] inputs: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] bias: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut ShortShared,
+    #[spirv(workgroup)] more_rows: &mut ShortShared,
+    #[spirv(workgroup)] columns: &mut ShortShared,
+    #[spirv(workgroup)] more_columns: &mut ShortShared,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
+    multiply_quadruple(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        rows,
+        more_rows,
+        columns,
+        more_columns,
         move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
         move |inner, column| weights.fetch((inner * column_count + column) as usize),
         move |row, column, sum| {

@@ -1,7 +1,8 @@
 //! The plane sweep: views compared on planes, costs averaged and joined along lines, disparities picked, pixels blended.
 
 use crate::Push;
-use spirv_std::glam::UVec3;
+use crate::loads::{Fours, Groups, PlaneVectors, Twos, ViewWords, Views, plane_vectors};
+use spirv_std::glam::{UVec3, Vec2, Vec4};
 use spirv_std::spirv;
 use viewfuse_core::pages::{Pages, PagesMut};
 use viewfuse_core::plane_sweep::Planes;
@@ -9,7 +10,7 @@ use viewfuse_core::plane_sweep::blend::{self, BlendBlock};
 use viewfuse_core::plane_sweep::census;
 use viewfuse_core::plane_sweep::disparity;
 use viewfuse_core::plane_sweep::evidence::{self, ViewPair};
-use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_core::plane_sweep::frustum::FrustumBlock;
 use viewfuse_core::plane_sweep::path::{self, CostBlock, Line};
 use viewfuse_core::plane_sweep::window::{self, WindowBlock};
 
@@ -19,12 +20,12 @@ use viewfuse_core::plane_sweep::window::{self, WindowBlock};
 pub fn compare_views(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<FrustumBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[SweptView],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[ViewWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] pairs: &[ViewPair],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] disparities: &[[f32; 2]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] grey: &mut [Planes],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] evidence: &mut [Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] disparities: &[Vec2],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] grey: &mut [PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] evidence: &mut [PlaneVectors],
 ) {
     if id.x >= push.piece.count {
         return;
@@ -34,17 +35,17 @@ pub fn compare_views(
     let band = frustum.row_count * frustum.camera.width * frustum.group_count;
     let pixel = frustum.first_row * frustum.camera.width + element / frustum.group_count;
     let group = element % frustum.group_count;
-    let found = evidence::evidence(frustum, views, pairs, texels, disparities, pixel, group);
+    let found = evidence::evidence(frustum, &Views(views), pairs, &Fours(texels), &Twos(disparities), pixel, group);
     let mut view = 0;
     while view < frustum.view_count {
-        grey[(view * band + element) as usize] = found.grey[view as usize];
+        grey[(view * band + element) as usize] = plane_vectors(&found.grey[view as usize]);
         view += 1;
     }
     let at = 4 * element as usize;
-    evidence[at] = found.difference;
-    evidence[at + 1] = found.weight;
-    evidence[at + 2] = found.dissent;
-    evidence[at + 3] = found.hull;
+    evidence[at] = plane_vectors(&found.difference);
+    evidence[at + 1] = plane_vectors(&found.weight);
+    evidence[at + 2] = plane_vectors(&found.dissent);
+    evidence[at + 3] = plane_vectors(&found.hull);
 }
 
 /// The costs of group and pixel number `first + id.x` of the band.
@@ -115,8 +116,8 @@ pub fn window_cost(
 pub fn follow_paths(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<CostBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] means: &[Planes],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] paths: &mut [Planes],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] means: &[PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] paths: &mut [PlaneVectors],
 ) {
     if id.x >= push.piece.count {
         return;
@@ -128,10 +129,10 @@ pub fn follow_paths(
     let mut state = Line::START;
     let mut step = 0;
     while step < step_count {
-        state.advance(means, block.pixel(direction, number, step) as usize * groups, groups);
+        state.advance(&Groups(means), block.pixel(direction, number, step) as usize * groups, groups);
         let mut group = 0;
         while group < groups {
-            paths[line + step as usize * groups + group] = state.costs(group);
+            paths[line + step as usize * groups + group] = plane_vectors(&state.costs(group));
             group += 1;
         }
         step += 1;
@@ -176,17 +177,17 @@ pub fn pick_disparity(
 pub fn blend_planes(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<BlendBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[SweptView],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] texels_a: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels_b: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] texels_c: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] texels_d: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] disparities: &[[f32; 2]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 6)] costs: &[Planes],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 7)] colours_a: &mut [[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 8)] colours_b: &mut [[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 9)] colours_c: &mut [[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 10)] colours_d: &mut [[f32; 4]],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[ViewWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] texels_a: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels_b: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] texels_c: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] texels_d: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] disparities: &[Vec2],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 6)] costs: &[PlaneVectors],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 7)] colours_a: &mut [Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 8)] colours_b: &mut [Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 9)] colours_c: &mut [Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 10)] colours_d: &mut [Vec4],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 11)] pixel_depths: &mut [f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 12)] confidences: &mut [f32],
     #[spirv(spec_constant(id = 0, default = 0))] page_shift: u32,
@@ -200,8 +201,8 @@ pub fn blend_planes(
     let at = [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
     let texels = Pages { a: texels_a, b: texels_b, c: texels_c, d: texels_d, shift: page_shift };
     let mut colours = PagesMut { a: colours_a, b: colours_b, c: colours_c, d: colours_d, shift: page_shift };
-    let seen = blend::blend(block, views, &texels, disparities, costs, at);
-    colours.store(pixel as usize, seen.colour);
+    let seen = blend::blend(block, &Views(views), &Fours(&texels), &Twos(disparities), &Groups(costs), at);
+    colours.store(pixel as usize, Vec4::from_array(seen.colour));
     pixel_depths[pixel as usize] = seen.depth;
     confidences[pixel as usize] = seen.confidence;
 }

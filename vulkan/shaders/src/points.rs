@@ -1,27 +1,26 @@
 //! The inputs of PixelNeRF's network at points, and radiance from its outputs.
 
+use crate::loads::{CameraWords, Cameras, PointWords, Points};
 use crate::{Piece, Push};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pages::StartingAt;
-use viewfuse_core::pixelnerf::{self, EmbedBlock, GatherBlock};
-use viewfuse_core::rays::RayPoint;
+use viewfuse_core::pages::{Fetch, StartingAt};
+use viewfuse_core::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace};
 
 /// Feature number `first + id.x`, flat in `[view][point][feature]`.
 #[spirv(compute(threads(64), entry_point_name = "embed_points"))]
 pub fn embed_points(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<EmbedBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[PointWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] embedded: &mut [f32],
 ) {
     if id.x >= push.piece.count {
         return;
     }
     let element = (push.piece.first + id.x) as usize;
-    embedded[element] = pixelnerf::embedded_value(views, points, &push.parameters, element);
+    embedded[element] = pixelnerf::embedded_value(&Cameras(views), &Points(points), &push.parameters, element);
 }
 
 /// Weight number `first + id.x`, flat in `[point][view]`; the parameter is how many views there are.
@@ -29,9 +28,9 @@ pub fn embed_points(
 pub fn visible_weights(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<u32>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] weights: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] points: &[PointWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] visible: &mut [f32],
 ) {
     if id.x >= push.piece.count {
@@ -39,18 +38,19 @@ pub fn visible_weights(
     }
     let view_count = push.parameters;
     let element = push.piece.first + id.x;
-    let point = &points[(element / view_count) as usize];
-    visible[element as usize] = pixelnerf::visible_weight(views, weights, view_count, point, element % view_count);
+    let point = Points(points).fetch((element / view_count) as usize);
+    visible[element as usize] =
+        pixelnerf::visible_weight(&Cameras(views), weights, view_count, &point, element % view_count);
 }
 
-/// Channel number `first + id.x` of a view's part of the latents, flat in `[point][channel]`.
+/// Four channels, number `first + id.x` of a view's part of the latents, flat in `[point][four of channels]`.
 #[spirv(compute(threads(64), entry_point_name = "gather_latents"))]
 #[allow(clippy::too_many_arguments)]
 pub fn gather_latents(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<GatherBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[PointWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] grid: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] gathered: &mut [f32],
@@ -59,9 +59,17 @@ pub fn gather_latents(
         return;
     }
     let block = &push.parameters;
-    let element = (push.piece.first + id.x) as usize;
-    let residual = StartingAt { all: residual, first: block.first() };
-    gathered[block.first() + element] = pixelnerf::gathered_value(views, points, grid, &residual, block, element);
+    let element = push.piece.first + id.x;
+    let (point, four) = (element / block.four_count(), element % block.four_count());
+    let place = GridPlace::of(&Cameras(views).fetch(block.view as usize), &Points(points).fetch(point as usize), block);
+    let row = block.first() + (point * block.channel_count) as usize;
+    let mut channel = 4 * four;
+    while channel < block.channel_count && channel < 4 * four + 4 {
+        let value = place.value(grid, channel as usize);
+        let at = row + channel as usize;
+        gathered[at] = if block.has_residual != 0 { residual[at] + value } else { value };
+        channel += 1;
+    }
 }
 
 /// Radiance of point number `first + id.x`, stored at the point's sample.
@@ -70,14 +78,14 @@ pub fn radiance(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] piece: &Piece,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] raw: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[PointWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] samples: &mut [[f32; 4]],
 ) {
     if id.x >= piece.count {
         return;
     }
     let element = (piece.first + id.x) as usize;
-    let point = &points[element];
+    let point = Points(points).fetch(element);
     let raw = StartingAt { all: raw, first: element * 4 };
-    samples[point.sample as usize] = pixelnerf::radiance(&raw, point);
+    samples[point.sample as usize] = pixelnerf::radiance(&raw, &point);
 }

@@ -1,10 +1,10 @@
 //! The depths of source pixels: the entry of their rays into the visual hull, and the plane sweep behind it.
 
 use crate::Push;
-use spirv_std::glam::UVec3;
+use crate::loads::{CameraWords, Cameras, Fours};
+use spirv_std::glam::{UVec3, Vec4};
 use spirv_std::spirv;
-use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pages::{Pages, PagesMut, StartingAt};
+use viewfuse_core::pages::{Fetch, Pages, PagesMut, StartingAt};
 use viewfuse_core::visual_hull::sweep::{OUTSIDE, SweepBlock, SweptPixel};
 use viewfuse_core::visual_hull::{ObjectBlock, hull, sweep};
 
@@ -15,7 +15,7 @@ pub fn hull_entry(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<u32>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] object: &ObjectBlock,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] views: &[CameraBlock],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] views: &[CameraWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels_a: &[[f32; 4]],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] texels_b: &[[f32; 4]],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] texels_c: &[[f32; 4]],
@@ -29,12 +29,13 @@ pub fn hull_entry(
     if id.x >= push.piece.count {
         return;
     }
+    let views = Cameras(views);
     let view = push.parameters;
     let pixel = push.piece.first + id.x;
     let texels = Pages { a: texels_a, b: texels_b, c: texels_c, d: texels_d, shift: page_shift };
     let mut entries = PagesMut { a: entries_a, b: entries_b, c: entries_c, d: entries_d, shift: page_shift };
-    let entry = hull::hull_entry(object, views, &texels, view, pixel);
-    entries.store((views[view as usize].first_texel + pixel) as usize, entry);
+    let entry = hull::hull_entry(object, &views, &texels, view, pixel);
+    entries.store((views.fetch(view as usize).first_texel + pixel) as usize, entry);
 }
 
 /// Matching costs of the other views at all planes of pixel number `first + id.x` of the band.
@@ -44,11 +45,11 @@ pub fn match_cost(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<SweepBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] object: &ObjectBlock,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] views: &[CameraBlock],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels_a: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] texels_b: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] texels_c: &[[f32; 4]],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] texels_d: &[[f32; 4]],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] views: &[CameraWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] texels_a: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] texels_b: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] texels_c: &[Vec4],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 5)] texels_d: &[Vec4],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 6)] entries_a: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 7)] entries_b: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 8)] entries_c: &[f32],
@@ -64,7 +65,8 @@ pub fn match_cost(
     let pixel = push.piece.first + id.x;
     let texels = Pages { a: texels_a, b: texels_b, c: texels_c, d: texels_d, shift: page_shift };
     let entries = Pages { a: entries_a, b: entries_b, c: entries_c, d: entries_d, shift: page_shift };
-    let swept = SweptPixel::new(sweep, views, &texels, &entries, sweep.first_row * sweep.width + pixel);
+    let (views, texels) = (Cameras(views), Fours(&texels));
+    let swept = SweptPixel::new(sweep, &views, &texels, &entries, sweep.first_row * sweep.width + pixel);
     let (first, end) = swept.planes(object, sweep);
     let costs_of_pixel = pixel * sweep.plane_count;
     let mut plane = 0;
@@ -74,7 +76,7 @@ pub fn match_cost(
     }
     while plane < end {
         costs[(costs_of_pixel + plane) as usize] =
-            swept.match_cost(object, sweep, views, &texels, &entries, pair_weights, plane);
+            swept.match_cost(object, sweep, &views, &texels, &entries, pair_weights, plane);
         plane += 1;
     }
     while plane < sweep.plane_count {
@@ -126,7 +128,7 @@ pub fn pick_depth(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<SweepBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] object: &ObjectBlock,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] views: &[CameraBlock],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] views: &[CameraWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] means: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] entries_a: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] entries_b: &[f32],
@@ -147,7 +149,7 @@ pub fn pick_depth(
     }
     let sweep = &push.parameters;
     let pixel = push.piece.first + id.x;
-    let first = (views[sweep.view as usize].first_texel + sweep.first_row * sweep.width) as usize;
+    let first = (Cameras(views).fetch(sweep.view as usize).first_texel + sweep.first_row * sweep.width) as usize;
     let entries = Pages { a: entries_a, b: entries_b, c: entries_c, d: entries_d, shift: page_shift };
     let guess = Pages { a: guess_a, b: guess_b, c: guess_c, d: guess_d, shift: page_shift };
     let mut picked = PagesMut { a: picked_a, b: picked_b, c: picked_c, d: picked_d, shift: page_shift };

@@ -1,4 +1,4 @@
-//! A matrix product by workgroups, each of which computes a tile of the outputs.
+//! A matrix product by workgroups, each of which computes a tile of the outputs, or several ([`Form`]).
 //!
 //! The workgroup proceeds along the inner index in steps: it fetches its rows of the left matrix and its columns of the
 //! right one into workgroup memory, each number once, and sums the products from there.
@@ -9,17 +9,22 @@
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
+use viewfuse_core::kernels::Form;
 use viewfuse_core::network::tile::{Sums, TILE};
 
 /// Inner indices of a step.
 const STEP: u32 = 16;
+/// The same where two tiles of rows and two of columns must fit into the memory of a workgroup.
+const SHORT_STEP: u32 = 8;
 /// Fours of a tile's rows or columns.
 const FOURS: u32 = TILE / 4;
 /// Fours from an inner index to the next: odd, so that neighbouring indices lie in different banks of the memory.
 const STRIDE: u32 = FOURS + 1;
 
-/// A step of either matrix in a workgroup's memory: `[inner][row or column]`, in fours.
+/// A step of a tile's rows or columns in a workgroup's memory: `[inner][row or column]`, in fours.
 pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
+/// The same for [`Form::Quadruple`].
+pub(crate) type ShortShared = [Vec4; (SHORT_STEP * STRIDE) as usize];
 
 /// The sizes of the matrices.
 #[derive(Clone, Copy)]
@@ -32,6 +37,35 @@ pub(crate) struct Shape {
     pub(crate) column_count: u32,
 }
 
+/// An invocation's place.
+#[derive(Clone, Copy)]
+struct Place {
+    /// Its number in the workgroup.
+    own: u32,
+    /// First row and column of the workgroup's first tile.
+    first_row: u32,
+    first_column: u32,
+    /// Its own place in the rows and columns of a tile.
+    own_row: u32,
+    own_column: u32,
+}
+
+impl Place {
+    #[inline(always)]
+    fn new(invocation: u32, shape: Shape, form: Form) -> Place {
+        let [rows, columns] = form.tiles();
+        let (group, own) = (invocation / TILE, invocation % TILE);
+        let group_columns = shape.column_count.div_ceil(TILE * columns);
+        Place {
+            own,
+            first_row: group / group_columns * (TILE * rows),
+            first_column: group % group_columns * (TILE * columns),
+            own_row: own / Sums::SIDE,
+            own_column: own % Sums::SIDE,
+        }
+    }
+}
+
 /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
 /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices, the
 /// last row or column is read and the sum is not stored.
@@ -41,51 +75,175 @@ pub(crate) fn multiply(
     shape: Shape,
     rows: &mut Shared,
     columns: &mut Shared,
-    left: impl Fn(u32, u32) -> f32,
-    right: impl Fn(u32, u32) -> f32,
+    left: impl Fn(u32, u32) -> f32 + Copy,
+    right: impl Fn(u32, u32) -> f32 + Copy,
     mut store: impl FnMut(u32, u32, f32),
 ) {
-    let Shape { row_count, inner_count, column_count } = shape;
-    let left = move |row: u32, inner: u32| left(row.min(row_count - 1), inner.min(inner_count - 1));
-    let right = move |inner: u32, column: u32| right(inner.min(inner_count - 1), column.min(column_count - 1));
-    let (tile, own) = (invocation / TILE, invocation % TILE);
-    let tile_columns = column_count.div_ceil(TILE);
-    let (first_row, first_column) = (tile / tile_columns * TILE, tile % tile_columns * TILE);
-    let (own_row, own_column) = (own / Sums::SIDE, own % Sums::SIDE);
+    let place = Place::new(invocation, shape, Form::Single);
     let mut sums = Sums::ZERO;
     let mut start = 0;
-    while start < inner_count {
-        let mut index = own;
-        while index < STEP * FOURS {
-            // Neighbours fetch what lies next to one another in the buffers.
-            let (inner, four) = (index % STEP, index / STEP);
-            let (at, row) = (start + inner, first_row + 4 * four);
-            let fetched = Vec4::new(left(row, at), left(row + 1, at), left(row + 2, at), left(row + 3, at));
-            write(rows, inner, four, fetched);
-            let (inner, four) = (index / FOURS, index % FOURS);
-            let (at, column) = (start + inner, first_column + 4 * four);
-            let fetched =
-                Vec4::new(right(at, column), right(at, column + 1), right(at, column + 2), right(at, column + 3));
-            write(columns, inner, four, fetched);
-            index += TILE;
-        }
+    while start < shape.inner_count {
+        fetch_rows(rows, place.own, start, place.first_row, shape, left);
+        fetch_columns(columns, place.own, start, place.first_column, shape, right);
         wait_for_all();
-        let count = STEP.min(inner_count - start);
+        let count = STEP.min(shape.inner_count - start);
         let mut inner = 0;
         while inner < count {
-            sums.add(read_fours(rows, inner, own_row), read_fours(columns, inner, own_column));
+            sums.add(read_fours(rows, inner, place.own_row), read_fours(columns, inner, place.own_column));
             inner += 1;
         }
         wait_for_all();
         start += STEP;
     }
-    let column = first_column + Sums::place(own_column, 0);
+    store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+}
+
+/// As [`multiply`], for [`Form::Double`]: a number of the rows is read once for the columns of two tiles.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn multiply_double(
+    invocation: u32,
+    shape: Shape,
+    rows: &mut Shared,
+    columns: &mut Shared,
+    more_columns: &mut Shared,
+    left: impl Fn(u32, u32) -> f32 + Copy,
+    right: impl Fn(u32, u32) -> f32 + Copy,
+    mut store: impl FnMut(u32, u32, f32),
+) {
+    let place = Place::new(invocation, shape, Form::Double);
+    let second_column = place.first_column + TILE;
+    let (mut sums, mut more) = (Sums::ZERO, Sums::ZERO);
+    let mut start = 0;
+    while start < shape.inner_count {
+        fetch_rows(rows, place.own, start, place.first_row, shape, left);
+        fetch_columns(columns, place.own, start, place.first_column, shape, right);
+        fetch_columns(more_columns, place.own, start, second_column, shape, right);
+        wait_for_all();
+        let count = STEP.min(shape.inner_count - start);
+        let mut inner = 0;
+        while inner < count {
+            let own_rows = read_fours(rows, inner, place.own_row);
+            sums.add(own_rows, read_fours(columns, inner, place.own_column));
+            more.add(own_rows, read_fours(more_columns, inner, place.own_column));
+            inner += 1;
+        }
+        wait_for_all();
+        start += STEP;
+    }
+    store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+    store_sums(more, place, place.first_row, second_column, shape, &mut store);
+}
+
+/// As [`multiply`], for [`Form::Quadruple`]: each number is read once for two tiles.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub(crate) fn multiply_quadruple(
+    invocation: u32,
+    shape: Shape,
+    rows: &mut ShortShared,
+    more_rows: &mut ShortShared,
+    columns: &mut ShortShared,
+    more_columns: &mut ShortShared,
+    left: impl Fn(u32, u32) -> f32 + Copy,
+    right: impl Fn(u32, u32) -> f32 + Copy,
+    mut store: impl FnMut(u32, u32, f32),
+) {
+    let place = Place::new(invocation, shape, Form::Quadruple);
+    let (second_row, second_column) = (place.first_row + TILE, place.first_column + TILE);
+    let (mut sums, mut beside, mut below, mut across) = (Sums::ZERO, Sums::ZERO, Sums::ZERO, Sums::ZERO);
+    let mut start = 0;
+    while start < shape.inner_count {
+        fetch_rows(rows, place.own, start, place.first_row, shape, left);
+        fetch_rows(more_rows, place.own, start, second_row, shape, left);
+        fetch_columns(columns, place.own, start, place.first_column, shape, right);
+        fetch_columns(more_columns, place.own, start, second_column, shape, right);
+        wait_for_all();
+        let count = SHORT_STEP.min(shape.inner_count - start);
+        let mut inner = 0;
+        while inner < count {
+            let own_rows = read_fours(rows, inner, place.own_row);
+            let own_more_rows = read_fours(more_rows, inner, place.own_row);
+            let own_columns = read_fours(columns, inner, place.own_column);
+            let own_more_columns = read_fours(more_columns, inner, place.own_column);
+            sums.add(own_rows, own_columns);
+            beside.add(own_rows, own_more_columns);
+            below.add(own_more_rows, own_columns);
+            across.add(own_more_rows, own_more_columns);
+            inner += 1;
+        }
+        wait_for_all();
+        start += SHORT_STEP;
+    }
+    store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+    store_sums(beside, place, place.first_row, second_column, shape, &mut store);
+    store_sums(below, place, second_row, place.first_column, shape, &mut store);
+    store_sums(across, place, second_row, second_column, shape, &mut store);
+}
+
+/// Fetches a step of a tile's rows, `STEP` inner indices of a [`Shared`] or of a [`ShortShared`].
+#[inline(always)]
+fn fetch_rows<const N: usize>(
+    rows: &mut [Vec4; N],
+    own: u32,
+    start: u32,
+    first_row: u32,
+    shape: Shape,
+    left: impl Fn(u32, u32) -> f32,
+) {
+    let left = move |row: u32, inner: u32| left(row.min(shape.row_count - 1), inner.min(shape.inner_count - 1));
+    let steps = N as u32 / STRIDE;
+    let mut index = own;
+    while index < steps * FOURS {
+        // Neighbours fetch what lies next to one another in the buffers.
+        let (inner, four) = (index % steps, index / steps);
+        let (at, row) = (start + inner, first_row + 4 * four);
+        let fetched = Vec4::new(left(row, at), left(row + 1, at), left(row + 2, at), left(row + 3, at));
+        write(rows, inner, four, fetched);
+        index += TILE;
+    }
+}
+
+/// Fetches a step of a tile's columns.
+#[inline(always)]
+fn fetch_columns<const N: usize>(
+    columns: &mut [Vec4; N],
+    own: u32,
+    start: u32,
+    first_column: u32,
+    shape: Shape,
+    right: impl Fn(u32, u32) -> f32,
+) {
+    let right =
+        move |inner: u32, column: u32| right(inner.min(shape.inner_count - 1), column.min(shape.column_count - 1));
+    let steps = N as u32 / STRIDE;
+    let mut index = own;
+    while index < steps * FOURS {
+        let (inner, four) = (index / FOURS, index % FOURS);
+        let (at, column) = (start + inner, first_column + 4 * four);
+        let fetched = Vec4::new(right(at, column), right(at, column + 1), right(at, column + 2), right(at, column + 3));
+        write(columns, inner, four, fetched);
+        index += TILE;
+    }
+}
+
+/// Stores an invocation's sums of a tile, as far as the outputs go.
+#[inline(always)]
+fn store_sums(
+    mut sums: Sums,
+    place: Place,
+    first_row: u32,
+    first_column: u32,
+    shape: Shape,
+    store: &mut impl FnMut(u32, u32, f32),
+) {
+    let column = first_column + Sums::place(place.own_column, 0);
     let mut index = 0;
     while index < Sums::SIDE {
-        let row = first_row + Sums::place(own_row, index);
+        let row = first_row + Sums::place(place.own_row, index);
         let [near, far] = sums.take_row();
         let mut store_one = |column: u32, sum: f32| {
-            if row < row_count && column < column_count {
+            if row < shape.row_count && column < shape.column_count {
                 store(row, column, sum);
             }
         };
@@ -103,28 +261,28 @@ pub(crate) fn multiply(
 
 /// The place of a four of a step: within its array for all indices.
 #[inline(always)]
-fn place(inner: u32, four: u32) -> usize {
-    (inner % STEP * STRIDE + four % FOURS) as usize
+fn place<const N: usize>(inner: u32, four: u32) -> usize {
+    (inner % (N as u32 / STRIDE) * STRIDE + four % FOURS) as usize
 }
 
 /// The numbers of an inner index that invocation `own` needs.
 #[inline(always)]
-fn read_fours(shared: &Shared, inner: u32, own: u32) -> [Vec4; 2] {
+fn read_fours<const N: usize>(shared: &[Vec4; N], inner: u32, own: u32) -> [Vec4; 2] {
     [read(shared, inner, Sums::place(own, 0) / 4), read(shared, inner, Sums::place(own, 4) / 4)]
 }
 
 #[inline(always)]
 #[allow(unsafe_code)]
-fn read(shared: &Shared, inner: u32, four: u32) -> Vec4 {
+fn read<const N: usize>(shared: &[Vec4; N], inner: u32, four: u32) -> Vec4 {
     // SAFETY: a place is within the array.
-    unsafe { *shared.index_unchecked(place(inner, four)) }
+    unsafe { *shared.index_unchecked(place::<N>(inner, four)) }
 }
 
 #[inline(always)]
 #[allow(unsafe_code)]
-fn write(shared: &mut Shared, inner: u32, four: u32, value: Vec4) {
+fn write<const N: usize>(shared: &mut [Vec4; N], inner: u32, four: u32, value: Vec4) {
     // SAFETY: a place is within the array.
-    unsafe { *shared.index_unchecked_mut(place(inner, four)) = value };
+    unsafe { *shared.index_unchecked_mut(place::<N>(inner, four)) = value };
 }
 
 /// A workgroup barrier: each invocation waits for all, and then sees the others' writes.

@@ -1,9 +1,9 @@
 //! Feature images from volumes, and the denoiser's inputs.
 
 use crate::Push;
+use crate::loads::{CameraWords, Cameras, PointWords, Points};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock};
 use viewfuse_core::half_precision;
 use viewfuse_core::rays::RayPoint;
@@ -13,8 +13,8 @@ use viewfuse_core::rays::RayPoint;
 pub fn gather_volume(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<VolumeBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[PointWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] volume: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] gathered: &mut [f32],
 ) {
@@ -23,7 +23,7 @@ pub fn gather_volume(
     }
     let block = &push.parameters;
     let element = (push.piece.first + id.x) as usize;
-    gathered[block.first() + element] = genvs::volume_value(views, points, volume, block, element);
+    gathered[block.first() + element] = genvs::volume_value(&Cameras(views), &Points(points), volume, block, element);
 }
 
 /// Word number `first + id.x`: two numbers in half precision.
@@ -46,8 +46,8 @@ pub fn pack_f16(
 pub fn gather_volume_f16(
     #[spirv(global_invocation_id)] id: UVec3,
     #[spirv(push_constant)] push: &Push<VolumeBlock>,
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraBlock],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[RayPoint],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[PointWords],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] volume: &[u32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] gathered: &mut [f32],
 ) {
@@ -56,7 +56,8 @@ pub fn gather_volume_f16(
     }
     let block = &push.parameters;
     let element = (push.piece.first + id.x) as usize;
-    gathered[block.first() + element] = genvs::volume_value_f16(views, points, volume, block, element);
+    gathered[block.first() + element] =
+        genvs::volume_value_f16(&Cameras(views), &Points(points), volume, block, element);
 }
 
 /// Weights of the samples on ray number `first + id.x`.

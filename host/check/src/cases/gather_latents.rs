@@ -96,7 +96,8 @@ impl Case for GatherLatents {
     }
 
     fn element_count(jobs: &Vec<Job>) -> usize {
-        jobs.iter().map(Job::len).sum()
+        let elements = |job: &Job| job.views.len() * job.points.len() * job.block.four_count() as usize;
+        jobs.iter().map(elements).sum()
     }
 
     fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {

@@ -36,7 +36,7 @@ impl Inputs {
             }
             weighted.extend([cost, weights]);
         }
-        let sum = |(pixel, group)| row_sums(&block, &weighted, pixel, group);
+        let sum = |(pixel, group)| row_sums(&block, &weighted[..], pixel, group);
         let sums = elements(&block).flat_map(sum).flatten().collect();
         Inputs { block, costs: weighted, sums }
     }

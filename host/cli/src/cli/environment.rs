@@ -16,5 +16,22 @@ pub(crate) fn instance_options() -> InstanceOptions {
 
 /// The environment's Vulkan, with these device options.
 pub(crate) fn device_options(gpu: GpuOptions) -> DeviceOptions {
-    DeviceOptions { instance: instance_options(), gpu }
+    DeviceOptions { instance: instance_options(), gpu, memory: cache_folder() }
+}
+
+/// Where devices remember what they compiled and measured: `VIEWFUSE_CACHE`, or the folder for such files that the system
+/// has for the user. Nowhere if the variable is empty.
+fn cache_folder() -> Option<PathBuf> {
+    if let Some(folder) = env::var_os("VIEWFUSE_CACHE") {
+        return (!folder.is_empty()).then(|| folder.into());
+    }
+    let folder = |name| env::var_os(name).map(PathBuf::from).filter(|folder: &PathBuf| folder.is_absolute());
+    let caches = if cfg!(windows) {
+        folder("LOCALAPPDATA")
+    } else if cfg!(target_os = "macos") {
+        folder("HOME").map(|home| home.join("Library/Caches"))
+    } else {
+        folder("XDG_CACHE_HOME").or_else(|| folder("HOME").map(|home| home.join(".cache")))
+    };
+    caches.map(|caches| caches.join("viewfuse"))
 }

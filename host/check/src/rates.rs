@@ -1,0 +1,190 @@
+//! Rates of the kernels that take the time, beside what the device can do at most, both measured in the same run.
+//!
+//! Two limits are measured: how fast a kernel copies, and how fast one multiplies and adds in registers. A kernel that must
+//! move so many bytes and needs so many operations takes at least the longer of the times that these limits allow; its
+//! *share* is that time over the time that it took. Limits and kernels are measured in turns, because what else a machine
+//! does, and how fast its clock may run, changes from second to second: a share is the median of the shares of all rounds.
+//!
+//! Bytes count each number once that is read or written; a cache may serve several reads. Of products, convolutions and
+//! compositing the operations are counted by hand; other kernels are compared with the copy only.
+
+mod limits;
+mod networks;
+mod sweeps;
+
+use super::report::CheckError;
+use serde::Serialize;
+use std::time::{Duration, Instant};
+use viewfuse_device::{Device, DeviceError};
+use viewfuse_job::progress::Progress;
+use viewfuse_vulkan::kernel::Kernel;
+
+/// The default number of rounds.
+pub const DEFAULT_ROUNDS: u32 = 5;
+/// The time for which a kernel is repeated in a round.
+const MEASURED: Duration = Duration::from_millis(20);
+/// Most repetitions in a round.
+const MOST_REPEATS: f64 = 500.0;
+
+/// Which limit a kernel is compared with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Limit {
+    /// Bytes copied.
+    Copy,
+    /// Multiply-adds in registers.
+    MultiplyAdd,
+}
+
+/// A kernel at one size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct KernelRate {
+    /// Its name.
+    pub kernel: &'static str,
+    /// What it worked on.
+    pub size: String,
+    /// Time of a dispatch, in milliseconds.
+    pub milliseconds: f64,
+    /// Billions of operations a second, an addition or a product each; null where they are not counted.
+    pub giga_operations: Option<f64>,
+    /// Billions of bytes a second that it reads and writes.
+    pub giga_bytes: f64,
+    /// The limit that allows least.
+    pub limit: Limit,
+    /// The time that this limit allows over the time that it took.
+    pub share: f64,
+}
+
+/// A device's limits and the rates of its kernels. All numbers are medians over the rounds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeviceRates {
+    /// Its name.
+    pub device: String,
+    /// Rounds.
+    pub rounds: u32,
+    /// Billions of bytes a second that a copy reads and writes.
+    pub copy_giga_bytes: f64,
+    /// Billions of operations a second in registers.
+    pub multiply_add_giga_operations: f64,
+    /// The kernels, in the order of the data.
+    pub kernels: Vec<KernelRate>,
+}
+
+/// A dispatch that can be repeated.
+struct Work<'a> {
+    kernel: Kernel,
+    size: String,
+    /// Additions and products.
+    operations: Option<f64>,
+    /// Bytes of all numbers that it reads and writes, once each.
+    bytes: f64,
+    run: Box<dyn FnMut() -> Result<(), DeviceError> + 'a>,
+}
+
+/// Measures a device.
+///
+/// # Errors
+/// [`CheckError`] if it fails, or the work is cancelled.
+pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress) -> Result<DeviceRates, CheckError> {
+    let rounds = rounds.max(1);
+    let making =
+        |kernel: &'static str| move |source: DeviceError| CheckError::Device { kernel, source: Box::new(source) };
+    let mut copy = limits::copy(device).map_err(making("copy_numbers"))?;
+    let mut chains = limits::chains(device).map_err(making("multiply_add"))?;
+    let mut works = sweeps::works(device).map_err(making("compare_views"))?;
+    works.extend(networks::works(device).map_err(making("linear"))?);
+    progress.expect(rounds as usize * works.len());
+    let copies = repeats(device, &mut copy)?;
+    let rounds_of_chains = repeats(device, &mut chains)?;
+    let mut limits = Vec::new();
+    let mut times = vec![Vec::new(); works.len()];
+    let mut shares = vec![Vec::new(); works.len()];
+    for _ in 0..rounds {
+        for (at, work) in works.iter_mut().enumerate() {
+            progress.check()?;
+            let limit = Limits {
+                bytes: rate(device, &mut copy, copies)?,
+                operations: rate(device, &mut chains, rounds_of_chains)?,
+            };
+            let count = repeats(device, work)?;
+            let time = seconds(device, work, count)?;
+            shares[at].push(limit.seconds(work).0 / time);
+            times[at].push(time);
+            limits.push(limit);
+            progress.step();
+        }
+    }
+    let of_limits = |value: fn(&Limits) -> f64| median(limits.iter().map(value).collect()) / 1.0e9;
+    let typical = Limits {
+        bytes: median(limits.iter().map(|limit| limit.bytes).collect()),
+        operations: median(limits.iter().map(|limit| limit.operations).collect()),
+    };
+    let kernel = |((work, times), shares): ((&Work<'_>, Vec<f64>), Vec<f64>)| {
+        let time = median(times);
+        KernelRate {
+            kernel: work.kernel.name(),
+            size: work.size.clone(),
+            milliseconds: 1.0e3 * time,
+            giga_operations: work.operations.map(|operations| operations / time / 1.0e9),
+            giga_bytes: work.bytes / time / 1.0e9,
+            limit: typical.seconds(work).1,
+            share: median(shares),
+        }
+    };
+    Ok(DeviceRates {
+        device: device.name(),
+        rounds,
+        copy_giga_bytes: of_limits(|limit| limit.bytes),
+        multiply_add_giga_operations: of_limits(|limit| limit.operations),
+        kernels: works.iter().zip(times).zip(shares).map(kernel).collect(),
+    })
+}
+
+/// What a device can do in a second.
+struct Limits {
+    bytes: f64,
+    operations: f64,
+}
+
+impl Limits {
+    /// The least time for some work, and what takes it.
+    fn seconds(&self, work: &Work<'_>) -> (f64, Limit) {
+        let copying = work.bytes / self.bytes;
+        let computing = work.operations.map_or(0.0, |operations| operations / self.operations);
+        if computing > copying { (computing, Limit::MultiplyAdd) } else { (copying, Limit::Copy) }
+    }
+}
+
+/// How fast a limit's own kernel is: operations a second, or bytes if it has none.
+fn rate<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f64, CheckError> {
+    Ok(work.operations.unwrap_or(work.bytes) / seconds(device, work, repeats)?)
+}
+
+/// As many repetitions as take the time that is measured, after one for what is made at the first use.
+fn repeats<D: Device>(device: &D, work: &mut Work<'_>) -> Result<u32, CheckError> {
+    seconds(device, work, 1)?;
+    let once = seconds(device, work, 1)?;
+    Ok((MEASURED.as_secs_f64() / once.max(1.0e-9)).clamp(1.0, MOST_REPEATS) as u32)
+}
+
+/// The time of a dispatch, of several behind each other.
+fn seconds<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f64, CheckError> {
+    let kernel = work.kernel.name();
+    let failed = |source: DeviceError| CheckError::Device { kernel, source: Box::new(source) };
+    device.finish().map_err(failed)?;
+    let start = Instant::now();
+    for _ in 0..repeats {
+        (work.run)().map_err(failed)?;
+    }
+    device.finish().map_err(failed)?;
+    Ok(start.elapsed().as_secs_f64().max(1.0e-9) / f64::from(repeats))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() % 2 {
+        0 => 0.5 * (values[middle - 1] + values[middle]),
+        _ => values[middle],
+    }
+}

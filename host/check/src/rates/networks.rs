@@ -1,0 +1,168 @@
+//! Kernels of networks at the sizes of a render: linear layers of the published PixelNeRF and of the included one,
+//! look-ups in its grids, fusion, compositing; a convolution and an attention's product of a GeNVS.
+
+use super::Work;
+use crate::poses::{numbers, random};
+use crate::sights::{camera, point};
+use viewfuse_core::composite::CompositeBlock;
+use viewfuse_core::fuse::FuseBlock;
+use viewfuse_core::network::attend::MatrixBlock;
+use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::linear::LinearBlock;
+use viewfuse_core::pixelnerf::GatherBlock;
+use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
+use viewfuse_vulkan::kernel::Kernel;
+
+const F32: f64 = size_of::<f32>() as f64;
+
+pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError> {
+    Ok(vec![
+        gather(device, 16_384, 64, 32)?,
+        convolve(device, 64, 64)?,
+        linear(device, [2046, 512, 512])?,
+        linear(device, [16_384, 64, 64])?,
+        linear(device, [16_384, 64, 4])?,
+        matrix_product(device, [1024, 64, 1024])?,
+        fuse(device, 3, 16_384, 64)?,
+        composite(device, 8192, 96)?,
+    ])
+}
+
+fn values(seed: u64, count: usize) -> Vec<f32> {
+    let random = &mut random(90, seed, 1);
+    numbers(count, || random.range(-0.5, 0.5))
+}
+
+fn linear<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceError> {
+    let [row_count, inner_count, column_count] = sizes;
+    let [rows, inner, columns] = sizes.map(|size| size as usize);
+    let block = LinearBlock { row_count, inner_count, column_count, relu_inputs: 1, ..LinearBlock::default() };
+    let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
+    let layer = Layer::new(device, &shape, &values(1, inner * columns), &values(2, columns))?;
+    let inputs = device.upload(&values(3, rows * inner))?;
+    let mut outputs = device.zeros::<f32>(rows * columns)?;
+    Ok(Work {
+        kernel: Kernel::Linear,
+        size: format!("{row_count}x{inner_count}x{column_count}"),
+        operations: Some(2.0 * (rows * inner * columns) as f64),
+        bytes: F32 * (rows * inner + inner * columns + rows * columns) as f64,
+        run: Box::new(move || device.linear(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs)),
+    })
+}
+
+fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>, DeviceError> {
+    let block = ConvolveBlock {
+        in_height: side,
+        in_width: side,
+        in_channels: channels,
+        in_pitch: channels,
+        enlarge: 1,
+        out_height: side,
+        out_width: side,
+        out_channels: channels,
+        out_pitch: channels,
+        size: 3,
+        stride: 1,
+        dilation: 1,
+        padding: 1,
+        scale: 1.0,
+        ..ConvolveBlock::default()
+    };
+    let (inner, columns) = (block.patch_len() as usize, channels as usize);
+    let image = (side * side * channels) as usize;
+    let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: side >= 32 };
+    let layer = Layer::new(device, &shape, &values(4, inner * columns), &values(5, columns))?;
+    let inputs = device.upload(&values(6, image))?;
+    let mut outputs = device.zeros::<f32>(image)?;
+    Ok(Work {
+        kernel: Kernel::Convolve,
+        size: format!("{side}x{side}, {channels} channels, 3x3"),
+        // Of the definition: an algorithm with fewer products may have a share above 1.
+        operations: Some(2.0 * (image * inner) as f64),
+        bytes: F32 * (2 * image + inner * columns) as f64,
+        run: Box::new(move || device.convolve(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs)),
+    })
+}
+
+fn matrix_product<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceError> {
+    let [row_count, inner_count, column_count] = sizes;
+    let [rows, inner, columns] = sizes.map(|size| size as usize);
+    let block = MatrixBlock {
+        row_count,
+        inner_count,
+        column_count,
+        left_pitch: inner_count,
+        // Transposed, as keys are.
+        right_row_pitch: 1,
+        right_column_pitch: inner_count,
+        scale: 0.125,
+        ..MatrixBlock::default()
+    };
+    let (left, right) = (device.upload(&values(7, rows * inner))?, device.upload(&values(8, inner * columns))?);
+    let mut outputs = device.zeros::<f32>(rows * columns)?;
+    Ok(Work {
+        kernel: Kernel::MatrixProduct,
+        size: format!("{row_count}x{inner_count}x{column_count}"),
+        operations: Some(2.0 * (rows * inner * columns) as f64),
+        bytes: F32 * (rows * inner + inner * columns + rows * columns) as f64,
+        run: Box::new(move || device.matrix_product(&block, &left, &right, &mut outputs)),
+    })
+}
+
+fn gather<D: Device>(device: &D, point_count: u32, channels: u32, side: u32) -> Result<Work<'_>, DeviceError> {
+    let random = &mut random(91, 1, 1);
+    let views = vec![camera(random)];
+    let points: Vec<_> = (0..point_count).map(|_| point(random, &views)).collect();
+    let block = GatherBlock {
+        point_count,
+        channel_count: channels,
+        height: side,
+        width: side,
+        pixel_centre: 0.5,
+        ..GatherBlock::default()
+    };
+    let (count, nodes) = ((point_count * channels) as usize, (side * side * channels) as usize);
+    let (views, points) = (device.upload(&views)?, device.upload(&points)?);
+    let (grid, residual) = (device.upload(&values(9, nodes))?, device.upload(&values(10, count))?);
+    let mut gathered = device.zeros::<f32>(count)?;
+    Ok(Work {
+        kernel: Kernel::GatherLatents,
+        size: format!("{point_count} points, {channels} channels of {side}x{side}"),
+        operations: None,
+        bytes: F32 * (2 * count + nodes) as f64 + 32.0 * f64::from(point_count),
+        run: Box::new(move || device.gather_latents(&block, &views, &points, &grid, Some(&residual), &mut gathered)),
+    })
+}
+
+fn fuse<D: Device>(device: &D, view_count: u32, point_count: u32, channel_count: u32) -> Result<Work<'_>, DeviceError> {
+    let count = point_count * channel_count;
+    let block = FuseBlock { view_count, stride: count, channel_count, weight_stride: view_count };
+    let weights = device.upload(&values(11, (point_count * view_count) as usize))?;
+    let latents = device.upload(&values(12, (view_count * count) as usize))?;
+    let mut fused = device.zeros::<f32>(count as usize)?;
+    Ok(Work {
+        kernel: Kernel::FuseViews,
+        size: format!("{view_count} views, {point_count} points, {channel_count} channels"),
+        operations: Some(2.0 * f64::from(view_count * count)),
+        bytes: F32 * f64::from((view_count + 1) * count + point_count * view_count),
+        run: Box::new(move || device.fuse_views(&block, count, &weights, &latents, &mut fused)),
+    })
+}
+
+fn composite<D: Device>(device: &D, ray_count: u32, sample_count: u32) -> Result<Work<'_>, DeviceError> {
+    let block = CompositeBlock { background: [1.0; 3], empty_depth: 2.0, sample_count };
+    let count = (ray_count * sample_count) as usize;
+    let random = &mut random(92, 1, 1);
+    let samples: Vec<[f32; 4]> = (0..count).map(|_| [0; 4].map(|_| 0.1 * random.unit() as f32)).collect();
+    let depths: Vec<f32> = (0..count as u32).map(|at| 1.0 + (at % sample_count) as f32 / sample_count as f32).collect();
+    let (samples, depths) = (device.upload(&samples)?, device.upload(&depths)?);
+    let (mut colours, mut pixel_depths) =
+        (device.zeros::<[f32; 4]>(ray_count as usize)?, device.zeros::<f32>(ray_count as usize)?);
+    Ok(Work {
+        kernel: Kernel::Composite,
+        size: format!("{ray_count} rays, {sample_count} samples"),
+        operations: None,
+        bytes: F32 * f64::from(ray_count) * (5.0 * f64::from(sample_count) + 5.0),
+        run: Box::new(move || device.composite(&block, ray_count, &samples, &depths, &mut colours, &mut pixel_depths)),
+    })
+}

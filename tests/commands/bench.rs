@@ -1,0 +1,42 @@
+//! `viewfuse bench`: what it prints and what it returns.
+
+use super::{BINARY, done};
+use serde_json::Value;
+use viewfuse_tests::command::{assert_wrong_arguments, files_below};
+use viewfuse_tests::scenes::Folder;
+
+viewfuse_tests::trials![the_cpu_beside_its_limits,];
+
+fn the_cpu_beside_its_limits() {
+    let folder = Folder::new();
+    let printed = done(folder.path(), "bench --device cpu --rounds 1 --json");
+    let bench: Value = serde_json::from_str(&printed).expect("JSON");
+    let device = &bench["devices"][0];
+    assert!(device["device"].as_str().is_some_and(|name| name.starts_with("cpu")), "{device}");
+    let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or(f64::NAN);
+    for key in ["copy_giga_bytes", "multiply_add_giga_operations"] {
+        assert!(number(device, key) > 0.1, "{key}: {device}");
+    }
+    let kernels = device["kernels"].as_array().expect("a list");
+    for name in ["census_cost", "compare_views", "composite", "convolve", "gather_latents", "linear", "matrix_product"]
+    {
+        assert!(kernels.iter().any(|kernel| kernel["kernel"] == name), "{name}: {printed}");
+    }
+    for kernel in kernels {
+        let (share, time) = (number(kernel, "share"), number(kernel, "milliseconds"));
+        // On a busy machine the limits are measured too low: by less than this.
+        assert!(share > 0.0 && share < 20.0 && time > 0.0, "{kernel}");
+        // A rate is what was counted over the time: the limit's own unit gives back the share.
+        let (rate, limit) = match kernel["limit"].as_str() {
+            Some("copy") => (number(kernel, "giga_bytes"), number(device, "copy_giga_bytes")),
+            Some("multiply_add") => (number(kernel, "giga_operations"), number(device, "multiply_add_giga_operations")),
+            other => panic!("the limit {other:?}"),
+        };
+        assert!((rate / limit / share).ln().abs() < 3.0, "{kernel} beside {limit}");
+    }
+    assert_eq!(files_below(folder.path()), [], "it leaves nothing behind");
+    let table = done(folder.path(), "bench --device cpu --rounds 1");
+    assert!(table.contains("GB/s, multiplies and adds") && table.contains("share of it"), "{table}");
+    assert_wrong_arguments(BINARY, folder.path(), "bench --rounds 0", &["0"]);
+    assert_wrong_arguments(BINARY, folder.path(), "bench --device gpu", &["gpu", "cpu"]);
+}

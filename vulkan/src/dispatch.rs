@@ -1,0 +1,246 @@
+//! Dispatches of kernels: arguments checked, split to fit the device, in the fastest form of their tiles.
+
+use crate::buffer::{Bound, ranges};
+use crate::error::VulkanError;
+use crate::forms::{self, Class};
+use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
+use crate::kernel::{Access, Form, Kernel, Layout, Piece, WORKGROUP};
+use crate::pipelines::Pipeline;
+use crate::submissions::Submission;
+use ash::vk;
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use viewfuse_core::pages::MOST_PAGES;
+
+/// The time that a dispatch of an unknown kernel is expected to take.
+const UNKNOWN: Duration = Duration::from_millis(20);
+
+/// A dispatch whose arguments are right.
+struct Job<'a> {
+    kernel: Kernel,
+    parameters: &'a [u8],
+    arrays: &'a [Bound<'a>],
+    page_shift: u32,
+}
+
+impl Gpu {
+    /// Dispatches a kernel for some of its elements. `parameters` are the kernel's own push constants, `arrays` its
+    /// bindings, both as in its row. Elements of a tiled kernel are counted in [`Form::Single`], and are all of them: the
+    /// device takes the form that was the fastest when it was measured, at the first use of such a size.
+    ///
+    /// # Errors
+    /// [`VulkanError::Arguments`] if they are not, [`VulkanError::OtherDevice`], [`VulkanError::Limit`] if an array cannot
+    /// be bound, and others if the device fails, or failed before.
+    pub fn dispatch(
+        &self,
+        kernel: Kernel,
+        parameters: &[u8],
+        elements: Range<u32>,
+        arrays: &[Bound<'_>],
+    ) -> Result<(), VulkanError> {
+        if elements.is_empty() {
+            return Ok(());
+        }
+        self.check_arguments(kernel, parameters, arrays)?;
+        let page_len = 1_usize << self.page_shift;
+        let needs_pages = kernel
+            .arrays()
+            .iter()
+            .zip(arrays)
+            .any(|(array, bound)| array.layout == Layout::Pages && bound.0.len > page_len);
+        let page_shift = if needs_pages { self.page_shift } else { 0 };
+        let job = Job { kernel, parameters, arrays, page_shift };
+        self.with_state(|gpu, state| {
+            let (form, of_form) = match forms::shape(kernel, parameters) {
+                Some(shape) => {
+                    let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
+                    (form, 0..form.elements(shape.row_count, shape.column_count))
+                }
+                None => (Form::Single, elements.clone()),
+            };
+            let count = u64::from(elements.end - elements.start);
+            let dispatches = gpu.record_job(state, &job, form, of_form, count)?;
+            let tally = &mut state.tallies[kernel as usize];
+            tally.dispatches += dispatches;
+            tally.elements += count;
+            Ok(())
+        })
+    }
+
+    /// The form for a class of products: as was asked for, as is known, or measured now.
+    fn form(&self, state: &mut State, job: &Job<'_>, class: &Class) -> Result<Form, VulkanError> {
+        if let Some(form) = self.form {
+            return Ok(form);
+        }
+        let candidates = class.candidates();
+        if candidates.len() == 1 {
+            return Ok(candidates[0]);
+        }
+        if let Some(form) = state.choices.get(class) {
+            return Ok(form);
+        }
+        let mut fastest = (Form::Single, Duration::MAX);
+        for &form in candidates {
+            let time = self.time_form(state, job, class, form)?;
+            if time < fastest.1 {
+                fastest = (form, time);
+            }
+        }
+        state.choices.set(class, fastest.0);
+        Ok(fastest.0)
+    }
+
+    /// The least time of a few dispatches of some tiles. They write what the dispatch that follows writes, too.
+    fn time_form(&self, state: &mut State, job: &Job<'_>, class: &Class, form: Form) -> Result<Duration, VulkanError> {
+        let elements = class.measured_elements(form, self.is_software);
+        let mut least = Duration::MAX;
+        // The first one makes what is made at the first use.
+        for round in 0..forms::ROUNDS {
+            state.wait()?;
+            let start = Instant::now();
+            self.record_job(state, job, form, 0..elements, 0)?;
+            state.wait()?;
+            if round > 0 {
+                least = least.min(start.elapsed());
+            }
+        }
+        Ok(least)
+    }
+
+    /// Records a dispatch, in as many pieces as the device's limits demand, and returns how many these are. `counted`
+    /// elements are counted for the time that later ones are expected to take.
+    fn record_job(
+        &self,
+        state: &mut State,
+        job: &Job<'_>,
+        form: Form,
+        elements: Range<u32>,
+        counted: u64,
+    ) -> Result<u64, VulkanError> {
+        let Job { kernel, parameters, arrays, page_shift } = *job;
+        let listed = kernel.arrays().iter().zip(arrays);
+        let uses: Vec<_> = listed.clone().map(|(array, bound)| (bound.0, array.access)).collect();
+        let pipeline = state.pipelines.get(kernel, form, page_shift)?;
+        let per_piece = self.handle.limits.workgroup_count.saturating_mul(WORKGROUP);
+        let expected = state.rates[kernel as usize].time_of(counted).unwrap_or(UNKNOWN);
+        let mut dispatches = 0;
+        self.record(state, &uses, |device, submission, submissions| {
+            let set = self.bind(submission, &pipeline, listed, page_shift)?;
+            submissions.start_clock(submission);
+            // SAFETY: pipeline, set and constants are of the kernel's layout; the counts are within the limits.
+            unsafe {
+                let (commands, compute) = (submission.commands, vk::PipelineBindPoint::COMPUTE);
+                device.cmd_bind_pipeline(commands, compute, pipeline.raw);
+                device.cmd_bind_descriptor_sets(commands, compute, pipeline.layout, 0, &[set], &[]);
+                for first in elements.clone().step_by(per_piece as usize) {
+                    let piece = Piece { first, count: per_piece.min(elements.end - first) };
+                    let constants = [parameters, bytemuck::bytes_of(&piece)].concat();
+                    let stage = vk::ShaderStageFlags::COMPUTE;
+                    // Pieces write different elements, but the validation layers only see whole arrays. Pieces are
+                    // large, so a barrier between them costs nothing.
+                    if dispatches > 0 && self.barriers {
+                        barrier(device, commands);
+                    }
+                    device.cmd_push_constants(commands, pipeline.layout, stage, 0, &constants);
+                    device.cmd_dispatch(commands, piece.count.div_ceil(WORKGROUP), 1, 1);
+                    dispatches += 1;
+                }
+            }
+            submissions.stop_clock(submission, kernel, counted, expected);
+            Ok(())
+        })?;
+        Ok(dispatches)
+    }
+
+    fn bind<'a>(
+        &self,
+        submission: &Submission,
+        pipeline: &Pipeline,
+        arrays: impl Iterator<Item = (&'a crate::kernel::Array, &'a Bound<'a>)>,
+        page_shift: u32,
+    ) -> Result<vk::DescriptorSet, VulkanError> {
+        let layouts = [pipeline.set_layout];
+        let info =
+            vk::DescriptorSetAllocateInfo::default().descriptor_pool(submission.descriptors).set_layouts(&layouts);
+        // SAFETY: the pool is as large as the largest set, and empty.
+        let set = unsafe { self.handle.device.allocate_descriptor_sets(&info) }
+            .map_err(|result| self.handle.failure("vkAllocateDescriptorSets", result))?[0];
+        let infos: Vec<[vk::DescriptorBufferInfo; 1]> = arrays
+            .flat_map(|(array, bound)| ranges(bound.0, array.layout, page_shift))
+            .map(|range| [vk::DescriptorBufferInfo { buffer: range.buffer, offset: range.offset, range: range.bytes }])
+            .collect();
+        let writes: Vec<_> = (0..)
+            .zip(&infos)
+            .map(|(binding, info)| {
+                vk::WriteDescriptorSet::default()
+                    .dst_set(set)
+                    .dst_binding(binding)
+                    .descriptor_type(vk::DescriptorType::STORAGE_BUFFER)
+                    .buffer_info(info)
+            })
+            .collect();
+        // SAFETY: the ranges lie in their buffers, which the submission holds.
+        unsafe { self.handle.device.update_descriptor_sets(&writes, &[]) };
+        Ok(set)
+    }
+
+    fn check_arguments(&self, kernel: Kernel, parameters: &[u8], arrays: &[Bound<'_>]) -> Result<(), VulkanError> {
+        let refuse = |detail| Err(VulkanError::Arguments { kernel: kernel.name(), detail });
+        if parameters.len() != kernel.parameter_bytes() {
+            return refuse(format!("{} bytes of parameters instead of {}", parameters.len(), kernel.parameter_bytes()));
+        }
+        let listed = kernel.arrays();
+        if arrays.len() != listed.len() {
+            return refuse(format!("{} arrays instead of {}", arrays.len(), listed.len()));
+        }
+        let (range, allocation) = (self.handle.limits.buffer_range, self.handle.limits.allocation);
+        // What makes pages as short as they are.
+        let (page_limit, most_page_bytes) = match range <= allocation {
+            true => ("maxStorageBufferRange", range),
+            false => ("maxMemoryAllocationSize", allocation),
+        };
+        for (array, bound) in listed.iter().zip(arrays) {
+            bound.0.check_owner(&self.handle)?;
+            let (len, stride) = (bound.0.len, bound.0.stride);
+            // Pages are counted in elements: there they must be the kernel's own.
+            let fits = match array.layout {
+                Layout::Whole | Layout::One => array.stride % stride == 0,
+                Layout::Pages => array.stride == stride,
+            };
+            if !fits {
+                return refuse(format!("{} of {stride} bytes an element instead of {}", array.name, array.stride));
+            }
+            let limit = |limit, needed, available| {
+                let pages = if array.layout == Layout::Pages { "a page of " } else { "" };
+                let what = format!("{pages}array {} of kernel {}", array.name, kernel.name());
+                Err(VulkanError::Limit { device: self.handle.name.clone(), what, limit, needed, available })
+            };
+            let bytes = (len * stride) as u64;
+            if bytes < array.least_bytes as u64 {
+                return refuse(format!("{} has {bytes} bytes instead of {}", array.name, array.least_bytes));
+            }
+            let shared = arrays.iter().filter(|other| Arc::ptr_eq(other.0, bound.0)).count() > 1;
+            if shared && array.access == Access::Write {
+                return refuse(format!("{} is written, and bound a second time", array.name));
+            }
+            let page_bytes = (len.min(1 << self.page_shift) * stride) as u64;
+            match array.layout {
+                Layout::Whole | Layout::One if bytes > range => return limit("maxStorageBufferRange", bytes, range),
+                Layout::Whole | Layout::One if bound.0.chunks.len() > 1 => {
+                    return limit("maxMemoryAllocationSize", bytes, allocation);
+                }
+                // Pages have a least length, for their offsets.
+                Layout::Pages if page_bytes > most_page_bytes => {
+                    return limit(page_limit, page_bytes, most_page_bytes);
+                }
+                Layout::Pages if len > MOST_PAGES << self.page_shift => {
+                    let page_len = len.div_ceil(MOST_PAGES).next_power_of_two() as u64;
+                    return limit(page_limit, page_len * WIDEST_PAGED, most_page_bytes);
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,199 @@
+//! Forms of tiled kernels: which come into question for a product, and which was the fastest.
+//!
+//! A form is measured at the first use of a kernel for products of a class, sizes to within a factor of two. All forms give the
+//! same bits, so a choice changes nothing but the time.
+
+use crate::kernel::{Form, Kernel, TILE, WORKGROUP};
+use bytemuck::AnyBitPattern;
+use std::collections::BTreeMap;
+use viewfuse_core::network::attend::MatrixBlock;
+use viewfuse_core::network::convolve::ConvolveBlock;
+use viewfuse_core::network::linear::LinearBlock;
+use viewfuse_core::network::transpose::TransposedBlock;
+
+/// Dispatches of a measurement, the first of which does not count.
+pub(crate) const ROUNDS: u32 = 4;
+/// Multiply-adds of a product that is worth a measurement.
+const LEAST_WORK: u64 = 1 << 22;
+/// Tiles that are measured: as many as keep a GPU busy, and few where a processor does their work.
+const MEASURED_TILES: u32 = 4096;
+const MEASURED_TILES_OF_SOFTWARE: u32 = 16;
+/// Logarithm of the rows from which on all products are of one class.
+const MOST_ROWS: u32 = 14;
+
+/// The sizes of a product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Shape {
+    pub(crate) row_count: u32,
+    pub(crate) inner_count: u32,
+    pub(crate) column_count: u32,
+}
+
+/// The product that a dispatch with these parameters computes; `None` for kernels without tiles.
+pub(crate) fn shape(kernel: Kernel, parameters: &[u8]) -> Option<Shape> {
+    let [row_count, inner_count, column_count] = match kernel {
+        Kernel::Linear => {
+            let LinearBlock { row_count, inner_count, column_count, .. } = read(parameters)?;
+            [row_count, inner_count, column_count]
+        }
+        Kernel::MatrixProduct => {
+            let MatrixBlock { row_count, inner_count, column_count, .. } = read(parameters)?;
+            [row_count, inner_count, column_count]
+        }
+        Kernel::Convolve => {
+            let block: ConvolveBlock = read(parameters)?;
+            [block.pixel_count(), block.patch_len(), block.out_channels]
+        }
+        Kernel::ConvolveTransposed => {
+            let block: TransposedBlock = read(parameters)?;
+            [block.pixel_count(), block.in_channels, block.column_count()]
+        }
+        _ => return None,
+    };
+    Some(Shape { row_count, inner_count, column_count })
+}
+
+fn read<B: AnyBitPattern>(parameters: &[u8]) -> Option<B> {
+    bytemuck::try_pod_read_unaligned(parameters).ok()
+}
+
+/// Products of one kernel that have about the same sizes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Class {
+    shape: Shape,
+    key: Key,
+}
+
+/// The kernel's name and the logarithms of rows, inner indices and columns.
+type Key = (String, [u32; 3]);
+
+impl Class {
+    pub(crate) fn new(kernel: Kernel, shape: Shape) -> Class {
+        let logarithm = |count: u32| u32::BITS - count.saturating_sub(1).leading_zeros();
+        let Shape { row_count, inner_count, column_count } = shape;
+        let sizes = [logarithm(row_count).min(MOST_ROWS), logarithm(inner_count), logarithm(column_count)];
+        Class { shape, key: (kernel.name().to_owned(), sizes) }
+    }
+
+    /// The forms that come into question, [`Form::Single`] first: none that would leave half of its tiles empty.
+    pub(crate) fn candidates(&self) -> &'static [Form] {
+        let Shape { row_count, inner_count, column_count } = self.shape;
+        let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
+        match (column_count > TILE, row_count > TILE) {
+            _ if work < LEAST_WORK => &[Form::Single],
+            (false, _) => &[Form::Single],
+            (true, false) => &[Form::Single, Form::Double],
+            (true, true) => &Form::ALL,
+        }
+    }
+
+    /// Elements of a measurement: the first rows, whole groups of tiles of every form.
+    pub(crate) fn measured_elements(&self, form: Form, is_software: bool) -> u32 {
+        let tiles = if is_software { MEASURED_TILES_OF_SOFTWARE } else { MEASURED_TILES };
+        let bands = tiles.div_ceil(2 * self.shape.column_count.div_ceil(TILE)).max(1);
+        form.elements(self.shape.row_count.min(2 * TILE * bands), self.shape.column_count)
+    }
+}
+
+const _: () = assert!(WORKGROUP == TILE);
+
+/// The fastest form of each class so far.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Choices {
+    forms: BTreeMap<Key, Form>,
+    has_new: bool,
+}
+
+impl Choices {
+    pub(crate) fn get(&self, class: &Class) -> Option<Form> {
+        self.forms.get(&class.key).copied()
+    }
+
+    pub(crate) fn set(&mut self, class: &Class, form: Form) {
+        self.forms.insert(class.key.clone(), form);
+        self.has_new = true;
+    }
+
+    /// Whether one was measured since they were read.
+    pub(crate) fn has_new(&self) -> bool {
+        self.has_new
+    }
+
+    /// A line a class: kernel, logarithms of the sizes, form.
+    pub(crate) fn text(&self) -> String {
+        let line = |((kernel, [rows, inner, columns]), form): (&Key, &Form)| {
+            format!("{kernel} {rows} {inner} {columns} {}\n", form.name())
+        };
+        self.forms.iter().map(line).collect()
+    }
+
+    /// Choices from their text; `None` if it is not one.
+    pub(crate) fn parse(text: &str) -> Option<Choices> {
+        let forms = text.lines().map(parse_line).collect::<Option<_>>()?;
+        Some(Choices { forms, has_new: false })
+    }
+}
+
+fn parse_line(line: &str) -> Option<(Key, Form)> {
+    let words: Vec<&str> = line.split(' ').collect();
+    let &[kernel, rows, inner, columns, form] = &words[..] else { return None };
+    let kernel = Kernel::ALL.into_iter().find(|known| known.is_tiled() && known.name() == kernel)?;
+    let form = Form::ALL.into_iter().find(|known| known.name() == form)?;
+    let sizes = [rows.parse().ok()?, inner.parse().ok()?, columns.parse().ok()?];
+    Some(((kernel.name().to_owned(), sizes), form))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bytemuck::bytes_of;
+
+    fn class(row_count: u32, inner_count: u32, column_count: u32) -> Class {
+        Class::new(Kernel::Linear, Shape { row_count, inner_count, column_count })
+    }
+
+    #[test]
+    fn shapes_are_read_from_parameters() {
+        let block = LinearBlock { row_count: 5, inner_count: 6, column_count: 7, ..LinearBlock::default() };
+        let found = shape(Kernel::Linear, bytes_of(&block));
+        assert_eq!(found, Some(Shape { row_count: 5, inner_count: 6, column_count: 7 }));
+        assert_eq!(shape(Kernel::Linear, &[0; 3]), None);
+        for kernel in Kernel::ALL {
+            let parameters = vec![0; kernel.parameter_bytes()];
+            assert_eq!(shape(kernel, &parameters).is_some(), kernel.is_tiled(), "{}", kernel.name());
+        }
+    }
+
+    #[test]
+    fn empty_tiles_and_little_work_are_no_candidates() {
+        assert_eq!(class(4096, 512, 512).candidates(), Form::ALL);
+        assert_eq!(class(4096, 512, 64).candidates(), [Form::Single]);
+        assert_eq!(class(64, 4096, 512).candidates(), [Form::Single, Form::Double]);
+        assert_eq!(class(128, 128, 128).candidates(), [Form::Single]);
+    }
+
+    #[test]
+    fn a_measurement_has_the_same_outputs_in_every_form() {
+        // Five tiles of columns: four bands of two tiles of rows.
+        let class = class(10_000, 64, 300);
+        let groups = Form::ALL.map(|form| class.measured_elements(form, true) / WORKGROUP);
+        assert_eq!(groups, [4 * 5, 4 * 3, 2 * 3]);
+        let whole = class.measured_elements(Form::Single, false);
+        assert_eq!(whole, Form::Single.elements(10_000, 300));
+    }
+
+    #[test]
+    fn choices_are_kept_by_class() {
+        let mut choices = Choices::default();
+        choices.set(&class(1000, 64, 128), Form::Double);
+        choices.set(&class(1000, 512, 512), Form::Quadruple);
+        assert_eq!(choices.get(&class(600, 60, 100)), Some(Form::Double));
+        assert_eq!(choices.get(&class(600, 512, 512)), Some(Form::Quadruple));
+        assert_eq!(choices.get(&class(2000, 64, 128)), None);
+        let parsed = Choices::parse(&choices.text()).expect("choices");
+        assert_eq!((parsed.get(&class(600, 60, 100)), parsed.has_new()), (Some(Form::Double), false));
+        for broken in ["linear 1 2 3", "lines 1 2 3 double", "linear 1 2 3 triple", "linear 1 b 3 double", "\n"] {
+            assert_eq!(Choices::parse(broken), None, "{broken}");
+        }
+    }
+}

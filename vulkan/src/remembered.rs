@@ -1,0 +1,156 @@
+//! What a device remembers from one process to the next: compiled pipelines and the fastest forms.
+//!
+//! ```text
+//! head       magic, module's checksum, vendor, device, driver's version, cache UUID
+//! lengths    of the forms and of the pipelines
+//! forms      text, a line a class
+//! pipelines  the data of a VkPipelineCache
+//! checksum   of all before it
+//! ```
+//!
+//! Numbers are little-endian. Data of another device, driver or module, and damaged data, is ignored: everything is made
+//! anew. The pipelines' own header is looked at, too, because not every driver does.
+
+use crate::adapter::Identity;
+use crate::forms::Choices;
+use crate::gpu::Gpu;
+use crate::pipelines::MODULE;
+
+const MAGIC: &[u8; 16] = b"viewfuse device\x01";
+/// Bytes of the head, of the lengths and of a checksum.
+const HEAD: usize = 16 + 8 + 4 * 3 + 16;
+const LENGTHS: usize = 8;
+const CHECKSUM: usize = 8;
+/// Bytes of the header of a pipeline cache, and its version.
+const CACHE_HEADER: usize = 32;
+const CACHE_VERSION: u32 = 1;
+
+impl Identity {
+    fn head(&self) -> Vec<u8> {
+        let mut head = MAGIC.to_vec();
+        head.extend(checksum(MODULE).to_le_bytes());
+        for number in [self.vendor, self.device, self.driver] {
+            head.extend(number.to_le_bytes());
+        }
+        head.extend(self.cache);
+        head
+    }
+
+    /// Whether data has the header of this device's pipeline caches.
+    fn has_header(&self, data: &[u8]) -> bool {
+        let number = |at: usize| data.get(at..at + 4)?.try_into().ok().map(u32::from_ne_bytes);
+        let numbers = [CACHE_HEADER as u32, CACHE_VERSION, self.vendor, self.device];
+        (0..4).all(|index| number(4 * index) == Some(numbers[index])) && data.get(16..CACHE_HEADER) == Some(&self.cache)
+    }
+}
+
+impl Gpu {
+    /// Takes what [`Gpu::remembered`] gave to an earlier process, before the first dispatch. Returns whether it was
+    /// taken: data of another device or driver, of another version of the kernels, and damaged data, is ignored.
+    pub fn recall(&self, remembered: &[u8]) -> bool {
+        let Some((choices, pipelines)) = decode(&self.handle.identity(), remembered) else { return false };
+        let mut state = self.lock();
+        state.choices = choices;
+        if !pipelines.is_empty() {
+            state.pipelines.recall(pipelines);
+        }
+        true
+    }
+
+    /// What the device remembers, if that is more than it recalled.
+    pub fn remembered(&self) -> Option<Vec<u8>> {
+        let state = self.lock();
+        let (pipelines, has_new) = state.pipelines.cached();
+        (has_new || state.choices.has_new()).then(|| encode(&self.handle.identity(), &state.choices, &pipelines))
+    }
+}
+
+fn encode(identity: &Identity, choices: &Choices, pipelines: &[u8]) -> Vec<u8> {
+    let text = choices.text();
+    let pipelines = if identity.has_header(pipelines) { pipelines } else { &[] };
+    let mut bytes = identity.head();
+    bytes.extend((text.len() as u32).to_le_bytes());
+    bytes.extend((pipelines.len() as u32).to_le_bytes());
+    bytes.extend(text.as_bytes());
+    bytes.extend(pipelines);
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes
+}
+
+fn decode<'a>(identity: &Identity, bytes: &'a [u8]) -> Option<(Choices, &'a [u8])> {
+    let (content, sum) = bytes.split_last_chunk::<CHECKSUM>()?;
+    if checksum(content).to_le_bytes() != *sum || !content.starts_with(&identity.head()) {
+        return None;
+    }
+    let length = |at: usize| Some(u32::from_le_bytes(content.get(at..at + 4)?.try_into().ok()?) as usize);
+    let (text_len, pipelines_len) = (length(HEAD)?, length(HEAD + 4)?);
+    let (text, pipelines) = content.get(HEAD + LENGTHS..)?.split_at_checked(text_len)?;
+    let choices = Choices::parse(std::str::from_utf8(text).ok()?)?;
+    let is_whole = pipelines.len() == pipelines_len && (pipelines.is_empty() || identity.has_header(pipelines));
+    is_whole.then_some((choices, pipelines))
+}
+
+/// FNV-1a of 64 bits: against damage, not against malice.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const IDENTITY: Identity = Identity { vendor: 7, device: 8, driver: 9, cache: [3; 16] };
+
+    fn pipelines() -> Vec<u8> {
+        let mut data: Vec<u8> = [32, 1, 7, 8].iter().flat_map(|number: &u32| number.to_ne_bytes()).collect();
+        data.extend([3; 16]);
+        data.extend(0..100);
+        data
+    }
+
+    fn choices() -> Choices {
+        Choices::parse("convolve 14 6 7 quadruple\nlinear 9 6 7 double\n").expect("choices")
+    }
+
+    #[test]
+    fn what_is_remembered_is_recalled() {
+        for data in [pipelines(), Vec::new()] {
+            let bytes = encode(&IDENTITY, &choices(), &data);
+            assert_eq!(decode(&IDENTITY, &bytes), Some((choices(), &data[..])));
+        }
+        // A cache without the right header is not kept.
+        let bytes = encode(&IDENTITY, &choices(), &[1; 100]);
+        assert_eq!(decode(&IDENTITY, &bytes), Some((choices(), &[][..])));
+    }
+
+    #[test]
+    fn damaged_data_is_ignored() {
+        let bytes = encode(&IDENTITY, &choices(), &pipelines());
+        for length in 0..bytes.len() {
+            assert_eq!(decode(&IDENTITY, &bytes[..length]), None, "{length} bytes");
+        }
+        for at in 0..bytes.len() {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 0x10;
+            assert_eq!(decode(&IDENTITY, &damaged), None, "byte {at}");
+        }
+    }
+
+    #[test]
+    fn another_device_or_driver_recalls_nothing() {
+        let bytes = encode(&IDENTITY, &choices(), &pipelines());
+        let others = [
+            Identity { vendor: 1, ..IDENTITY },
+            Identity { device: 1, ..IDENTITY },
+            Identity { driver: 1, ..IDENTITY },
+            Identity { cache: [1; 16], ..IDENTITY },
+        ];
+        for other in others {
+            assert_eq!(decode(&other, &bytes), None);
+        }
+        // A right frame around another device's pipelines.
+        let mut foreign = pipelines();
+        foreign[8] = 1;
+        assert!(!IDENTITY.has_header(&foreign) && IDENTITY.has_header(&pipelines()));
+    }
+}
