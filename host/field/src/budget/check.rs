@@ -12,7 +12,7 @@ use viewfuse_core::random::uniform;
 const EVEN_SHARE: f64 = 0.25;
 /// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 23 degrees of freedom is
 /// 1.7; squared differences are skewed.
-const STANDARD_ERRORS: f64 = 2.5;
+const STANDARD_ERRORS: f64 = 2.0;
 
 /// A drawn pixel, and the inverse of its probability over the number of pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]

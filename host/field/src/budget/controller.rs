@@ -10,7 +10,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_weighting::sources::SourceWeights;
 
 /// A search begins where the typical error, scaled, is below the bound by this factor: most first checks then succeed.
-const MARGIN: f64 = 1.25;
+const MARGIN: f64 = 1.15;
 /// Exact pixels of a round of a check: as many as take this share of the picture's work, in these bounds; and the most rounds
 /// until a check is decided.
 const CHECK_WORK: f64 = 0.2;

@@ -34,10 +34,6 @@ pub(super) fn estimate(better: &Rendered, cheaper: &Rendered, ratio: f64) -> Pai
 mod tests {
     use super::*;
 
-    fn grey(value: f32) -> Rendered {
-        Rendered { colours: vec![[value; 4]; 4], depths: Vec::new(), confidences: Vec::new(), width: 2, height: 2 }
-    }
-
     #[test]
     fn squares_add_up() {
         // The truth is 0; what neither resolves has the root mean square 0.01, what only the better one does 0.02.
