@@ -13,6 +13,7 @@ use anyhow::{Context, bail, ensure};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
+use viewfuse_evaluate::PSNR;
 use viewfuse_evaluate::metrics::interval::Interval;
 use viewfuse_evaluate::protocol::Protocol;
 use viewfuse_evaluate::run_folder::{Finished, RunFolder, missing};
@@ -96,7 +97,9 @@ impl Group {
 
 /// The difference of a scheme from the mean; for the mean itself the score.
 pub(crate) fn cell(table: &Table, scheme: &str) -> Option<Interval> {
-    let cell = table.rows.iter().find(|row| row.scheme == scheme)?.cells.get(table.headline)?.as_ref()?;
+    // Tables of masked benchmarks have another headline.
+    let psnr = table.metrics.iter().position(|metric| metric.name == PSNR)?;
+    let cell = table.rows.iter().find(|row| row.scheme == scheme)?.cells.get(psnr)?.as_ref()?;
     if scheme == REFERENCE { Some(cell.value) } else { cell.versus_reference }
 }
 
