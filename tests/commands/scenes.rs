@@ -1,4 +1,4 @@
-//! `viewfuse scenes make`: what it writes, and how it stops and goes on.
+//! `viewfuse scenes make` and `scenes photograph`: what it writes, and how it stops and goes on.
 
 use super::{BINARY, done};
 use std::fs;
@@ -8,6 +8,7 @@ use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
     scenes_appear_in_their_folders_and_are_read_again,
+    a_room_is_photographed_as_asked,
     wrong_arguments_are_told,
     ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on,
 ];
@@ -29,12 +30,27 @@ fn scenes_appear_in_their_folders_and_are_read_again() {
     assert_eq!(done(folder.path(), toys), "out: 1 new scenes, 0 existing\n");
 }
 
+fn a_room_is_photographed_as_asked() {
+    let folder = Folder::new();
+    let room = "scenes photograph room out --rig handheld --views 3 --size 64x48 --seed 2 --exposures 0.2 --focals 0.1 --distortion -0.1";
+    assert_eq!(done(folder.path(), room), "out: 3 views\n");
+    let scene = Scene::open(folder.path().join("out")).expect("a scene");
+    assert_eq!(scene.views.len(), 3);
+    assert_eq!(scene.views[0].lens.map(|lens| lens.coefficients()[0]), Some(-0.1));
+    let focals: Vec<f32> = scene.views.iter().map(|view| view.camera.pinhole.focal()[0]).collect();
+    assert!(focals[0] != focals[1] && scene.photograph(2).expect("a photograph").pixels.dimensions() == (64, 48));
+    assert_refused(BINARY, folder.path(), room, &["out: exists already"]);
+    assert_refused(BINARY, folder.path(), &room.replace("-0.1", "-2").replace("out", "other"), &["the lens", "twice"]);
+    assert!(!folder.path().join("other").exists());
+}
+
 fn wrong_arguments_are_told() {
     let folder = Folder::new();
     let wrong = |arguments: &str, parts: &[&str]| assert_wrong_arguments(BINARY, folder.path(), arguments, parts);
     wrong("scenes make lorries out", &["lorries", "cars, chairs or toys"]);
     wrong("scenes make cars out --size 100", &["the size must be 64 or 128"]);
     wrong("scenes make cars out --views 0", &["--views"]);
+    wrong("scenes photograph moon out", &["moon", "room or garden"]);
     wrong("scenes make cars out --train 2000000", &["--train"]);
 }
 

@@ -11,6 +11,7 @@ viewfuse_tests::trials![
     weights_as_json,
     evaluates_schemes_against_the_nearest_copy,
     evaluates_the_views_that_are_no_sources,
+    auto_is_a_row_and_leaves_the_others_alone,
     a_reader_that_goes_away_is_no_failure,
 ];
 
@@ -98,6 +99,31 @@ fn evaluates_the_views_that_are_no_sources() {
     let table = done(scene.path(), "evaluate toy --sources all/2 --size 32x32 --weights error:alpha=1");
     assert!(table.contains("toy: 12 targets"), "{table}");
     assert_eq!(names_in(scene.path()), ["toy"]);
+}
+
+fn auto_is_a_row_and_leaves_the_others_alone() {
+    let scene = toy();
+    let room = viewfuse_tests::places::data("room");
+    let job = format!("{} --targets 5 --sources 1,3,4,6,7,9 --size 64x48", room.display());
+    let scores = |weights: &str| -> Vec<(String, f64)> {
+        done(scene.path(), &format!("evaluate {job} {weights} -o scores.csv"));
+        let csv = fs::read_to_string(scene.path().join("scores.csv")).expect("the scores");
+        let line = |line: &str| {
+            let cells: Vec<&str> = line.split(',').collect();
+            (cells[1].to_owned(), cells[4].parse().expect("a number"))
+        };
+        csv.lines().skip(1).map(line).collect()
+    };
+    let of = |scores: &[(String, f64)], scheme: &str| {
+        scores.iter().find(|(own, _)| own == scheme).unwrap_or_else(|| panic!("no row {scheme}")).1
+    };
+    let (both, alone) = (scores("--weights auto --weights mean"), scores("--weights mean"));
+    assert_near(of(&both, "mean"), of(&alone, "mean"), 1.0e-6);
+    // The same choice as `render` makes without being told a scheme.
+    done(scene.path(), &format!("render {job} -o out"));
+    let record = fs::read_to_string(scene.path().join("out/run.json")).expect("a record");
+    let record: Value = serde_json::from_str(&record).expect("JSON");
+    assert_near(of(&both, "auto"), record["frames"][0]["psnr"].as_f64().expect("a score"), 1.0e-4);
 }
 
 /// `viewfuse ... | head` closes the pipe early: no panic, and the files are written all the same.

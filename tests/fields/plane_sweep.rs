@@ -9,9 +9,11 @@ use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::weighting::Weighting;
+use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::metrics::psnr;
+use viewfuse_core::plane_sweep::blend::blend;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::places::repository;
@@ -62,17 +64,22 @@ fn wall(gains: [f32; 3]) -> SourceImages {
     sources(centres.iter().zip(gains).map(|(centre, gain)| photograph(camera(*centre, 72, 54), gain)).collect())
 }
 
+/// Equal weights of all others for each source.
+fn relevance(count: usize) -> Vec<SourceWeights> {
+    let of = |own: usize| {
+        let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+        (0..count).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
+        Weights::from_scores(&scores, count as u32)
+    };
+    (0..count).map(of).collect()
+}
+
 /// A picture with equal weights.
 fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
     let (field, count) = (TrainingFree::default(), sources.images.len());
     let renderer = On { device: &Cpu, field: &field };
     let mut session = Session::open(&renderer, sources, &Silent).expect("a session");
-    let relevance = |own: usize| {
-        let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
-        (0..count).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
-        Weights::from_scores(&scores, count as u32)
-    };
-    session.weigh(&(0..count).map(relevance).collect::<Vec<_>>(), &Silent).expect("a weighting");
+    session.weigh(&relevance(count), &Silent).expect("a weighting");
     session.render(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
 }
 
@@ -102,6 +109,22 @@ fn a_painted_wall_is_found_and_shown() {
     assert!((median - WALL).abs() < 0.05 * WALL, "{median}");
     let copy = inner_error(&wall([1.0; 3]).images[0].texels, &photograph(target, 1.0).texels, 72);
     assert!(copy > 5.0 * error, "a copy is as good: {copy}");
+}
+
+#[test]
+fn the_planes_of_a_target_are_those_of_its_picture() {
+    let (sources, target) = (wall([0.9, 1.0, 1.1]), camera(Vec3::new(0.1, 0.0, 0.0), 40, 30));
+    let rendered = picture(&sources, &target);
+    let targets = [(target, Weights::mean(3))];
+    let planes = TrainingFree::default().sweep.target_planes(&Cpu, &sources, &relevance(3), &targets, &Silent);
+    let planes = planes.expect("planes").remove(0);
+    assert_eq!(planes.sources, [0, 1, 2]);
+    for (pixel, colour) in rendered.colours.iter().enumerate() {
+        let at = [(pixel % 40) as f32 + 0.5, (pixel / 40) as f32 + 0.5];
+        let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
+        let blended = blend(&planes.block, &planes.views, texels, disparities, &planes.costs[..], at);
+        assert_eq!(blended.colour, *colour, "pixel {pixel}");
+    }
 }
 
 #[test]

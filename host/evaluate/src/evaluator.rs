@@ -10,13 +10,14 @@ use std::collections::hash_map::Entry;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::Renderer;
+use viewfuse_field::auto::choose;
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
 use viewfuse_scene::photographs::{Album, GroundTruth, PhotographsError, SourceImages};
-use viewfuse_weighting::Weighting;
+use viewfuse_weighting::OpenedChoice;
 
 /// Why an evaluation failed.
 #[derive(Debug, thiserror::Error)]
@@ -90,8 +91,9 @@ pub fn without_masks(scene: &Scene) -> Scene {
 
 /// What renders and scores.
 pub struct Evaluator<'a> {
-    /// The schemes.
-    pub weightings: &'a [Weighting],
+    /// The schemes. [`OpenedChoice::Auto`] chooses a scheme and the field's scalars for each set of sources, from these sources
+    /// alone.
+    pub weightings: &'a [OpenedChoice],
     /// What makes the pictures.
     pub renderer: &'a dyn Renderer,
     /// How.
@@ -104,7 +106,7 @@ pub struct Evaluator<'a> {
 
 impl Evaluator<'_> {
     /// Scores the baselines and then every scheme on targets that share their sources. `seen` gets each rendered frame with
-    /// its scheme, its values and the sources at working size.
+    /// its scheme's name, its values and the sources at working size.
     ///
     /// # Errors
     /// [`EvaluateError`].
@@ -113,7 +115,7 @@ impl Evaluator<'_> {
         subject: Subject<'_>,
         sources: &[usize],
         targets: &[usize],
-        mut seen: impl FnMut(&Weighting, &Frame, &[(String, f64)], &SourceImages),
+        mut seen: impl FnMut(&str, &Frame, &[(String, f64)], &SourceImages),
     ) -> Result<Vec<Score>, EvaluateError> {
         let Evaluator { weightings, renderer, options, progress, .. } = *self;
         let Subject { scene, album, masked } = subject;
@@ -150,9 +152,19 @@ impl Evaluator<'_> {
         drop(shots);
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
-        for weighting in weightings {
+        for row in weightings {
+            let name = row.to_string();
             let start = Instant::now();
+            let weighting = &match row {
+                OpenedChoice::Given(weighting) => weighting.clone(),
+                OpenedChoice::Auto => {
+                    let chosen = choose(&stage, renderer, options, progress)?;
+                    stage.tune(&chosen.settings);
+                    chosen.weighting
+                }
+            };
             stage.weigh(weighting, progress)?;
+            // Choosing is a part of it.
             let encode_share = start.elapsed() / targets.len().max(1) as u32;
             let mut bounded = Vec::new();
             for &target in targets {
@@ -163,11 +175,12 @@ impl Evaluator<'_> {
                     shared += frame.encode;
                     let mask = masks.get(&target).and_then(Option::as_ref);
                     let values = self.values(&frame.picture, &truth.picture, truth.seen.as_ref(), mask)?;
-                    seen(weighting, &frame, &values, &stage.images);
-                    scores.push(score(&weighting.to_string(), target, values, time));
+                    seen(&name, &frame, &values, &stage.images);
+                    scores.push(score(&name, target, values, time));
                 }
             }
-            kept_in_words(&bounded).iter().for_each(|words| progress.note(&format!("{weighting}: {words}")));
+            kept_in_words(&bounded).iter().for_each(|words| progress.note(&format!("{name}: {words}")));
+            stage.tune(&options.settings);
         }
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);

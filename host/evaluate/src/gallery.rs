@@ -9,7 +9,6 @@ use viewfuse_field::render::Frame;
 use viewfuse_job::files::{WriteError, read_at_most, write_whole};
 use viewfuse_output::png::write_png;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_weighting::Weighting;
 
 /// Name of the folder of pictures in that of the evaluation.
 pub const PICTURES: &str = "pictures";
@@ -171,8 +170,8 @@ pub struct Gallery {
 }
 
 impl Gallery {
-    /// Stores the parts of a frame that the report needs.
-    pub fn add(&mut self, weighting: &Weighting, frame: &Frame, values: &[(String, f64)], sources: &SourceImages) {
+    /// Stores the parts of a frame that the report needs. `scheme` is its row's name.
+    pub fn add(&mut self, scheme: &str, frame: &Frame, values: &[(String, f64)], sources: &SourceImages) {
         let Some(truth) = &frame.truth else { return };
         if self.sources.is_empty() {
             self.sources = (0..sources.images.len()).map(|source| thumbnail(sources.picture(source))).collect();
@@ -185,7 +184,7 @@ impl Gallery {
         }
         let finite = |(name, value): &(String, f64)| (name.clone(), Some(*value).filter(|value| value.is_finite()));
         let shown = ShownScheme {
-            scheme: weighting.to_string(),
+            scheme: scheme.to_owned(),
             file: String::new(),
             weights: frame.omission.weights.values()[..sources.images.len()].to_vec(),
             values: values.iter().map(finite).collect(),

@@ -20,7 +20,7 @@ use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::rig::Rig;
 
 pub use hull::{NoObject, find_object};
-pub use sweep::Sweep;
+pub use sweep::{Sweep, TargetPlanes};
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 use crate::garden;
 use crate::noise::{fractions, words};
-use crate::photograph::{depth, photograph};
+use crate::photograph::{depth, photograph_through};
 use crate::rig::Rig;
 use crate::room;
 use crate::scenery::{Scenery, SceneryError};
@@ -10,6 +10,7 @@ use image::RgbImage;
 use std::fmt;
 use std::str::FromStr;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
+use viewfuse_core::lens::Lens;
 use viewfuse_core::math::clamp;
 use viewfuse_core::pose::PoseError;
 
@@ -41,6 +42,9 @@ pub enum ShootError {
     /// A camera is unusable.
     #[error("a camera is unusable: {0}")]
     Camera(#[from] PoseError),
+    /// A lens folds over inside the pictures.
+    #[error("the lens {0:?} shows some points of the pictures twice or not at all")]
+    Lens([f64; 8]),
     /// The scenery is unusable.
     #[error(transparent)]
     Scenery(#[from] SceneryError),
@@ -48,6 +52,9 @@ pub enum ShootError {
 
 /// Focal length as a part of the pictures' longer side.
 const FOCAL: f32 = 0.92;
+
+/// Distance of a corner and where the lens bends the corner's ray to, normalised, above which the lens folds over.
+const LARGEST_RESIDUAL: f64 = 1.0e-6;
 
 /// Seed of the sample: a room with many colours and textures.
 const SAMPLE_SEED: u64 = 17;
@@ -65,6 +72,7 @@ pub struct Shoot {
     cameras: Vec<Camera>,
     /// A factor on the light of each view.
     exposures: Vec<f32>,
+    lens: Option<Lens>,
     seed: u32,
 }
 
@@ -84,7 +92,7 @@ pub fn generate(place: Place, rig: Rig, seed: u64, size: [u32; 2], count: u32) -
     };
     let cameras = rig.cameras(&walk, pinhole, count, seed)?;
     let exposures = vec![1.0; cameras.len()];
-    Ok(Shoot { scenery, cameras, exposures, seed: seed as u32 })
+    Ok(Shoot { scenery, cameras, exposures, lens: None, seed: seed as u32 })
 }
 
 /// The repository's sample of a room, as `tests/data/room` has it: 11 views of 320 x 240 pixels on an arc.
@@ -120,12 +128,62 @@ impl Shoot {
         Shoot { exposures: (0..self.cameras.len()).map(exposure).collect(), ..self }
     }
 
+    /// The same with a lens that is zoomed: each view gets a factor between `1 - spread` and `1 + spread` on its focal lengths,
+    /// drawn for the seed. A spread outside of 0 to 0.5 is taken as the nearer of the two.
+    ///
+    /// # Errors
+    /// [`ShootError::Size`]; none for a spread of 0.5 or less.
+    pub fn with_focals(self, spread: f32) -> Result<Shoot, ShootError> {
+        let spread = clamp(spread, 0.0, 0.5);
+        let zoomed = |(view, camera): (usize, &Camera)| {
+            let factor = 1.0 + spread * (2.0 * fractions(self.seed, [view as i32, 2, 0])[0] - 1.0);
+            let pinhole = camera.pinhole;
+            let size = [pinhole.width(), pinhole.height()];
+            let focal = pinhole.focal().map(|focal| focal * factor);
+            match Pinhole::new(focal, pinhole.principal(), size[0], size[1]) {
+                Ok(pinhole) => Ok(Camera { pinhole, ..*camera }),
+                Err(source) => Err(ShootError::Size { size, source }),
+            }
+        };
+        let cameras = self.cameras.iter().enumerate().map(zoomed).collect::<Result<_, _>>()?;
+        Ok(Shoot { cameras, ..self })
+    }
+
+    /// The same through a lens, which all views share. Depths stay those of the pinholes.
+    ///
+    /// # Errors
+    /// [`ShootError::Lens`] if it folds over inside a picture.
+    pub fn with_lens(self, lens: Lens) -> Result<Shoot, ShootError> {
+        let folds = |camera: &Camera| {
+            let pinhole = &camera.pinhole;
+            let ([focal_x, focal_y], [x, y]) = (pinhole.focal(), pinhole.principal());
+            let (right, below) = (pinhole.width() as f32 - x, pinhole.height() as f32 - y);
+            let corners = [[-x, -y], [right, -y], [-x, below], [right, below]];
+            let misses = |[x, y]: [f32; 2]| {
+                let corner = [f64::from(x / focal_x), f64::from(y / focal_y)];
+                let straight = lens.undistort(corner);
+                let radius = straight.point[0].hypot(straight.point[1]);
+                !(straight.residual <= LARGEST_RESIDUAL) || lens.reach(2.0 * radius + 1.0e-9) < radius
+            };
+            corners.into_iter().any(misses)
+        };
+        match self.cameras.iter().any(folds) {
+            true => Err(ShootError::Lens(lens.coefficients())),
+            false => Ok(Shoot { lens: Some(lens).filter(|lens| !lens.is_pinhole()), ..self }),
+        }
+    }
+
+    /// The lens, if it is none of a pinhole.
+    pub fn lens(&self) -> Option<&Lens> {
+        self.lens.as_ref()
+    }
+
     /// The photograph of a view; `None` if there is no such view. Noise in the shadows differs from view to view.
     pub fn photograph(&self, view: usize, rays_per_side: u32) -> Option<RgbImage> {
         let camera = self.cameras.get(view)?;
         let [seed, ..] = words(self.seed, [view as i32, 0, 0]);
         let exposure = *self.exposures.get(view)?;
-        Some(photograph(&self.scenery, camera, rays_per_side, exposure, seed))
+        Some(photograph_through(&self.scenery, camera, self.lens.as_ref(), rays_per_side, exposure, seed))
     }
 
     /// The exact depth of a view's pixels, as [`depth`] has it; `None` if there is no such view.

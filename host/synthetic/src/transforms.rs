@@ -1,7 +1,7 @@
 //! A scene folder in NeRF's layout, as nerfstudio writes it.
 //!
 //! ```text
-//! transforms.json        intrinsics; for each frame its file and its pose, camera-to-world in OpenGL axes
+//! transforms.json        intrinsics and lens; for each frame its file, its focal lengths if they differ, and its pose, camera-to-world in OpenGL axes
 //! images/000.jpg         photographs
 //! ```
 //!
@@ -12,9 +12,11 @@ use crate::shoot::Shoot;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use viewfuse_core::camera::Camera;
+use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_job::progress::Progress;
 
 /// Quality of the photographs, of 100.
@@ -29,12 +31,16 @@ struct Transforms {
     fl_y: f32,
     cx: f32,
     cy: f32,
+    #[serde(flatten)]
+    lens: BTreeMap<&'static str, f64>,
     frames: Vec<Frame>,
 }
 
 #[derive(Serialize)]
 struct Frame {
     file_path: String,
+    #[serde(flatten)]
+    focal: BTreeMap<&'static str, f32>,
     transform_matrix: [[f32; 4]; 4],
 }
 
@@ -53,7 +59,8 @@ pub fn write_shoot(
     if count > LARGEST_VIEW_COUNT {
         return Err(WriteError::ViewCount { path: folder.to_owned(), count });
     }
-    let text = transforms(shoot.cameras()).ok_or_else(|| WriteError::ViewCount { path: folder.to_owned(), count })?;
+    let text = transforms(shoot.cameras(), shoot.lens())
+        .ok_or_else(|| WriteError::ViewCount { path: folder.to_owned(), count })?;
     create_whole(folder, |unfinished| {
         let path = unfinished.join("transforms.json");
         let json = serde_json::to_string_pretty(&text).map_err(|source| io_error(&path)(source.into()))?;
@@ -87,24 +94,44 @@ pub fn file_name(view: usize) -> String {
     format!("images/{view:03}.jpg")
 }
 
-/// What the file says; `None` without cameras. The cameras of a shoot share their intrinsics.
-fn transforms(cameras: &[Camera]) -> Option<Transforms> {
+/// Names of a lens's coefficients, in their order.
+const COEFFICIENTS: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
+
+/// What the file says; `None` without cameras. The cameras of a shoot share everything but their focal lengths.
+fn transforms(cameras: &[Camera], lens: Option<&Lens>) -> Option<Transforms> {
     let pinhole = cameras.first()?.pinhole;
-    let frame = |(view, camera): (usize, &Camera)| Frame {
-        file_path: file_name(view),
-        transform_matrix: camera.pose.to_opengl(),
+    let frame = |(view, camera): (usize, &Camera)| {
+        let [fl_x, fl_y] = camera.pinhole.focal();
+        let is_own = camera.pinhole.focal() != pinhole.focal();
+        Frame {
+            file_path: file_name(view),
+            focal: if is_own { BTreeMap::from([("fl_x", fl_x), ("fl_y", fl_y)]) } else { BTreeMap::new() },
+            transform_matrix: camera.pose.to_opengl(),
+        }
     };
     let ([fl_x, fl_y], [cx, cy]) = (pinhole.focal(), pinhole.principal());
     Some(Transforms {
-        camera_model: "PINHOLE",
+        camera_model: match lens.map(Lens::projection) {
+            None => "PINHOLE",
+            Some(Projection::Perspective) => "FULL_OPENCV",
+            Some(Projection::Fisheye) => "OPENCV_FISHEYE",
+        },
         w: pinhole.width(),
         h: pinhole.height(),
         fl_x,
         fl_y,
         cx,
         cy,
+        lens: lens.map_or_else(BTreeMap::new, coefficients),
         frames: cameras.iter().enumerate().map(frame).collect(),
     })
+}
+
+/// A lens's coefficients that are not 0, by name; a fisheye has the first four.
+fn coefficients(lens: &Lens) -> BTreeMap<&'static str, f64> {
+    let count = if lens.projection() == Projection::Fisheye { 4 } else { COEFFICIENTS.len() };
+    let named = COEFFICIENTS.into_iter().zip(lens.coefficients()).take(count);
+    named.filter(|(_, value)| *value != 0.0).collect()
 }
 
 /// The same JSON with each row of a matrix on one line: lists of numbers are joined.

@@ -7,6 +7,7 @@
 //! spec        the text form, parsed without any file     WeightingSpec, scheme_names, grammar
 //! choice      a scheme or the best for the scene         WeightingChoice, choice_grammar
 //! weighting   ready to weigh                             Weighting, Weigh
+//! opened      a choice that is ready for use             OpenedChoice
 //! select      the few sources that targets need
 //! ```
 
@@ -14,12 +15,14 @@
 
 pub mod attention;
 mod choice;
+mod opened;
 pub mod select;
 pub mod sources;
 mod spec;
 mod weighting;
 
 pub use choice::{WeightingChoice, choice_grammar};
+pub use opened::OpenedChoice;
 pub use spec::{WeightingError, WeightingSpec, grammar, scheme_names};
 pub use weighting::{Weigh, Weighting};
 

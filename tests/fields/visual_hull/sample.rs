@@ -15,7 +15,7 @@ use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::{Selection, target_of};
 use viewfuse::scene::photographs::{Album, BackgroundChoice, PhotographsError, to_rgb8};
-use viewfuse::weighting::Weighting;
+use viewfuse::weighting::{OpenedChoice, Weighting};
 use viewfuse_tests::scenes::Folder;
 
 use super::worlds::Run;
@@ -33,7 +33,7 @@ fn scheme(name: &str) -> Weighting {
 fn scores(folder: &Path, schemes: &[&str]) -> Table {
     let scene = Scene::open(folder).expect("the sample");
     let selection = Selection { sources: Some(TRAINING.to_owned()), ..Selection::default() };
-    let weightings: Vec<Weighting> = schemes.iter().map(|name| scheme(name)).collect();
+    let weightings: Vec<OpenedChoice> = schemes.iter().map(|name| scheme(name).into()).collect();
     let (field, options, quiet) = (TrainingFree::default(), RenderOptions::default(), Silent);
     let evaluator = Evaluator {
         weightings: &weightings,

@@ -7,12 +7,13 @@ use viewfuse::synthetic::lamp::Lamp;
 use viewfuse::synthetic::photograph::{RAYS_PER_SIDE, photograph};
 use viewfuse::synthetic::room::{CEILING, FLOOR, HALF_LENGTH, HALF_WIDTH};
 use viewfuse::synthetic::scenery::SceneryError;
-use viewfuse::synthetic::shoot::{Place, Shoot, generate, sample};
+use viewfuse::synthetic::shoot::{Place, Shoot, ShootError, generate, sample};
 use viewfuse::synthetic::trace::first;
 use viewfuse::synthetic::transforms::{file_name, jpeg};
 use viewfuse::synthetic::{Finish, Object, Part, Placement, Rig, Scenery, Shape, Texture, write_shoot};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole, Ray};
+use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 
@@ -208,6 +209,66 @@ fn exposures_are_factors_on_the_light() {
         let (factor, expected) = (mean(&shoot, view), shoot.exposures()[view]);
         assert!((factor - expected).abs() < 0.03, "view {view}: {factor} instead of {expected}");
     }
+}
+
+/// A perspective lens of one coefficient.
+fn lens(k1: f64) -> Lens {
+    Lens::new(Projection::Perspective, [k1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).expect("a lens")
+}
+
+/// Root mean square difference of the pixels that are not at the border, in levels of 255.
+fn difference(a: &image::RgbImage, b: &image::RgbImage) -> f64 {
+    let (width, height) = a.dimensions();
+    let (mut sum, mut count) = (0.0, 0);
+    for (x, y, pixel) in a.enumerate_pixels() {
+        if (4..width - 4).contains(&x) && (4..height - 4).contains(&y) {
+            let channels = pixel.0.iter().zip(b.get_pixel(x, y).0);
+            sum += channels.map(|(a, b)| (f64::from(*a) - f64::from(b)).powi(2)).sum::<f64>();
+            count += 3;
+        }
+    }
+    (sum / f64::from(count)).sqrt()
+}
+
+#[test]
+fn a_lens_bends_the_photograph_and_the_reader_straightens_it() {
+    let directory = tempfile::tempdir().expect("a folder");
+    let folder = directory.path().join("scene");
+    let plain = generate(Place::Room, Rig::Arc, 5, [160, 120], 2).expect("a room");
+    let bent = plain.clone().with_lens(lens(-0.2)).expect("a lens that shows everything once");
+    assert_eq!(bent.depth(0), plain.depth(0), "depths are those of the pinhole");
+    write_shoot(&folder, &bent, 2, &viewfuse::job::progress::Silent).expect("written");
+    let scene = Scene::open(&folder).expect("it opens");
+    assert_eq!(scene.views[1].lens, Some(lens(-0.2)));
+    let ideal = plain.photograph(1, 2).expect("a view");
+    let taken = bent.photograph(1, 2).expect("a view");
+    let read = image::DynamicImage::from(scene.photograph(1).expect("a photograph").pixels).to_rgb8();
+    let (before, after) = (difference(&taken, &ideal), difference(&read, &ideal));
+    assert!(before > 20.0 && after < 0.5 * before, "{before} levels through the lens, {after} when it is read");
+    // A lens of none is a pinhole, and one that folds over inside the picture is refused.
+    assert_eq!(plain.clone().with_lens(lens(0.0)), Ok(plain.clone()));
+    assert!(matches!(plain.with_lens(lens(-1.5)), Err(ShootError::Lens(_))));
+}
+
+#[test]
+fn focal_lengths_differ_from_view_to_view() {
+    let directory = tempfile::tempdir().expect("a folder");
+    let folder = directory.path().join("scene");
+    let plain = small(Rig::Handheld, 3, 4);
+    let zoomed = plain.clone().with_focals(0.2).expect("a spread");
+    let focal = |camera: &Camera| camera.pinhole.focal()[0];
+    let factors: Vec<f32> =
+        zoomed.cameras().iter().zip(plain.cameras()).map(|(own, other)| focal(own) / focal(other)).collect();
+    assert!(factors.iter().all(|factor| (0.8..=1.2).contains(factor)), "{factors:?}");
+    assert!(factors.windows(2).all(|pair| pair[0] != pair[1]), "{factors:?}");
+    write_shoot(&folder, &zoomed, 1, &viewfuse::job::progress::Silent).expect("written");
+    let scene = Scene::open(&folder).expect("it opens");
+    for (view, camera) in scene.views.iter().zip(zoomed.cameras()) {
+        assert_eq!(view.camera.pinhole, camera.pinhole, "{}", view.name);
+    }
+    // The pixel in the middle shows the same point, whatever the focal length.
+    let middle = |shoot: &Shoot| shoot.depth(2).expect("a view")[24 * 64 + 32];
+    assert!((middle(&zoomed) / middle(&plain) - 1.0).abs() < 0.05, "{} and {}", middle(&zoomed), middle(&plain));
 }
 
 #[test]

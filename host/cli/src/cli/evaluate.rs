@@ -17,7 +17,7 @@ use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_file_apart;
 use super::terminal::Terminal;
-use super::weighting::{many_help, open_all, or_every_scheme};
+use super::weighting::{many_choices_help, or_every_scheme};
 use super::{on_threads, say};
 use clap::Args;
 use files::{csv_of, json_of};
@@ -33,7 +33,7 @@ use viewfuse_evaluate::{Evaluator, Score};
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_scene::Scene;
 use viewfuse_scene::dataset::{Dataset, DatasetError, Split};
-use viewfuse_weighting::WeightingSpec;
+use viewfuse_weighting::{OpenedChoice, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -59,8 +59,8 @@ pub(crate) struct Arguments {
     targets: Option<String>,
     #[command(flatten)]
     sources: SourceOptions,
-    #[arg(long, value_name = "SCHEME", help = many_help())]
-    weights: Vec<WeightingSpec>,
+    #[arg(long, value_name = "SCHEME", help = many_choices_help())]
+    weights: Vec<WeightingChoice>,
     #[command(flatten)]
     protocol: ProtocolOptions,
     #[command(flatten)]
@@ -99,13 +99,13 @@ impl Arguments {
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     arguments.metrics.refuse_sets()?;
-    let mut specs = or_every_scheme(&arguments.weights)?;
+    let mut choices: Vec<WeightingChoice> = or_every_scheme(&arguments.weights)?;
     if arguments.protocol.protocol.is_some() {
         // Once in a table is enough.
         let mut seen = HashSet::new();
-        specs.retain(|spec| seen.insert(spec.to_string()));
+        choices.retain(|choice| seen.insert(choice.to_string()));
     }
-    let weightings = open_all(&specs)?;
+    let weightings: Vec<OpenedChoice> = choices.iter().map(WeightingChoice::open).collect::<Result<_, _>>()?;
     if let Some(protocol) = &arguments.protocol.protocol {
         return protocol::run(arguments, protocol, &weightings, values);
     }

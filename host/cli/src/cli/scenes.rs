@@ -1,12 +1,16 @@
 //! `viewfuse scenes`.
 
+use super::parse::{parse_share, parse_size as parse_picture_size};
 use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use viewfuse_core::lens::{Lens, Projection};
 use viewfuse_synthetic::collection::{LARGEST_OBJECT_COUNT, ObjectCounts, Settings, make};
 use viewfuse_synthetic::kinds::Kind;
+use viewfuse_synthetic::photograph::RAYS_PER_SIDE;
+use viewfuse_synthetic::{Place, Rig, generate, write_shoot};
 
 #[derive(Args)]
 pub(crate) struct Arguments {
@@ -18,6 +22,45 @@ pub(crate) struct Arguments {
 enum Command {
     /// Generate and render objects of one kind: training, validation and test scenes in SRN's layout.
     Make(MakeArguments),
+    /// Generate and photograph a scene with a background: one scene in NeRF's layout.
+    Photograph(PhotographArguments),
+}
+
+#[derive(Args)]
+#[command(after_help = "Examples:\n  \
+    viewfuse scenes photograph room scene/ --rig handheld --seed 3\n      scene/transforms.json and scene/images, 12 views of 320 x 240 pixels\n  \
+    viewfuse scenes photograph garden scene/ --exposures 0.2 --focals 0.1 --distortion=-0.05\n      with a camera that sets its exposure and its zoom itself, and a lens with barrel distortion\n\n\
+    The same settings give the same pictures.")]
+struct PhotographArguments {
+    /// What is photographed: room or garden
+    place: Place,
+    /// The output folder, which must not exist
+    #[arg(value_name = "OUT_FOLDER")]
+    out: PathBuf,
+    /// How the photographer moves: arc, forward, turntable or handheld
+    #[arg(long, value_name = "RIG", default_value = "arc")]
+    rig: Rig,
+    /// Number of views
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = view_count())]
+    views: u32,
+    /// Size of the photographs
+    #[arg(long, value_name = "WxH", default_value = "320x240", value_parser = parse_picture_size)]
+    size: [u32; 2],
+    /// Seed of every random draw
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+    /// Largest difference of the views' exposures from the mean, as a share of it
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share)]
+    exposures: f32,
+    /// Largest difference of the views' focal lengths from the mean, as a share of it, at most 0.5
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = parse_share)]
+    focals: f32,
+    /// Radial distortion k1 of the lens, OpenCV's: below 0 a barrel's, above 0 a pincushion's
+    #[arg(long, value_name = "K1", default_value_t = 0.0, allow_negative_numbers = true)]
+    distortion: f64,
+    /// Work on this many threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
 }
 
 #[derive(Args)]
@@ -77,6 +120,7 @@ fn parse_size(text: &str) -> Result<u32, String> {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     match &arguments.command {
         Command::Make(arguments) => run_make(arguments),
+        Command::Photograph(arguments) => run_photograph(arguments),
     }
 }
 
@@ -88,5 +132,19 @@ fn run_make(arguments: &MakeArguments) -> anyhow::Result<ExitCode> {
     let made = on_threads(*threads, || make(out, *kind, &settings, counts, &progress))??;
     drop(progress);
     say(format_args!("{}: {} new scenes, {} existing", out.display(), made.new_count, made.kept_count))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_photograph(arguments: &PhotographArguments) -> anyhow::Result<ExitCode> {
+    let PhotographArguments { place, out, rig, views, size, seed, .. } = arguments;
+    let lens = Lens::new(Projection::Perspective, [arguments.distortion, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])?;
+    let shoot = generate(*place, *rig, *seed, *size, *views)?
+        .with_exposures(arguments.exposures)
+        .with_focals(arguments.focals)?
+        .with_lens(lens)?;
+    let progress = Terminal::new("photographing");
+    on_threads(arguments.threads, || write_shoot(out, &shoot, RAYS_PER_SIDE, &progress))??;
+    drop(progress);
+    say(format_args!("{}: {views} views", out.display()))?;
     Ok(ExitCode::SUCCESS)
 }

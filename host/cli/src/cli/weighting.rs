@@ -1,5 +1,6 @@
 //! `--weights`: its values and help.
 
+use std::str::FromStr;
 use viewfuse_weighting::attention::AttentionError;
 use viewfuse_weighting::{Weighting, WeightingError, WeightingSpec, choice_grammar, grammar, scheme_names};
 
@@ -15,8 +16,14 @@ pub(crate) fn many_help() -> String {
     format!("A weighting scheme; may be given several times: {grammar} [default: every scheme that needs no file]")
 }
 
+/// Help of an option that can be given several times, with the automatic choice.
+pub(crate) fn many_choices_help() -> String {
+    let grammar = choice_grammar();
+    format!("A weighting scheme; may be given several times: {grammar} [default: every scheme that needs no file]")
+}
+
 /// The given schemes, or every scheme that needs no file.
-pub(crate) fn or_every_scheme(given: &[WeightingSpec]) -> Result<Vec<WeightingSpec>, WeightingError> {
+pub(crate) fn or_every_scheme<T: Clone + FromStr<Err = WeightingError>>(given: &[T]) -> Result<Vec<T>, WeightingError> {
     if given.is_empty() { scheme_names().into_iter().map(str::parse).collect() } else { Ok(given.to_vec()) }
 }
 

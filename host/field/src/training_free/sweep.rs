@@ -5,9 +5,11 @@
 //! matching    costs of the planes in a frustum
 //! search      surface points of a scene whose files do not tell its depths
 //! unseen      parts of a picture that its photograph does not show
+//! planes      a target's planes on the host, to be examined
 //! ```
 
 mod matching;
+mod planes;
 mod search;
 mod unseen;
 
@@ -18,6 +20,7 @@ use crate::{
 };
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::plane_sweep::Planes;
 use viewfuse_core::plane_sweep::blend::BlendBlock;
 use viewfuse_core::plane_sweep::disparity::TEMPERATURE;
 use viewfuse_core::plane_sweep::frustum::SweptView;
@@ -25,6 +28,8 @@ use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
+
+pub use planes::TargetPlanes;
 
 /// Most other sources that a source is compared with, those with the greatest weights: run time is linear in the
 /// sources.
@@ -96,6 +101,15 @@ pub(super) struct Views<'a, D: Device> {
     texels: Vec<[f32; 4]>,
     /// The gains estimated from some views under the current weighting, and these views.
     gains: Option<(Vec<usize>, Vec<[f32; 4]>)>,
+}
+
+/// The planes of a target.
+struct Volume<D: Device> {
+    block: BlendBlock,
+    /// The views that are blended, with pictures' cameras.
+    views: Vec<SweptView>,
+    /// `[row][column][group]`.
+    costs: D::Buffer<Planes>,
 }
 
 impl Sweep {
@@ -219,6 +233,34 @@ impl<D: Device> Views<'_, D> {
         }
         Ok(())
     }
+    /// The costs of a target's planes, and what its pixels are blended from.
+    fn volume(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Volume<D>, FieldError> {
+        let &Request { camera: target, views, .. } = request;
+        self.estimate_gains(views)?;
+        let (small_width, small_height) = reduced_size(target, self.settings.match_side);
+        let pinhole = target.pinhole.resized(small_width, small_height).map_err(FieldError::unsuitable)?;
+        let camera = Camera { pinhole, ..*target }.block(0);
+        let weights: Vec<(usize, f32)> = views.iter().copied().zip(request.view_weights()).collect();
+        let range = self.range(&camera);
+        let (maps, gains) = (&self.matched.cameras, self.gains.as_ref().map(|(_, gains)| &gains[..]));
+        let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
+        let matching = self.settings.matching(self.device, self.has_silhouettes);
+        let frustum = matching.frustum(camera, range, &matched);
+        let costs = matching.costs(frustum, &matched, &self.matched.texels, &self.disparities, progress)?;
+        let views = swept(&self.pictures.cameras, maps, &weights, Some(&self.steps), gains);
+        let block = BlendBlock {
+            target: target.block(0),
+            far_disparity: range.far_disparity,
+            disparity_step: range.step,
+            volume_width: camera.width,
+            volume_height: camera.height,
+            group_count: range.group_count,
+            view_count: views.len() as u32,
+            sharpness: 1.0 / self.settings.temperature,
+            has_silhouettes: u32::from(self.has_silhouettes),
+        };
+        Ok(Volume { block, views, costs })
+    }
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
@@ -319,32 +361,9 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
-        let &Request { camera: target, views, .. } = request;
-        self.estimate_gains(views)?;
+        let Volume { block, views: blended, costs } = self.volume(request, progress)?;
         let device = self.device;
-        let (width, height) = (target.pinhole.width(), target.pinhole.height());
-        let (small_width, small_height) = reduced_size(target, self.settings.match_side);
-        let pinhole = target.pinhole.resized(small_width, small_height).map_err(FieldError::unsuitable)?;
-        let camera = Camera { pinhole, ..*target }.block(0);
-        let weights: Vec<(usize, f32)> = views.iter().copied().zip(request.view_weights()).collect();
-        let range = self.range(&camera);
-        let (maps, gains) = (&self.matched.cameras, self.gains.as_ref().map(|(_, gains)| &gains[..]));
-        let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
-        let matching = self.settings.matching(device, self.has_silhouettes);
-        let frustum = matching.frustum(camera, range, &matched);
-        let costs = matching.costs(frustum, &matched, &self.matched.texels, &self.disparities, progress)?;
-        let blended = swept(&self.pictures.cameras, maps, &weights, Some(&self.steps), gains);
-        let block = BlendBlock {
-            target: target.block(0),
-            far_disparity: range.far_disparity,
-            disparity_step: range.step,
-            volume_width: camera.width,
-            volume_height: camera.height,
-            group_count: range.group_count,
-            view_count: blended.len() as u32,
-            sharpness: 1.0 / self.settings.temperature,
-            has_silhouettes: u32::from(self.has_silhouettes),
-        };
+        let (width, height) = (block.target.width, block.target.height);
         let count = (width * height) as usize;
         let blend_views = device.upload(&blended)?;
         let (mut colours, mut depths, mut confidences) =

@@ -12,7 +12,7 @@ use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderOptions, open_album};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
-use viewfuse_weighting::Weighting;
+use viewfuse_weighting::OpenedChoice;
 
 /// The jobs of a shard that are not finished.
 pub(super) struct Jobs<'a> {
@@ -25,7 +25,7 @@ pub(super) struct Jobs<'a> {
     pub(super) plan: &'a Plan,
     pub(super) shard: Shard,
     pub(super) picture_count: usize,
-    pub(super) weightings: &'a [Weighting],
+    pub(super) weightings: &'a [OpenedChoice],
     /// One a scene.
     pub(super) options: &'a [RenderOptions],
     pub(super) metrics: &'a MetricOptions,
@@ -72,9 +72,9 @@ impl Jobs<'_> {
                 Subject { scene, album: &album, masked },
                 &job.sources,
                 &job.targets,
-                |weighting, frame, values, images| {
+                |scheme, frame, values, images| {
                     if folder.is_some() && number < self.picture_count && frame.target.name == first {
-                        gallery.add(weighting, frame, values, images);
+                        gallery.add(scheme, frame, values, images);
                     }
                 },
             )?;

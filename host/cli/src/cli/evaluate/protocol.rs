@@ -23,7 +23,7 @@ use viewfuse_job::digest::sha256_of;
 use viewfuse_job::files::{check_writable, write_whole};
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::reduced_size;
-use viewfuse_weighting::Weighting;
+use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
@@ -57,7 +57,7 @@ pub(crate) struct ProtocolOptions {
 pub(super) fn run(
     arguments: &Arguments,
     protocol: &Protocol,
-    weightings: &[Weighting],
+    weightings: &[OpenedChoice],
     mut options: BTreeMap<String, String>,
 ) -> anyhow::Result<ExitCode> {
     let protocol = &with_targets(protocol, arguments.targets.as_deref())?;
@@ -89,14 +89,14 @@ pub(super) fn run(
     });
     let mut files = BTreeMap::new();
     let networks = arguments.model.file().into_iter().chain(arguments.metrics.files());
-    for path in networks.chain(weightings.iter().filter_map(Weighting::file)) {
+    for path in networks.chain(weightings.iter().filter_map(OpenedChoice::file)) {
         let digest = sha256_of(path).with_context(|| path.display().to_string())?;
         files.insert(path.display().to_string(), digest);
     }
     let settings = Settings {
         viewfuse: env!("CARGO_PKG_VERSION").to_owned(),
         protocol: protocol.to_string(),
-        schemes: weightings.iter().map(Weighting::to_string).collect(),
+        schemes: weightings.iter().map(OpenedChoice::to_string).collect(),
         field: about.name.to_owned(),
         metric: protocol.metric_words().to_owned(),
         options,

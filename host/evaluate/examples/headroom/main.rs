@@ -1,0 +1,187 @@
+//! What better depths, visibility or blending could gain on the training-free field: each is replaced by the truth's choice.
+//!
+//! `cargo run --release -p viewfuse-evaluate --example headroom -- SIDE MOST_TARGETS TABLE GROUP=SCENE=PROTOCOL...`
+//!
+//! A scene is a folder, or `made:PLACE/RIG/SEED` or `made:KIND/INDEX`, which is generated with exact depths. Rows are means over
+//! the pictures of a group. Pictures have a longest side of `SIDE`; at most `MOST_TARGETS` of a job are taken. The table goes to
+//! the file `TABLE`, and what was run above it. Columns, all but the first two gains in decibels over the sweep:
+//!
+//! ```text
+//! field            the training-free field as it is: of objects with silhouettes the visual hull
+//! sweep            the plane sweep, with the silhouettes where there are some
+//! temperature      the best temperature of the softmax over planes
+//! visibility       on each plane the best subset of the five sources of greatest weight
+//! one source       the best single source under the posterior over planes
+//! blend            the best convex combination of the sources under it
+//! plane            the plane whose blended colour is nearest to the truth
+//! plane and blend  on that plane the best convex combination
+//! depth            exact depth of the generator, with the field's visibility
+//! ... and visibility, ... and blend   likewise, with exact visibility, with the best convex combination
+//! opacity          the photograph's own alpha
+//! unseen           pixels that no source sees by the field's visibility, by exact depths, and the former's squared error
+//! ```
+//!
+//! All choices by colour are made on windows of 3x3 pixels and see the truth: they bound what could be gained, from above.
+
+mod made;
+mod oracle;
+mod samples;
+mod table;
+
+use anyhow::{Context, bail, ensure};
+use made::Made;
+use oracle::oracles;
+use samples::Colour;
+use std::path::{Path, PathBuf};
+use table::{Row, Target, table};
+use viewfuse_core::camera::Camera;
+use viewfuse_core::plane_sweep::blend::blend;
+use viewfuse_device::cpu::Cpu;
+use viewfuse_evaluate::protocol::{Draws, Protocol};
+use viewfuse_evaluate::without_masks;
+use viewfuse_field::On;
+use viewfuse_field::render::{RenderOptions, Stage};
+use viewfuse_field::training_free::{TargetPlanes, TrainingFree};
+use viewfuse_job::files::write_whole;
+use viewfuse_job::progress::Silent;
+use viewfuse_scene::Scene;
+use viewfuse_scene::few_shot::target_of;
+use viewfuse_scene::photographs::{Album, BackgroundChoice, scaled_size};
+use viewfuse_weighting::Weighting;
+
+/// The scheme of all rows: the best on average over left-out sources.
+const SCHEME: &str = "distance:power=2";
+/// Largest difference between the picture that is put together here and the field's own, of 1.
+const MOST_DIFFERENCE: f32 = 2.0e-3;
+
+fn main() -> anyhow::Result<()> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [side, most_targets, path, jobs @ ..] = arguments.as_slice() else {
+        bail!("usage: headroom SIDE MOST_TARGETS TABLE GROUP=SCENE=PROTOCOL...");
+    };
+    let (side, most_targets): (u32, usize) = (side.parse()?, most_targets.parse()?);
+    let scratch = std::env::temp_dir().join(format!("viewfuse-headroom-{}", std::process::id()));
+    let mut rows = Vec::new();
+    for (index, job) in jobs.iter().enumerate() {
+        let [group, scene, protocol] = job.splitn(3, '=').collect::<Vec<_>>()[..] else {
+            bail!("'{job}': a job is GROUP=SCENE=PROTOCOL");
+        };
+        let made = scene.strip_prefix("made:").map(|words| Made::parse(words, side)).transpose()?;
+        let folder = match &made {
+            None => PathBuf::from(scene),
+            Some(made) => {
+                let folder = scratch.join(index.to_string());
+                made.write(&folder)?;
+                folder
+            }
+        };
+        let before = rows.len();
+        let measured = measure(&folder, made.as_ref(), &protocol.parse()?, side, most_targets, group, &mut rows);
+        measured.with_context(|| job.clone())?;
+        eprint!("{}", table(&rows[before..]));
+    }
+    if scratch.exists() {
+        std::fs::remove_dir_all(&scratch)?;
+    }
+    let run: Vec<String> = jobs.iter().map(|job| shown(job)).collect();
+    let head = format!("Pictures of {side} pixels, weights {SCHEME}, at most {most_targets} targets a job:\n");
+    write_whole(Path::new(path), format!("{}\n{head}{}\n", table(&rows), run.join("\n")).as_bytes())?;
+    Ok(())
+}
+
+/// A job without the folders that its scene lies in.
+fn shown(job: &str) -> String {
+    let words: Vec<&str> = job.splitn(3, '=').collect();
+    let [group, scene, protocol] = words[..] else { return job.to_owned() };
+    let name = Path::new(scene).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    format!("{group}: {}, {protocol}", if scene.starts_with("made:") { scene } else { &name })
+}
+
+fn measure(
+    folder: &Path,
+    made: Option<&Made>,
+    protocol: &Protocol,
+    side: u32,
+    most_targets: usize,
+    group: &str,
+    rows: &mut Vec<Row>,
+) -> anyhow::Result<()> {
+    let mut scene = Scene::open(folder)?;
+    let mut options = RenderOptions::default();
+    if protocol.hides_masks() {
+        scene = without_masks(&scene);
+        options.background = BackgroundChoice::None;
+    }
+    options.size = Some(scaled_size(&scene.views[0].camera, side).into());
+    let scenes = [scene];
+    let plan = protocol.plan(&scenes, Draws { seed: 0, trial_count: 1, target_count: most_targets }, 2)?;
+    let scene = &scenes[0];
+    let pairs: Vec<(&[usize], usize)> =
+        plan.jobs.iter().flat_map(|job| job.targets.iter().map(|target| (&job.sources[..], *target))).collect();
+    let step = pairs.len().div_ceil(most_targets).max(1);
+    for (sources, target) in pairs.into_iter().step_by(step) {
+        let album = Album::open(scene, sources.iter().copied().chain([target]), &Silent)?;
+        let field = TrainingFree::default();
+        let renderer = On { device: &Cpu, field: &field };
+        let mut stage = Stage::prepare(scene, &album, sources, &renderer, &options, &Silent)?;
+        let weighting = Weighting::open(SCHEME)?;
+        stage.weigh(&weighting, &Silent)?;
+        let frame = stage.frame(&weighting, &target_of(scene, target), &Silent)?;
+        let size = stage.picture_size(target)?;
+        let camera = scene.views[target].camera;
+        let camera = Camera { pinhole: camera.pinhole.resized(size[0], size[1])?, ..camera };
+        let relevance = stage.relevance(&weighting);
+        let targets = [(camera, frame.omission.weights)];
+        let planes = field.sweep.target_planes(&Cpu, &stage.images, &relevance, &targets, &Silent)?;
+        let planes = planes.first().context("no planes")?;
+        let depths = made.map(|made| made.depths(sources, target, scene.frame.scale)).transpose()?;
+        let truth = frame.truth.as_ref().context("no photograph to compare with")?;
+        let colours: Vec<Colour> =
+            truth.picture.pixels().map(|pixel| pixel.0.map(|level| f32::from(level) / 255.0)).collect();
+        let oracles = oracles(planes, &colours, depths.as_ref());
+        let opacity = check(planes, &oracles.base)?;
+        let alpha = match stage.images.has_silhouettes {
+            true => alpha(&album, target, size)?,
+            false => None,
+        };
+        let seen = truth.seen.as_ref().map_or_else(
+            || vec![true; colours.len()],
+            |seen| seen.pixels().map(|pixel| pixel.0[0] == u8::MAX).collect(),
+        );
+        let target = Target {
+            truth: &colours,
+            seen: &seen,
+            opacity: &opacity,
+            alpha: alpha.as_deref(),
+            background: stage.images.background,
+        };
+        rows.push(target.row(group, truth.psnr, &oracles));
+    }
+    Ok(())
+}
+
+/// The field's opacity; fails if the picture that is put together here is not the field's own.
+fn check(planes: &TargetPlanes, base: &[Colour]) -> anyhow::Result<Vec<f32>> {
+    let width = planes.block.target.width as usize;
+    let mut opacity = Vec::with_capacity(base.len());
+    for (pixel, own) in base.iter().enumerate() {
+        let at = [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
+        let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
+        let colour = blend(&planes.block, &planes.views, texels, disparities, &planes.costs[..], at).colour;
+        let differs = |channel: usize| !((own[channel] * colour[3] - colour[channel]).abs() <= MOST_DIFFERENCE);
+        ensure!(!(0..3).any(differs), "pixel {pixel}: {own:?} is not the field's {colour:?}");
+        opacity.push(colour[3]);
+    }
+    Ok(opacity)
+}
+
+/// The photograph's own alpha: what white and black behind it have in common. `None` if it has none.
+fn alpha(album: &Album<'_>, target: usize, size: [u32; 2]) -> anyhow::Result<Option<Vec<f32>>> {
+    let [white, black] = [1.0, 0.0].map(|level| album.truth(target, size, Some([level; 3])));
+    let (white, black) = (white?.picture, black?.picture);
+    let alpha = |(white, black): (&image::Rgb<u8>, &image::Rgb<u8>)| {
+        1.0 - (f32::from(white.0[1]) - f32::from(black.0[1])) / 255.0
+    };
+    let alphas: Vec<f32> = white.pixels().zip(black.pixels()).map(alpha).collect();
+    Ok(Some(alphas).filter(|alphas| alphas.iter().any(|alpha| *alpha < 0.5)))
+}
