@@ -122,7 +122,7 @@ fn the_planes_of_a_target_are_those_of_its_picture() {
     for (pixel, colour) in rendered.colours.iter().enumerate() {
         let at = [(pixel % 40) as f32 + 0.5, (pixel / 40) as f32 + 0.5];
         let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
-        let blended = blend(&planes.block, &planes.views, texels, disparities, &planes.costs[..], at);
+        let blended = blend(&planes.block, &planes.views[..], texels, disparities, &planes.costs[..], at);
         assert_eq!(blended.colour, *colour, "pixel {pixel}");
     }
 }

@@ -167,7 +167,7 @@ fn check(planes: &TargetPlanes, base: &[Colour]) -> anyhow::Result<Vec<f32>> {
     for (pixel, own) in base.iter().enumerate() {
         let at = [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
         let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
-        let colour = blend(&planes.block, &planes.views, texels, disparities, &planes.costs[..], at).colour;
+        let colour = blend(&planes.block, &planes.views[..], texels, disparities, &planes.costs[..], at).colour;
         let differs = |channel: usize| !((own[channel] * colour[3] - colour[channel]).abs() <= MOST_DIFFERENCE);
         ensure!(!(0..3).any(differs), "pixel {pixel}: {own:?} is not the field's {colour:?}");
         opacity.push(colour[3]);
