@@ -19,7 +19,7 @@ use viewfuse_tests::places;
 const MOST_MISSED: f64 = 0.05;
 
 fn scene(name: &str) -> Scene {
-    Scene::open(&places::data(name)).expect("a scene")
+    Scene::open(places::data(name)).expect("a scene")
 }
 
 fn job(scene: &Scene, sources: &str, targets: &str) -> FewShot {

@@ -94,7 +94,7 @@ fn blended(swept: &Swept, block: &BlendBlock, costs: &[Planes]) -> Vec<Blended> 
     (0..block.target.width * block.target.height)
         .map(|pixel| {
             let at = [pixel % block.target.width, pixel / block.target.width].map(|side| side as f32 + 0.5);
-            blend(block, &swept.views[..], &swept.texels[..], &swept.disparities[..], &costs[..], at)
+            blend(block, &swept.views[..], &swept.texels[..], &swept.disparities[..], costs, at)
         })
         .collect()
 }
@@ -197,7 +197,7 @@ fn census_does_not_mind_exposure() {
     let mut swept = Swept::new(2, 60);
     let (grey, evidence) = stairs(&mut swept);
     let cost = |grey: &[Planes]| -> Vec<[Planes; 2]> {
-        (0..16).map(|pixel| census_cost(&swept.frustum, &swept.pairs, &grey[..], &evidence[..], pixel, 0)).collect()
+        (0..16).map(|pixel| census_cost(&swept.frustum, &swept.pairs, grey, &evidence[..], pixel, 0)).collect()
     };
     let before = cost(&grey);
     let with = |change: fn(f32) -> f32| {

@@ -71,7 +71,7 @@ fn features(pose: &Pose) -> [f32; POSE_FEATURES] {
 /// How far a feature may be from that of [`super::pose_features`]: with an error `e` of sine and cosine each, those of the
 /// double angle are known to `2 sqrt(2) e` and the roundings.
 pub fn feature_error(feature: usize) -> f32 {
-    let is_angle = feature >= 3 && feature < 3 + 6 * FREQUENCY_COUNT;
+    let is_angle = (3..3 + 6 * FREQUENCY_COUNT).contains(&feature);
     // Both ways of computing are known to 9e-8 at the first frequency.
     let mut error = 1.8e-7;
     let mut k = 3;

@@ -63,13 +63,16 @@ impl Numbers<'_> {
     }
 }
 
+/// A call of a function with its arrays given.
+type Run = Box<dyn Fn(&[*mut u32]) -> Status>;
+
 /// A call: its arrays, which of them it writes, and itself, given where they are.
 struct Call {
     arrays: Vec<Vec<u32>>,
     written: usize,
     /// Whether the output is weights.
     weighs: bool,
-    run: Box<dyn Fn(&[*mut u32]) -> Status>,
+    run: Run,
 }
 
 /// Every function.

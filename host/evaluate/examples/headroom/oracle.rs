@@ -75,6 +75,8 @@ pub(crate) fn oracles(planes: &TargetPlanes, truth: &[Colour], depths: Option<&D
     let mut of_views: Vec<Mixture> = (0..views).map(|_| Mixture::new(count)).collect();
     let mut best_plane = vec![(f32::MAX, 0); count];
     let mut unseen = vec![0.0; count];
+    // Planes index the excesses of each pixel.
+    #[allow(clippy::needless_range_loop)]
     for plane in 0..plane_count(planes) {
         let samples = samples(planes, |_| disparity(planes, plane));
         let share = |pixel: usize, factor: f32| share(excess[pixel][plane] * sharpness * factor);

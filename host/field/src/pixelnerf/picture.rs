@@ -55,7 +55,9 @@ impl<D: Device> Renderer<'_, D> {
         while step > 1 {
             let half = step / 2;
             let mut rays = Vec::new();
-            for [column, row] in grid(half).filter(|[column, row]| column % step != 0 || row % step != 0) {
+            for [column, row] in
+                grid(half).filter(|[column, row]| !column.is_multiple_of(step) || !row.is_multiple_of(step))
+            {
                 let pixel = row * width + column;
                 match between(picture, [column, row], step, most_difference, far_difference) {
                     Some((colour, depth)) => {
@@ -137,7 +139,8 @@ fn between(
     most_difference: f32,
     far_difference: f32,
 ) -> Option<([f32; 4], f32)> {
-    let around = |place: u32| if place % step == 0 { [place; 2] } else { [place - step / 2, place + step / 2] };
+    let around =
+        |place: u32| if place.is_multiple_of(step) { [place; 2] } else { [place - step / 2, place + step / 2] };
     let ([left, right], [top, bottom]) = (around(column), around(row));
     if right >= picture.width || bottom >= picture.height {
         return None;
