@@ -64,9 +64,10 @@ fn commands() -> Vec<String> {
 }
 
 /// Lines of `sh` blocks that are not run here: how they begin, and why.
-const NOT_RUN: [(&str, &str); 13] = [
+const NOT_RUN: [(&str, &str); 14] = [
     ("#", "a comment"),
     ("tests/run", "it runs this test"),
+    ("tests/gpu", "it runs all tests of a GPU"),
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
     ("cargo run --release -- view ", "it runs until Ctrl-C; `view.rs` runs it"),
