@@ -126,6 +126,8 @@ mod tests {
         estimate
     }
 
+    const COUNT: usize = 4000;
+
     #[test]
     fn the_estimate_is_unbiased_and_its_upper_end_holds() {
         // An edge that is moved, and a disc that is darker.
@@ -133,11 +135,12 @@ mod tests {
             let picture = disc(0.0, 1.0);
             let squares = picture.colours.iter().zip(&truth.colours).map(|(a, b)| square(a, b));
             let error = (squares.sum::<f64>() / 4096.0).sqrt();
-            let estimates: Vec<Estimate> = (0..400).map(|seed| estimated(&picture, &truth, seed)).collect();
-            let mean = estimates.iter().map(|estimate| estimate.value.powi(2)).sum::<f64>() / 400.0;
+            let estimates: Vec<Estimate> = (0..COUNT as u64).map(|seed| estimated(&picture, &truth, seed)).collect();
+            let mean = estimates.iter().map(|estimate| estimate.value.powi(2)).sum::<f64>() / COUNT as f64;
             assert!((mean.sqrt() / error - 1.0).abs() < 0.05, "{} {error}", mean.sqrt());
             let missed = estimates.iter().filter(|estimate| estimate.upper < error).count();
-            assert!(missed <= 40, "{missed} of 400 below the true error");
+            // Without what is expected before the first draw, which a search adds.
+            assert!(missed * 8 <= COUNT, "{missed} of {COUNT} below the true error");
         }
     }
 

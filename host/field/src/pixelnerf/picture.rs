@@ -153,8 +153,9 @@ fn between(
         let values = colours.map(|colour| colour[channel]);
         let (least, greatest) =
             values.iter().fold((f32::MAX, f32::MIN), |(l, g), value| (l.min(*value), g.max(*value)));
-        // NaN is not alike.
-        if !(greatest - least <= most_difference) {
+        // The least and the greatest pass over NaN.
+        let is_finite = values.iter().all(|value| value.is_finite());
+        if !is_finite || greatest - least > most_difference {
             return None;
         }
         mean[channel] = 0.25 * values.iter().sum::<f32>();
