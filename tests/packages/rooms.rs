@@ -87,10 +87,10 @@ fn a_hidden_test_is_found() {
 fn a_library_that_is_not_tested_inside_has_no_tests_inside() {
     let mut count = 0;
     for package in packages() {
-        let folder = Path::new(text(&package, "manifest_path")).with_file_name("src");
         for target in list(&package, "targets").iter().filter(|target| target["test"] == false) {
             if list(target, "kind")[0] == "lib" {
                 count += 1;
+                let folder = Path::new(text(target, "src_path")).parent().expect("a folder").to_path_buf();
                 for path in files(&folder, "rs") {
                     let code = Source::new(&std::fs::read_to_string(&path).expect("a file")).code;
                     assert!(!code.contains("#[test]"), "{}", path.display());
