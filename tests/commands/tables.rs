@@ -122,7 +122,8 @@ fn auto_is_a_row_and_leaves_the_others_alone() {
     let (both, alone) = (scores("--weights auto --weights mean"), scores("--weights mean"));
     assert_near(of(&both, "mean"), of(&alone, "mean"), 1.0e-6);
     // The same choice as `render` makes without being told a scheme.
-    done(scene.path(), &format!("render {job} -o out"));
+    let outcome = run(BINARY, scene.path(), &format!("render {job} -o out"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
     let record = fs::read_to_string(scene.path().join("out/run.json")).expect("a record");
     let record: Value = serde_json::from_str(&record).expect("JSON");
     assert_near(of(&both, "auto"), record["frames"][0]["psnr"].as_f64().expect("a score"), 1.0e-4);
