@@ -1,11 +1,33 @@
 //! Matrix products of two computed matrices, and softmax.
 
 use crate::Push;
-use crate::tile::{Shape, Shared, ShortShared, multiply, multiply_double, multiply_quadruple};
+use crate::tile::{Double, Quadruple, Shape, Shared, ShortShared, Single, Tiles};
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::network::attend::{MatrixBlock, softmax_scale, softmax_value};
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn product_of(
+    id: UVec3,
+    push: &Push<MatrixBlock>,
+    left: &[f32],
+    right: &[f32],
+    outputs: &mut [f32],
+    tiles: impl Tiles,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (left, right) = (Endless(left), Endless(right));
+    tiles.multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        move |row, inner| block.left(&left, row, inner),
+        move |inner, column| block.right(&right, inner, column),
+        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
+    );
+}
 
 /// A part of a tile of rows and columns: invocation `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "matrix_product"))]
@@ -19,18 +41,7 @@ pub fn matrix_product(
     #[spirv(workgroup)] rows: &mut Shared,
     #[spirv(workgroup)] columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count;
-    let (left, right) = (Endless(left), Endless(right));
-    multiply(
-        push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
-        rows,
-        columns,
-        move |row, inner| block.left(&left, row, inner),
-        move |inner, column| block.right(&right, inner, column),
-        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
-    );
+    product_of(id, push, left, right, outputs, Single { rows, columns });
 }
 
 /// A part of two tiles of rows and columns: invocation `first + id.x`.
@@ -46,19 +57,7 @@ pub fn matrix_product_double(
     #[spirv(workgroup)] columns: &mut Shared,
     #[spirv(workgroup)] more_columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count;
-    let (left, right) = (Endless(left), Endless(right));
-    multiply_double(
-        push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
-        rows,
-        columns,
-        more_columns,
-        move |row, inner| block.left(&left, row, inner),
-        move |inner, column| block.right(&right, inner, column),
-        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
-    );
+    product_of(id, push, left, right, outputs, Double { rows, columns, more_columns });
 }
 
 /// A part of four tiles of rows and columns: invocation `first + id.x`.
@@ -75,20 +74,7 @@ pub fn matrix_product_quadruple(
     #[spirv(workgroup)] columns: &mut ShortShared,
     #[spirv(workgroup)] more_columns: &mut ShortShared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count;
-    let (left, right) = (Endless(left), Endless(right));
-    multiply_quadruple(
-        push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
-        rows,
-        more_rows,
-        columns,
-        more_columns,
-        move |row, inner| block.left(&left, row, inner),
-        move |inner, column| block.right(&right, inner, column),
-        move |row, column, sum| store(outputs, (row * column_count + column) as usize, sum * block.scale),
-    );
+    product_of(id, push, left, right, outputs, Quadruple { rows, more_rows, columns, more_columns });
 }
 
 /// Weights of the scores in row number `first + id.x`; the parameter is how many columns a row has.

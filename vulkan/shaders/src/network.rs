@@ -1,7 +1,7 @@
 //! Layers of networks.
 
 use crate::Push;
-use crate::tile::{Shape, Shared, ShortShared, multiply, multiply_double, multiply_quadruple};
+use crate::tile::{Double, Quadruple, Shape, Shared, ShortShared, Single, Tiles};
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
@@ -11,6 +11,33 @@ use viewfuse_core::network::linear::{LinearBlock, first_of_sum, input_value, rec
 use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_core::pages::Fetch;
+
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn convolution(
+    id: UVec3,
+    push: &Push<ConvolveBlock>,
+    inputs: &[f32],
+    weights: &[f32],
+    bias: &[f32],
+    residual: &[f32],
+    outputs: &mut [f32],
+    tiles: impl Tiles,
+) {
+    let block = &push.parameters;
+    let channels = block.out_channels;
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
+    tiles.multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
+        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
+        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
+        move |pixel, channel, sum| {
+            let value = convolved(&bias, &residual, block, pixel, channel, sum);
+            store(outputs, block.place(pixel, channel), value);
+        },
+    );
+}
 
 /// A part of a tile of pixels and output channels: invocation `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "convolve"))]
@@ -26,21 +53,7 @@ pub fn convolve(
     #[spirv(workgroup)] rows: &mut Shared,
     #[spirv(workgroup)] columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let channels = block.out_channels;
-    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
-    multiply(
-        push.piece.first + id.x,
-        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
-        rows,
-        columns,
-        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
-        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
-        move |pixel, channel, sum| {
-            let value = convolved(&bias, &residual, block, pixel, channel, sum);
-            store(outputs, block.place(pixel, channel), value);
-        },
-    );
+    convolution(id, push, inputs, weights, bias, residual, outputs, Single { rows, columns });
 }
 
 /// A part of two tiles of pixels and output channels: invocation `first + id.x`.
@@ -58,22 +71,7 @@ pub fn convolve_double(
     #[spirv(workgroup)] columns: &mut Shared,
     #[spirv(workgroup)] more_columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let channels = block.out_channels;
-    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
-    multiply_double(
-        push.piece.first + id.x,
-        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
-        rows,
-        columns,
-        more_columns,
-        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
-        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
-        move |pixel, channel, sum| {
-            let value = convolved(&bias, &residual, block, pixel, channel, sum);
-            store(outputs, block.place(pixel, channel), value);
-        },
-    );
+    convolution(id, push, inputs, weights, bias, residual, outputs, Double { rows, columns, more_columns });
 }
 
 /// A part of four tiles of pixels and output channels: invocation `first + id.x`.
@@ -92,22 +90,15 @@ pub fn convolve_quadruple(
     #[spirv(workgroup)] columns: &mut ShortShared,
     #[spirv(workgroup)] more_columns: &mut ShortShared,
 ) {
-    let block = &push.parameters;
-    let channels = block.out_channels;
-    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
-    multiply_quadruple(
-        push.piece.first + id.x,
-        Shape { row_count: block.pixel_count(), inner_count: block.patch_len(), column_count: channels },
-        rows,
-        more_rows,
-        columns,
-        more_columns,
-        move |pixel, inner| patch_value(&inputs, block, pixel, inner),
-        move |inner, channel| weights.fetch((inner * channels + channel) as usize),
-        move |pixel, channel, sum| {
-            let value = convolved(&bias, &residual, block, pixel, channel, sum);
-            store(outputs, block.place(pixel, channel), value);
-        },
+    convolution(
+        id,
+        push,
+        inputs,
+        weights,
+        bias,
+        residual,
+        outputs,
+        Quadruple { rows, more_rows, columns, more_columns },
     );
 }
 
@@ -127,6 +118,29 @@ pub fn convolve_depthwise(
     outputs[element] = depthwise_element(inputs, weights, &push.parameters, element);
 }
 
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn transposed_convolution(
+    id: UVec3,
+    push: &Push<TransposedBlock>,
+    inputs: &[f32],
+    weights: &[f32],
+    bias: &[f32],
+    outputs: &mut [f32],
+    tiles: impl Tiles,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count();
+    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
+    tiles.multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
+        move |pixel, inner| block.input(&inputs, pixel, inner),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
+    );
+}
+
 /// A part of a tile of input pixels and what they become: invocation `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "convolve_transposed"))]
 #[allow(clippy::too_many_arguments)]
@@ -140,18 +154,7 @@ pub fn convolve_transposed(
     #[spirv(workgroup)] rows: &mut Shared,
     #[spirv(workgroup)] columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count();
-    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
-    multiply(
-        push.piece.first + id.x,
-        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
-        rows,
-        columns,
-        move |pixel, inner| block.input(&inputs, pixel, inner),
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
-    );
+    transposed_convolution(id, push, inputs, weights, bias, outputs, Single { rows, columns });
 }
 
 /// A part of two tiles of input pixels and what they become: invocation `first + id.x`.
@@ -168,19 +171,7 @@ pub fn convolve_transposed_double(
     #[spirv(workgroup)] columns: &mut Shared,
     #[spirv(workgroup)] more_columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count();
-    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
-    multiply_double(
-        push.piece.first + id.x,
-        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
-        rows,
-        columns,
-        more_columns,
-        move |pixel, inner| block.input(&inputs, pixel, inner),
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
-    );
+    transposed_convolution(id, push, inputs, weights, bias, outputs, Double { rows, columns, more_columns });
 }
 
 /// A part of four tiles of input pixels and what they become: invocation `first + id.x`.
@@ -198,19 +189,14 @@ pub fn convolve_transposed_quadruple(
     #[spirv(workgroup)] columns: &mut ShortShared,
     #[spirv(workgroup)] more_columns: &mut ShortShared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count();
-    let (inputs, weights, bias) = (Endless(inputs), Endless(weights), Endless(bias));
-    multiply_quadruple(
-        push.piece.first + id.x,
-        Shape { row_count: block.pixel_count(), inner_count: block.in_channels, column_count },
-        rows,
-        more_rows,
-        columns,
-        more_columns,
-        move |pixel, inner| block.input(&inputs, pixel, inner),
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |pixel, column, sum| store(outputs, block.place(pixel, column), block.output(&bias, column, sum)),
+    transposed_convolution(
+        id,
+        push,
+        inputs,
+        weights,
+        bias,
+        outputs,
+        Quadruple { rows, more_rows, columns, more_columns },
     );
 }
 
@@ -245,6 +231,34 @@ pub fn upsample(
     outputs[block.place(element)] = upsampled_element(inputs, block, element);
 }
 
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn linear_layer(
+    id: UVec3,
+    push: &Push<LinearBlock>,
+    inputs: &[f32],
+    weights: &[f32],
+    bias: &[f32],
+    residual: &[f32],
+    outputs: &mut [f32],
+    tiles: impl Tiles,
+) {
+    let block = &push.parameters;
+    let column_count = block.column_count;
+    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
+    tiles.multiply(
+        push.piece.first + id.x,
+        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
+        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
+        move |inner, column| weights.fetch((inner * column_count + column) as usize),
+        move |row, column, sum| {
+            let element = (row * column_count + column) as usize;
+            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
+            store(outputs, element, rectified(first + sum, block.relu_outputs));
+        },
+    );
+}
+
 /// A part of a tile of rows and columns: invocation `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "linear"))]
 #[allow(clippy::too_many_arguments)]
@@ -259,22 +273,7 @@ pub fn linear(
     #[spirv(workgroup)] rows: &mut Shared,
     #[spirv(workgroup)] columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count;
-    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
-    multiply(
-        push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
-        rows,
-        columns,
-        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |row, column, sum| {
-            let element = (row * column_count + column) as usize;
-            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
-            store(outputs, element, rectified(first + sum, block.relu_outputs));
-        },
-    );
+    linear_layer(id, push, inputs, weights, bias, residual, outputs, Single { rows, columns });
 }
 
 /// A part of two tiles of rows and columns: invocation `first + id.x`.
@@ -292,23 +291,7 @@ pub fn linear_double(
     #[spirv(workgroup)] columns: &mut Shared,
     #[spirv(workgroup)] more_columns: &mut Shared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count;
-    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
-    multiply_double(
-        push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
-        rows,
-        columns,
-        more_columns,
-        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |row, column, sum| {
-            let element = (row * column_count + column) as usize;
-            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
-            store(outputs, element, rectified(first + sum, block.relu_outputs));
-        },
-    );
+    linear_layer(id, push, inputs, weights, bias, residual, outputs, Double { rows, columns, more_columns });
 }
 
 /// A part of four tiles of rows and columns: invocation `first + id.x`.
@@ -327,22 +310,14 @@ pub fn linear_quadruple(
     #[spirv(workgroup)] columns: &mut ShortShared,
     #[spirv(workgroup)] more_columns: &mut ShortShared,
 ) {
-    let block = &push.parameters;
-    let column_count = block.column_count;
-    let (inputs, weights, bias, residual) = (Endless(inputs), Endless(weights), Endless(bias), Endless(residual));
-    multiply_quadruple(
-        push.piece.first + id.x,
-        Shape { row_count: block.row_count, inner_count: block.inner_count, column_count },
-        rows,
-        more_rows,
-        columns,
-        more_columns,
-        move |row, inner| input_value(&inputs, block, row as usize, inner as usize),
-        move |inner, column| weights.fetch((inner * column_count + column) as usize),
-        move |row, column, sum| {
-            let element = (row * column_count + column) as usize;
-            let first = first_of_sum(&bias, &residual, block.has_residual, element, column as usize);
-            store(outputs, element, rectified(first + sum, block.relu_outputs));
-        },
+    linear_layer(
+        id,
+        push,
+        inputs,
+        weights,
+        bias,
+        residual,
+        outputs,
+        Quadruple { rows, more_rows, columns, more_columns },
     );
 }

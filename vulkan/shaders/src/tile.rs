@@ -66,119 +66,151 @@ impl Place {
     }
 }
 
-/// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
-/// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices, the
-/// last row or column is read and the sum is not stored.
-#[inline(always)]
-pub(crate) fn multiply(
-    invocation: u32,
-    shape: Shape,
-    rows: &mut Shared,
-    columns: &mut Shared,
-    left: impl Fn(u32, u32) -> f32 + Copy,
-    right: impl Fn(u32, u32) -> f32 + Copy,
-    mut store: impl FnMut(u32, u32, f32),
-) {
-    let place = Place::new(invocation, shape, Form::Single);
-    let mut sums = Sums::ZERO;
-    let mut start = 0;
-    while start < shape.inner_count {
-        fetch_rows(rows, place.own, start, place.first_row, shape, left);
-        fetch_columns(columns, place.own, start, place.first_column, shape, right);
-        wait_for_all();
-        let count = STEP.min(shape.inner_count - start);
-        let mut inner = 0;
-        while inner < count {
-            sums.add(read_fours(rows, inner, place.own_row), read_fours(columns, inner, place.own_column));
-            inner += 1;
-        }
-        wait_for_all();
-        start += STEP;
-    }
-    store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+/// The workgroup memory of a [`Form`].
+pub(crate) trait Tiles {
+    /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
+    /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices,
+    /// the last row or column is read and the sum is not stored.
+    fn multiply(
+        self,
+        invocation: u32,
+        shape: Shape,
+        left: impl Fn(u32, u32) -> f32 + Copy,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+        store: impl FnMut(u32, u32, f32),
+    );
 }
 
-/// As [`multiply`], for [`Form::Double`]: a number of the rows is read once for the columns of two tiles.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub(crate) fn multiply_double(
-    invocation: u32,
-    shape: Shape,
-    rows: &mut Shared,
-    columns: &mut Shared,
-    more_columns: &mut Shared,
-    left: impl Fn(u32, u32) -> f32 + Copy,
-    right: impl Fn(u32, u32) -> f32 + Copy,
-    mut store: impl FnMut(u32, u32, f32),
-) {
-    let place = Place::new(invocation, shape, Form::Double);
-    let second_column = place.first_column + TILE;
-    let (mut sums, mut more) = (Sums::ZERO, Sums::ZERO);
-    let mut start = 0;
-    while start < shape.inner_count {
-        fetch_rows(rows, place.own, start, place.first_row, shape, left);
-        fetch_columns(columns, place.own, start, place.first_column, shape, right);
-        fetch_columns(more_columns, place.own, start, second_column, shape, right);
-        wait_for_all();
-        let count = STEP.min(shape.inner_count - start);
-        let mut inner = 0;
-        while inner < count {
-            let own_rows = read_fours(rows, inner, place.own_row);
-            sums.add(own_rows, read_fours(columns, inner, place.own_column));
-            more.add(own_rows, read_fours(more_columns, inner, place.own_column));
-            inner += 1;
-        }
-        wait_for_all();
-        start += STEP;
-    }
-    store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
-    store_sums(more, place, place.first_row, second_column, shape, &mut store);
+/// That of [`Form::Single`].
+pub(crate) struct Single<'a> {
+    pub(crate) rows: &'a mut Shared,
+    pub(crate) columns: &'a mut Shared,
 }
 
-/// As [`multiply`], for [`Form::Quadruple`]: each number is read once for two tiles.
-#[inline(always)]
-#[allow(clippy::too_many_arguments)]
-pub(crate) fn multiply_quadruple(
-    invocation: u32,
-    shape: Shape,
-    rows: &mut ShortShared,
-    more_rows: &mut ShortShared,
-    columns: &mut ShortShared,
-    more_columns: &mut ShortShared,
-    left: impl Fn(u32, u32) -> f32 + Copy,
-    right: impl Fn(u32, u32) -> f32 + Copy,
-    mut store: impl FnMut(u32, u32, f32),
-) {
-    let place = Place::new(invocation, shape, Form::Quadruple);
-    let (second_row, second_column) = (place.first_row + TILE, place.first_column + TILE);
-    let (mut sums, mut beside, mut below, mut across) = (Sums::ZERO, Sums::ZERO, Sums::ZERO, Sums::ZERO);
-    let mut start = 0;
-    while start < shape.inner_count {
-        fetch_rows(rows, place.own, start, place.first_row, shape, left);
-        fetch_rows(more_rows, place.own, start, second_row, shape, left);
-        fetch_columns(columns, place.own, start, place.first_column, shape, right);
-        fetch_columns(more_columns, place.own, start, second_column, shape, right);
-        wait_for_all();
-        let count = SHORT_STEP.min(shape.inner_count - start);
-        let mut inner = 0;
-        while inner < count {
-            let own_rows = read_fours(rows, inner, place.own_row);
-            let own_more_rows = read_fours(more_rows, inner, place.own_row);
-            let own_columns = read_fours(columns, inner, place.own_column);
-            let own_more_columns = read_fours(more_columns, inner, place.own_column);
-            sums.add(own_rows, own_columns);
-            beside.add(own_rows, own_more_columns);
-            below.add(own_more_rows, own_columns);
-            across.add(own_more_rows, own_more_columns);
-            inner += 1;
+/// That of [`Form::Double`]: a number of the rows is read once for the columns of two tiles.
+pub(crate) struct Double<'a> {
+    pub(crate) rows: &'a mut Shared,
+    pub(crate) columns: &'a mut Shared,
+    pub(crate) more_columns: &'a mut Shared,
+}
+
+/// That of [`Form::Quadruple`]: each number is read once for two tiles.
+pub(crate) struct Quadruple<'a> {
+    pub(crate) rows: &'a mut ShortShared,
+    pub(crate) more_rows: &'a mut ShortShared,
+    pub(crate) columns: &'a mut ShortShared,
+    pub(crate) more_columns: &'a mut ShortShared,
+}
+
+impl Tiles for Single<'_> {
+    #[inline(always)]
+    fn multiply(
+        self,
+        invocation: u32,
+        shape: Shape,
+        left: impl Fn(u32, u32) -> f32 + Copy,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+        mut store: impl FnMut(u32, u32, f32),
+    ) {
+        let Single { rows, columns } = self;
+        let place = Place::new(invocation, shape, Form::Single);
+        let mut sums = Sums::ZERO;
+        let mut start = 0;
+        while start < shape.inner_count {
+            fetch_rows(rows, place.own, start, place.first_row, shape, left);
+            fetch_columns(columns, place.own, start, place.first_column, shape, right);
+            wait_for_all();
+            let count = STEP.min(shape.inner_count - start);
+            let mut inner = 0;
+            while inner < count {
+                sums.add(read_fours(rows, inner, place.own_row), read_fours(columns, inner, place.own_column));
+                inner += 1;
+            }
+            wait_for_all();
+            start += STEP;
         }
-        wait_for_all();
-        start += SHORT_STEP;
+        store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
     }
-    store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
-    store_sums(beside, place, place.first_row, second_column, shape, &mut store);
-    store_sums(below, place, second_row, place.first_column, shape, &mut store);
-    store_sums(across, place, second_row, second_column, shape, &mut store);
+}
+
+impl Tiles for Double<'_> {
+    #[inline(always)]
+    fn multiply(
+        self,
+        invocation: u32,
+        shape: Shape,
+        left: impl Fn(u32, u32) -> f32 + Copy,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+        mut store: impl FnMut(u32, u32, f32),
+    ) {
+        let Double { rows, columns, more_columns } = self;
+        let place = Place::new(invocation, shape, Form::Double);
+        let second_column = place.first_column + TILE;
+        let (mut sums, mut more) = (Sums::ZERO, Sums::ZERO);
+        let mut start = 0;
+        while start < shape.inner_count {
+            fetch_rows(rows, place.own, start, place.first_row, shape, left);
+            fetch_columns(columns, place.own, start, place.first_column, shape, right);
+            fetch_columns(more_columns, place.own, start, second_column, shape, right);
+            wait_for_all();
+            let count = STEP.min(shape.inner_count - start);
+            let mut inner = 0;
+            while inner < count {
+                let own_rows = read_fours(rows, inner, place.own_row);
+                sums.add(own_rows, read_fours(columns, inner, place.own_column));
+                more.add(own_rows, read_fours(more_columns, inner, place.own_column));
+                inner += 1;
+            }
+            wait_for_all();
+            start += STEP;
+        }
+        store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+        store_sums(more, place, place.first_row, second_column, shape, &mut store);
+    }
+}
+
+impl Tiles for Quadruple<'_> {
+    #[inline(always)]
+    fn multiply(
+        self,
+        invocation: u32,
+        shape: Shape,
+        left: impl Fn(u32, u32) -> f32 + Copy,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+        mut store: impl FnMut(u32, u32, f32),
+    ) {
+        let Quadruple { rows, more_rows, columns, more_columns } = self;
+        let place = Place::new(invocation, shape, Form::Quadruple);
+        let (second_row, second_column) = (place.first_row + TILE, place.first_column + TILE);
+        let (mut sums, mut beside, mut below, mut across) = (Sums::ZERO, Sums::ZERO, Sums::ZERO, Sums::ZERO);
+        let mut start = 0;
+        while start < shape.inner_count {
+            fetch_rows(rows, place.own, start, place.first_row, shape, left);
+            fetch_rows(more_rows, place.own, start, second_row, shape, left);
+            fetch_columns(columns, place.own, start, place.first_column, shape, right);
+            fetch_columns(more_columns, place.own, start, second_column, shape, right);
+            wait_for_all();
+            let count = SHORT_STEP.min(shape.inner_count - start);
+            let mut inner = 0;
+            while inner < count {
+                let own_rows = read_fours(rows, inner, place.own_row);
+                let own_more_rows = read_fours(more_rows, inner, place.own_row);
+                let own_columns = read_fours(columns, inner, place.own_column);
+                let own_more_columns = read_fours(more_columns, inner, place.own_column);
+                sums.add(own_rows, own_columns);
+                beside.add(own_rows, own_more_columns);
+                below.add(own_more_rows, own_columns);
+                across.add(own_more_rows, own_more_columns);
+                inner += 1;
+            }
+            wait_for_all();
+            start += SHORT_STEP;
+        }
+        store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+        store_sums(beside, place, place.first_row, second_column, shape, &mut store);
+        store_sums(below, place, second_row, place.first_column, shape, &mut store);
+        store_sums(across, place, second_row, second_column, shape, &mut store);
+    }
 }
 
 /// Fetches a step of a tile's rows, `STEP` inner indices of a [`Shared`] or of a [`ShortShared`].
