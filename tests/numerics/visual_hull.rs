@@ -10,7 +10,7 @@ use viewfuse::check::world::{Numbers, World};
 use viewfuse::check::{camera_oracle, hull_oracle as oracle};
 use viewfuse_core::visual_hull::NO_SURFACE;
 use viewfuse_core::visual_hull::hull::{hull_alpha, hull_entry};
-use viewfuse_core::visual_hull::shade::{JUMP, depth_at, sample};
+use viewfuse_core::visual_hull::shade::{EMPTY, JUMP, depth_at, sample};
 
 const SEEDS: std::ops::Range<u64> = 1..5;
 
@@ -73,6 +73,43 @@ fn hull_alpha_agrees() {
         }
     };
     check("hull_alpha", 1.0e-4, case, &[("focal length", World::spoil_focal), ("texels", World::spoil_texels)]);
+}
+
+/// A point beyond the right border of the first image, inside the others.
+#[test]
+fn beyond_an_image_its_border_goes_on() {
+    let mut world = World::new(1);
+    let middle = world.object.middle();
+    world.texels.fill([1.0; 4]);
+    // Every pixel's surface is as far away as the point.
+    for view in &world.views {
+        let first = view.first_texel as usize;
+        world.depths[first..first + (view.width * view.height) as usize].fill(view.project(middle).depth);
+    }
+    let first = world.views[0];
+    world.views[0].intrinsics[2] += 2.0 * first.width as f32;
+    let alpha = |world: &World| hull_alpha(&world.object, &world.views[..], &world.texels[..], middle, 0.3);
+    let shade = |world: &World| {
+        sample(
+            &world.object,
+            &world.views[..],
+            &world.footprints,
+            &world.texels[..],
+            &world.depths[..],
+            &world.weights,
+            middle,
+        )
+    };
+    assert!(!world.views[0].project(middle).in_image && world.views[0].project(middle).in_front);
+    // The border shows the object: the image cuts it off, and says nothing of what is beyond.
+    assert_eq!(alpha(&world), 1.0);
+    assert!(shade(&world) != EMPTY);
+    let own = first.first_texel as usize..(first.first_texel + first.width * first.height) as usize;
+    let last_column = own.skip(first.width as usize - 1).step_by(first.width as usize);
+    last_column.for_each(|texel| world.texels[texel] = [0.0; 4]);
+    // The border shows background: the object ends inside the image.
+    assert_eq!(alpha(&world), 0.0);
+    assert_eq!(shade(&world), EMPTY);
 }
 
 // A coordinate's error times the change of depth over a pixel, at most a jump of 0.4.

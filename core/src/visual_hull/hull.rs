@@ -9,7 +9,7 @@ use glam::Vec3;
 
 /// Least alpha at which a pixel can show the object: such a source pixel gets a depth.
 pub const LEAST_ALPHA: f32 = 0.1;
-/// A point of the swept hull must have at least this alpha in every view that contains it.
+/// A point of the swept hull must have at least this alpha in every view that has it in front.
 pub const SWEPT_ALPHA: f32 = 0.3;
 /// A source ray enters the hull at this alpha: below [`SWEPT_ALPHA`], so that the boundary itself is swept.
 pub const ENTRY_ALPHA: f32 = 0.6 * SWEPT_ALPHA;
@@ -31,8 +31,9 @@ pub fn look_up_alpha(view: &CameraBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized
     bilinear_channel_from(texels, view.first_texel as usize, view.width, view.height, x, y, 3)
 }
 
-/// How far the silhouettes allow a point to belong to the object: the least alpha over the views that contain it, in
-/// `[0, 1]`. 0 if that falls below `least`, or if too few views contain the point.
+/// How far the silhouettes allow a point to belong to the object: the least alpha over the views that have it in front of
+/// them, in `[0, 1]`. Beyond a view's image its border's alpha goes on: an image with background at its border says that
+/// the object is not there. 0 if the alpha falls below `least`, or if too few images contain the point.
 #[inline]
 pub fn hull_alpha(
     object: &ObjectBlock,
@@ -47,8 +48,8 @@ pub fn hull_alpha(
     while view < object.view_count as usize {
         let camera = views.fetch(view);
         let seen = camera.project(point_world);
-        if seen.in_image {
-            containing += 1;
+        if seen.in_front {
+            containing += u32::from(seen.in_image);
             let here = look_up_alpha(&camera, texels, seen.x, seen.y);
             if here < alpha {
                 alpha = here;

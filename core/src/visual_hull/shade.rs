@@ -115,8 +115,8 @@ pub fn sample(
     while view < object.view_count as usize {
         let camera = views.fetch(view);
         let seen = camera.project(point_world);
-        if seen.in_image {
-            containing += 1;
+        if seen.in_front {
+            containing += u32::from(seen.in_image);
             let colour = look_up(&camera, texels, seen.x, seen.y);
             let alpha = colour[3];
             hull = min(alpha, hull);
@@ -124,7 +124,7 @@ pub fn sample(
                 return EMPTY;
             }
             let weight = weights[view];
-            if weight > 0.0 {
+            if seen.in_image && weight > 0.0 {
                 let footprint = footprints[view];
                 let depth = depth_at(&camera, depths, seen.x, seen.y, JUMP * footprint);
                 let distance = if depth < NO_SURFACE { (depth - seen.depth) / footprint } else { TRUNCATION };

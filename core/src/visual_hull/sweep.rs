@@ -192,19 +192,21 @@ impl SweptPixel {
         while other < object.view_count {
             let camera = views.fetch(other as usize);
             let seen = camera.project(point);
-            if other != sweep.view && seen.in_image {
-                containing += 1;
+            if other != sweep.view && seen.in_front {
                 let colour = look_up(&camera, texels, seen.x, seen.y);
                 if colour[3] < SWEPT_ALPHA {
                     return OUTSIDE;
                 }
-                let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
-                let entry = entries.fetch(camera.texel_at(seen.x, seen.y));
-                let share = weight * fade(max(seen.depth - entry, 0.0) * reach);
-                // For a view that does not see the point only the silhouette counts.
-                if share > 0.0 {
-                    sum += share * min(mean_difference(&straight(&colour), &self.own), MOST_DIFFERENCE);
-                    share_sum += share;
+                if seen.in_image {
+                    containing += 1;
+                    let weight = pair_weights[(sweep.view * object.view_count + other) as usize];
+                    let entry = entries.fetch(camera.texel_at(seen.x, seen.y));
+                    let share = weight * fade(max(seen.depth - entry, 0.0) * reach);
+                    // For a view that does not see the point only the silhouette counts.
+                    if share > 0.0 {
+                        sum += share * min(mean_difference(&straight(&colour), &self.own), MOST_DIFFERENCE);
+                        share_sum += share;
+                    }
                 }
             }
             other += 1;

@@ -49,7 +49,9 @@ pub struct Seen {
     pub y: Bounded,
     /// Along the principal axis.
     pub depth: Bounded,
-    /// Whether the point is in front of the camera and inside its image.
+    /// Whether the point is in front of the camera.
+    pub in_front: Option<bool>,
+    /// Whether it is in front of the camera and inside its image.
     pub in_image: Option<bool>,
 }
 
@@ -63,8 +65,8 @@ pub fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
     // In homogeneous coordinates: the intrinsics first, then one division.
     let x = (focal_x * dot(right, offset) + middle_x * depth) / depth;
     let y = (focal_y * dot(down, offset) + middle_y * depth) / depth;
-    let in_image = inside(camera, Bounded::ZERO.below(depth), x, y);
-    Seen { x, y, depth, in_image }
+    let in_front = Bounded::ZERO.below(depth);
+    Seen { x, y, depth, in_front, in_image: inside(camera, in_front, x, y) }
 }
 
 /// Whether a point that is projected to these image coordinates is in front of the camera and inside its image; the border

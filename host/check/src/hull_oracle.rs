@@ -63,22 +63,27 @@ fn interval(object: &ObjectBlock, origin: Vector, direction: Vector) -> (Bounded
     (enter, leave)
 }
 
-/// Least alpha over the views that contain a point; 0 if below `least` or if too few contain it.
+/// Least alpha over the views that have a point in front of them; 0 if below `least` or if too few contain it.
 pub fn hull_alpha(scene: &Scene, point_world: Vector, least: f32) -> Option<Bounded> {
     let mut alpha = Bounded::ONE;
     let (mut sure, mut unsure, mut undecided) = (0, 0, false);
     for view in scene.views {
         let seen = project(view, point_world);
-        if seen.in_image == Some(false) {
+        if seen.in_front == Some(false) {
             continue;
         }
+        // Beyond the image that of its border.
         let here = look_up(view, scene.texels, seen.x, seen.y)[3];
-        match (seen.in_image, here.below(least.into())) {
+        match (seen.in_front, here.below(least.into())) {
             // One view that surely says no is enough, whatever the others say.
             (Some(true), Some(true)) => return Some(Bounded::ZERO),
-            (Some(true), Some(false)) => sure += 1,
-            (Some(true), None) => (sure, undecided) = (sure + 1, true),
-            _ => (unsure, undecided) = (unsure + 1, true),
+            (Some(true), Some(false)) => {}
+            _ => undecided = true,
+        }
+        match seen.in_image {
+            Some(true) => sure += 1,
+            Some(false) => {}
+            None => (unsure, undecided) = (unsure + 1, true),
         }
         alpha = alpha.lesser(here);
     }

@@ -71,28 +71,34 @@ pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, ju
 /// Views by index, with the projection of a point and their depth and colour there.
 type Witnesses = Vec<(usize, Seen, [Bounded; 4])>;
 
-/// The views that contain a point; the inner `None` if it projects to the background of one of them.
-fn containing(scene: &Scene, place: Vector) -> Option<Option<Witnesses>> {
+/// The views that contain a point, and the least alpha over all views that have it in front of them; the inner `None` if it
+/// projects to the background of one of them.
+fn containing(scene: &Scene, place: Vector) -> Option<Option<(Witnesses, Bounded)>> {
     let mut undecided = false;
-    let mut views = Vec::new();
+    let (mut views, mut hull) = (Vec::new(), Bounded::ONE);
     for (index, view) in scene.views.iter().enumerate() {
         let seen = project(view, place);
-        if seen.in_image == Some(false) {
+        if seen.in_front == Some(false) {
             continue;
         }
         let texel = look_up(view, scene.texels, seen.x, seen.y);
-        match (seen.in_image, texel[3].below(EMPTY_ALPHA.into())) {
+        match (seen.in_front, texel[3].below(EMPTY_ALPHA.into())) {
             (Some(true), Some(true)) => return Some(None),
-            (Some(true), Some(false)) => views.push((index, seen, texel)),
+            (Some(true), Some(false)) => hull = hull.lesser(texel[3]),
             _ => undecided = true,
         }
+        match seen.in_image {
+            Some(true) => views.push((index, seen, texel)),
+            Some(false) => {}
+            None => undecided = true,
+        }
     }
-    if undecided { None } else { Some(Some(views)) }
+    if undecided { None } else { Some(Some((views, hull))) }
 }
 
 /// Occupancy and colour at a point.
 pub fn sample(scene: &Scene, footprints: &[f32], depths: &[f32], weights: &[f32], place: Vector) -> Option<Colour> {
-    let Some(views) = containing(scene, place)? else {
+    let Some((views, hull)) = containing(scene, place)? else {
         return Some(EMPTY);
     };
     if views.len() < scene.object.least_containing as usize {
@@ -102,7 +108,6 @@ pub fn sample(scene: &Scene, footprints: &[f32], depths: &[f32], weights: &[f32]
     let (mut colours, mut colour_share) = ([Bounded::ZERO; 3], Bounded::ZERO);
     let mut least_behind = NOWHERE;
     let truncation = Bounded::from(TRUNCATION);
-    let hull = views.iter().fold(Bounded::ONE, |least, (_, _, texel)| least.lesser(texel[3]));
     for (view, seen, texel) in views.into_iter().filter(|(view, _, _)| weights[*view] > 0.0) {
         let (weight, footprint) = (Bounded::from(weights[view]), Bounded::from(footprints[view]));
         let camera = &scene.views[view];

@@ -49,14 +49,19 @@ pub fn match_cost(
     let (mut undecided, mut votes) = (false, Vec::new());
     for (other, view) in scene.views.iter().enumerate().filter(|(other, _)| *other != sweep.view as usize) {
         let seen = project(view, place);
-        if seen.in_image == Some(false) {
+        if seen.in_front == Some(false) {
             continue;
         }
         let colour = look_up(view, scene.texels, seen.x, seen.y);
-        match (seen.in_image, colour[3].below(SWEPT_ALPHA.into())) {
+        match (seen.in_front, colour[3].below(SWEPT_ALPHA.into())) {
             (Some(true), Some(true)) => return Some(OUT),
-            (Some(true), Some(false)) => containing += 1,
+            (Some(true), Some(false)) => {}
             _ => undecided = true,
+        }
+        match seen.in_image {
+            Some(true) => containing += 1,
+            Some(false) => continue,
+            None => undecided = true,
         }
         let (Some(column), Some(row)) = (cell(seen.x, view.width), cell(seen.y, view.height)) else {
             undecided = true;
