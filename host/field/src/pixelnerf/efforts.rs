@@ -6,7 +6,7 @@ use crate::Effort;
 /// Samples of a single pass in 64ths of those of the first, with the largest difference between the rays
 /// around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
 /// (the example `efforts` of `viewfuse-evaluate`).
-const ONE_PASS: [(u32, f32, f32, f32); 8] = [
+const ONE_PASS: [(u32, f32, f32, f32); 9] = [
     (12, 0.25, 0.036, 0.018),
     (16, 0.2, 0.026, 0.02),
     (24, 0.2, 0.016, 0.022),
@@ -14,8 +14,11 @@ const ONE_PASS: [(u32, f32, f32, f32); 8] = [
     (40, 0.15, 0.0084, 0.028),
     (48, 0.12, 0.007, 0.033),
     (64, 0.08, 0.0053, 0.043),
+    (88, 0.06, 0.0046, 0.06),
     (128, 0.04, 0.0041, 0.09),
 ];
+/// Pixels from probe to probe of a single pass: where probes miss something, the check finds it.
+const PROBE_STEP: u32 = 5;
 /// The same with both passes.
 const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
     (
@@ -45,7 +48,7 @@ pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> 
         let coarse_count = (full.coarse_count * share).div_ceil(64).max(1);
         let sampling = Sampling { coarse_count, importance_count: 0, depth_count: 0, ..full };
         let probe_samples = coarse_count.div_ceil(2).max(full.coarse_count.div_ceil(4));
-        let omissions = keep(Omissions { probe_samples, interpolation, ..ALL });
+        let omissions = keep(Omissions { probe_samples, interpolation, empty_space: PROBE_STEP, ..ALL });
         (
             Effort::new(format!("{coarse_count} samples, one pass"), error, work),
             PixelNerfOptions { sampling, omissions },
