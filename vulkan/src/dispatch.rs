@@ -163,7 +163,7 @@ impl Gpu {
         let layouts = [pipeline.set_layout];
         let info =
             vk::DescriptorSetAllocateInfo::default().descriptor_pool(submission.descriptors).set_layouts(&layouts);
-        // SAFETY: the pool is as large as the largest set, and empty.
+        // SAFETY: the pool has room for a largest set of each of a submission's dispatches, and is reset with it.
         let set = unsafe { self.handle.device.allocate_descriptor_sets(&info) }
             .map_err(|result| self.handle.failure("vkAllocateDescriptorSets", result))?[0];
         let infos: Vec<[vk::DescriptorBufferInfo; 1]> = arrays

@@ -5,7 +5,7 @@
 //! lengths    of the forms and of the pipelines
 //! forms      text, a line a class
 //! pipelines  the data of a VkPipelineCache
-//! checksum   of all before it
+//! checksum   CRC-32 of all before it: against damage, not against malice
 //! ```
 //!
 //! Numbers are little-endian. Data of another device, driver or module, and damaged data, is ignored: everything is made
@@ -16,11 +16,11 @@ use crate::forms::Choices;
 use crate::gpu::Gpu;
 use crate::pipelines::MODULE;
 
-const MAGIC: &[u8; 16] = b"viewfuse device\x01";
+const MAGIC: &[u8; 16] = b"viewfuse device\x02";
 /// Bytes of the head, of the lengths and of a checksum.
-const HEAD: usize = 16 + 8 + 4 * 3 + 16;
+const HEAD: usize = 16 + 4 + 4 * 3 + 16;
 const LENGTHS: usize = 8;
-const CHECKSUM: usize = 8;
+const CHECKSUM: usize = 4;
 /// Bytes of the header of a pipeline cache, and its version.
 const CACHE_HEADER: usize = 32;
 const CACHE_VERSION: u32 = 1;
@@ -28,7 +28,7 @@ const CACHE_VERSION: u32 = 1;
 impl Identity {
     fn head(&self) -> Vec<u8> {
         let mut head = MAGIC.to_vec();
-        head.extend(checksum(MODULE).to_le_bytes());
+        head.extend(crc32fast::hash(MODULE).to_le_bytes());
         for number in [self.vendor, self.device, self.driver] {
             head.extend(number.to_le_bytes());
         }
@@ -73,13 +73,13 @@ fn encode(identity: &Identity, choices: &Choices, pipelines: &[u8]) -> Vec<u8> {
     bytes.extend((pipelines.len() as u32).to_le_bytes());
     bytes.extend(text.as_bytes());
     bytes.extend(pipelines);
-    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes.extend(crc32fast::hash(&bytes).to_le_bytes());
     bytes
 }
 
 fn decode<'a>(identity: &Identity, bytes: &'a [u8]) -> Option<(Choices, &'a [u8])> {
     let (content, sum) = bytes.split_last_chunk::<CHECKSUM>()?;
-    if checksum(content).to_le_bytes() != *sum || !content.starts_with(&identity.head()) {
+    if crc32fast::hash(content).to_le_bytes() != *sum || !content.starts_with(&identity.head()) {
         return None;
     }
     let length = |at: usize| Some(u32::from_le_bytes(content.get(at..at + 4)?.try_into().ok()?) as usize);
@@ -88,11 +88,6 @@ fn decode<'a>(identity: &Identity, bytes: &'a [u8]) -> Option<(Choices, &'a [u8]
     let choices = Choices::parse(std::str::from_utf8(text).ok()?)?;
     let is_whole = pipelines.len() == pipelines_len && (pipelines.is_empty() || identity.has_header(pipelines));
     is_whole.then_some((choices, pipelines))
-}
-
-/// FNV-1a of 64 bits: against damage, not against malice.
-fn checksum(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3))
 }
 
 #[cfg(test)]
