@@ -8,6 +8,7 @@ mod items;
 mod shown;
 
 use super::{list, packages, text};
+use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,9 +23,9 @@ fn libraries() -> Vec<(String, PathBuf)> {
     let mut found = Vec::new();
     for package in packages() {
         let is_published = package["publish"].is_null() && text(&package, "name") != "viewfuse-shaders";
-        let targets = list(&package, "targets").iter();
-        let library = targets.filter(|target| list(target, "kind").iter().any(|kind| kind == "lib" || kind == "rlib"));
-        if let (true, Some(library)) = (is_published, library.last()) {
+        let is_library = |target: &&Value| list(target, "kind").iter().any(|kind| kind == "lib" || kind == "rlib");
+        let library = list(&package, "targets").iter().find(is_library);
+        if let (true, Some(library)) = (is_published, library) {
             found.push((text(&package, "name").to_owned(), PathBuf::from(text(library, "src_path"))));
         }
     }
