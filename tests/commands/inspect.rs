@@ -11,6 +11,7 @@ viewfuse_tests::trials![
     flipped_axes,
     cameras_without_a_common_point,
     a_scene_in_other_units,
+    a_scene_in_a_map,
     two_views_from_one_place,
     a_background_of_many_colours,
 ];
@@ -78,6 +79,19 @@ fn a_scene_in_other_units() {
     let scene = toy();
     change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] *= 1.0e3));
     assert_warns(&scene, "the cameras are 1.300e3 units from what they look at", 0);
+}
+
+/// In the coordinates of a map: what is changed when it is opened is said, and is no reason for a warning.
+fn a_scene_in_a_map() {
+    let scene = toy();
+    change_poses(&scene, |_, matrix| [3, 7, 11].iter().for_each(|&at| matrix[at] += 1.0e6));
+    let inspection = inspection(&scene);
+    assert_eq!(texts(&inspection["warnings"]), Vec::<&str>::new());
+    let origin = numbers(&inspection["origin"]);
+    assert!(origin.len() == 3 && origin.iter().all(|x| (x - 1.0e6).abs() < 2.0), "{inspection}");
+    let printed = done(scene.path(), "inspect toy");
+    let says = |line: &str| line.starts_with("frame      the file's (") && line.contains("is the origin");
+    assert!(printed.lines().any(says), "{printed}");
 }
 
 fn two_views_from_one_place() {

@@ -10,31 +10,43 @@ use std::process::Stdio;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse::nn::checkpoint::Checkpoint;
+use viewfuse::output::journal::JOURNAL;
 use viewfuse_tests::command::{command, files_below, toy};
-use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![killed_at_any_moment];
 
-/// Every command that writes, and where.
-const COMMANDS: [(&str, &str); 9] = [
-    ("render toy --orbit 4 --size 24x24 --device cpu -o out", "out"),
-    (
-        "evaluate toy --protocol random --trials 4 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o out",
-        "out",
-    ),
-    ("evaluate toy --targets 20,21 --weights mean --size 16x16 --device cpu -o out/scores.csv", "out"),
-    ("scenes make toys out --train 3 --val 1 --test 0 --views 2 --test-views 2 --size 64", "out"),
-    ("export toy --layout transforms -o out/toy", "out"),
-    ("convert small.safetensors out/small.safetensors --half", "out"),
-    ("inspect toy -o out/cameras.png", "out"),
-    ("pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o out", "out"),
-    (
-        "train pixelnerf learn/toys --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
-         --validate-every 4 --write-every 0 -o out",
-        "out",
-    ),
+/// Files of an output folder.
+type Files = BTreeMap<PathBuf, Vec<u8>>;
+
+/// Every command that writes, into the folder `OUT`. The others (`compare`, `devices`, `verify`, `check`, `bench`) only
+/// print; `view` keeps nothing.
+const COMMANDS: [&str; 19] = [
+    "render toy --orbit 4 --size 24x24 --device cpu -o OUT",
+    "render toy --targets 20,21 --depth exr,npy --alpha --size 24x24 --device cpu -o OUT",
+    "render toy --between 2 6 --frames 4 --size 16x16 --video webp,y4m --device cpu -o OUT",
+    "evaluate toy --protocol random --trials 4 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o OUT",
+    "evaluate toy --targets 20,21 --weights mean --size 16x16 --device cpu -o OUT/scores.csv",
+    "pareto toy --targets 20 --views 3 --size 16x16 --repeat 1 --device cpu -o OUT",
+    "report run --training small -o OUT/page.html",
+    "select toy --count 3 --targets 20,21 --json -o OUT/views.json",
+    "weights toy --targets 20,21 --npy OUT/weights.npy",
+    "points toy --size 32x32 -o OUT/toy.ply",
+    "inspect toy -o OUT/cameras.png",
+    "scenes make toys OUT --train 3 --val 1 --test 0 --views 2 --test-views 2 --size 64",
+    "scenes photograph room OUT --views 3 --size 64x48",
+    "export toy --layout transforms -o OUT/toy",
+    "convert small/model.safetensors OUT/small.safetensors --half",
+    "convert weighting/model.safetensors OUT/attention.h",
+    "train pixelnerf learn/toys --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 12 \
+     --validate-every 4 --write-every 0 -o OUT",
+    "train genvs learn/toys --width 4 --objects 1 --samples 4 --side 16 --steps 3 --validate-every 3 --write-every 0 -o OUT",
+    "train weighting small/model.safetensors learn/toys --objects 1 --rays 4 --steps 4 --validate-every 4 \
+     --write-every 0 -o OUT",
 ];
+
+/// What the commands read, made before the first kill.
+const INPUTS: [&str; 5] = ["toy", "learn", "small", "weighting", "run"];
 
 /// Kills in the ordinary tests: each command once.
 const FEW: usize = COMMANDS.len();
@@ -42,28 +54,43 @@ const FEW: usize = COMMANDS.len();
 /// What all commands need.
 fn folder() -> Folder {
     let folder = toy();
-    fs::copy(data("pixelnerf_small.safetensors"), folder.path().join("small.safetensors")).expect("a copy");
-    done(folder.path(), "scenes make toys learn --train 2 --val 1 --test 0 --views 8 --test-views 8 --size 64");
+    for arguments in [
+        "scenes make toys learn --train 2 --val 1 --test 0 --views 9 --test-views 9 --size 64",
+        "train pixelnerf learn/toys --width 8 --objects 1 --rays 8 --coarse 4 --fine 2 --side 16 --steps 4 \
+         --validate-every 4 -o small",
+        "train weighting small/model.safetensors learn/toys --objects 1 --rays 4 --steps 1 --validate-every 1 -o weighting",
+        "evaluate toy --protocol random --trials 2 --targets-per-trial 1 --weights mean --size 16x16 --device cpu -o run",
+    ] {
+        done(folder.path(), arguments);
+    }
     folder
 }
 
-/// Every file is whole: it is read by whatever reads its kind. Hidden ones are those that a kill leaves.
+/// Every file that is an input, with its bytes.
+fn inputs(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let files = INPUTS.iter().flat_map(|name| files_below(&folder.join(name)));
+    files.filter(|(path, _)| path.is_file()).map(|(path, _)| (path.clone(), fs::read(&path).expect("a file"))).collect()
+}
+
+/// Every file is whole: it is read by whatever reads its kind, or is `like` the one that an undisturbed run wrote. Hidden
+/// ones are those that a kill leaves.
 #[track_caller]
-fn assert_whole(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut whole = BTreeMap::new();
+fn assert_whole(folder: &Path, like: &Files) -> Files {
+    let mut whole = Files::new();
     if !folder.is_dir() {
         return whole;
     }
     for (path, _) in files_below(folder) {
         let inside = path.strip_prefix(folder).expect("inside").to_path_buf();
-        let is_hidden = inside.components().any(|part| part.as_os_str().to_string_lossy().starts_with('.'));
-        if is_hidden || !path.is_file() {
+        if is_hidden(&inside) || !path.is_file() {
             continue;
         }
         let bytes = fs::read(&path).expect("a file");
         let text = || String::from_utf8(bytes.clone()).unwrap_or_else(|_| panic!("{}: no text", path.display()));
         match path.extension().and_then(|extension| extension.to_str()).unwrap_or_default() {
-            "png" => {
+            // A decoder reads a JPEG that is cut off, too.
+            "jpg" if !bytes.ends_with(&[0xff, 0xd9]) => panic!("{}: has no end", path.display()),
+            "png" | "jpg" => {
                 drop(image::load_from_memory(&bytes).unwrap_or_else(|error| panic!("{}: {error}", path.display())))
             }
             "json" => drop(
@@ -74,8 +101,12 @@ fn assert_whole(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
                 serde_json::from_str::<Value>(line).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
             }),
             "svg" => assert!(text().trim_end().ends_with("</svg>"), "{}", path.display()),
+            "html" => assert!(text().trim_end().ends_with("</html>"), "{}", path.display()),
             "csv" | "txt" => assert!(text().ends_with('\n'), "{}", path.display()),
             "safetensors" => drop(Checkpoint::open(&path).unwrap_or_else(|error| panic!("{error}"))),
+            "exr" | "npy" | "ply" | "webp" | "y4m" | "h" => {
+                assert!(like.get(&inside).is_none_or(|like| *like == bytes), "{} is not what it was", path.display());
+            }
             other => panic!("{}: what is {other}?", path.display()),
         }
         whole.insert(inside, bytes);
@@ -83,31 +114,46 @@ fn assert_whole(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     whole
 }
 
+/// Whether it is a file that a kill leaves, or in such a folder.
+fn is_hidden(path: &Path) -> bool {
+    path.components().any(|part| part.as_os_str().to_string_lossy().starts_with('.'))
+}
+
+/// The first of the finished files that are no longer there. A journal goes when its run is done.
+fn lost<'a>(finished: &'a Files, now: &Files) -> Option<&'a PathBuf> {
+    finished.keys().find(|name| !name.ends_with(JOURNAL) && !now.contains_key(*name))
+}
+
+/// What an undisturbed run wrote, and its time.
+fn undisturbed(folder: &Path, arguments: &str, out: &Path) -> (Files, Duration) {
+    let start = Instant::now();
+    done(folder, arguments);
+    let time = start.elapsed();
+    let files = assert_whole(out, &Files::new());
+    assert!(!files.is_empty(), "viewfuse {arguments} wrote nothing");
+    (files, time)
+}
+
 fn killed_at_any_moment() {
     let kills = std::env::var("VIEWFUSE_KILLS").map_or(FEW, |count| count.parse().expect("VIEWFUSE_KILLS is a number"));
     let folder = folder();
-    let inputs = |folder: &Path| -> Vec<(PathBuf, Vec<u8>)> {
-        let files = ["toy", "learn", "small.safetensors"].map(|name| folder.join(name));
-        let files =
-            files.iter().flat_map(|path| if path.is_dir() { files_below(path) } else { vec![(path.clone(), 0)] });
-        files
-            .filter(|(path, _)| path.is_file())
-            .map(|(path, _)| (path.clone(), fs::read(&path).expect("a file")))
-            .collect()
-    };
     let before = inputs(folder.path());
-    let mut times = [Duration::ZERO; COMMANDS.len()];
-    let (mut random, mut in_the_middle) = (0x9e37_79b9_7f4a_7c15_u64 ^ kills as u64, 0);
+    let mut first: Vec<(Files, Duration)> = Vec::new();
+    let (mut random, mut in_the_middle, mut in_a_file) = (0x9e37_79b9_7f4a_7c15_u64 ^ kills as u64, 0, 0);
     for kill in 0..kills {
-        let (arguments, out) = COMMANDS[kill % COMMANDS.len()];
-        let out = folder.path().join(out);
-        let time = &mut times[kill % COMMANDS.len()];
-        if time.is_zero() {
-            let start = Instant::now();
-            done(folder.path(), arguments);
-            *time = start.elapsed();
+        let name = format!("out{}", kill % COMMANDS.len());
+        let arguments = &COMMANDS[kill % COMMANDS.len()].replace("OUT", &name);
+        let out = folder.path().join(name);
+        if first.len() < COMMANDS.len() {
+            first.push(undisturbed(folder.path(), arguments, &out));
+        }
+        let (like, time) = &first[kill % COMMANDS.len()];
+        // By turns into an empty folder and over what an earlier run finished. An export never goes over one that is there.
+        let is_over = (kill + kill / COMMANDS.len()) % 2 == 1 && !arguments.starts_with("export");
+        if !is_over && out.is_dir() {
             fs::remove_dir_all(&out).expect("an output");
         }
+        let earlier = assert_whole(&out, like);
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let moment = time.mul_f64((random >> 33) as f64 / f64::from(1_u32 << 31));
         let mut run = command(BINARY, folder.path(), arguments);
@@ -116,22 +162,25 @@ fn killed_at_any_moment() {
         in_the_middle += usize::from(child.try_wait().expect("a process").is_none());
         child.kill().expect("a kill");
         child.wait().expect("an end");
-        let finished = assert_whole(&out);
+        let finished = assert_whole(&out, like);
+        assert_eq!(lost(&earlier, &finished), None, "viewfuse {arguments} lost what an earlier run finished");
         assert_eq!(inputs(folder.path()), before, "viewfuse {arguments} changed an input");
-        // What was whole may have been replaced by the next run, but is still there; and nothing hidden is.
+        in_a_file += usize::from(out.is_dir() && files_below(&out).iter().any(|(path, _)| is_unfinished(path)));
         if out.join("toy").is_dir() {
-            // An export never goes over one that is there.
             fs::remove_dir_all(out.join("toy")).expect("an output");
         }
+        // The same command goes on, keeps what was finished, and leaves nothing of the kill.
         done(folder.path(), arguments);
-        let after = assert_whole(&out);
-        let gone: Vec<_> = finished.keys().filter(|name| !after.contains_key(*name)).collect();
-        assert!(gone.is_empty(), "viewfuse {arguments}: finished files are gone: {gone:?}");
-        let left: Vec<PathBuf> = files_below(&out).into_iter().map(|(path, _)| path).collect();
-        let is_left = |path: &&PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        assert_eq!(left.iter().find(is_left), None, "viewfuse {arguments} left something");
-        fs::remove_dir_all(&out).expect("an output");
+        let after = assert_whole(&out, like);
+        assert_eq!(lost(&finished, &after), None, "viewfuse {arguments} lost what it had finished");
+        assert!(after.keys().eq(like.keys()), "viewfuse {arguments}: {:?} instead of {:?}", after.keys(), like.keys());
+        let left = files_below(&out).into_iter().map(|(path, _)| path).find(|path| is_unfinished(path));
+        assert_eq!(left, None, "viewfuse {arguments} left something");
     }
-    println!("{kills} kills, {in_the_middle} while the command ran");
+    println!("{kills} kills, {in_the_middle} while the command ran, {in_a_file} while a file was written");
     assert!(in_the_middle * 2 > kills, "the kills come too late: {in_the_middle} of {kills} while the command ran");
+}
+
+fn is_unfinished(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }

@@ -111,6 +111,9 @@ fn labels_name_schemes() {
     let record = json(&fs::read_to_string(folder.join("out/run.json")).expect("a record"));
     assert_eq!(record["weighting"], "near");
     assert_wrong_arguments(BINARY, folder, "weights toy --target 20 --weights a/b=mean", &["'a/b' is not a label"]);
+    // One that means another scheme would be read as that.
+    let taken = "weights toy --target 20 --weights mean=error:alpha=1";
+    assert_wrong_arguments(BINARY, folder, taken, &["'mean' is a weighting itself"]);
 }
 
 fn tables_for_papers() {

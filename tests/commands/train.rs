@@ -163,6 +163,10 @@ fn wrong_input_is_told() {
     refused("train weighting learn/toys.json learn/toys -o out", &["learn/toys.json"]);
     fs::write(folder.path().join("state.safetensors"), "nothing").expect("a file");
     refused("train pixelnerf learn/toys -o .", &["./state.safetensors: is not the state of a training run"]);
+    if cfg!(target_os = "linux") {
+        // Nobody can make a folder there; it is noticed before the first of many steps.
+        refused("train pixelnerf learn/toys --steps 1000000 -o /proc/out", &["/proc/out/", "cannot be written"]);
+    }
     assert_wrong_arguments(BINARY, folder.path(), "train genvs learn/toys -o out --width 5", &["a multiple of 4"]);
     assert!(!folder.path().join("out").exists());
 }

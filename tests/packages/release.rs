@@ -11,9 +11,10 @@ use viewfuse_tests::places::repository;
 /// Most versions of crates beside a newer one.
 const MOST_DUPLICATES: usize = 24;
 
-/// Every crate of the lock file, as cargo describes it.
+/// Every crate of the lock file, those of optional features too, as cargo describes it.
 fn crates() -> Vec<Value> {
-    let metadata: Value = serde_json::from_str(&cargo(&["metadata", "--format-version", "1"])).expect("JSON");
+    let metadata = cargo(&["metadata", "--all-features", "--format-version", "1"]);
+    let metadata: Value = serde_json::from_str(&metadata).expect("JSON");
     list(&metadata, "packages").to_vec()
 }
 

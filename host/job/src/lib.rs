@@ -4,6 +4,7 @@
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
+//! text       text of files, in messages                    in_line
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted
 //! panics     panics of other libraries as errors              caught
 //! files      output files, completely or not at all           write_whole, WholeFile, WholeFolder
@@ -16,6 +17,7 @@ pub mod digest;
 pub mod files;
 pub mod panics;
 pub mod progress;
+pub mod text;
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

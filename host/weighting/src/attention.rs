@@ -24,6 +24,7 @@ use viewfuse_core::attention::{
 };
 use viewfuse_core::pose::Pose;
 use viewfuse_job::files::read_at_most;
+use viewfuse_job::text::in_line;
 
 /// Why attention parameters could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -37,7 +38,7 @@ pub enum AttentionError {
         cause: std::io::Error,
     },
     /// The file is not in the safetensors format.
-    #[error("{}: not a safetensors file: {cause}", path.display())]
+    #[error("{}: not a safetensors file: {}", path.display(), in_line(cause))]
     Format {
         /// The file.
         path: PathBuf,

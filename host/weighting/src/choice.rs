@@ -1,11 +1,8 @@
 //! A named scheme, or `auto`: the best one for the scene.
 
-use crate::spec::{WeightingError, WeightingSpec, grammar};
+use crate::spec::{AUTO, WeightingError, WeightingSpec, grammar};
 use std::fmt;
 use std::str::FromStr;
-
-/// The text form of the automatic choice.
-const AUTO: &str = "auto";
 
 /// The text forms, for help texts: `auto` before those of [`grammar`].
 pub fn choice_grammar() -> String {

@@ -19,6 +19,9 @@ pub fn scheme_names() -> Vec<&'static str> {
     ROWS.iter().flat_map(|row| row.tables).copied().chain([CROSS_ATTENTION]).collect()
 }
 
+/// The text form of the automatic choice, which is no label either.
+pub(crate) const AUTO: &str = "auto";
+
 /// The text forms, for help texts: `mean, l1, ..., gaussian:beta=B, ..., attention:FILE`.
 pub fn grammar() -> String {
     let formulas = ROWS.iter().map(row_grammar);
@@ -76,6 +79,12 @@ pub enum WeightingError {
     /// A label that could not stand in a table.
     #[error("'{label}' is not a label of a weighting: letters, digits, '-', '_', '.' and blanks")]
     BadLabel {
+        /// The given text.
+        label: String,
+    },
+    /// A label that would be read as another weighting.
+    #[error("'{label}' is a weighting itself, and no label of one")]
+    TakenLabel {
         /// The given text.
         label: String,
     },
@@ -144,6 +153,9 @@ impl FromStr for WeightingSpec {
             let is_label = |byte: u8| byte.is_ascii_alphanumeric() || b"-_. ".contains(&byte);
             if label.is_empty() || !label.bytes().all(is_label) {
                 return Err(WeightingError::BadLabel { label: label.to_owned() });
+            }
+            if label == AUTO || label.parse::<WeightingSpec>().is_ok() {
+                return Err(WeightingError::TakenLabel { label: label.to_owned() });
             }
             let rest = &text[label.len() + 1..];
             let spec: WeightingSpec = rest.parse()?;
@@ -302,8 +314,8 @@ mod tests {
         assert_eq!((spec.to_string().as_str(), &spec.kind), ("half", &meant.kind));
         let spec: WeightingSpec = "cars=attention:a=b/c:d.safetensors".parse()?;
         assert_eq!((spec.to_string().as_str(), spec.file()), ("cars", Some(Path::new("a=b/c:d.safetensors"))));
-        // A label has none itself.
-        for wrong in ["=mean", "a/b=mean", "a=b=mean", "a=nothing"] {
+        // A label has none itself, and is no scheme that it is not.
+        for wrong in ["=mean", "a/b=mean", "a=b=mean", "a=nothing", "mean=error:alpha=1", "auto=mean"] {
             wrong.parse::<WeightingSpec>().expect_err(wrong);
         }
         Ok(())

@@ -40,6 +40,16 @@ fn means_the_same<T: FromStr<Err: Display> + Display + PartialEq>(text: &str) ->
     parsed::<T>(text)
 }
 
+/// The same for a weighting; one with a label is written as the label, which is then no weighting itself.
+fn weighting_means_the_same(text: &str) -> Result<bool, String> {
+    let label = text.parse::<WeightingSpec>().ok().map(|value| value.to_string());
+    let rest = label.as_ref().and_then(|label| text.strip_prefix(label.as_str())?.strip_prefix('='));
+    match (label, rest) {
+        (Some(label), Some(rest)) if label.parse::<WeightingSpec>().is_err() => means_the_same::<WeightingSpec>(rest),
+        _ => means_the_same::<WeightingSpec>(text),
+    }
+}
+
 impl Target for Specs {
     fn seeds(&self) -> Vec<Vec<u8>> {
         let texts = [
@@ -49,6 +59,7 @@ impl Target for Specs {
             "distance:power=2",
             "attention:file.safetensors",
             "auto",
+            "half=error:alpha=0.5",
             "random:sources=3",
             "close:sources=5,degrees=10",
             "count:sources=2+8",
@@ -76,7 +87,7 @@ impl Target for Specs {
     fn run(&mut self, bytes: &[u8]) -> Result<Verdict, String> {
         let text = &String::from_utf8_lossy(bytes);
         let outcomes = [
-            means_the_same::<WeightingSpec>(text)?,
+            weighting_means_the_same(text)?,
             parsed::<WeightingChoice>(text)?,
             means_the_same::<Protocol>(text)?,
             means_the_same::<Shard>(text)?,

@@ -8,6 +8,7 @@ use thiserror::Error;
 use viewfuse_core::lens::LensError;
 use viewfuse_core::pose::{LARGEST_COORDINATE, PoseError};
 use viewfuse_job::panics::Panicked;
+use viewfuse_job::text::in_line;
 
 use super::LARGEST_SIDE;
 use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place, Short};
@@ -98,7 +99,7 @@ pub enum SceneError {
         looked_for: &'static str,
     },
     /// A pose whose photograph is missing.
-    #[error("{path}{place}: this pose has no photograph: there is no {image}")]
+    #[error("{path}{place}: this pose has no photograph: there is no {}", in_line(image.display()))]
     PoseWithoutImage {
         /// The file with the pose.
         path: PathBuf,
@@ -108,7 +109,7 @@ pub enum SceneError {
         image: PathBuf,
     },
     /// A mask that is named and missing.
-    #[error("{path}{place}: there is no mask {mask}")]
+    #[error("{path}{place}: there is no mask {}", in_line(mask.display()))]
     NoMask {
         /// The file that names it.
         path: PathBuf,
@@ -406,7 +407,14 @@ pub enum SceneError {
     },
 }
 
-/// A message of a decoder, some of which end in a line break.
+/// Most characters of what a decoder says.
+const LONGEST_CAUSE: usize = 300;
+
+/// A message of a decoder: some end in a line break, some list every number that they do not know.
 fn in_one_line(cause: &image::ImageError) -> String {
-    cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ")
+    let line = cause.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(LONGEST_CAUSE) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
 }
