@@ -5,6 +5,7 @@
 //! check        the difference of a picture from the exact one, estimated from few pixels
 //! embedded     the same from two pictures of different efforts, for fields whose pixels are not independent
 //! deadline     cancels what would come too late
+//! expected     the errors and times that efforts are expected to have
 //! controller   the search, and what it keeps from picture to picture
 //! ```
 //!
@@ -17,6 +18,7 @@ mod check;
 mod controller;
 mod deadline;
 mod embedded;
+mod expected;
 
 pub(crate) use controller::{Controller, View};
 

@@ -2,6 +2,7 @@
 
 use super::check::{Sample, draw};
 use super::deadline::Deadline;
+use super::expected::Expected;
 use super::{Bound, Estimate, Kept, Tried, embedded};
 use crate::{Effort, Encodings, FieldError, Rendered, Session};
 use std::time::{Duration, Instant};
@@ -9,8 +10,6 @@ use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// A search begins where the typical error, scaled, is below the bound by this factor: most first checks then succeed.
-const MARGIN: f64 = 1.15;
 /// Exact pixels of a round of a check: as many as take this share of the picture's work, in these bounds; and the most rounds
 /// until a check is decided.
 const CHECK_WORK: f64 = 0.2;
@@ -20,21 +19,12 @@ const ROUNDS: usize = 3;
 const PIXEL_ERROR: f32 = 1.0 / 7.0;
 /// What is expected counts as much as this many draws.
 const EXPECTED_DRAWS: usize = 8;
-/// The least scale: few draws often miss the few largest differences, so that low estimates prove little.
-const LEAST_SCALE: f64 = 0.9;
 /// Pictures that keep another picture's choice have this much more error at most.
 const OTHER_PICTURES: f64 = 1.3;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
 /// After an exact picture, only one of so many tries less.
 const EXACT_PICTURES: u64 = 8;
-/// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not typical.
-const CHEAP: f32 = 0.1;
-const MOST_SKIPPED: usize = 3;
-/// Pictures are compared whose typical errors differ by at least this factor.
-const LEAST_RATIO: f32 = 1.5;
-/// An effort is tried if it is expected to take this share of the time that is left.
-const TIME_SHARE: f64 = 0.75;
 /// The share of the time that must be left for estimating the error of a picture with a bounded time.
 const CHECK_SHARE: f64 = 0.25;
 
@@ -54,15 +44,11 @@ pub(crate) struct View<'a> {
 /// Keeps a bound over the pictures of a run.
 pub(crate) struct Controller {
     bound: Bound,
-    efforts: Vec<Effort>,
+    expected: Expected,
     /// Whether errors are estimated from exact pixels; otherwise by comparing two pictures.
     by_pixels: bool,
     /// Whether another effort encodes the sources again.
     encodes_again: bool,
-    /// Estimated over typical errors in this scene.
-    scale: Option<f64>,
-    /// Seconds of each effort's last picture, without encoding.
-    seconds: Vec<Option<f64>>,
     /// The effort that was chosen by comparing two, its estimate, and the pictures until the next comparison.
     compared: Option<(usize, Estimate, u32)>,
     /// The effort of the last picture that was checked by pixels, and its estimate.
@@ -84,28 +70,15 @@ struct Search<'s, 'a> {
 
 impl Controller {
     /// For these efforts of a field, which can render pixels alone or not. Without any, the field has a single way to render.
-    pub(crate) fn new(bound: Bound, mut efforts: Vec<Effort>, by_pixels: bool) -> Controller {
-        if efforts.is_empty() {
-            efforts.push(Effort::exact());
-        }
-        let seconds = vec![None; efforts.len()];
-        Controller {
-            bound,
-            efforts,
-            by_pixels,
-            encodes_again: false,
-            scale: None,
-            seconds,
-            compared: None,
-            last: None,
-            pictures: 0,
-        }
+    pub(crate) fn new(bound: Bound, efforts: Vec<Effort>, by_pixels: bool) -> Controller {
+        let expected = Expected::new(efforts, if by_pixels { 1.0 } else { embedded::SAFETY });
+        Controller { bound, expected, by_pixels, encodes_again: false, compared: None, last: None, pictures: 0 }
     }
 
     /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
     pub(crate) fn first(&self) -> usize {
         match self.bound {
-            Bound::Error(most) => self.cheapest_within(f64::from(most)),
+            Bound::Error(most) => self.expected.cheapest_within(f64::from(most)),
             Bound::Time(_) => 0,
         }
     }
@@ -133,7 +106,7 @@ impl Controller {
             Bound::Time(most) => (None, Some(most.as_secs_f64())),
         };
         let seconds = search.start.elapsed().as_secs_f64();
-        let (effort, tried) = (self.efforts[effort].name.clone(), search.tried);
+        let (effort, tried) = (self.expected.efforts[effort].name.clone(), search.tried);
         Ok((rendered, Kept { most_error, most_seconds, effort, error, seconds, is_kept, tried }, search.encode))
     }
 
@@ -151,18 +124,18 @@ impl Controller {
         let mut effort = self.begin(most);
         loop {
             let rendered = self.picture(search, effort, termination, progress)?;
-            if self.is_exact(effort) {
+            if self.expected.is_exact(effort) {
                 self.last = Some((effort, Estimate::EXACT));
                 return Ok((rendered, effort, Estimate::EXACT));
             }
             let estimate = self.check(search, &rendered, effort, ROUNDS, most, progress)?;
-            self.learn(effort, estimate);
+            self.expected.learn(effort, estimate);
             if estimate.upper <= most {
                 self.last = Some((effort, estimate));
                 return Ok((rendered, effort, estimate));
             }
             search.tried.push(self.tried(effort, Some(estimate)));
-            effort = self.after(effort, most);
+            effort = self.expected.after(effort, most);
         }
     }
 
@@ -184,17 +157,17 @@ impl Controller {
                 return Ok((self.picture(search, effort, termination, progress)?, effort, estimate));
             }
         }
-        let mut effort = known.unwrap_or_else(|| self.cheapest_within(most));
-        if self.is_exact(effort) {
+        let mut effort = known.unwrap_or_else(|| self.expected.cheapest_within(most));
+        if self.expected.is_exact(effort) {
             let rendered = self.picture(search, effort, termination, progress)?;
             return Ok(self.compared_to(rendered, [effort; 2], [Estimate::EXACT; 2]));
         }
         effort = effort.max(1);
-        let mut below = self.below(effort);
+        let mut below = self.expected.below(effort);
         let mut cheaper = self.picture(search, below, termination, progress)?;
         loop {
             let rendered = self.picture(search, effort, termination, progress)?;
-            let typical = |effort: usize| f64::from(self.efforts[effort].typical_error);
+            let typical = |effort: usize| f64::from(self.expected.efforts[effort].typical_error);
             let found = embedded::estimate(&rendered, &cheaper, typical(below) / typical(effort));
             let variation = if self.encodes_again { OTHER_PICTURES } else { 1.0 };
             let with_termination = |estimate: Estimate| Estimate {
@@ -202,12 +175,12 @@ impl Controller {
                 ..estimate
             };
             let of_cheaper = with_termination(found.cheaper);
-            if self.is_exact(effort) {
-                self.learn(below, of_cheaper);
+            if self.expected.is_exact(effort) {
+                self.expected.learn(below, of_cheaper);
                 return Ok(self.compared_to(rendered, [effort; 2], [Estimate::EXACT; 2]));
             }
             let estimate = with_termination(found.better);
-            self.learn(effort, estimate);
+            self.expected.learn(effort, estimate);
             if estimate.upper <= most {
                 // The next pictures take the cheaper effort if that is enough for them.
                 let next = if of_cheaper.upper <= most { (below, of_cheaper) } else { (effort, estimate) };
@@ -215,7 +188,7 @@ impl Controller {
             }
             search.tried.push(self.tried(effort, Some(estimate)));
             (cheaper, below) = (rendered, effort);
-            effort = self.after(effort, most);
+            effort = self.expected.after(effort, most);
         }
     }
 
@@ -240,10 +213,10 @@ impl Controller {
     ) -> Result<(Rendered, usize, Option<Estimate>, bool), FieldError> {
         let end = search.start + most;
         let left = || end.saturating_duration_since(Instant::now()).as_secs_f64();
-        let mut effort = self.best_within(left()).unwrap_or(0);
+        let mut effort = self.expected.best_within(left()).unwrap_or(0);
         let mut best = (self.picture(search, effort, search.view.early_termination, progress)?, effort);
         let deadline = Deadline { progress, end };
-        while let Some(better) = self.best_within(left()).filter(|better| *better > effort) {
+        while let Some(better) = self.expected.best_within(left()).filter(|better| *better > effort) {
             effort = better;
             match self.picture(search, effort, search.view.early_termination, &deadline) {
                 Ok(rendered) => {
@@ -261,7 +234,7 @@ impl Controller {
         }
         let (rendered, effort) = best;
         let is_kept = search.start.elapsed() <= most;
-        if self.is_exact(effort) {
+        if self.expected.is_exact(effort) {
             return Ok((rendered, effort, Some(Estimate::EXACT), is_kept));
         }
         let mut estimate = None;
@@ -283,7 +256,7 @@ impl Controller {
         early_termination: f32,
         progress: &dyn Progress,
     ) -> Result<Rendered, FieldError> {
-        let is_exact = self.is_exact(effort);
+        let is_exact = self.expected.is_exact(effort);
         let Search { session, view, encode, .. } = search;
         let (weights, early_termination) = if is_exact { (view.all, 0.0) } else { (view.used, early_termination) };
         let start = Instant::now();
@@ -292,7 +265,7 @@ impl Controller {
         *encode += start.elapsed();
         let start = Instant::now();
         let rendered = session.render(view.camera, weights, early_termination, progress)?;
-        self.seconds[effort] = Some(start.elapsed().as_secs_f64());
+        self.expected.seconds[effort] = Some(start.elapsed().as_secs_f64());
         Ok(rendered)
     }
 
@@ -306,7 +279,7 @@ impl Controller {
         most: f64,
         progress: &dyn Progress,
     ) -> Result<Estimate, FieldError> {
-        let Effort { typical_error, typical_work, .. } = self.efforts[effort];
+        let Effort { typical_error, typical_work, .. } = self.expected.efforts[effort];
         let affordable = CHECK_WORK * f64::from(typical_work) * rendered.colours.len() as f64;
         let count = (affordable as usize).clamp(ROUND[0], ROUND[1]);
         let mut sample = Sample::default();
@@ -330,9 +303,9 @@ impl Controller {
     /// the bound.
     fn begin(&self, most: f64) -> usize {
         match self.last {
-            None => self.cheapest_within(most),
-            Some((effort, _)) if self.is_exact(effort) => match self.pictures % EXACT_PICTURES {
-                0 => self.cheapest_within(most).min(effort),
+            None => self.expected.cheapest_within(most),
+            Some((effort, _)) if self.expected.is_exact(effort) => match self.pictures % EXACT_PICTURES {
+                0 => self.expected.cheapest_within(most).min(effort),
                 _ => effort,
             },
             Some((effort, estimate)) if FAR_LESS * estimate.upper <= most => effort.saturating_sub(1),
@@ -340,54 +313,7 @@ impl Controller {
         }
     }
 
-    /// The effort to try after one whose error is too large.
-    fn after(&self, effort: usize, most: f64) -> usize {
-        let next = self.cheapest_within(most).max(effort + 1);
-        let near = (effort + 1..=effort + MOST_SKIPPED).rev();
-        let cheap = near.into_iter().find(|near| self.efforts.get(*near).is_some_and(|own| own.typical_work <= CHEAP));
-        cheap.map_or(next, |cheap| next.min(cheap))
-    }
-
-    /// The cheapest effort whose error is expected to be below the bound.
-    fn cheapest_within(&self, most: f64) -> usize {
-        let margin = if self.by_pixels { MARGIN } else { MARGIN * embedded::SAFETY };
-        let scale = margin * self.scale.unwrap_or(1.0);
-        let is_within = |effort: &Effort| f64::from(effort.typical_error) * scale <= most;
-        self.efforts.iter().position(is_within).unwrap_or(self.efforts.len() - 1)
-    }
-
-    /// The best effort that is expected to take less than the time that is left; none before a time was measured.
-    fn best_within(&self, left: f64) -> Option<usize> {
-        let (_, measured) = (0..).zip(&self.seconds).filter(|(_, seconds)| seconds.is_some()).last()?;
-        let index = self.seconds.iter().rposition(Option::is_some)?;
-        let rate = measured.as_ref()? / f64::from(self.efforts[index].typical_work);
-        let expected = |effort: usize| match self.seconds[effort] {
-            Some(seconds) => seconds,
-            None => rate * f64::from(self.efforts[effort].typical_work),
-        };
-        (0..self.efforts.len()).rev().find(|effort| expected(*effort) <= TIME_SHARE * left)
-    }
-
-    /// The best effort below another one whose error is typically larger by a factor that a comparison can tell.
-    fn below(&self, effort: usize) -> usize {
-        let least = LEAST_RATIO * self.efforts[effort].typical_error;
-        (0..effort).rev().find(|below| self.efforts[*below].typical_error >= least).unwrap_or(0)
-    }
-
-    /// Updates the scale of errors by half, in logarithms: single estimates are uncertain.
-    fn learn(&mut self, effort: usize, estimate: Estimate) {
-        let found = estimate.value / f64::from(self.efforts[effort].typical_error);
-        if found.is_finite() && found > 0.0 {
-            let scale = self.scale.map_or(found, |scale| (scale * found).sqrt());
-            self.scale = Some(scale.max(LEAST_SCALE));
-        }
-    }
-
-    fn is_exact(&self, effort: usize) -> bool {
-        effort + 1 == self.efforts.len()
-    }
-
     fn tried(&self, effort: usize, error: Option<Estimate>) -> Tried {
-        Tried { effort: self.efforts[effort].name.clone(), error }
+        Tried { effort: self.expected.efforts[effort].name.clone(), error }
     }
 }
