@@ -36,11 +36,10 @@ pub fn check_device<D: Device>(
     seed_count: u32,
     progress: &dyn Progress,
 ) -> Result<DeviceReport, CheckError> {
-    progress.expect(Kernel::ALL.len());
     let mut kernels = Vec::new();
-    for kernel in Kernel::ALL {
+    for (index, kernel) in Kernel::ALL.into_iter().enumerate() {
+        progress.stage(kernel.name(), index..index + 1, Kernel::ALL.len());
         kernels.push(check_kernel(device, role, kernel, seed_count, progress)?);
-        progress.step();
     }
     Ok(DeviceReport { device: device.name(), kernels, picture: None })
 }

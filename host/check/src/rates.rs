@@ -93,13 +93,14 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
     let mut chains = limits::chains(device).map_err(making("multiply_add"))?;
     let mut works = sweeps::works(device).map_err(making("compare_views"))?;
     works.extend(networks::works(device).map_err(making("linear"))?);
-    progress.expect(rounds as usize * works.len());
     let copies = repeats(device, &mut copy)?;
     let rounds_of_chains = repeats(device, &mut chains)?;
     let mut limits = Vec::new();
     let mut times = vec![Vec::new(); works.len()];
     let mut shares = vec![Vec::new(); works.len()];
-    for _ in 0..rounds {
+    for round in 0..rounds as usize {
+        progress.stage(&format!("round {} of {rounds}", round + 1), round..round + 1, rounds as usize);
+        progress.expect(works.len());
         for (at, work) in works.iter_mut().enumerate() {
             progress.check()?;
             let limit = Limits {

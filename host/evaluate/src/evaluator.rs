@@ -13,7 +13,7 @@ use viewfuse_field::Renderer;
 use viewfuse_field::auto::choose;
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Selection, SelectionError, target_of, view_list};
 use viewfuse_scene::photographs::{Album, GroundTruth, PhotographsError, SourceImages};
@@ -126,6 +126,9 @@ impl Evaluator<'_> {
             values,
             time,
         };
+        let of_a_scheme = 1 + targets.len();
+        let stage_count = 1 + weightings.len() * of_a_scheme;
+        progress.stage("reading the sources", 0..1, stage_count);
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
         let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
         for &target in targets {
@@ -152,9 +155,11 @@ impl Evaluator<'_> {
         drop(shots);
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
-        for row in weightings {
+        for (index, row) in weightings.iter().enumerate() {
             let name = row.to_string();
+            let place = 1 + index * of_a_scheme;
             let start = Instant::now();
+            progress.stage(&format!("{name}, encoding the sources"), place..place + 1, stage_count);
             let weighting = &match row {
                 OpenedChoice::Given(weighting) => weighting.clone(),
                 OpenedChoice::Auto => {
@@ -167,7 +172,9 @@ impl Evaluator<'_> {
             // Choosing is a part of it.
             let encode_share = start.elapsed() / targets.len().max(1) as u32;
             let mut bounded = Vec::new();
-            for &target in targets {
+            for (index, &target) in targets.iter().enumerate() {
+                let (view, place) = (&scene.views[target].name, place + 1 + index);
+                progress.stage(&format!("{name}, view {view}"), place..place + 1, stage_count);
                 let frame = stage.frame(weighting, &target_of(scene, target), progress)?;
                 bounded.extend(frame.kept.clone());
                 if let Some(truth) = &frame.truth {
@@ -224,11 +231,15 @@ impl Evaluator<'_> {
     pub fn score_all(&self, scene: &Scene, selection: &Selection) -> Result<Vec<Score>, EvaluateError> {
         let groups = source_groups(scene, selection, self.renderer.about().least_sources)?;
         let used = groups.iter().flat_map(|(sources, targets)| sources.iter().chain(targets).copied());
+        let of = 1 + groups.len();
+        self.progress.stage("reading photographs", 0..1, of);
         let album = open_album(scene, used, self.renderer, self.options, self.progress)?;
         let mut scores = Vec::new();
-        for (sources, targets) in &groups {
+        for (index, (sources, targets)) in groups.iter().enumerate() {
             let subject = Subject { scene, album: &album, masked: None };
-            scores.extend(self.score(subject, sources, targets, |_, _, _, _| {})?);
+            let progress = &Part::begin(self.progress, "", 1 + index..2 + index, of);
+            let own = Evaluator { progress, ..*self };
+            scores.extend(own.score(subject, sources, targets, |_, _, _, _| {})?);
         }
         Ok(scores)
     }

@@ -108,7 +108,14 @@ impl Subject<'_> {
         round_count: u32,
         progress: &dyn Progress,
     ) -> Result<Measured, RenderError> {
-        progress.expect(settings.len() * self.job.targets.len() * (round_count as usize + 1));
+        let of = settings.len() * (round_count as usize + 1);
+        let begin = |round: usize, index: usize| {
+            let place = round * settings.len() + index;
+            let words = &settings[index].words;
+            let name = if round == 0 { words.clone() } else { format!("{words}, round {round} of {round_count}") };
+            progress.stage(&name, place..place + 1, of);
+            progress.expect(self.job.targets.len());
+        };
         let images = self.images(settings, progress)?;
         // Later rounds are only timed, not compared with the truth.
         let mut without_truth = self.job.targets.clone();
@@ -116,7 +123,8 @@ impl Subject<'_> {
         let mut exact: Vec<Vec<[f32; 4]>> = Vec::new();
         let mut size = [0; 2];
         let mut firsts: Vec<First> = Vec::new();
-        for (setting, images) in settings.iter().zip(&images) {
+        for (index, (setting, images)) in settings.iter().zip(&images).enumerate() {
+            begin(0, index);
             let renderer = setting.field.on(device);
             let Round { frames, record, .. } =
                 self.round(renderer.as_ref(), &setting.options, images, &self.job.targets, progress)?;
@@ -127,8 +135,9 @@ impl Subject<'_> {
             firsts.push(First::of(&frames, &exact, record));
         }
         let mut times: Vec<Vec<[f64; 2]>> = vec![Vec::new(); settings.len()];
-        for _ in 0..round_count {
+        for round in 1..=round_count as usize {
             for (index, (setting, images)) in settings.iter().zip(&images).enumerate() {
+                begin(round, index);
                 let renderer = setting.field.on(device);
                 let round = self.round(renderer.as_ref(), &setting.options, images, &without_truth, progress)?;
                 times[index].push(round.seconds_a_target());

@@ -63,8 +63,10 @@ pub fn point_cloud(
     options: CloudOptions,
     progress: &dyn Progress,
 ) -> Result<Vec<CloudPoint>, RenderError> {
+    progress.stage("depths of the views", 0..3, 4);
     stage.weigh(weighting, progress)?;
     stage.encode_all(progress)?;
+    progress.stage("fusing the depths", 3..4, 4);
     let maps = stage.source_depths()?;
     let relevance = stage.relevance(weighting);
     let (images, has_silhouettes) = (&stage.images.images[..], stage.images.has_silhouettes);

@@ -65,15 +65,15 @@ pub(crate) fn render_chosen<C, X: From<RenderError>>(
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let shown = job.sources.iter().copied().chain(truths);
     let (count, stage_count) = (job.targets.len(), 3 + job.targets.len());
-    progress.stage("reading the sources", 0, stage_count);
+    progress.stage("reading the sources", 0..1, stage_count);
     let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
-    progress.stage("choosing the scheme", 1, stage_count);
+    progress.stage("choosing the scheme", 1..2, stage_count);
     let (weighting, chosen) = choose(&mut stage)?;
-    progress.stage("encoding the sources", 2, stage_count);
+    progress.stage("encoding the sources", 2..3, stage_count);
     stage.weigh(&weighting, progress)?;
     for (index, target) in job.targets.iter().enumerate() {
-        progress.stage(&format!("view {} of {count}", index + 1), 3 + index, stage_count);
+        progress.stage(&format!("view {} of {count}", index + 1), 3 + index..4 + index, stage_count);
         let frame = stage.frame(&weighting, target, progress)?;
         deliver(&stage.images, frame, &chosen)?;
     }

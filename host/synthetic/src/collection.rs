@@ -11,7 +11,7 @@
 //! objects can be added to one and leave all others as they are.
 
 use crate::cameras::{random_views, sphere, spiral_views};
-use crate::folder::{self, write_scene};
+use crate::folder::{self, write_views};
 use crate::kinds::Kind;
 use crate::object::ObjectError;
 use rayon::prelude::*;
@@ -192,7 +192,8 @@ pub fn make(
             }
         }
     }
-    progress.expect(jobs.len());
+    let cameras_of = |job: &Job| if job.on_spiral { spiral.len() } else { settings.views as usize };
+    progress.expect(jobs.iter().map(cameras_of).sum());
     jobs.par_iter().try_for_each(|job| {
         progress.check()?;
         let object =
@@ -204,8 +205,7 @@ pub fn make(
             random = random_views(&sphere, settings.seed, job.index, settings.views)?;
             &random
         };
-        write_scene(&job.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
-        progress.step();
+        write_views(&job.folder, &object, cameras, RAYS_PER_SIDE, progress)?;
         Ok::<(), MakeError>(())
     })?;
     made.new_count = jobs.len();

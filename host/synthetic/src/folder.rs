@@ -99,6 +99,21 @@ pub fn write_scene(
     rays_per_side: u32,
     progress: &dyn Progress,
 ) -> Result<(), WriteError> {
+    progress.expect(cameras.len());
+    write_views(folder, object, cameras, rays_per_side, progress)
+}
+
+/// As [`write_scene`], for a caller that expects the views: only their steps are told.
+///
+/// # Errors
+/// [`WriteError`].
+pub(crate) fn write_views(
+    folder: &Path,
+    object: &Object,
+    cameras: &[Camera],
+    rays_per_side: u32,
+    progress: &dyn Progress,
+) -> Result<(), WriteError> {
     let pinhole = shared_pinhole(folder, cameras)?;
     create_whole(folder, |unfinished| {
         for path in [unfinished.join("pose"), unfinished.join("rgb")] {
@@ -110,6 +125,7 @@ pub fn write_scene(
             write_text(&unfinished.join(format!("pose/{index:06}.txt")), &pose_text(camera))?;
             let picture = render_with(object, camera, rays_per_side);
             write_picture(&unfinished.join(format!("rgb/{index:06}.png")), &picture)?;
+            progress.step();
         }
         Ok(())
     })

@@ -54,6 +54,7 @@ pub fn write_splits(
         return Err(WriteError::Intrinsics { path: folder.to_owned(), view: 0 });
     }
     let slope = f64::from(pinhole.width()) / 2.0 / f64::from(pinhole.focal()[0]);
+    progress.expect(cameras.len());
     create_whole(folder, |unfinished| {
         for (split, views) in splits {
             let pictures = unfinished.join(split);
@@ -71,6 +72,7 @@ pub fn write_splits(
                 progress.check()?;
                 let picture = render_with(object, camera, rays_per_side);
                 write_picture(&pictures.join(format!("r_{number}.png")), &picture)?;
+                progress.step();
             }
         }
         Ok(())

@@ -67,6 +67,7 @@ pub fn write_shoot(
         write_text(&path, &(with_short_rows(&json) + "\n"))?;
         let images = unfinished.join("images");
         fs::create_dir(&images).map_err(io_error(&images))?;
+        progress.expect(count);
         for view in 0..count {
             progress.check()?;
             if let Some(photograph) = shoot.photograph(view, rays_per_side) {
@@ -74,6 +75,7 @@ pub fn write_shoot(
                 let bytes = jpeg(&photograph).map_err(|source| WriteError::Jpeg { path: path.clone(), source })?;
                 fs::write(&path, bytes).map_err(io_error(&path))?;
             }
+            progress.step();
         }
         Ok(())
     })

@@ -41,6 +41,9 @@ pub struct Schedule {
     pub write_every: f64,
 }
 
+/// The whole work is so many parts of about the same time: reading the scenes is the first, training all others.
+pub(crate) const STAGES: usize = 20;
+
 /// Names of files in the folder of a run.
 const CURVE: &str = "curve.svg";
 const RECORD: &str = "record.json";
@@ -151,6 +154,7 @@ pub(crate) fn run(
     let average = Average::new(learner.parameters(), AVERAGING)?;
     let learned = Learned { parameters: learner.parameters(), adam: Adam::new(learner.parameters())?, average };
     let mut so_far = state::read(&run.state(), settings, &learned)?.unwrap_or_default();
+    progress.stage("training", 1..STAGES, STAGES);
     progress.expect(schedule.steps.saturating_sub(so_far.steps) as usize);
     let mut written = Instant::now();
     while so_far.steps < schedule.steps {

@@ -1,6 +1,7 @@
 //! Training scenes in memory: pictures over white at the training size, with their cameras.
 
 use super::TrainError;
+use super::run::STAGES;
 use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -34,6 +35,7 @@ impl Data {
                 return Err(TrainError::NoScenes { purpose });
             }
         }
+        progress.stage("reading the scenes", 0..1, STAGES);
         let [training, validation] = lists.map(|list| TrainingScene::open_all(list, side, least_views, progress));
         Ok(Data { training: training?, validation: validation? })
     }

@@ -623,7 +623,8 @@ function transforms() {
 }
 
 function command() {
-  const word = /^[\w@%+=:,./-]+$/.test(scheme) ? scheme : `'${scheme.replaceAll("'", "'\\''")}'`;
+  const weights = (scheme === scene.scheme && scene.commands.first_weights) || scheme;
+  const word = /^[\w@%+=:,./-]+$/.test(weights) ? weights : `'${weights.replaceAll("'", "'\\''")}'`;
   const matrix = JSON.stringify(matrixOf(pose));
   const own = scene.others.find((other) => JSON.stringify(matrixOf(other.pose)) === matrix);
   const line = own ? scene.commands.view.replace('{view}', own.name) : scene.commands.pose.replace('{file}', FILE);

@@ -39,8 +39,8 @@ use subject::Subject;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_device::choice::AnyDevice;
-use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderError, RenderOptions};
+use viewfuse_field::{AnyField, Setting};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_weighting::Weighting;
@@ -72,6 +72,16 @@ pub struct Viewed<'a> {
     pub options: &'a RenderOptions,
     /// The weighting that the page begins with; the page can choose any other that needs no file.
     pub weighting: &'a Weighting,
+    /// The field's scalars that were chosen along with this weighting. Other weightings have those of the options.
+    pub settings: Option<&'a [Setting]>,
+}
+
+impl<'a> Viewed<'a> {
+    /// The field's scalars under a weighting.
+    pub(crate) fn settings_of(&self, scheme: &str) -> &'a [Setting] {
+        let chosen = self.settings.filter(|_| scheme == self.weighting.to_string());
+        chosen.unwrap_or(&self.options.settings)
+    }
 }
 
 /// A listening server with everything that it shows.
@@ -94,7 +104,7 @@ impl<'a> Viewer<'a> {
     /// # Errors
     /// [`ViewError`].
     pub fn listen(viewed: Viewed<'a>, commands: Commands, port: u16) -> Result<Viewer<'a>, ViewError> {
-        let Viewed { scene, sources, field, device, options, weighting } = viewed;
+        let Viewed { scene, sources, field, device, options, weighting, .. } = viewed;
         let first = sources.first().ok_or(RenderError::Sources(SourcesError::Empty))?;
         let camera = scene.views[*first].camera;
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();

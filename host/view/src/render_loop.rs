@@ -97,9 +97,10 @@ struct Weighed<'a> {
 
 impl Weighed<'_> {
     /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use them.
-    fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
+    fn weigh(&mut self, weighting: &Weighting, viewed: &Viewed<'_>, progress: &dyn Progress) -> Result<(), RenderError> {
         let scheme = weighting.to_string();
         if self.scheme != scheme {
+            self.stage.tune(viewed.settings_of(&scheme));
             self.scheme = scheme;
             self.stage.weigh(weighting, progress)?;
         }
@@ -181,7 +182,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
                 shared.status.begin("preparing coarse pictures");
                 let stage = coarse::stage(scene, &album, sources, small, renderer.as_ref(), &coarse_options, &watch)?;
                 let mut coarse = Weighed { stage, scheme: String::new() };
-                coarse.weigh(weighting, &watch)?;
+                coarse.weigh(weighting, &viewer.viewed, &watch)?;
                 pictures.coarse = Some(coarse);
             }
             None => pictures.prepare(&watch)?,
@@ -254,7 +255,7 @@ impl<'a> RenderLoop<'a> {
         let watch = Watch { shared: self.shared, outer: self.outer, makes_way: true };
         if let Some(coarse) = &mut self.coarse {
             self.shared.status.begin("encoding sources for coarse pictures");
-            coarse.weigh(&request.weighting, &watch)?;
+            coarse.weigh(&request.weighting, &self.viewer.viewed, &watch)?;
             // A frame that has to encode sources first would come late.
             coarse.stage.encode_all(&watch)?;
         }
@@ -281,7 +282,7 @@ impl<'a> RenderLoop<'a> {
             return self.full_frame(request, watch);
         };
         self.shared.status.begin("encoding sources");
-        full.weigh(&request.weighting, watch)?;
+        full.weigh(&request.weighting, &self.viewer.viewed, watch)?;
         self.shared.status.begin("rendering");
         let start = Instant::now();
         let frame = full.stage.frame(&request.weighting, &target, watch)?;

@@ -88,6 +88,8 @@ pub struct Commands {
     pub view: String,
     /// For any other pose.
     pub pose: String,
+    /// What stands for the weighting that the page begins with; its own text if this is empty.
+    pub first_weights: String,
 }
 
 impl Subject {

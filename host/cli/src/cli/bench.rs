@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use viewfuse_check::CheckError;
 use viewfuse_check::rates::{DEFAULT_ROUNDS, DeviceRates, KernelRate, Limit, measure_rates};
 use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
+use viewfuse_job::progress::Part;
 use viewfuse_vulkan::GpuOptions;
 
 #[derive(Args)]
@@ -44,7 +45,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let progress = Terminal::new("measuring");
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
     let mut bench = Bench { viewfuse: env!("CARGO_PKG_VERSION"), devices: Vec::new(), failures, notes };
-    for device in devices {
+    let count = devices.len();
+    for (index, device) in devices.into_iter().enumerate() {
+        let progress = Part::begin(&progress, device.name(), index..index + 1, count);
         let measured = match &device {
             AnyDevice::Cpu(cpu) => measure_rates(cpu, arguments.rounds, &progress),
             AnyDevice::Vulkan(vulkan) => measure_rates(vulkan.as_ref(), arguments.rounds, &progress),

@@ -14,6 +14,7 @@ use viewfuse_check::report::{PictureVersusCpu, VersusCpu};
 use viewfuse_check::{CheckError, DeviceReport, KernelReport, PictureReport, Report, check_device};
 use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
 use viewfuse_field::AnyField;
+use viewfuse_job::progress::Part;
 use viewfuse_vulkan::GpuOptions;
 
 #[derive(Args)]
@@ -35,8 +36,6 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
-    let progress = Terminal::new("checking");
-    let picture = Picture::new(arguments.scene.as_deref(), &progress)?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
     let mut report = Report {
         viewfuse: env!("CARGO_PKG_VERSION"),
@@ -46,14 +45,20 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         failures,
         notes,
     };
-    for device in devices {
+    // The kernels of a device take most of the time.
+    let (progress, of) = (Terminal::new("checking"), 1 + 10 * devices.len());
+    let picture = Picture::new(arguments.scene.as_deref(), &Part::begin(&progress, "picture", 0..1, of))?;
+    for (index, device) in devices.into_iter().enumerate() {
+        let (name, first) = (device.name(), 1 + 10 * index);
+        let part = Part::begin(&progress, name.clone(), first..first + 9, of);
         let checked = match &device {
-            AnyDevice::Cpu(cpu) => check_device(cpu, Role::Reference, arguments.seeds, &progress),
-            AnyDevice::Vulkan(vulkan) => check_device(vulkan.as_ref(), Role::Other, arguments.seeds, &progress),
+            AnyDevice::Cpu(cpu) => check_device(cpu, Role::Reference, arguments.seeds, &part),
+            AnyDevice::Vulkan(vulkan) => check_device(vulkan.as_ref(), Role::Other, arguments.seeds, &part),
         };
         let role = if matches!(device, AnyDevice::Cpu(_)) { Role::Reference } else { Role::Other };
         let checked = checked.and_then(|kernels| {
-            let picture = picture.check(AnyField::default().on(&device).as_ref(), role, &progress)?;
+            let part = Part::begin(&progress, format!("{name}: picture"), first + 9..first + 10, of);
+            let picture = picture.check(AnyField::default().on(&device).as_ref(), role, &part)?;
             Ok(DeviceReport { picture: Some(picture), ..kernels })
         });
         match checked {

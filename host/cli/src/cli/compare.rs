@@ -87,7 +87,10 @@ fn opened(path: &Path) -> anyhow::Result<RgbImage> {
 
 fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyhow::Result<()> {
     let metrics = arguments.metrics.open(device)?;
-    let progress = Terminal::new("comparing");
+    let progress = Terminal::new("comparing pictures");
+    // Inception sees every picture again, and each truth.
+    let parts = if metrics.inception.is_some() && pairs.len() > 1 { 3 } else { 1 };
+    progress.stage("comparing pictures", 0..1, parts);
     progress.expect(pairs.len());
     let (mut scores, mut pictures) = (Vec::new(), Vec::new());
     for pair in pairs {
@@ -100,15 +103,33 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
         }
         progress.step();
     }
+    let sets = match &metrics.inception {
+        Some(_) if pictures.len() > 1 => features_of_sets(&metrics, &pictures, device, &progress)?,
+        _ => None,
+    };
     drop(progress);
     print_scores(pairs, &scores)?;
-    match &metrics.inception {
-        Some(inception) if pictures.len() > 1 => {
-            print_distances(&metrics, inception.kind(), &pictures, device, arguments.seed)
-        }
-        Some(_) => Ok(say("FID and KID need sets of at least 2 pictures")?),
-        None => Ok(()),
+    match (&metrics.inception, sets) {
+        (Some(inception), Some(sets)) => print_distances(inception.kind(), &sets, pictures.len(), arguments.seed),
+        (Some(_), None) => Ok(say("FID and KID need sets of at least 2 pictures")?),
+        (None, _) => Ok(()),
     }
+}
+
+/// Inception's features of all predictions and of all truths; `None` without that network.
+fn features_of_sets<D: Device>(
+    metrics: &Metrics<D>,
+    pictures: &[[RgbImage; 2]],
+    device: &D,
+    progress: &dyn Progress,
+) -> anyhow::Result<Option<[Features; 2]>> {
+    progress.stage("features of the pictures", 1..2, 3);
+    let predictions = metrics.features_of_predictions(device, pictures.iter().map(|[prediction, _]| prediction))?;
+    progress.stage("features of the truths", 2..3, 3);
+    progress.expect(pictures.len());
+    let truths = pictures.iter().map(|[_, truth]| truth).inspect(|_| progress.step());
+    let truths = metrics.features_of_truths(device, truths)?;
+    Ok(predictions.zip(truths).map(|(predictions, truths)| [predictions, truths]))
 }
 
 /// A row for each metric: the mean, and the worst picture. A metric leaves out pictures that are too small for it.
@@ -139,24 +160,20 @@ fn print_scores(pairs: &[Pair], scores: &[Vec<Scored>]) -> anyhow::Result<()> {
     Ok(say(rows)?)
 }
 
-fn print_distances<D: Device>(
-    metrics: &Metrics<D>,
+fn print_distances(
     kind: InceptionKind,
-    pictures: &[[RgbImage; 2]],
-    device: &D,
+    [predictions, truths]: &[Features; 2],
+    count: usize,
     seed: u64,
 ) -> anyhow::Result<()> {
-    let predictions = metrics.features_of_predictions(device, pictures.iter().map(|[prediction, _]| prediction))?;
-    let truths = metrics.features_of_truths(device, pictures.iter().map(|[_, truth]| truth))?;
-    let (Some(predictions), Some(truths)) = (predictions, truths) else { return Ok(()) };
-    let [fid, kid] = distances(&predictions, &truths, seed)?;
+    let [fid, kid] = distances(predictions, truths, seed)?;
     let network = match kind {
         InceptionKind::Fid => "the Inception that FID is defined with",
         InceptionKind::Torchvision => "torchvision's Inception, not comparable with published numbers",
     };
     say(format_args!("FID {fid:.3}, KID {kid:.6} ({network})"))?;
-    if pictures.len() < predictions.dimension() {
-        say(format_args!("FID of {} pictures is biased; KID does not depend on their number", pictures.len()))?;
+    if count < predictions.dimension() {
+        say(format_args!("FID of {count} pictures is biased; KID does not depend on their number"))?;
     }
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use std::env;
 use std::path::PathBuf;
+use std::time::Duration;
 use viewfuse_device::choice::DeviceOptions;
 use viewfuse_vulkan::{GpuOptions, InstanceOptions};
 
@@ -12,6 +13,15 @@ pub(crate) fn instance_options() -> InstanceOptions {
         loader: env::var_os("VIEWFUSE_VULKAN_LOADER").map(PathBuf::from),
         validation: env::var_os("VIEWFUSE_VALIDATION").is_some_and(|value| value == "1"),
     }
+}
+
+/// Time between two lines of progress where standard error is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(5);
+
+/// The same by `VIEWFUSE_PROGRESS`, in seconds, if it is a number of them; 0 stands for a line at each change.
+pub(crate) fn time_between_lines() -> Duration {
+    let given = env::var("VIEWFUSE_PROGRESS").ok().and_then(|text| text.parse().ok());
+    given.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok()).unwrap_or(BETWEEN_LINES)
 }
 
 /// The environment's Vulkan, with these device options.

@@ -31,6 +31,7 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_evaluate::summary::{Observation, Table, table};
 use viewfuse_evaluate::{Evaluator, Score};
 use viewfuse_job::files::{check_writable, write_whole};
+use viewfuse_job::progress::Part;
 use viewfuse_scene::Scene;
 use viewfuse_scene::dataset::{Dataset, DatasetError, Split};
 use viewfuse_weighting::{OpenedChoice, WeightingChoice};
@@ -128,8 +129,10 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         }
         Ok(())
     };
-    for (path, scene) in paths.iter().zip(&scenes) {
-        let progress = Terminal::new("evaluating");
+    let terminal = Terminal::new("evaluating");
+    for (index, (path, scene)) in paths.iter().zip(&scenes).enumerate() {
+        let name = if scenes.len() == 1 { String::new() } else { path.display().to_string() };
+        let progress = Part::begin(&terminal, name, index..index + 1, scenes.len());
         let score = || -> anyhow::Result<Vec<Score>> {
             let (renderer, scorer) = (field.on(&device), arguments.metrics.on(&device)?);
             let evaluator = Evaluator {
@@ -142,10 +145,10 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
             Ok(evaluator.score_all(scene, &selection)?)
         };
         let scores = on_threads(arguments.picture.threads, score)??;
-        drop(progress);
-        tell(&path.display().to_string(), &table(&observed(&[&scores])))?;
+        terminal.aside(|| tell(&path.display().to_string(), &table(&observed(&[&scores]))))?;
         all.push(scores);
     }
+    drop(terminal);
     if all.len() > 1 {
         tell(&format!("all {} scenes", all.len()), &table(&observed(&all.iter().collect::<Vec<_>>())))?;
     }

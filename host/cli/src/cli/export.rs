@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     keep_folder_apart([&scene], &arguments.output)?;
-    let progress = Terminal::new("writing");
+    let progress = Terminal::new("writing the photographs");
     let written = write(&scene, arguments.layout, &arguments.output, &progress)?;
     drop(progress);
     say(format_args!("read       {} ({})", scene.path.display(), scene.layout))?;

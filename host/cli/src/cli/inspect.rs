@@ -33,7 +33,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart([&scene], path))?;
-    let progress = Terminal::new("reading");
+    let progress = Terminal::new("reading the photographs");
     let inspection = inspect(&scene, arguments.background, &progress)?;
     drop(progress);
     if arguments.json {

@@ -20,7 +20,7 @@ use viewfuse_evaluate::pareto::{Measured, Setting, Subject, plot};
 use viewfuse_field::render::RenderOptions;
 use viewfuse_field::{AnyField, LeftOut};
 use viewfuse_job::files::{check_writable, write_whole};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::record::source_names;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::Album;
@@ -96,12 +96,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     [&csv, &svg, &json].into_iter().try_for_each(|path| check_writable(path))?;
     let Several { devices, notes, failures } = open_several(&arguments.device, &device_options(GpuOptions::default()))?;
 
-    let progress = Terminal::new("measuring");
+    let progress = Terminal::new("reading the photographs");
     let truths = job.targets.iter().filter_map(|target| target.truth);
     let album = Album::open(&scene, job.sources.iter().copied().chain(truths), &progress)?;
     let subject = Subject { scene: &scene, album: &album, job: &job, weighting: &weighting };
     let (only, round_count) = (&arguments.only, arguments.repeat);
-    let sweep = Sweep { subject, options: &options, only, round_count, progress: &progress };
+    let sweep = Sweep { subject, options: &options, only, round_count };
     let mut record = ParetoRecord {
         viewfuse: env!("CARGO_PKG_VERSION"),
         scene: arguments.scene.display().to_string(),
@@ -117,8 +117,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         failures,
     };
     let mut first: Option<Measured> = None;
-    for device in devices {
-        let (name, measured) = on_threads(arguments.picture.threads, || (device.name(), sweep.on(&device, &field)))?;
+    let count = devices.len();
+    for (index, device) in devices.into_iter().enumerate() {
+        let name = device.name();
+        let part = Part::begin(&progress, name.clone(), index..index + 1, count);
+        let measured = on_threads(arguments.picture.threads, || sweep.on(&device, &field, &part))?;
         let measured = match measured {
             Ok(measured) => measured,
             // The results of the other devices are kept if one fails.
@@ -173,11 +176,10 @@ struct Sweep<'a> {
     options: &'a RenderOptions,
     only: &'a [String],
     round_count: u32,
-    progress: &'a dyn Progress,
 }
 
 impl Sweep<'_> {
-    fn on(&self, device: &AnyDevice, field: &AnyField) -> Result<Measured, Failure> {
+    fn on(&self, device: &AnyDevice, field: &AnyField, progress: &dyn Progress) -> Result<Measured, Failure> {
         let settings = settings::of(field, self.options, self.subject.job.targets.len());
         let begins = |setting: &Setting, words: &String| setting.words.starts_with(words.as_str());
         if let Some(none) = self.only.iter().find(|words| !settings.iter().any(|setting| begins(setting, words))) {
@@ -191,7 +193,7 @@ impl Sweep<'_> {
             .into_iter()
             .filter(|setting| self.only.is_empty() || is_exact(setting) || is_asked(setting))
             .collect();
-        self.subject.measure(device, &settings, self.round_count, self.progress).map_err(|error| match error {
+        self.subject.measure(device, &settings, self.round_count, progress).map_err(|error| match error {
             error if error.is_of_device() => Failure::Device(format!("{:#}", anyhow::Error::from(error))),
             error => Failure::Other(error.into()),
         })

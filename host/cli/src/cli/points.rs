@@ -14,6 +14,7 @@ use viewfuse_field::AnyField;
 use viewfuse_field::point_cloud::{CloudOptions, CloudPoint, point_cloud};
 use viewfuse_field::render::Stage;
 use viewfuse_job::files::check_writable;
+use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::ply::write_ply;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::Album;
@@ -60,9 +61,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let renderer = field.on(&device);
     let progress = Terminal::new("points");
     let points = on_threads(arguments.picture.threads, || -> anyhow::Result<Vec<CloudPoint>> {
+        progress.stage("reading the photographs", 0..1, 10);
         let album = Album::open(&scene, sources.iter().copied(), &progress)?;
         let mut stage = Stage::prepare(&scene, &album, &sources, renderer.as_ref(), &options, &progress)?;
-        Ok(point_cloud(&mut stage, &weighting, CloudOptions { least_views: arguments.agree }, &progress)?)
+        let options = CloudOptions { least_views: arguments.agree };
+        Ok(point_cloud(&mut stage, &weighting, options, &Part::begin(&progress, "", 1..10, 10))?)
     })??;
     drop(progress);
     if points.is_empty() {

@@ -24,7 +24,7 @@ use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
 use viewfuse_field::render::{Frame, render};
 use viewfuse_job::files::check_writable;
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::folder::check_folder;
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
@@ -132,21 +132,25 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         }
         Some(_) => job,
     };
+    // A frame of a video takes a part of the time that it took to render.
+    let (frames, formats) = (10 * job.targets.len().max(1), &arguments.outputs.video);
+    let of = frames + job.targets.len() * formats.len();
+    let part = Part::begin(&progress, "", 0..frames, of);
     let (record, videos) = on_threads(arguments.picture.threads, || -> anyhow::Result<(RunRecord, Vec<String>)> {
         let finished = match &weighting {
             Some(weighting) => {
                 let write = |sources: &SourceImages, frame: Frame| anyhow::Ok(writer.write(sources, &frame)?);
-                render(&scene, &job, weighting, renderer, &options, &progress, write)?
+                render(&scene, &job, weighting, renderer, &options, &part, write)?
             }
             None => {
                 let write = |sources: &SourceImages, frame: Frame, chosen: &auto::Chosen| {
                     writer.set_chosen(chosen);
                     anyhow::Ok(writer.write(sources, &frame)?)
                 };
-                auto::render(&scene, &job, renderer, &options, &progress, write)?.0
+                auto::render(&scene, &job, renderer, &options, &part, write)?.0
             }
         };
-        let videos = videos(&writer, &arguments.outputs.video, rate, &progress)?;
+        let videos = videos(&writer, formats, rate, &Part::begin(&progress, "", frames..of, of))?;
         let circumstances = Circumstances {
             program: env!("CARGO_PKG_VERSION"),
             device_reason: reason,
@@ -172,8 +176,8 @@ fn videos(
     progress: &dyn Progress,
 ) -> anyhow::Result<Vec<String>> {
     let mut lines = Vec::new();
-    for format in formats {
-        progress.stage(&format!("writing video.{format}"), 1, 1);
+    for (index, format) in formats.iter().enumerate() {
+        progress.stage(&format!("writing video.{format}"), index..index + 1, formats.len());
         match writer.write_video(*format, rate, progress) {
             Err(error @ VideoError::NoProgram) => {
                 let path = writer.write_video(VideoFormat::Y4m, rate, progress)?;

@@ -128,7 +128,7 @@ fn run_make(arguments: &MakeArguments) -> anyhow::Result<ExitCode> {
     let MakeArguments { kind, out, train, val, test, views, test_views, size, seed, threads } = arguments;
     let settings = Settings::new(*kind, *seed, *size, *views, *test_views);
     let counts = ObjectCounts { train: *train, validation: *val, test: *test };
-    let progress = Terminal::new("making");
+    let progress = Terminal::new("making scenes");
     let made = on_threads(*threads, || make(out, *kind, &settings, counts, &progress))??;
     drop(progress);
     say(format_args!("{}: {} new scenes, {} existing", out.display(), made.new_count, made.kept_count))?;

@@ -1,25 +1,30 @@
 //! The terminal: progress, warnings, messages, and Ctrl-C.
+//!
+//! ```text
+//! course        how far the work is: a share that never falls, and the time that is left
+//! progress_bar  the course as a bar or as lines
+//! clock         what is shown again and again
+//! ```
 
+mod clock;
 mod course;
+mod progress_bar;
 
 use super::ending;
+use super::environment::time_between_lines;
 use super::shown::{shown, shown_in_line};
+use clock::Clock;
 use course::Course;
-use indicatif::{ProgressBar, ProgressStyle};
+use progress_bar::Shown;
 use std::fmt::Display;
 use std::io::{self, IsTerminal, Write};
-use std::sync::Mutex;
+use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::{Arc, Mutex};
 use viewfuse_job::progress::Progress;
 
 /// Set by Ctrl-C and by SIGTERM.
 static CANCELLED: AtomicBool = AtomicBool::new(false);
-
-/// Steps of the bar.
-const STEPS: f64 = 1000.0;
-/// Time between two lines where there is no terminal.
-const LINES: Duration = Duration::from_secs(5);
 
 /// Makes Ctrl-C (and SIGTERM) set the flag instead of ending the process. Work that does not stop soon, and a second signal,
 /// end it at once.
@@ -58,11 +63,9 @@ pub(crate) fn silence_caught_panics() {
 
 /// On standard error: a bar on a terminal, elsewhere a line every few seconds, and warnings. Messages on standard output.
 pub(crate) struct Terminal {
-    bar: ProgressBar,
-    is_terminal: bool,
-    course: Mutex<Course>,
-    /// When the last line was written.
-    line: Mutex<Instant>,
+    shown: Arc<Shown>,
+    /// Shows the time that is left also while nothing else changes. `None` where there is nothing to show it on.
+    clock: Option<Clock>,
     /// Warnings that were shown.
     told: Mutex<Vec<String>>,
 }
@@ -70,75 +73,49 @@ pub(crate) struct Terminal {
 impl Terminal {
     /// Without progress; `label` is the stage until the work names one.
     pub(crate) fn new(label: &str) -> Terminal {
-        let bar = ProgressBar::new(STEPS as u64);
-        let is_terminal = io::stderr().is_terminal();
-        let template = "{msg} [{wide_bar:.blue}] {percent:>3} %";
-        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message(label.to_owned());
-        if is_terminal {
-            bar.enable_steady_tick(Duration::from_millis(200));
-        }
-        Terminal::of(bar, is_terminal, label)
-    }
-
-    fn of(bar: ProgressBar, is_terminal: bool, label: &str) -> Terminal {
-        let now = Instant::now();
-        let (course, line) = (Mutex::new(Course::new(label, now)), Mutex::new(now));
-        Terminal { bar, is_terminal, course, line, told: Mutex::default() }
-    }
-
-    /// Changes the course and shows it.
-    fn change(&self, change: impl FnOnce(&mut Course)) {
-        let Ok(mut course) = self.course.lock() else { return };
-        change(&mut course);
-        let now = Instant::now();
-        if self.is_terminal {
-            self.bar.set_position((STEPS * course.share()) as u64);
-            self.bar.set_message(course.words(now));
-            return;
-        }
-        let Ok(mut line) = self.line.lock() else { return };
-        if now.duration_since(*line) >= LINES {
-            *line = now;
-            // A closed pipe is ignored.
-            let share = (100.0 * course.share()) as u64;
-            writeln!(io::stderr().lock(), "progress: {share} %, {}", course.words(now)).ok();
-        }
+        let shown = Arc::new(Shown::new(label, io::stderr().is_terminal(), time_between_lines()));
+        let own = Arc::clone(&shown);
+        let clock = Clock::start(move || own.show());
+        Terminal { shown, clock: Some(clock), told: Mutex::default() }
     }
 
     /// Without a bar: for work that shows its progress elsewhere.
     #[cfg(feature = "view")]
     pub(crate) fn without_bar() -> Terminal {
-        // As on a terminal there are no lines, and the bar is hidden.
-        Terminal::of(ProgressBar::hidden(), true, "")
+        Terminal { shown: Arc::new(Shown::hidden()), clock: None, told: Mutex::default() }
+    }
+
+    /// Runs what prints while the work goes on.
+    pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
+        self.shown.bar.suspend(print)
     }
 }
 
 impl Progress for Terminal {
-    fn stage(&self, name: &str, done: usize, of: usize) {
-        self.change(|course| course.begin(name, done, of));
+    fn stage(&self, name: &str, place: Range<usize>, of: usize) {
+        self.shown.change(|course| course.begin(name, place, of));
     }
 
     fn expect(&self, pieces: usize) {
-        self.change(|course| course.expect(pieces));
+        self.shown.change(|course| course.expect(pieces));
     }
 
     fn step(&self) {
-        self.change(Course::step);
+        self.shown.change(Course::step);
     }
 
     /// Shows each warning once.
     fn warn(&self, warning: &str) {
         let Ok(mut told) = self.told.lock() else { return };
         if !told.iter().any(|earlier| earlier == warning) {
-            self.bar.suspend(|| complain(format_args!("warning: {warning}")));
+            self.aside(|| complain(format_args!("warning: {warning}")));
             told.push(warning.to_owned());
         }
     }
 
     /// A closed pipe is ignored.
     fn note(&self, news: &str) {
-        self.bar.suspend(|| writeln!(io::stdout().lock(), "{}", shown(news)).ok());
+        self.aside(|| writeln!(io::stdout().lock(), "{}", shown(news)).ok());
     }
 
     fn is_cancelled(&self) -> bool {
@@ -148,6 +125,7 @@ impl Progress for Terminal {
 
 impl Drop for Terminal {
     fn drop(&mut self) {
-        self.bar.finish_and_clear();
+        self.clock.take();
+        self.shown.bar.finish_and_clear();
     }
 }

@@ -214,7 +214,7 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     let settings =
         PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
     let [train, validation] = scenes(run, from.as_deref())?;
-    let progress = Terminal::new("training");
+    let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
     let train_it =
         || train_pixelnerf(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
@@ -228,7 +228,7 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
     let settings =
         GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
     let [train, validation] = scenes(run, from.as_deref())?;
-    let progress = Terminal::new("training");
+    let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
     let train_it =
         || train_genvs(&settings, from.as_ref(), &run.schedule(), [&train, &validation], &run.output, &progress);
@@ -246,7 +246,7 @@ fn weighting(arguments: &WeightingArguments) -> anyhow::Result<ExitCode> {
     let settings = WeightingSettings { embedding, side: *side, objects: *objects, rays: *rays };
     let [train, validation] = scenes(run, Some(model))?;
     let checkpoint = Checkpoint::open(model)?;
-    let progress = Terminal::new("training");
+    let progress = Terminal::new("reading the scenes");
     let (schedule, scenes) = (run.schedule(), [&train[..], &validation[..]]);
     let train_it = || train_weighting(&settings, &checkpoint, &schedule, scenes, &run.output, &progress);
     let outcome = on_threads(run.threads, train_it)??;

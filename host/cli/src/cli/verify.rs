@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_check::verify::{Measure, Report, verify};
 use viewfuse_device::choice::{AnyDevice, Chosen};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Part, Progress};
 
 #[derive(Args)]
 #[command(after_help = "Example:\n  viewfuse verify fixtures/weighting.json fixtures/metrics.safetensors\n\n\
@@ -26,17 +26,17 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let Chosen { device, .. } = arguments.device.open()?;
     let mut all_pass = true;
-    for path in &arguments.files {
-        let progress = Terminal::new("verifying");
+    let (terminal, count) = (Terminal::new("verifying"), arguments.files.len());
+    for (index, path) in arguments.files.iter().enumerate() {
+        let progress = Part::begin(&terminal, path.display().to_string(), index..index + 1, count);
         let report = match &device {
             AnyDevice::Cpu(cpu) => verify(path, cpu, &progress),
             AnyDevice::Vulkan(vulkan) => verify(path, vulkan.as_ref(), &progress),
         };
         // The error of a cancelled comparison is the cancellation.
         progress.check()?;
-        drop(progress);
         let report = report?;
-        print_report(&report)?;
+        terminal.aside(|| print_report(&report))?;
         all_pass &= report.passes();
     }
     Ok(if all_pass { ExitCode::SUCCESS } else { ExitCode::from(1) })

@@ -8,9 +8,12 @@ use clap::Args;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_device::choice::Chosen;
+use viewfuse_field::render::{RenderOptions, Stage, open_album};
+use viewfuse_field::{Renderer, auto};
+use viewfuse_job::progress::Progress;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
-use viewfuse_weighting::{WeightingSpec, grammar};
+use viewfuse_weighting::{WeightingChoice, WeightingSpec, choice_grammar};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -23,8 +26,8 @@ pub(crate) struct Arguments {
     scene: PathBuf,
     #[command(flatten)]
     sources: SourceOptions,
-    #[arg(long, value_name = "SCHEME", default_value_t = WeightingSpec::default(), help = weights_help())]
-    weights: WeightingSpec,
+    #[arg(long, value_name = "SCHEME", default_value_t = WeightingChoice::Given(WeightingSpec::default()), help = weights_help())]
+    weights: WeightingChoice,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -52,12 +55,15 @@ fn scene_help() -> String {
 }
 
 fn weights_help() -> String {
-    format!("Weighting scheme at the beginning; the page can choose another: {}", grammar())
+    format!("Weighting scheme at the beginning; the page can choose another: {}", choice_grammar())
 }
 
 /// `given` are the options on the command line, by long name, each with its value if it takes one.
 pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> anyhow::Result<ExitCode> {
-    let weighting = arguments.weights.open()?;
+    let given_weighting = match &arguments.weights {
+        WeightingChoice::Given(spec) => Some(spec.open()?),
+        WeightingChoice::Auto => None,
+    };
     let scene = Scene::open(&arguments.scene)?;
     let field = arguments.model.open(arguments.seed, None)?;
     let about = field.about();
@@ -65,7 +71,15 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let Chosen { device, reason } = arguments.device.open()?;
     let commands = commands(arguments, given, &scene, &sources);
-    on_threads(arguments.picture.threads, || {
+    on_threads(arguments.picture.threads, || -> anyhow::Result<()> {
+        let (weighting, settings) = match given_weighting {
+            Some(weighting) => (weighting, None),
+            None => {
+                let chosen = chosen(&scene, &sources, field.on(&device).as_ref(), &options)?;
+                say(format_args!("chosen: {}", chosen.weighting))?;
+                (chosen.weighting, Some(chosen.settings))
+            }
+        };
         let viewed = Viewed {
             scene: &scene,
             sources: &sources,
@@ -73,6 +87,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
             device: &device,
             options: &options,
             weighting: &weighting,
+            settings: settings.as_deref(),
         };
         let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
         let (count, path) = (sources.len(), arguments.scene.display());
@@ -84,6 +99,21 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         viewer.serve(&Terminal::without_bar()).map_err(plain)
     })??;
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is best for the sources.
+fn chosen(
+    scene: &Scene,
+    sources: &[usize],
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+) -> anyhow::Result<auto::Chosen> {
+    let progress = Terminal::new("reading the photographs");
+    progress.stage("reading the photographs", 0..1, 10);
+    let album = open_album(scene, sources.iter().copied(), renderer, options, &progress)?;
+    let stage = Stage::prepare(scene, &album, sources, renderer, options, &progress)?;
+    progress.stage("choosing the scheme", 1..10, 10);
+    Ok(auto::choose(&stage, renderer, options, &progress)?)
 }
 
 /// The error behind a viewer's, so that its hint is found.
@@ -107,7 +137,11 @@ fn commands(arguments: &Arguments, given: &[(String, Option<String>)], scene: &S
     }
     let path = quoted(&arguments.scene.to_string_lossy());
     let line = |what: &str| format!("viewfuse render {path} {what}{options} --weights {{weights}} -o out");
-    Commands { view: line("--targets {view}"), pose: line("--camera-path {file}") }
+    let first_weights = match &arguments.weights {
+        WeightingChoice::Auto => arguments.weights.to_string(),
+        WeightingChoice::Given(_) => String::new(),
+    };
+    Commands { view: line("--targets {view}"), pose: line("--camera-path {file}"), first_weights }
 }
 
 /// A word as a shell takes it.

@@ -91,6 +91,7 @@ impl Checkpoint {
         write(&header)?;
         let bytes = 8 + header.len() as u64 + tensors.iter().map(|(_, _, _, bytes)| bytes).sum::<u64>();
         let mut written = Written { tensors, bytes, relative_error: 0.0, tiny_count: 0, tiny_error: 0.0 };
+        progress.expect(written.tensors.len());
         for index in 0..written.tensors.len() {
             progress.check().map_err(CheckpointError::Interrupted)?;
             let (name, target) = (written.tensors[index].0.clone(), written.tensors[index].1);
@@ -109,6 +110,7 @@ impl Checkpoint {
                 done += (bytes.len() / element.size()) as u64;
                 Ok(())
             })?;
+            progress.step();
         }
         file.finish().map_err(CheckpointError::Write)?;
         Ok(written)

@@ -10,7 +10,7 @@ use viewfuse_evaluate::run_folder::{Finished, FolderError, RunFolder, Settings, 
 use viewfuse_evaluate::{Evaluator, Subject, without_masks};
 use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderOptions, open_album};
-use viewfuse_job::progress::Progress;
+use viewfuse_job::progress::{Part, Progress};
 use viewfuse_scene::Scene;
 use viewfuse_weighting::OpenedChoice;
 
@@ -54,13 +54,14 @@ impl Jobs<'_> {
             false => scenes.to_vec(),
         };
         let (renderer, scorer) = (renderer.as_ref(), scorer.as_ref());
-        let mut count = 0;
-        for (number, job) in plan.jobs.iter().enumerate() {
-            if !shard.does(number) || finished.contains_key(&number) {
-                continue;
-            }
+        let is_open = |number: &usize| shard.does(*number) && !finished.contains_key(number);
+        let open: Vec<usize> = (0..plan.jobs.len()).filter(is_open).collect();
+        for (index, &number) in open.iter().enumerate() {
+            let job = &plan.jobs[number];
             progress.check()?;
             let (scene, options) = (&shown[job.scene], &self.options[job.scene]);
+            let name = format!("job {} of {}, {}", index + 1, open.len(), scene.name());
+            let progress = &Part::begin(progress, name, index..index + 1, open.len());
             let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
             let sources = names(scene, &job.sources);
             let views = job.sources.iter().chain(&job.targets).copied();
@@ -93,10 +94,9 @@ impl Jobs<'_> {
                 journal.add(&done)?;
             }
             finished.insert(number, done);
-            count += 1;
         }
         // Other shards may have added some.
-        Ok((folder.map_or(Ok(finished), |folder| folder.finished())?, count))
+        Ok((folder.map_or(Ok(finished), |folder| folder.finished())?, open.len()))
     }
 
     /// A finished job must be the one that would be done now.

@@ -1,5 +1,6 @@
 //! How far the work is: a share that never falls, and the time that is left.
 
+use std::ops::Range;
 use std::time::{Duration, Instant};
 
 /// Least share from which the time that is left is told.
@@ -8,8 +9,8 @@ const TELLING: f64 = 0.02;
 /// The course of some work.
 pub(super) struct Course {
     stage: String,
-    /// Stages that are done, of all.
-    stages: (usize, usize),
+    /// The place of the stage in the whole work, as shares of it.
+    place: Range<f64>,
     /// Pieces of the stage that are done, of those that are known.
     pieces: (usize, usize),
     /// The greatest share so far.
@@ -19,12 +20,14 @@ pub(super) struct Course {
 
 impl Course {
     pub(super) fn new(stage: &str, start: Instant) -> Course {
-        Course { stage: stage.to_owned(), stages: (0, 1), pieces: (0, 0), share: 0.0, start }
+        Course { stage: stage.to_owned(), place: 0.0..1.0, pieces: (0, 0), share: 0.0, start }
     }
 
-    pub(super) fn begin(&mut self, stage: &str, done: usize, of: usize) {
+    /// As of `Progress::stage`.
+    pub(super) fn begin(&mut self, stage: &str, place: Range<usize>, of: usize) {
         stage.clone_into(&mut self.stage);
-        (self.stages, self.pieces) = ((done, of), (0, 0));
+        let share = |part: usize| if of == 0 { 0.0 } else { (part as f64 / of as f64).min(1.0) };
+        (self.place, self.pieces) = (share(place.start)..share(place.end), (0, 0));
         self.rise();
     }
 
@@ -43,10 +46,10 @@ impl Course {
     }
 
     fn rise(&mut self) {
-        let share = |(done, of): (usize, usize)| if of == 0 { 0.0 } else { (done as f64 / of as f64).min(1.0) };
-        let (done, of) = self.stages;
-        let within = if of == 0 { 0.0 } else { share(self.pieces) / of as f64 };
-        self.share = self.share.max((share((done, of)) + within).min(1.0));
+        let (done, of) = self.pieces;
+        let within = if of == 0 { 0.0 } else { (done as f64 / of as f64).min(1.0) };
+        let Range { start, end } = self.place;
+        self.share = self.share.max(start + within * (end - start).max(0.0));
     }
 
     /// The stage, and the time that is left at the rate so far.
@@ -79,7 +82,7 @@ mod tests {
         let mut course = Course::new("start", Instant::now());
         let mut before = 0.0;
         for stage in 0..4 {
-            course.begin(&format!("stage {stage}"), stage, 4);
+            course.begin(&format!("stage {stage}"), stage..stage + 1, 4);
             for pieces in [1, 3, 10] {
                 course.expect(pieces);
                 course.step();
@@ -89,6 +92,11 @@ mod tests {
         }
         // The only piece that was known was done: the further ones do not lower it.
         assert_eq!(before, 1.0);
+        // A stage that begins before the last one ended.
+        course.begin("again", 1..2, 4);
+        course.expect(2);
+        course.step();
+        assert_eq!(course.share(), before);
         // Pieces without stages.
         let mut course = Course::new("pieces", Instant::now());
         course.step();
@@ -106,7 +114,7 @@ mod tests {
         let start = Instant::now();
         let mut course = Course::new("first", start);
         assert_eq!(course.words(start + Duration::from_secs(9)), "first");
-        course.begin("view 2 of 4", 1, 4);
+        course.begin("view 2 of 4", 1..2, 4);
         assert_eq!(course.words(start + Duration::from_secs(10)), "view 2 of 4, about 30 s left");
         assert_eq!(course.words(start + Duration::from_secs(200)), "view 2 of 4, about 10 min left");
         assert_eq!(course.words(start + Duration::from_secs(3600)), "view 2 of 4, about 3 h 0 min left");

@@ -1,0 +1,78 @@
+//! The course of the work as a bar on a terminal, and elsewhere as a line every few seconds.
+
+use super::course::Course;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::io::{self, Write};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Steps of the bar.
+const STEPS: f64 = 1000.0;
+
+/// What shows a course.
+pub(super) struct Shown {
+    pub(super) bar: ProgressBar,
+    course: Mutex<Course>,
+    /// `None` where the bar is shown.
+    lines: Option<Mutex<Lines>>,
+}
+
+/// Lines about the course.
+struct Lines {
+    /// Time from one line to the next.
+    between: Duration,
+    /// When the last one was written.
+    last: Instant,
+    /// What it said.
+    said: String,
+}
+
+impl Shown {
+    /// On a terminal a bar, elsewhere lines with this time between them; of 0 one for each change.
+    pub(super) fn new(label: &str, is_terminal: bool, between: Duration) -> Shown {
+        let now = Instant::now();
+        let bar = if is_terminal { ProgressBar::new(STEPS as u64) } else { ProgressBar::hidden() };
+        let template = "{msg} [{wide_bar:.blue}] {percent:>3} %";
+        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar.set_message(label.to_owned());
+        let lines = (!is_terminal).then(|| Mutex::new(Lines { between, last: now, said: String::new() }));
+        Shown { bar, course: Mutex::new(Course::new(label, now)), lines }
+    }
+
+    /// Shows nothing.
+    #[cfg(feature = "view")]
+    pub(super) fn hidden() -> Shown {
+        Shown { bar: ProgressBar::hidden(), course: Mutex::new(Course::new("", Instant::now())), lines: None }
+    }
+
+    /// Changes the course and shows it.
+    pub(super) fn change(&self, change: impl FnOnce(&mut Course)) {
+        if let Ok(mut course) = self.course.lock() {
+            change(&mut course);
+        }
+        self.show();
+    }
+
+    /// Shows the course as it is now.
+    pub(super) fn show(&self) {
+        let now = Instant::now();
+        let Ok((share, words)) = self.course.lock().map(|course| (course.share(), course.words(now))) else { return };
+        let Some(lines) = &self.lines else {
+            self.bar.set_position((STEPS * share) as u64);
+            self.bar.set_message(words);
+            return;
+        };
+        let Ok(mut lines) = lines.lock() else { return };
+        if now.duration_since(lines.last) < lines.between {
+            return;
+        }
+        let line = format!("progress: {} %, {words}", (100.0 * share) as u64);
+        // Without a time between lines each is one of its own.
+        if lines.between > Duration::ZERO || line != lines.said {
+            lines.last = now;
+            // A closed pipe is ignored.
+            writeln!(io::stderr().lock(), "{line}").ok();
+            lines.said = line;
+        }
+    }
+}
