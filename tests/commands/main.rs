@@ -19,6 +19,7 @@ mod memory;
 mod moving;
 mod outputs;
 mod pareto;
+mod progress;
 mod protocols;
 mod python;
 mod readme;
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         moving::trials(),
         outputs::trials(),
         pareto::trials(),
+        progress::trials(),
         protocols::trials(),
         python::trials(),
         readme::trials(),

@@ -3,6 +3,7 @@
 use super::{BINARY, done};
 use image::codecs::webp::WebPDecoder;
 use image::{AnimationDecoder, Rgb, RgbImage};
+use libtest_mimic::Trial;
 use serde_json::{Value, json};
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -11,15 +12,31 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse_tests::command::{Outcome, command, files_below, names_in, toy, without_progress};
+use viewfuse_tests::trials::{is_required, needing, trial};
 
-viewfuse_tests::trials![
-    a_path_as_animated_webp_and_as_y4m,
-    a_run_that_was_killed_twice_ends_with_the_same_bytes,
-    another_run_begins_anew,
-    mp4_by_the_ffmpeg_of_the_machine_or_y4m,
-    depths_and_opacity_for_other_programs,
-    camera_paths_from_files,
-];
+pub(crate) fn trials() -> Vec<Trial> {
+    let is_there = Command::new("ffmpeg").arg("-version").output().is_ok_and(|output| output.status.success());
+    let missing = (!is_there).then(|| "no ffmpeg".to_owned());
+    let real = trial("commands::moving::mp4_by_ffmpeg_shows_the_pictures", mp4_by_ffmpeg_shows_the_pictures);
+    let mut trials = always();
+    trials.push(needing(missing, is_required("VIEWFUSE_REQUIRE_FFMPEG"), real));
+    trials
+}
+
+/// Those that need nothing else.
+fn always() -> Vec<Trial> {
+    vec![
+        trial("commands::moving::a_path_as_animated_webp_and_as_y4m", a_path_as_animated_webp_and_as_y4m),
+        trial(
+            "commands::moving::a_run_that_was_killed_twice_ends_with_the_same_bytes",
+            a_run_that_was_killed_twice_ends_with_the_same_bytes,
+        ),
+        trial("commands::moving::another_run_begins_anew", another_run_begins_anew),
+        trial("commands::moving::an_ffmpeg_gets_the_video_or_there_is_y4m", an_ffmpeg_gets_the_video_or_there_is_y4m),
+        trial("commands::moving::depths_and_opacity_for_other_programs", depths_and_opacity_for_other_programs),
+        trial("commands::moving::camera_paths_from_files", camera_paths_from_files),
+    ]
+}
 
 const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --weights error:alpha=1 --device cpu --no-sheets";
 const PATIENCE: Duration = Duration::from_secs(300);
@@ -154,7 +171,41 @@ fn with_programs(folder: &Path, programs: &Path, arguments: &str) -> Outcome {
     Outcome::of(run)
 }
 
-fn mp4_by_the_ffmpeg_of_the_machine_or_y4m() {
+/// The ffmpeg of this machine: what it wrote, it decodes to the pictures again, up to its compression.
+fn mp4_by_ffmpeg_shows_the_pictures() {
+    let scene = toy();
+    let folder = scene.path();
+    // Odd sides, which the format does not have: a row and a column are added.
+    done(
+        folder,
+        "render toy --between 2 6 --frames 5 --size 63x63 --device cpu --no-sheets --video mp4 --fps 10 -o out",
+    );
+    let video = folder.join("out/video.mp4");
+    let mut decode = Command::new("ffmpeg");
+    decode.args(["-hide_banner", "-loglevel", "error", "-i"]).arg(&video);
+    let decoded = decode.args(["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]).output().expect("ffmpeg starts");
+    assert!(decoded.status.success(), "{}", String::from_utf8_lossy(&decoded.stderr));
+    let frames: Vec<&[u8]> = decoded.stdout.chunks(3 * 64 * 64).collect();
+    assert_eq!((frames.len(), frames.last().map(|frame| frame.len())), (5, Some(3 * 64 * 64)));
+    let pictures: Vec<RgbImage> =
+        (0..5).map(|frame| png(&folder.join("out"), &format!("between-{frame:03}.png"))).collect();
+    let difference = |frame: &[u8], picture: &RgbImage| {
+        let levels = picture.enumerate_pixels().flat_map(|(x, y, pixel)| {
+            let place = 3 * (64 * y as usize + x as usize);
+            (0..3).map(move |channel| f64::from(frame[place + channel].abs_diff(pixel.0[channel])))
+        });
+        levels.sum::<f64>() / f64::from(3 * 63 * 63)
+    };
+    for (at, frame) in frames.iter().enumerate() {
+        let own = difference(frame, &pictures[at]);
+        assert!(own < 6.0, "frame {at} differs by {own}");
+        // It is that picture and no other.
+        let other = difference(frame, &pictures[(at + 2) % 5]);
+        assert!(other > 1.5 * own, "frame {at}: {own}, another picture {other}");
+    }
+}
+
+fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
     let scene = toy();
     let folder = scene.path();
     let programs = folder.join("programs");

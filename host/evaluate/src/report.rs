@@ -1,7 +1,7 @@
 //! A report: evaluations, sweeps of run time and trainings on one HTML page that holds everything it shows.
 //!
 //! The page needs no network and no scripts, and states so in its content security policy, which allows only its own
-//! styles and pictures. It shows tables as papers print them (the best value of a column bold, the next underlined),
+//! styles and pictures. It shows tables as papers print them (what is best as far as the intervals decide is bold),
 //! figures as SVG, pictures, and the records of the runs.
 //!
 //! ```text

@@ -149,6 +149,7 @@ async function askPicture(moving) {
     told(null);
     if (number < drawn) return;
     drawn = number;
+    release(shown);
     shown = { pose: at, ...answer };
     tellWeights(answer.weights, number);
     drawPicture();
@@ -156,6 +157,13 @@ async function askPicture(moving) {
   } catch (error) {
     told(error);
   }
+}
+
+// The memory of a picture that is replaced: the browser would keep it for a while.
+function release(old) {
+  if (old === null) return;
+  old.bitmap.close();
+  if (old.layer) old.layer.bitmap.close();
 }
 
 // 4 bytes length of the JSON, the JSON, the picture, the layer.
@@ -227,7 +235,7 @@ function changed() {
   clearTimeout(restTimer);
   restTimer = setTimeout(askFull, REST);
   tellCommand();
-  drawMap();
+  drawMapSoon();
 }
 
 // While something is waited for, what the program does.
@@ -418,6 +426,15 @@ function firstObserver() {
   return { target, pose: lookAt(add(target, times(direction, 4 * scene.distance)), target, scene.up) };
 }
 
+let isMapDue = false;
+
+// Once for each picture of the screen, however often something changes.
+function drawMapSoon() {
+  if (isMapDue) return;
+  isMapDue = true;
+  requestAnimationFrame(() => { isMapDue = false; drawMap(); });
+}
+
 function drawMap() {
   if (scene === null) return;
   const canvas = element('map');
@@ -517,7 +534,7 @@ function tellWeights(own, number) {
   });
   element('sum').textContent = own.reduce((a, b) => a + b, 0).toFixed(3);
   element('most').textContent = `${(100 * most).toFixed(0)} %`;
-  drawMap();
+  drawMapSoon();
 }
 
 // ---------------------------------------------------------------- settings
@@ -757,7 +774,7 @@ function listenToMap(canvas) {
     const around = turnedPose(observer.pose, observer.target, scene.up, -across);
     const above = turnedPose(around, observer.target, around.right, -below);
     observer.pose = Math.abs(dot(above.forward, scene.up)) < 0.98 ? above : around;
-    drawMap();
+    drawMapSoon();
   });
   for (const name of ['pointerup', 'pointercancel']) canvas.addEventListener(name, () => { at = null; });
 }

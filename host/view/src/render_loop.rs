@@ -97,7 +97,12 @@ struct Weighed<'a> {
 
 impl Weighed<'_> {
     /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use them.
-    fn weigh(&mut self, weighting: &Weighting, viewed: &Viewed<'_>, progress: &dyn Progress) -> Result<(), RenderError> {
+    fn weigh(
+        &mut self,
+        weighting: &Weighting,
+        viewed: &Viewed<'_>,
+        progress: &dyn Progress,
+    ) -> Result<(), RenderError> {
         let scheme = weighting.to_string();
         if self.scheme != scheme {
             self.stage.tune(viewed.settings_of(&scheme));

@@ -35,10 +35,16 @@ pub(super) struct Connection<'a> {
 }
 
 impl Program {
-    /// Starts it in a folder and waits until it tells its address.
+    /// Starts it in a folder, on the CPU, and waits until it tells its address.
     #[track_caller]
     pub(super) fn start(folder: &Path, arguments: &str) -> Program {
-        let mut run = command(BINARY, folder, &format!("view {arguments} --no-browser --device cpu"));
+        Program::start_on("cpu", folder, arguments)
+    }
+
+    /// The same on any device.
+    #[track_caller]
+    pub(super) fn start_on(device: &str, folder: &Path, arguments: &str) -> Program {
+        let mut run = command(BINARY, folder, &format!("view {arguments} --no-browser --device {device}"));
         let mut process = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
         let mut lines = BufReader::new(process.stdout.take().expect("a pipe")).lines();
         let address = lines.find_map(|line| line.expect("text").strip_prefix("http://").map(str::to_owned));

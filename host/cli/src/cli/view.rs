@@ -111,8 +111,9 @@ fn chosen(
     let progress = Terminal::new("reading the photographs");
     progress.stage("reading the photographs", 0..1, 10);
     let album = open_album(scene, sources.iter().copied(), renderer, options, &progress)?;
+    progress.stage("preparing the sources", 1..4, 10);
     let stage = Stage::prepare(scene, &album, sources, renderer, options, &progress)?;
-    progress.stage("choosing the scheme", 1..10, 10);
+    progress.stage("choosing the scheme", 4..10, 10);
     Ok(auto::choose(&stage, renderer, options, &progress)?)
 }
 

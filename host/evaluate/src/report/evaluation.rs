@@ -57,15 +57,18 @@ impl Evaluation {
 
     /// Its heading in the contents, with its field and network.
     pub(super) fn entry(&self) -> String {
+        format!("{}: {}", self.title(), self.field())
+    }
+
+    /// The field and its network, without that file's folder, which is in the record.
+    fn field(&self) -> String {
         let Settings { field, options, .. } = &self.settings;
         let network = options.get("model").map(|model| model.rsplit(['/', '\\']).next().unwrap_or(model));
-        let network = network.map_or(String::new(), |network| format!(" {network}"));
-        format!("{}: {field}{network}", self.title())
+        network.map_or_else(|| field.clone(), |network| format!("{field} {network}"))
     }
 
     pub(super) fn section(&self, id: &str) -> Result<Markup, ReportError> {
-        let Settings { protocol, field, job_count, notes, scenes, options, .. } = &self.settings;
-        let network = options.get("model").map_or(String::new(), |model| format!(" {model}"));
+        let Settings { protocol, job_count, notes, scenes, .. } = &self.settings;
         let done = job_count - self.missing.len();
         let figures = if self.tables.len() > 1 { figure::all(&self.tables)? } else { Vec::new() };
         Ok(html! {
@@ -74,7 +77,7 @@ impl Evaluation {
                 p.facts {
                     span { code { (protocol) } }
                     span { (counted(scenes.len(), "scene")) }
-                    span { "field: " (field) (network) }
+                    span { "field: " (self.field()) }
                     @for device in &self.devices { span { (device) } }
                 }
                 @if !self.missing.is_empty() {
@@ -84,6 +87,7 @@ impl Evaluation {
                     }
                 }
                 @for lead in self.tables.iter().filter_map(lead) { (lead) }
+                @for words in self.interval_words() { p.legend { (words) "." } }
                 @if !figures.is_empty() {
                     div.figures { @for svg in &figures { figure { div.scroll.drawn { (PreEscaped(svg)) } } } }
                     (figure::key(&self.tables))
@@ -105,6 +109,13 @@ impl Evaluation {
                 (self.record())
             }
         })
+    }
+
+    /// What the intervals of the tables are over: once where they say the same.
+    fn interval_words(&self) -> Vec<String> {
+        let mut words: Vec<String> = self.tables.iter().map(Table::interval_words).collect();
+        words.dedup();
+        words
     }
 
     fn record(&self) -> Markup {
@@ -152,7 +163,6 @@ fn lead(table: &Table) -> Option<Markup> {
             "."
         }
         ul.notes { @for verdict in table.verdicts() { li { (verdict) } } }
-        p.legend { (table.interval_words()) "." }
     })
 }
 

@@ -62,10 +62,12 @@ impl Jobs<'_> {
             let (scene, options) = (&shown[job.scene], &self.options[job.scene]);
             let name = format!("job {} of {}, {}", index + 1, open.len(), scene.name());
             let progress = &Part::begin(progress, name, index..index + 1, open.len());
-            let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
             let sources = names(scene, &job.sources);
             let views = job.sources.iter().chain(&job.targets).copied();
+            progress.stage("reading photographs", 0..1, 10);
             let album = open_album(scene, views, renderer, options, progress)?;
+            let progress = &Part::begin(progress, "", 1..10, 10);
+            let evaluator = Evaluator { weightings, renderer, options, scorer, progress };
             let masked = self.protocol.is_masked().then(|| &scenes[job.scene]);
             let mut gallery = Gallery::default();
             let first = job.targets.first().map_or("", |&target| &scene.views[target].name);

@@ -13,8 +13,8 @@ const STEPS: f64 = 1000.0;
 pub(super) struct Shown {
     pub(super) bar: ProgressBar,
     course: Mutex<Course>,
-    /// `None` where the bar is shown.
-    lines: Option<Mutex<Lines>>,
+    /// `None` where the bar is shown. Who shows the course holds it, so that what is shown is in order.
+    lines: Mutex<Option<Lines>>,
 }
 
 /// Lines about the course.
@@ -35,14 +35,18 @@ impl Shown {
         let template = "{msg} [{wide_bar:.blue}] {percent:>3} %";
         bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(label.to_owned());
-        let lines = (!is_terminal).then(|| Mutex::new(Lines { between, last: now, said: String::new() }));
-        Shown { bar, course: Mutex::new(Course::new(label, now)), lines }
+        let lines = (!is_terminal).then(|| Lines { between, last: now, said: String::new() });
+        Shown { bar, course: Mutex::new(Course::new(label, now)), lines: Mutex::new(lines) }
     }
 
     /// Shows nothing.
     #[cfg(feature = "view")]
     pub(super) fn hidden() -> Shown {
-        Shown { bar: ProgressBar::hidden(), course: Mutex::new(Course::new("", Instant::now())), lines: None }
+        Shown {
+            bar: ProgressBar::hidden(),
+            course: Mutex::new(Course::new("", Instant::now())),
+            lines: Mutex::new(None),
+        }
     }
 
     /// Changes the course and shows it.
@@ -55,14 +59,14 @@ impl Shown {
 
     /// Shows the course as it is now.
     pub(super) fn show(&self) {
+        let Ok(mut lines) = self.lines.lock() else { return };
         let now = Instant::now();
         let Ok((share, words)) = self.course.lock().map(|course| (course.share(), course.words(now))) else { return };
-        let Some(lines) = &self.lines else {
+        let Some(lines) = lines.as_mut() else {
             self.bar.set_position((STEPS * share) as u64);
             self.bar.set_message(words);
             return;
         };
-        let Ok(mut lines) = lines.lock() else { return };
         if now.duration_since(lines.last) < lines.between {
             return;
         }

@@ -1,0 +1,242 @@
+//! The page in a browser: a hand, two hands on a phone, keys, menus, tabs, and what is taken elsewhere.
+
+use super::super::browser::{self, Browser, InBrowser};
+use super::super::{assert_near, numbers};
+use super::devtools::{Chromium, Tab};
+use super::program::request;
+use super::{COARSE, COUNT, WEIGHTS, done_with_warnings, keep, room, weights};
+use image::{RgbImage, RgbaImage};
+use libtest_mimic::Trial;
+use serde_json::json;
+use std::fs;
+use std::time::{Duration, Instant};
+use viewfuse_tests::command::names_in;
+use viewfuse_tests::places::data;
+use viewfuse_tests::scenes::Folder;
+
+pub(super) fn trials() -> [Trial; 4] {
+    let tests: [(&str, InBrowser); 4] = [
+        ("view::browser::a_hand_turns_the_view", a_hand_turns_the_view),
+        ("view::browser::tabs_come_and_go", tabs_come_and_go),
+        ("view::browser::a_phone_shows_all_of_it", a_phone_shows_all_of_it),
+        ("view::browser::a_view_is_taken_elsewhere", a_view_is_taken_elsewhere),
+    ];
+    browser::trials(tests)
+}
+
+/// The full picture of the view as it is now.
+const FULL: &str = "typeof shown !== 'undefined' && shown && shown.full && shown.pose === pose";
+
+/// Small enough that a full picture comes soon.
+const SMALL: &str = "--sources 003..007 --size 96x72";
+
+/// The pixels of the picture on the page.
+fn canvas(tab: &Tab<'_>) -> RgbaImage {
+    use base64::Engine;
+    let address = tab.text("document.getElementById('picture').toDataURL('image/png')");
+    let text = address.strip_prefix("data:image/png;base64,").expect("a PNG");
+    let bytes = base64::engine::general_purpose::STANDARD.decode(text).expect("base64");
+    image::load_from_memory(&bytes).expect("a picture").to_rgba8()
+}
+
+/// Mean absolute difference of two pictures, of 255.
+fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let sum: u64 = a.as_raw().iter().zip(b.as_raw()).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    sum as f64 / a.as_raw().len() as f64
+}
+
+fn a_hand_turns_the_view(browser: &Browser) {
+    let program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(FULL);
+    tab.wait_for(
+        "[...document.images].every((own) => own.complete && own.naturalWidth > 0) && document.images.length === 5",
+    );
+    let (first, first_weights, first_map) =
+        (canvas(&tab), weights(&tab), tab.text("document.getElementById('map').toDataURL()"));
+    let distinct: std::collections::HashSet<[u8; 4]> = first.pixels().map(|pixel| pixel.0).collect();
+    assert!(distinct.len() > 1000, "{} colours", distinct.len());
+    assert!(tab.text("document.getElementById('status').textContent").starts_with("full, 96 × 72"));
+
+    // A drag turns the view: coarse pictures on the way, a full one at its end.
+    let [x, y] = tab.middle_of("#picture");
+    let before = tab.number(COUNT);
+    tab.mouse("mousePressed", [x, y], json!({}));
+    tab.mouse("mouseMoved", [x + 120.0, y + 20.0], json!({}));
+    tab.wait_for(COARSE);
+    assert!(difference(&canvas(&tab), &first) > 2.0, "the picture does not follow the hand");
+    // The hand rests, but the button is held.
+    tab.wait_for(FULL);
+    tab.mouse("mouseReleased", [x + 120.0, y + 20.0], json!({}));
+    assert!(tab.number(COUNT) >= before + 2.0);
+    let turned = canvas(&tab);
+    assert!(difference(&turned, &first) > 2.0);
+    let turned_weights = weights(&tab);
+    assert!(turned_weights.iter().zip(&first_weights).any(|(a, b)| (a - b).abs() > 0.05), "{turned_weights:?}");
+    assert_ne!(tab.text("document.getElementById('map').toDataURL()"), first_map, "the cameras' colours");
+    keep(&tab, "desktop.png");
+
+    // Keys: back and forth is where it was; then to the start.
+    let matrix = "JSON.stringify(matrixOf(pose))";
+    let place = tab.text(matrix);
+    for (there, back) in [("ArrowLeft", "ArrowRight"), ("ArrowUp", "ArrowDown"), ("+", "-")] {
+        tab.key(there);
+        assert_ne!(tab.text(matrix), place, "{there}");
+        tab.key(back);
+        let gap = tab
+            .number(&format!("Math.max(...matrixOf(pose).flat().map((own, i) => Math.abs(own - {place}.flat()[i])))"));
+        assert!(gap < 1.0e-9, "{there} and {back}: {gap}");
+    }
+    tab.key("0");
+    tab.wait_for(COARSE);
+    tab.wait_for(FULL);
+    assert!(canvas(&tab) == first, "the start is what it was");
+    tab.mouse("mouseWheel", [x, y], json!({"deltaX": 0, "deltaY": -300}));
+    tab.wait_for(COARSE);
+    assert_ne!(tab.text(matrix), place);
+
+    // Schemes by the menu, their parameter by the slider.
+    let choose = |id: &str, value: &str, event: &str| {
+        tab.evaluate(&format!(
+            "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()"
+        ));
+    };
+    choose("scheme", "mean", "change");
+    tab.wait_for(&format!("{WEIGHTS}.every((own) => Math.abs(own - 0.2) < 1e-6)"));
+    weights(&tab);
+    choose("scheme", "gaussian", "change");
+    choose("parameter", "700", "input");
+    tab.wait_for("document.getElementById('parameter-value').textContent === '6.31'");
+    tab.wait_for(&format!("Math.max(...{WEIGHTS}) > 0.25"));
+    weights(&tab);
+    tab.wait_for(FULL);
+    // Layers over the picture.
+    let plain = canvas(&tab);
+    for layer in ["depth", "confidence"] {
+        tab.evaluate(&format!("document.querySelector('input[value={layer}]').click()"));
+        tab.wait_for(&format!("shown.layer && shown.layer.kind === '{layer}' && shown.full"));
+        assert!(difference(&canvas(&tab), &plain) > 5.0, "{layer}");
+        keep(&tab, &format!("{layer}.png"));
+    }
+    tab.evaluate("document.querySelector('#sources button').click()");
+    tab.wait_for(&format!("{WEIGHTS}[0] > 0.8"));
+    assert_eq!(tab.console(), [""; 0]);
+}
+
+fn tabs_come_and_go(browser: &Browser) {
+    let mut program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    let first = chromium.open(&program.address(), [900, 700], false);
+    let second = chromium.open(&program.address(), [900, 700], false);
+    first.wait_for(FULL);
+    second.wait_for(FULL);
+    let [x, y] = second.middle_of("#picture");
+    second.drag([x, y], [x + 150.0, y], 5);
+    second.wait_for(COARSE);
+    second.wait_for(FULL);
+    // Each has a view of its own.
+    assert_eq!(first.evaluate("pose.centre.every((own, i) => own === scene.start.centre[i])"), true);
+    assert_eq!(second.evaluate("pose.centre.every((own, i) => own === scene.start.centre[i])"), false);
+    assert_eq!(second.console(), [""; 0]);
+    // Closed in the middle of a drag.
+    second.mouse("mousePressed", [x, y], json!({}));
+    second.mouse("mouseMoved", [x + 50.0, y], json!({}));
+    second.close();
+    first.key("ArrowLeft");
+    first.wait_for(COARSE);
+    first.wait_for(FULL);
+    assert_eq!(first.console(), [""; 0]);
+    first.close();
+    std::thread::sleep(Duration::from_millis(300));
+    assert!(program.is_running());
+    let third = chromium.open(&program.address(), [900, 700], false);
+    third.wait_for(FULL);
+    assert_eq!(program.interrupt().0, Some(0));
+    third.key("ArrowLeft");
+    third.wait_for("!document.getElementById('problem').hidden");
+    assert!(third.text("document.getElementById('problem').textContent").contains("does not answer"));
+}
+
+fn a_phone_shows_all_of_it(browser: &Browser) {
+    let program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [390, 844], true);
+    tab.wait_for(FULL);
+    let first = canvas(&tab);
+    assert_eq!(tab.number("document.documentElement.scrollWidth"), 390.0, "it is wider than the phone");
+    keep(&tab, "phone.png");
+    // One finger turns, two move.
+    let [x, y] = tab.middle_of("#picture");
+    tab.touch("touchStart", &[[x, y]]);
+    tab.touch("touchMove", &[[x + 40.0, y]]);
+    tab.touch("touchMove", &[[x + 80.0, y]]);
+    tab.touch("touchEnd", &[]);
+    tab.wait_for(COARSE);
+    tab.wait_for(FULL);
+    assert!(difference(&canvas(&tab), &first) > 2.0, "the picture does not follow the finger");
+    let distance = "length(sub(pose.centre, focus))";
+    let before = tab.number(distance);
+    tab.touch("touchStart", &[[x - 30.0, y], [x + 30.0, y]]);
+    tab.touch("touchMove", &[[x - 45.0, y], [x + 45.0, y]]);
+    tab.touch("touchMove", &[[x - 60.0, y], [x + 60.0, y]]);
+    tab.touch("touchEnd", &[]);
+    assert!(tab.number(distance) < 0.7 * before, "a pinch does not move");
+    assert_eq!(tab.number("window.visualViewport.scale"), 1.0, "the page is not enlarged instead");
+    weights(&tab);
+    let smallest = "Math.min(...[...document.querySelectorAll('p, label, legend, output, b, pre')].map((own) => parseFloat(getComputedStyle(own).fontSize)))";
+    assert!(tab.number(smallest) >= 12.0, "{}", tab.number(smallest));
+    assert_eq!(tab.console(), [""; 0]);
+}
+
+/// A pose is saved as a file that viewfuse reads, and the command line says how this view is rendered.
+fn a_view_is_taken_elsewhere(browser: &Browser) {
+    let program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(FULL);
+    let downloads = json!({"behavior": "allow", "downloadPath": chromium.folder().join("saved").display().to_string()});
+    chromium.call(None, "Browser.setDownloadBehavior", downloads);
+    let permissions = json!({"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]});
+    chromium.call(None, "Browser.grantPermissions", permissions);
+    for _ in 0..4 {
+        tab.key("ArrowLeft");
+    }
+    let folder = Folder::new();
+    tab.evaluate("document.getElementById('save').click()");
+    let saved = chromium.folder().join("saved/view.json");
+    let start = Instant::now();
+    while !saved.exists() || names_in(saved.parent().expect("a folder")).len() != 1 {
+        assert!(start.elapsed() < Duration::from_secs(60), "nothing is saved");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    // With a photograph beside it, it is a scene of one view.
+    fs::copy(&saved, folder.file("transforms.json")).expect("a copy");
+    RgbImage::new(96, 72).save(folder.file("view.png")).expect("a picture");
+    let scene = viewfuse::scene::Scene::open(folder.path()).expect("a scene");
+    let pose = scene.views[0].camera.pose.to_opencv();
+    let shown: Vec<f64> = numbers(&tab.evaluate("matrixOf(pose).flat()"));
+    for (own, shown) in pose.iter().flatten().zip(shown) {
+        assert_near(f64::from(*own), shown, 1.0e-6);
+    }
+    tab.call("Page.bringToFront", json!({}));
+    tab.evaluate("document.getElementById('copy').click()");
+    tab.wait_for("document.getElementById('said').textContent.startsWith('Copied')");
+    let line = tab.text("navigator.clipboard.readText()");
+    assert_eq!(line, tab.text("document.getElementById('command').textContent"));
+    let start = "viewfuse render tests/data/room --camera-path view.json --sources 003,004,005,006,007 --size 96x72";
+    assert!(line.starts_with(start) && line.ends_with(" --weights error:alpha=1 -o out"), "{line}");
+    // The line renders what is shown.
+    fs::copy(&saved, folder.file("view.json")).expect("a copy");
+    let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
+    done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
+    let rendered = image::open(folder.path().join("out/view.png")).expect("a picture").to_rgb8();
+    let (_, picture) = program.connect().picture(&request("x", &tab.evaluate("matrixOf(pose)"), false)).unpacked();
+    assert!(rendered == picture, "the command line renders another picture");
+    // A view of the scene that is no source has a name.
+    tab.evaluate("goTo(scene.others[0].pose)");
+    let line = tab.text("document.getElementById('command').textContent");
+    assert!(line.contains("render tests/data/room --targets 000 --sources"), "{line}");
+    assert_eq!(tab.console(), [""; 0]);
+}

@@ -1,0 +1,227 @@
+//! The server by requests alone: who may ask, what is answered, and that it ends.
+
+use super::super::{BINARY, assert_near, numbers};
+use super::program::{Program, request};
+use super::{done_with_warnings, room};
+use libtest_mimic::Trial;
+use serde_json::json;
+use std::time::Duration;
+use viewfuse_tests::command::{assert_refused, files_below, toy};
+use viewfuse_tests::devices::vulkan_devices;
+use viewfuse_tests::places::{data, repository};
+use viewfuse_tests::scenes::Folder;
+use viewfuse_tests::trials::{is_required, needing, trial};
+
+pub(super) fn trials() -> Vec<Trial> {
+    let has_vulkan = vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|own| own.missing.is_empty()));
+    let missing = (!has_vulkan).then(|| "no Vulkan device".to_owned());
+    let on_vulkan = trial("commands::view::a_vulkan_device_shows_the_same", a_vulkan_device_shows_the_same);
+    vec![
+        needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), on_vulkan),
+        trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
+        trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
+        trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
+        trial("commands::view::the_newest_request_wins", the_newest_request_wins),
+        trial("commands::view::many_connections_at_once_are_answered", many_connections_at_once_are_answered),
+        trial("commands::view::ctrl_c_ends_it_and_nothing_is_written", ctrl_c_ends_it_and_nothing_is_written),
+        trial("commands::view::a_taken_port_is_an_error", a_taken_port_is_an_error),
+        trial("commands::view::learned_fields_are_shown", learned_fields_are_shown),
+    ]
+}
+
+fn other_hosts_and_addresses_get_nothing() {
+    let program = Program::start(&repository(), &format!("{} --size 24x24", data("toy").display()));
+    let own = ("Host", program.host.as_str());
+    let status = |method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]| {
+        program.connect().ask(method, path, headers, body).status
+    };
+    let page = program.get("");
+    let text = String::from_utf8_lossy(&page.body);
+    assert!(page.status == 200 && text.contains("<title>viewfuse</title>"), "{text}");
+    for header in
+        ["Content-Security-Policy: default-src 'none'", "Referrer-Policy: no-referrer", "Cache-Control: no-store"]
+    {
+        assert!(page.head.contains(header), "{header} is not in {}", page.head);
+    }
+    assert!(!page.head.contains("Access-Control-Allow-Origin"), "{}", page.head);
+    for host in ["evil.example", "127.0.0.1", "127.0.0.1:1"] {
+        assert_eq!(status("GET", &program.path, &[("Host", host)], b""), 403, "{host}");
+    }
+    assert_eq!(status("GET", &program.path, &[], b""), 403, "no host");
+    assert_eq!(status("GET", &program.path, &[own, own], b""), 403, "two hosts");
+    assert_eq!(status("GET", &program.path, &[own, ("Origin", "http://evil.example")], b""), 403);
+    for path in ["/", "/scene", "/0123456789abcdef0123456789abcdef/", &program.path[..20]] {
+        assert_eq!(status("GET", path, &[own], b""), 403, "{path}");
+    }
+    for (rest, expected) in [("scene", 405), ("picture", 400), ("nothing", 404), ("../Cargo.toml", 404)] {
+        assert_eq!(status("POST", &format!("{}{rest}", program.path), &[own], b"{}"), expected, "{rest}");
+    }
+    let long = vec![b' '; 5000];
+    assert_eq!(status("POST", &format!("{}picture", program.path), &[own], &long), 413);
+    let start = &program.scene()["start"];
+    for (key, value) in [("scheme", "attention:Cargo.toml"), ("scheme", "median"), ("layer", "everything")] {
+        let mut wrong = request("a", start, true);
+        wrong[key] = value.into();
+        assert_eq!(program.connect().picture(&wrong).status, 400, "{key}={value}");
+    }
+    // After all of that it goes on.
+    let (answer, picture) = program.connect().picture(&request("a", start, false)).unpacked();
+    assert_eq!((answer["full"].as_bool(), picture.dimensions()), (Some(true), (24, 24)));
+}
+
+fn full_pictures_are_those_of_render() {
+    let folder = Folder::new();
+    let scene = data("room");
+    let options = "--sources 000..004,006..009 --size 96x72";
+    for scheme in ["error:alpha=1", "gaussian:beta=2"] {
+        let arguments =
+            format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
+        done_with_warnings(folder.path(), &arguments);
+    }
+    let program = Program::start(folder.path(), &format!("{} {options}", scene.display()));
+    let found = program.scene();
+    let others = found["others"].as_array().expect("other views");
+    let pose = &others.iter().find(|view| view["name"] == "005").expect("view 005")["pose"];
+    let mut connection = program.connect();
+    let mut pictures = Vec::new();
+    // Back to the first one: what was encoded for another scheme is not used.
+    for scheme in ["error:alpha=1", "mean", "gaussian:beta=2"] {
+        let mut request = request("a", pose, false);
+        request["scheme"] = scheme.into();
+        request["layer"] = "depth".into();
+        let (answer, picture) = connection.picture(&request).unpacked();
+        assert_eq!(answer["layers"], json!(["depth", "confidence"]));
+        assert_eq!(answer["layer"]["bytes"], 96 * 72);
+        let sum: f64 = numbers(&answer["weights"]).iter().sum();
+        assert_near(sum, 1.0, 1.0e-5);
+        pictures.push(picture);
+    }
+    let rendered = image::open(folder.path().join("out/005.png")).expect("a picture").to_rgb8();
+    assert!(pictures[2] == rendered, "the picture is not that of render");
+    assert!(pictures[0] != pictures[1] && pictures[0] != rendered);
+}
+
+/// What `--weights auto` chooses is what `render` chooses, with the field's scalars; other schemes have the usual ones.
+fn the_scheme_can_be_chosen_for_the_scene() {
+    let folder = toy();
+    let options = "--sources 000000..000011 --size 48x48";
+    let program = Program::start(folder.path(), &format!("toy {options} --weights auto"));
+    let found = program.scene();
+    let pose = &found["others"][8]["pose"];
+    assert_eq!(found["others"][8]["name"], "000020");
+    assert_eq!(found["commands"]["first_weights"], "auto");
+    let picture = |scheme: &serde_json::Value| {
+        let mut request = request("a", pose, false);
+        request["scheme"] = scheme.clone();
+        program.connect().picture(&request).unpacked().1
+    };
+    let shown = [&found["scheme"], &json!("mean"), &found["scheme"]].map(picture);
+    for (scheme, own) in ["auto", "mean"].into_iter().zip(&shown) {
+        let arguments = format!("render toy --targets 000020 --weights {scheme} {options} --device cpu -o {scheme}");
+        done_with_warnings(folder.path(), &arguments);
+        let path = folder.path().join(scheme).join("000020.png");
+        assert!(image::open(path).expect("a picture").to_rgb8() == *own, "{scheme}: another picture");
+    }
+    assert!(shown[0] != shown[1] && shown[0] == shown[2]);
+}
+
+/// The kernels are the same functions on every device.
+fn a_vulkan_device_shows_the_same() {
+    let folder = toy();
+    let pictures = ["cpu", "vulkan"].map(|device| {
+        let program = Program::start_on(device, folder.path(), "toy --sources 0..3 --size 32x32");
+        let found = program.scene();
+        assert_eq!(found["device"].as_str().is_some_and(|name| name.starts_with("cpu")), device == "cpu", "{found}");
+        let mut connection = program.connect();
+        let coarse = connection.picture(&request("a", &found["start"], true)).unpacked().1;
+        assert!(coarse.width() <= 32);
+        connection.picture(&request("a", &found["start"], false)).unpacked().1
+    });
+    let gaps = pictures[0].as_raw().iter().zip(pictures[1].as_raw()).map(|(a, b)| u64::from(a.abs_diff(*b)));
+    let mean = gaps.sum::<u64>() as f64 / pictures[0].as_raw().len() as f64;
+    assert!(pictures[0].dimensions() == (32, 32) && mean < 0.5, "they differ by {mean} of 255");
+}
+
+fn the_newest_request_wins() {
+    let program = room("");
+    let start = program.scene()["start"].clone();
+    let mut first = program.connect();
+    let (answer, _) = first.picture(&request("a", &start, true)).unpacked();
+    assert_eq!(answer["full"], false);
+    // A full picture takes seconds the first time; then its tab wants something else.
+    first.send_picture(&request("a", &start, false));
+    let (mut second, mut third) = (program.connect(), program.connect());
+    std::thread::sleep(Duration::from_millis(100));
+    second.send_picture(&request("a", &start, false));
+    let other = third.picture(&request("b", &start, true));
+    assert_eq!(other.unpacked().0["full"], false, "another tab does not wait for it");
+    third.send_picture(&request("a", &start, true));
+    assert_eq!((first.receive().status, second.receive().status), (204, 204));
+    assert_eq!(third.receive().unpacked().0["full"], false);
+    // Weights are told without a picture.
+    let weights = third.ask(
+        "POST",
+        &format!("{}weights", program.path),
+        &[("Host", &program.host)],
+        request("a", &start, true).to_string().as_bytes(),
+    );
+    assert_eq!(numbers(&weights.json()).len(), 11);
+}
+
+/// Browsers open several connections at once and keep them.
+fn many_connections_at_once_are_answered() {
+    let folder = toy();
+    let program = Program::start(folder.path(), "toy --size 24x24");
+    let path = format!("{}status", program.path);
+    let mut connections = Vec::new();
+    for _ in 0..10 {
+        let mut new: Vec<_> = (0..6).map(|_| program.connect()).collect();
+        new.iter_mut().for_each(|own| own.send("GET", &path, &[("Host", &program.host)], b""));
+        connections.extend(new);
+    }
+    for connection in &mut connections {
+        assert_eq!(connection.receive().status, 200);
+    }
+}
+
+fn ctrl_c_ends_it_and_nothing_is_written() {
+    let folder = toy();
+    let before = files_below(folder.path());
+    let mut program = Program::start(folder.path(), "toy --size 48x48");
+    let start = program.scene()["start"].clone();
+    program.connect().picture(&request("a", &start, true)).unpacked();
+    // In the middle of a full picture.
+    let mut connection = program.connect();
+    connection.send_picture(&request("a", &start, false));
+    drop(connection);
+    assert_eq!(program.interrupt(), (Some(0), String::new()));
+    assert!(std::net::TcpStream::connect(&program.host).is_err(), "it still listens");
+    assert_eq!(files_below(folder.path()), before);
+}
+
+fn a_taken_port_is_an_error() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let port = listener.local_addr().expect("an address").port();
+    let folder = toy();
+    let parts = ["cannot listen on 127.0.0.1", &port.to_string(), "--port"];
+    assert_refused(BINARY, folder.path(), &format!("view toy --no-browser --device cpu --port {port}"), &parts);
+    assert_refused(BINARY, folder.path(), "view toy --no-browser --size 48x20", &["does not keep the shape", "--size"]);
+}
+
+/// Fields without a cheaper form are shown in smaller pictures of their own.
+fn learned_fields_are_shown() {
+    let folder = toy();
+    for (model, layers) in
+        [("formula:8 --samples 16,4,4", json!(["depth"])), ("genvs:small --steps 2 --samples 8", json!([]))]
+    {
+        let arguments = format!("toy --sources 000000,000008,000016 --size 32x32 --model {model}");
+        let program = Program::start(folder.path(), &arguments);
+        let start = program.scene()["start"].clone();
+        let mut connection = program.connect();
+        let (coarse, picture) = connection.picture(&request("a", &start, true)).unpacked();
+        assert!(picture.width() <= 32, "{model}: {coarse}");
+        let (full, picture) = connection.picture(&request("a", &start, false)).unpacked();
+        assert_eq!((full["full"].as_bool(), picture.dimensions()), (Some(true), (32, 32)), "{model}");
+        assert_eq!(full["layers"], layers, "{model}");
+    }
+}
