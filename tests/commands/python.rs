@@ -66,6 +66,22 @@ fn needs(lock: &Lock, name: &str) -> BTreeSet<(String, String)> {
     found
 }
 
+/// Where one of our packages is.
+fn folder_of(package: &str) -> String {
+    match package.trim_start_matches("viewfuse-") {
+        own @ ("core" | "vulkan") => own.to_owned(),
+        own => format!("host/{own}"),
+    }
+}
+
+/// The dependencies of a manifest that no feature turns on.
+fn always_needed(manifest: &str) -> BTreeSet<String> {
+    let lines = manifest.lines().skip_while(|line| *line != "[dependencies]").skip(1);
+    let own = lines.take_while(|line| !line.starts_with('[')).filter(|line| !line.contains("optional = true"));
+    let name = |line: &str| line.split([' ', '.', '=']).next().unwrap_or_default().to_owned();
+    own.filter(|line| line.contains('=') && !line.starts_with(['#', ' '])).map(name).collect()
+}
+
 fn it_is_built_from_the_same_crates() {
     let (own, ours) = (lock(&read("host/python/Cargo.lock")), lock(&read("Cargo.lock")));
     let needed = needs(&own, "viewfuse");
@@ -83,6 +99,10 @@ fn it_is_built_from_the_same_crates() {
         };
         let (own, ours) = (names(&own), names(&ours));
         assert!(own.is_subset(&ours), "{name}: {own:?} {ours:?}");
+        let always = always_needed(&read(&format!("{}/Cargo.toml", folder_of(name))));
+        assert!(!always.is_empty(), "{name} needs nothing");
+        let missing: Vec<_> = always.difference(&own).collect();
+        assert!(missing.is_empty(), "{name} needs {missing:?}: run cargo in host/python, without --locked");
     }
     let version = |manifest: &str| manifest.lines().find(|line| line.starts_with("version = ")).map(str::to_owned);
     assert_eq!(version(&read("host/python/Cargo.toml")), version(&read("Cargo.toml")));
