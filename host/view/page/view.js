@@ -136,7 +136,8 @@ let isCoarseWanted = false;
 let fullOut = 0;             // requests for full pictures that wait
 let restTimer = 0;
 
-async function askPicture(moving) {
+// `arrived` is called once the program has answered: it can do the next picture while this one is drawn.
+async function askPicture(moving, arrived) {
   asked += 1;
   const number = asked;
   const at = pose;
@@ -145,9 +146,14 @@ async function askPicture(moving) {
   try {
     const response = await post('picture', body);
     if (response === null) return;
-    const answer = await unpacked(await response.arrayBuffer());
+    const bytes = await response.arrayBuffer();
+    arrived();
+    const answer = await unpacked(bytes);
     told(null);
-    if (number < drawn) return;
+    if (number < drawn) {
+      release(answer);
+      return;
+    }
     drawn = number;
     release(shown);
     shown = { pose: at, ...answer };
@@ -191,9 +197,10 @@ async function pumpCoarse() {
   if (isCoarseOut || !isCoarseWanted) return;
   isCoarseOut = true;
   isCoarseWanted = false;
-  await askPicture(true);
-  isCoarseOut = false;
-  pumpCoarse();
+  const next = () => { isCoarseOut = false; pumpCoarse(); };
+  let hasArrived = false;
+  await askPicture(true, () => { hasArrived = true; next(); });
+  if (!hasArrived) next();
 }
 
 async function askFull() {
@@ -202,7 +209,7 @@ async function askFull() {
     return;
   }
   fullOut += 1;
-  await askPicture(false);
+  await askPicture(false, () => {});
   fullOut -= 1;
 }
 
