@@ -13,7 +13,7 @@ use super::average::Average;
 use super::curve;
 use super::draw::Draw;
 use super::parameters::{Contents, Parameters};
-use super::scenes::Data;
+use super::scenes::{Data, STAGES};
 use super::state::{self, Learned, Progressed};
 use candle_core::Tensor;
 use serde::Serialize;
@@ -40,9 +40,6 @@ pub struct Schedule {
     #[serde(skip)]
     pub write_every: f64,
 }
-
-/// The whole work is so many parts of about the same time: reading the scenes is the first, training all others.
-pub(crate) const STAGES: usize = 20;
 
 /// Names of files in the folder of a run.
 const CURVE: &str = "curve.svg";

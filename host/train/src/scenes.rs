@@ -1,7 +1,6 @@
 //! Training scenes in memory: pictures over white at the training size, with their cameras.
 
 use super::TrainError;
-use super::run::STAGES;
 use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
@@ -12,6 +11,9 @@ use viewfuse_field::learned::default_near_far;
 use viewfuse_job::digest::hexadecimal;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
+
+/// The whole work is so many parts of about the same time: reading the scenes is the first, training all others.
+pub(crate) const STAGES: usize = 20;
 
 /// Training and validation scenes.
 pub(crate) struct Data {
