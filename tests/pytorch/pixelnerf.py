@@ -332,7 +332,7 @@ def render(options):
     result = {
         "torch": torch.__version__,
         "blas": "mkl" if torch.backends.mkl.is_available() else "other",
-        "instructions": torch.backends.cpu.get_cpu_capability(),
+        "instructions": torch.backends.cpu.get_cpu_capability() if hasattr(torch.backends, "cpu") else "not told",
         "threads": torch.get_num_threads(),
         "device": torch.cuda.get_device_name() if DEVICE.type == "cuda" else "cpu",
         "python": platform.python_version(),
@@ -414,7 +414,9 @@ def main():
     options = parser.parse_args()
     global DEVICE
     DEVICE = torch.device(options.device)
-    torch.set_default_device(DEVICE)
+    # The CPU is the default; older PyTorch cannot set it.
+    if DEVICE.type != "cpu":
+        torch.set_default_device(DEVICE)
     # The same precision as everywhere else.
     torch.backends.cudnn.allow_tf32 = False
     if options.threads:
