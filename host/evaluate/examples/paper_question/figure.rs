@@ -2,6 +2,7 @@
 
 use crate::{Column, ERROR, Group, PAPER, cell};
 use anyhow::anyhow;
+use plotters::element::DashedPathElement;
 use plotters::prelude::*;
 use std::error::Error;
 use viewfuse_evaluate::metrics::interval::Interval;
@@ -117,6 +118,7 @@ fn draw(picture: &mut String, lines: &[Line]) -> Result<(), Box<dyn Error>> {
             match is_second {
                 true => {
                     let dashed = DashedLineSeries::new(points.clone(), 6, 4, style);
+                    let key = move |(x, y)| DashedPathElement::new([(x, y), (x + 20, y)], 6, 4, style);
                     chart.draw_series(dashed)?.label(label).legend(key)
                 }
                 false => chart.draw_series(LineSeries::new(points.clone(), style))?.label(label).legend(key),
