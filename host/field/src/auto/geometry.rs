@@ -17,7 +17,7 @@ pub struct Standing {
     /// `(sum_i 1 / g_i^2)^(-1/2)`: at most the gap to the nearest source, less with every further one.
     pub gap: f64,
     /// `|sum_i v_i / g_i^2| / sum_i |v_i| / g_i^2` with `v_i` from the camera to a source: near 0 in the middle of the
-    /// sources, 1 if all of them are in one direction. Recorded only: the expectation does not use it.
+    /// sources, 1 if all of them are in one direction.
     pub outside: f64,
 }
 

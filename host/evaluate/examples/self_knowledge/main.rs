@@ -3,11 +3,16 @@
 //!
 //! `cargo run --release -p viewfuse-evaluate --example self_knowledge -- SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...`
 //!
-//! Pictures have a longest side of `SIDE`. With `grid`, all that `auto` tried is rendered at the targets as well, which is what
-//! takes the time. Each line of output is a JSON object, one a job: what the constants of `viewfuse_field::auto` are fitted to.
-//! The last lines are the summary.
+//! Pictures have a longest side of `SIDE`. Of each protocol at most `MOST_TARGETS` jobs (sets of sources) are rendered, with as
+//! many targets each. With `grid`, all that `auto` tried is rendered at the targets as well, which is what takes the time. Each
+//! line of output is a JSON object, one a job. The last lines are the summary: how well the built-in constants of the
+//! expected score do, and constants that are fitted to these targets, with their errors when each scene in turn is left out of
+//! the fit.
+
+mod fit;
 
 use anyhow::{Context, bail};
+use fit::{Row, fit};
 use serde_json::json;
 use std::path::Path;
 use viewfuse_device::cpu::Cpu;
@@ -46,6 +51,8 @@ fn main() -> anyhow::Result<()> {
 struct Summary {
     /// Expected and true score of each target, and whether the true one is in the interval.
     targets: Vec<(f64, f64, bool)>,
+    /// The same targets for the fit.
+    rows: Vec<Row>,
     /// Mean score of a job: as chosen, of the best candidate in hindsight, of the first one.
     jobs: Vec<[f64; 3]>,
 }
@@ -63,6 +70,10 @@ impl Summary {
             "{count} targets: correlation {:.2}, within 1.5 dB {near:.2}, within the interval {inside:.2}",
             product / spreads.sqrt()
         );
+        let (constants, errors) = fit(&self.rows);
+        let deviation = (errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt();
+        let near = errors.iter().filter(|error| error.abs() < 1.5).count() as f64 / count;
+        println!("fitted {constants:.3?}; scenes left out: deviation {deviation:.2} dB, within 1.5 dB {near:.2}");
         if !self.jobs.is_empty() {
             let [chosen, best, first] =
                 [0, 1, 2].map(|column| self.jobs.iter().map(|job| job[column]).sum::<f64>() / jobs);
@@ -90,7 +101,8 @@ fn measure(
     let scenes = [scene];
     let plan = protocol.plan(&scenes, Draws { seed: 0, trial_count: 1, target_count: most_targets }, 3)?;
     let scene = &scenes[0];
-    for job in &plan.jobs {
+    let every = plan.jobs.len().div_ceil(most_targets).max(1);
+    for job in plan.jobs.iter().step_by(every) {
         let step = job.targets.len().div_ceil(most_targets).max(1);
         let targets: Vec<usize> = job.targets.iter().copied().step_by(step).collect();
         let album = Album::open(scene, job.sources.iter().chain(&targets).copied(), &Silent)?;
@@ -152,6 +164,11 @@ fn rendered(
         let (Some(expected), Some(truth)) = (chosen.expected(&frame), &frame.truth) else { continue };
         let is_inside = (expected.interval[0]..=expected.interval[1]).contains(&truth.psnr);
         summary.targets.push((expected.psnr, truth.psnr, is_inside));
+        if let Some(basis) = &chosen.basis {
+            let confidence = (!frame.confidences.is_empty()).then_some(f64::from(confidence));
+            let terms = basis.terms(chosen.standing(&frame), confidence);
+            summary.rows.push(Row { scene: scene.path.display().to_string(), terms, above: truth.psnr - basis.psnr });
+        }
         views.push(json!({
             "target": frame.target.name, "standing": chosen.standing(&frame), "confidence": confidence,
             "expected": expected, "psnr": truth.psnr,
