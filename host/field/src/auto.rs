@@ -44,7 +44,7 @@ pub fn schemes() -> Vec<Scheme> {
 }
 
 /// Least significant gain, decibels. Of 0, 0.03 and 0.1, with and without a margin for the spread between sources, this
-/// came nearest to the best choice in hindsight over 15 scenes and selections.
+/// came nearest to the best choice in hindsight over 15 scenes and selections; see also [`is_better`].
 const LEAST_GAIN: f64 = 0.1;
 
 /// A scheme and settings that were tried.
@@ -206,9 +206,16 @@ impl Search<'_, '_> {
     }
 }
 
-/// Whether a candidate beats the best one so far, and the one it replaces by more than the noise.
+/// Whether a candidate beats the best one so far, and the one it replaces by more than the noise: in the mean, and by half
+/// of that in the median, so that one source alone does not decide.
 fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> bool {
-    mean_score(candidate) > mean_score(best) && mean_score(candidate) - mean_score(replaced) > LEAST_GAIN
+    let mut gains: Vec<f64> = candidate.iter().zip(replaced).map(|(own, other)| own.psnr - other.psnr).collect();
+    gains.sort_by(f64::total_cmp);
+    let middle = gains.len() / 2;
+    let median = if gains.len() % 2 == 1 { gains[middle] } else { 0.5 * (gains[middle - 1] + gains[middle]) };
+    mean_score(candidate) > mean_score(best)
+        && mean_score(candidate) - mean_score(replaced) > LEAST_GAIN
+        && median > 0.5 * LEAST_GAIN
 }
 
 /// Mean score, decibels.
@@ -234,4 +241,27 @@ pub fn render<X: From<RenderError>>(
         Ok((chosen.weighting.clone(), chosen))
     };
     render_chosen(scene, job, renderer, options, progress, choose, deliver)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcomes(scores: &[f64]) -> Vec<Outcome> {
+        let standing = Standing { gap: 0.1, outside: 0.5 };
+        let of = |&psnr: &f64| Outcome { source: 0, psnr, confidence: None, standing, copy: 10.0 };
+        scores.iter().map(of).collect()
+    }
+
+    #[test]
+    fn one_source_alone_does_not_decide() {
+        let first = outcomes(&[16.6, 14.5, 14.1]);
+        assert!(!is_better(&outcomes(&[17.3, 14.5, 14.1]), &first, &first), "one of three gains");
+        assert!(is_better(&outcomes(&[17.0, 14.6, 14.2]), &first, &first), "all gain");
+        assert!(!is_better(&outcomes(&[16.65, 14.55, 14.15]), &first, &first), "within the noise");
+        let best = outcomes(&[17.3, 15.0, 14.6]);
+        assert!(!is_better(&outcomes(&[17.0, 14.9, 14.6]), &best, &first), "another one is better");
+        let (four, more) = (outcomes(&[20.0; 4]), outcomes(&[20.0, 20.0, 20.2, 22.0]));
+        assert!(is_better(&more, &four, &four), "the median of four lies between the middle two");
+    }
 }
