@@ -27,6 +27,7 @@ mod made;
 mod oracle;
 mod samples;
 mod table;
+mod visit;
 
 use anyhow::{Context, bail, ensure};
 use made::Made;
@@ -34,23 +35,14 @@ use oracle::oracles;
 use samples::Colour;
 use std::path::{Path, PathBuf};
 use table::{Row, Target, table};
-use viewfuse_core::camera::Camera;
 use viewfuse_core::plane_sweep::blend::blend;
-use viewfuse_device::cpu::Cpu;
-use viewfuse_evaluate::protocol::{Draws, Protocol};
-use viewfuse_evaluate::without_masks;
-use viewfuse_field::On;
-use viewfuse_field::render::{RenderOptions, Stage};
-use viewfuse_field::training_free::{TargetPlanes, TrainingFree};
+use viewfuse_evaluate::protocol::Protocol;
+use viewfuse_field::training_free::TargetPlanes;
 use viewfuse_job::files::write_whole;
-use viewfuse_job::progress::Silent;
 use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::target_of;
-use viewfuse_scene::photographs::{Album, BackgroundChoice, scaled_size};
-use viewfuse_weighting::Weighting;
+use viewfuse_scene::photographs::Album;
+use visit::{SCHEME, visit};
 
-/// The scheme of all rows: the best on average over left-out sources.
-const SCHEME: &str = "distance:power=2";
 /// Largest difference between the picture that is put together here and the field's own, of 1.
 const MOST_DIFFERENCE: f32 = 2.0e-3;
 
@@ -106,58 +98,25 @@ fn measure(
     group: &str,
     rows: &mut Vec<Row>,
 ) -> anyhow::Result<()> {
-    let mut scene = Scene::open(folder)?;
-    let mut options = RenderOptions::default();
-    if protocol.hides_masks() {
-        scene = without_masks(&scene);
-        options.background = BackgroundChoice::None;
-    }
-    options.size = Some(scaled_size(&scene.views[0].camera, side).into());
-    let scenes = [scene];
-    let plan = protocol.plan(&scenes, Draws { seed: 0, trial_count: 1, target_count: most_targets }, 2)?;
-    let scene = &scenes[0];
-    let pairs: Vec<(&[usize], usize)> =
-        plan.jobs.iter().flat_map(|job| job.targets.iter().map(|target| (&job.sources[..], *target))).collect();
-    let step = pairs.len().div_ceil(most_targets).max(1);
-    for (sources, target) in pairs.into_iter().step_by(step) {
-        let album = Album::open(scene, sources.iter().copied().chain([target]), &Silent)?;
-        let field = TrainingFree::default();
-        let renderer = On { device: &Cpu, field: &field };
-        let mut stage = Stage::prepare(scene, &album, sources, &renderer, &options, &Silent)?;
-        let weighting = Weighting::open(SCHEME)?;
-        stage.weigh(&weighting, &Silent)?;
-        let frame = stage.frame(&weighting, &target_of(scene, target), &Silent)?;
-        let size = stage.picture_size(target)?;
-        let camera = scene.views[target].camera;
-        let camera = Camera { pinhole: camera.pinhole.resized(size[0], size[1])?, ..camera };
-        let relevance = stage.relevance(&weighting);
-        let targets = [(camera, frame.omission.weights)];
-        let planes = field.sweep.target_planes(&Cpu, &stage.images, &relevance, &targets, &Silent)?;
-        let planes = planes.first().context("no planes")?;
-        let depths = made.map(|made| made.depths(sources, target, scene.frame.scale)).transpose()?;
-        let truth = frame.truth.as_ref().context("no photograph to compare with")?;
-        let colours: Vec<Colour> =
-            truth.picture.pixels().map(|pixel| pixel.0.map(|level| f32::from(level) / 255.0)).collect();
-        let oracles = oracles(planes, &colours, depths.as_ref());
-        let opacity = check(planes, &oracles.base)?;
-        let alpha = match stage.images.has_silhouettes {
-            true => alpha(&album, target, size)?,
+    visit(Scene::open(folder)?, protocol, side, most_targets, |visit| {
+        let depths = made.map(|made| made.depths(visit.sources, visit.target, visit.scene.frame.scale)).transpose()?;
+        let colours = visit.photograph();
+        let oracles = oracles(visit.planes, &colours, depths.as_ref());
+        let opacity = check(visit.planes, &oracles.base)?;
+        let alpha = match visit.has_silhouettes {
+            true => alpha(visit.album, visit.target, visit.size)?,
             false => None,
         };
-        let seen = truth.seen.as_ref().map_or_else(
-            || vec![true; colours.len()],
-            |seen| seen.pixels().map(|pixel| pixel.0[0] == u8::MAX).collect(),
-        );
         let target = Target {
             truth: &colours,
-            seen: &seen,
+            seen: &visit.seen(),
             opacity: &opacity,
             alpha: alpha.as_deref(),
-            background: stage.images.background,
+            background: visit.background,
         };
-        rows.push(target.row(group, truth.psnr, &oracles));
-    }
-    Ok(())
+        rows.push(target.row(group, visit.truth.psnr, &oracles));
+        Ok(())
+    })
 }
 
 /// The field's opacity; fails if the picture that is put together here is not the field's own.
