@@ -106,10 +106,9 @@ fn a_library_that_is_not_tested_inside_has_no_tests_inside() {
 #[test]
 fn no_path_leads_out_of_the_repository() {
     let beside = concat!("../", "shared");
-    let mut paths: Vec<PathBuf> = ["tests/run", "tests/compare_pytorch", "tests/compare_pytorch_genvs", ".ci/run"]
-        .iter()
-        .map(|file| repository().join(file))
-        .collect();
+    let comparisons = ["", "_genvs", "_training"].map(|of| format!("tests/compare_pytorch{of}"));
+    let scripts = ["tests/run", ".ci/run"].map(str::to_owned).into_iter().chain(comparisons);
+    let mut paths: Vec<PathBuf> = scripts.map(|file| repository().join(file)).collect();
     for extension in ["rs", "toml", "md", "c", "h", "py"] {
         for folder in ["core", "vulkan", "host", "tests"] {
             paths.extend(files(&repository().join(folder), extension));
