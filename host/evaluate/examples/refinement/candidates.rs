@@ -28,7 +28,7 @@ const MOST_DIFFERENCE: f32 = 2.0e-3;
 pub(crate) struct Candidates {
     /// The scene.
     pub(crate) scene: String,
-    /// Columns of the picture.
+    /// All of them, row by row.
     pub(crate) pixels: Pixels,
     /// Which pixels count.
     pub(crate) seen: Vec<bool>,

@@ -95,7 +95,7 @@ impl Network {
         })
     }
 
-    /// How many numbers are learned.
+    /// How many numbers are learned, with those of inputs that a variant does not use.
     pub(crate) fn parameter_count(&self) -> usize {
         let unused = |layer: usize| {
             let heads = [(4..6, self.parts.planes), (6..8, self.parts.blend)];
