@@ -51,7 +51,7 @@ pub(crate) fn train(parts: Parts, learning: &Learning, pictures: &[&Candidates])
 pub(crate) fn loss(network: &Network, learning: &Learning, pictures: &[&Candidates], step: u32) -> Result<Tensor> {
     let draw = |picture: usize, index: u32| {
         let word = threefry_2x32([learning.seed as u32, step], [picture as u32, index])[0];
-        move |count: usize| (u64::from(word) * count as u64 >> 32) as u32
+        move |count: usize| ((u64::from(word) * count as u64) >> 32) as u32
     };
     let mut sum = Tensor::zeros((), candle_core::DType::F32, &Device::Cpu)?;
     for place in 0..PICTURES {
