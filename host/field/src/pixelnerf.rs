@@ -9,6 +9,8 @@ mod efforts;
 mod encoder;
 mod memory;
 mod network;
+mod node_picture;
+mod node_ray;
 mod open;
 mod options;
 mod parameters;
@@ -222,7 +224,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let renderer = self.renderer(&views, request, options, progress);
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
-        let step = omissions.empty_space;
+        let step = if omissions.nodes > 0 { 0 } else { omissions.empty_space };
         let seen = match step > 1 {
             true => {
                 let mut probes = Evaluated::default();
@@ -232,7 +234,10 @@ impl<D: Device> Prepared for Views<'_, D> {
             }
             false => None,
         };
-        let mut rendered = renderer.picture(&mut workspace, seen.as_ref(), &mut evaluated)?;
+        let mut rendered = match omissions.nodes {
+            0 => renderer.picture(&mut workspace, seen.as_ref(), &mut evaluated)?,
+            _ => renderer.picture_between_nodes(&mut workspace, &mut evaluated)?,
+        };
         along_axis(&mut rendered, &renderer.cast);
         let rows_a_sample = request.views.len() * self.field.architecture.injected_count;
         self.counts.add(rows_a_sample, omissions.latent_layers, &evaluated);

@@ -1,0 +1,230 @@
+//! A picture from rays whose samples are interpolated between nodes: which nodes of which rays are evaluated.
+//!
+//! Grids of rays follow one another, the widest first. On a ray of the first grid all nodes are candidates, on the others those
+//! that its neighbours on the grid before did not find empty. Candidates are evaluated some at a time, from the front, until
+//! the ray is opaque.
+
+use super::network::Workspace;
+use super::node_ray::{NodeRay, bits};
+use super::pass::{Evaluated, Renderer};
+use super::picture::{between, widest_step};
+use crate::{FieldError, Rendered};
+use std::mem::replace;
+use viewfuse_core::pixelnerf::radiance;
+use viewfuse_core::rays::{RayPoint, TargetRay, cast_ray};
+use viewfuse_device::Device;
+use viewfuse_device::parallel::for_each_row_of_two;
+
+/// The most nodes on a ray.
+pub(super) const MOST_NODES: u32 = 128;
+/// The widest first grid, in pixels, and the rows and columns that it has at least.
+const WIDEST_FIRST_STEP: u32 = 8;
+const LEAST_FIRST_GRID: u32 = 16;
+/// A part of a ray is empty if its opacity is below this.
+const LEAST_SHARE: f32 = 1.0 / 128.0;
+/// Candidates of a ray at a time.
+const AT_ONCE: usize = 4;
+
+/// A picture so far.
+struct Unfinished {
+    picture: Rendered,
+    /// `[pixel]`: bit `node` says that the ray is empty there.
+    empty: Vec<u128>,
+}
+
+/// Rays with the values of their nodes.
+struct Marched {
+    rays: Vec<TargetRay>,
+    /// `[ray][node]`.
+    values: Vec<[f32; 4]>,
+    /// `[ray]`: bit `node` says that it was evaluated.
+    known: Vec<u128>,
+    /// Transmittance behind the last evaluated node.
+    transmittances: Vec<f32>,
+}
+
+impl<D: Device> Renderer<'_, D> {
+    /// The whole picture; depths are along the rays.
+    pub(super) fn picture_between_nodes(
+        &self,
+        workspace: &mut Workspace<D>,
+        evaluated: &mut [Evaluated; 2],
+    ) -> Result<Rendered, FieldError> {
+        let (width, height) = (self.cast.camera.width, self.cast.camera.height);
+        let count = (width * height) as usize;
+        let (colours, depths) = (vec![[0.0; 4]; count], vec![0.0; count]);
+        let picture = Rendered { colours, depths, confidences: Vec::new(), width, height };
+        let mut so_far = Unfinished { picture, empty: vec![0; count] };
+        let (most_difference, far_difference) = self.interpolation();
+        let most_step = widest_step(width.min(height));
+        let mut step = first_step(width.min(height));
+        let grid = |step: u32| {
+            let rows = (0..height).step_by(step as usize);
+            rows.flat_map(move |row| (0..width).step_by(step as usize).map(move |column| [column, row]))
+        };
+        let first: Vec<u32> = grid(step).map(|[column, row]| row * width + column).collect();
+        let candidates = vec![self.all_nodes(); first.len()];
+        self.render_nodes(workspace, &first, &candidates, evaluated, &mut so_far)?;
+        while step > 1 {
+            let half = step / 2;
+            let (mut pixels, mut candidates) = (Vec::new(), Vec::new());
+            for [column, row] in grid(half).filter(|place| place.iter().any(|place| !place.is_multiple_of(step))) {
+                let pixel = (row * width + column) as usize;
+                let empty = so_far.empty_around([column, row], step);
+                let is_alike = || between(&so_far.picture, [column, row], step, most_difference, far_difference);
+                match (step <= most_step).then(is_alike).flatten() {
+                    Some((colour, depth)) => {
+                        so_far.picture.colours[pixel] = colour;
+                        so_far.picture.depths[pixel] = depth;
+                        so_far.empty[pixel] = empty;
+                    }
+                    None => {
+                        pixels.push(pixel as u32);
+                        // One node to either side of what is not empty is a candidate, too.
+                        let not_empty = self.all_nodes() & !empty;
+                        candidates.push((not_empty | not_empty << 1 | not_empty >> 1) & self.all_nodes());
+                    }
+                }
+            }
+            self.render_nodes(workspace, &pixels, &candidates, evaluated, &mut so_far)?;
+            step = half;
+        }
+        for (evaluated, samples) in evaluated.iter_mut().zip(self.sampling.counts()) {
+            evaluated.samples += count as u64 * u64::from(samples);
+        }
+        Ok(so_far.picture)
+    }
+
+    fn all_nodes(&self) -> u128 {
+        bits(self.omissions.nodes as usize)
+    }
+
+    /// Renders some pixels of a picture, evaluating candidates only.
+    fn render_nodes(
+        &self,
+        workspace: &mut Workspace<D>,
+        pixels: &[u32],
+        candidates: &[u128],
+        evaluated: &mut [Evaluated; 2],
+        so_far: &mut Unfinished,
+    ) -> Result<(), FieldError> {
+        let count = self.omissions.nodes as usize;
+        let mut marched = self.march(workspace, pixels, candidates)?;
+        let pass = if self.sampling.counts()[1] > 0 { 1 } else { 0 };
+        evaluated[pass].evaluated += marched.known.iter().map(|known| u64::from(known.count_ones())).sum::<u64>();
+        let least = self.least_density();
+        for (ray, pixel) in pixels.iter().enumerate() {
+            let nodes = &marched.values[ray * count..(ray + 1) * count];
+            let is_empty = |node: &usize| marched.known[ray] >> node & 1 != 0 && nodes[*node][3] < least;
+            let found = (0..count).filter(is_empty).fold(0, |empty, node| empty | 1 << node);
+            so_far.empty[*pixel as usize] = found | self.all_nodes() & !candidates[ray];
+        }
+        let mut results = vec![([0.0; 4], 0.0); pixels.len()];
+        let Marched { rays, values, known, transmittances } = &mut marched;
+        let mut node_rays: Vec<&mut [[f32; 4]]> = values.chunks_mut(count).collect();
+        let (sampling, background, termination) = (&self.sampling, &self.background, self.termination());
+        for_each_row_of_two(&mut node_rays, &mut results, 1, 16, |ray, nodes, result| {
+            let is_opaque = transmittances[ray] <= termination;
+            let node_ray = NodeRay::new(rays[ray], nodes[0], known[ray], is_opaque);
+            let found = node_ray.composite(pixels[ray], sampling, background);
+            let [red, green, blue] = found.channels;
+            result[0] = ([red, green, blue, found.opacity], found.depth);
+        });
+        for (pixel, (colour, depth)) in pixels.iter().zip(results) {
+            so_far.picture.colours[*pixel as usize] = colour;
+            so_far.picture.depths[*pixel as usize] = depth;
+        }
+        Ok(())
+    }
+
+    /// Evaluates the candidates along rays until these are opaque.
+    fn march(
+        &self,
+        workspace: &mut Workspace<D>,
+        pixels: &[u32],
+        candidates: &[u128],
+    ) -> Result<Marched, FieldError> {
+        let count = self.omissions.nodes as usize;
+        let spacing = (self.cast.far - self.cast.near) / count as f32;
+        let rays: Vec<TargetRay> = pixels.iter().map(|pixel| cast_ray(&self.cast, *pixel)).collect();
+        let mut values = vec![[0.0, 0.0, 0.0, -1.0]; pixels.len() * count];
+        let (mut known, mut left) = (vec![0; pixels.len()], candidates.to_vec());
+        let mut transmittances = vec![1.0_f32; pixels.len()];
+        loop {
+            let mut points = Vec::new();
+            for (ray, left) in left.iter_mut().enumerate() {
+                for _ in 0..AT_ONCE {
+                    if *left == 0 || transmittances[ray] <= self.termination() {
+                        break;
+                    }
+                    let node = left.trailing_zeros() as usize;
+                    *left &= *left - 1;
+                    known[ray] |= 1 << node;
+                    points.push(point(&rays[ray], ray, node, count));
+                }
+            }
+            if points.is_empty() {
+                return Ok(Marched { rays, values, known, transmittances });
+            }
+            for some in points.chunks(workspace.point_count as usize) {
+                let raw = self.ask_at(workspace, some)?;
+                for (point, raw) in some.iter().zip(raw.as_chunks::<4>().0) {
+                    let [red, green, blue, _] = radiance(raw, point);
+                    values[point.sample as usize] = [red, green, blue, raw[3]];
+                    transmittances[point.sample as usize / count] *= (-raw[3].max(0.0) * spacing).exp();
+                }
+            }
+        }
+    }
+
+    /// The second pass's raw outputs at points, four each; more than there are points.
+    fn ask_at(&self, workspace: &mut Workspace<D>, points: &[RayPoint]) -> Result<Vec<f32>, FieldError> {
+        self.progress.check()?;
+        let own = replace(&mut workspace.points, self.device.upload(points)?);
+        let asked = self.fine.ask(workspace, self.views, points.len() as u32);
+        workspace.points = own;
+        asked?;
+        Ok(self.device.download(&workspace.raw)?)
+    }
+
+    /// Transmittance at which a ray counts as opaque.
+    fn termination(&self) -> f32 {
+        self.early_termination
+    }
+
+    /// The density below which a node is empty.
+    fn least_density(&self) -> f32 {
+        let spacing = (self.cast.far - self.cast.near) / self.omissions.nodes as f32;
+        -(-LEAST_SHARE).ln_1p() / spacing
+    }
+}
+
+impl Unfinished {
+    /// The nodes at which all neighbours of a pixel on the grid of `step` are empty. Neighbours outside count as those
+    /// inside.
+    fn empty_around(&self, [column, row]: [u32; 2], step: u32) -> u128 {
+        let Rendered { width, height, .. } = self.picture;
+        let around = |place: u32, side: u32| {
+            let (before, last) = (place / step * step, (side - 1) / step * step);
+            [before, if place.is_multiple_of(step) { before } else { (before + step).min(last) }]
+        };
+        let (columns, rows) = (around(column, width), around(row, height));
+        let places = rows.iter().flat_map(|row| columns.map(|column| (row * width + column) as usize));
+        places.fold(u128::MAX, |empty, pixel| empty & self.empty[pixel])
+    }
+}
+
+fn point(ray: &TargetRay, index: usize, node: usize, count: usize) -> RayPoint {
+    let depth = NodeRay::depth(ray, node, count);
+    let position = [0, 1, 2].map(|axis| ray.origin[axis] + ray.direction[axis] * depth);
+    RayPoint { position, length: 0.0, direction: ray.direction, sample: (index * count + node) as u32 }
+}
+
+/// The step of the first grid: a power of two.
+fn first_step(side: u32) -> u32 {
+    let mut step = 2;
+    while step < WIDEST_FIRST_STEP && side >= 2 * step * LEAST_FIRST_GRID {
+        step *= 2;
+    }
+    step
+}
