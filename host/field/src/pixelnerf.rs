@@ -278,7 +278,7 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn record(&self) -> Record {
         let Counts { latent_rows, mapped_rows, passes: [coarse, fine] } = self.counts;
-        let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, .. } =
+        let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, nodes, .. } =
             self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
@@ -286,14 +286,14 @@ impl<D: Device> Prepared for Views<'_, D> {
             line("latent layers at points", latent_layers, mapped_rows, latent_rows, "rounding"),
             line(
                 "first-pass samples",
-                empty_space > 1 || interpolation > 0.0,
+                empty_space > 1 || interpolation > 0.0 || nodes > 0,
                 omitted(coarse),
                 coarse.samples,
                 "objects between the probes; see `viewfuse pareto`",
             ),
             line(
                 "second-pass samples",
-                empty_rays || empty_parts || hidden_samples,
+                empty_rays || empty_parts || hidden_samples || nodes > 0,
                 omitted(fine),
                 fine.samples,
                 "surfaces that the first pass missed; those behind have at most the transmittance of early termination",

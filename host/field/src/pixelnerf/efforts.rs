@@ -8,14 +8,14 @@ use crate::Effort;
 /// around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
 /// (the example `efforts` of `viewfuse-evaluate`).
 const NODES: [(u32, f32, f32, f32); 8] = [
-    (12, 0.25, 0.036, 0.018),
-    (16, 0.2, 0.026, 0.02),
-    (20, 0.2, 0.016, 0.022),
-    (24, 0.2, 0.0105, 0.024),
-    (32, 0.15, 0.0084, 0.028),
-    (40, 0.12, 0.007, 0.033),
-    (48, 0.08, 0.0053, 0.043),
-    (64, 0.06, 0.0046, 0.06),
+    (12, 0.25, 0.03, 0.01),
+    (16, 0.2, 0.02, 0.012),
+    (20, 0.2, 0.015, 0.014),
+    (24, 0.2, 0.012, 0.016),
+    (32, 0.15, 0.008, 0.02),
+    (40, 0.12, 0.007, 0.025),
+    (48, 0.1, 0.0065, 0.03),
+    (64, 0.06, 0.006, 0.045),
 ];
 /// Both passes, without nodes.
 const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [

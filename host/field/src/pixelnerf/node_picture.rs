@@ -18,10 +18,10 @@ use viewfuse_device::parallel::for_each_row_of_two;
 /// The most nodes on a ray.
 pub(super) const MOST_NODES: u32 = 128;
 /// The widest first grid, in pixels, and the rows and columns that it has at least.
-const WIDEST_FIRST_STEP: u32 = 8;
-const LEAST_FIRST_GRID: u32 = 16;
-/// A part of a ray is empty if its opacity is below this.
-const LEAST_SHARE: f32 = 1.0 / 128.0;
+const WIDEST_FIRST_STEP: u32 = 16;
+const LEAST_FIRST_GRID: u32 = 8;
+/// A node is empty if a whole ray of its density has less optical depth than this.
+const LEAST_OPTICAL_DEPTH: f32 = 0.5;
 /// Candidates of a ray at a time.
 const AT_ONCE: usize = 4;
 
@@ -122,7 +122,7 @@ impl<D: Device> Renderer<'_, D> {
         let mut results = vec![([0.0; 4], 0.0); pixels.len()];
         let Marched { rays, values, known, transmittances } = &mut marched;
         let mut node_rays: Vec<&mut [[f32; 4]]> = values.chunks_mut(count).collect();
-        let (sampling, background, termination) = (&self.sampling, &self.background, self.termination());
+        let (sampling, background, termination) = (&self.sampling, &self.background, self.early_termination);
         for_each_row_of_two(&mut node_rays, &mut results, 1, 16, |ray, nodes, result| {
             let is_opaque = transmittances[ray] <= termination;
             let node_ray = NodeRay::new(rays[ray], nodes[0], known[ray], is_opaque);
@@ -154,7 +154,7 @@ impl<D: Device> Renderer<'_, D> {
             let mut points = Vec::new();
             for (ray, left) in left.iter_mut().enumerate() {
                 for _ in 0..AT_ONCE {
-                    if *left == 0 || transmittances[ray] <= self.termination() {
+                    if *left == 0 || transmittances[ray] <= self.early_termination {
                         break;
                     }
                     let node = left.trailing_zeros() as usize;
@@ -187,15 +187,9 @@ impl<D: Device> Renderer<'_, D> {
         Ok(self.device.download(&workspace.raw)?)
     }
 
-    /// Transmittance at which a ray counts as opaque.
-    fn termination(&self) -> f32 {
-        self.early_termination
-    }
-
     /// The density below which a node is empty.
     fn least_density(&self) -> f32 {
-        let spacing = (self.cast.far - self.cast.near) / self.omissions.nodes as f32;
-        -(-LEAST_SHARE).ln_1p() / spacing
+        LEAST_OPTICAL_DEPTH / (self.cast.far - self.cast.near)
     }
 }
 

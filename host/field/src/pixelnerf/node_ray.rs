@@ -25,8 +25,8 @@ impl<'a> NodeRay<'a> {
     /// Fills the nodes beside known ones, and all behind the last one if nothing behind it is seen.
     pub(super) fn new(ray: TargetRay, values: &'a mut [[f32; 4]], mut known: u128, is_opaque: bool) -> NodeRay<'a> {
         let count = values.len();
-        let last = 127 - known.leading_zeros() as usize;
         if is_opaque && known != 0 {
+            let last = 127 - known.leading_zeros() as usize;
             let behind = values[last];
             values[last + 1..].fill(behind);
             known |= bits(count) & !bits(last + 1);
@@ -165,4 +165,64 @@ fn cubic_weights(share: f32) -> [f32; 4] {
         before * own * behind / 2.0,
         -before * own * left / 6.0,
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RAY: TargetRay = TargetRay { origin: [0.0; 3], near: 1.0, direction: [0.0, 0.0, 1.0], far: 2.0 };
+    const WHITE: [f32; 3] = [1.0; 3];
+
+    /// 16 nodes whose density follows the depth behind the near bound.
+    fn nodes(density: impl Fn(f32) -> f32) -> Vec<[f32; 4]> {
+        (0..16).map(|node| [0.25, 0.5, 0.75, density(NodeRay::depth(&RAY, node, 16) - 1.0)]).collect()
+    }
+
+    #[test]
+    fn cubic_densities_are_exact_and_never_negative() {
+        let cubic = |depth: f32| 2.0 - 3.0 * depth + 8.0 * depth.powi(2) - 5.0 * depth.powi(3);
+        let mut values = nodes(cubic);
+        let ray = NodeRay::new(RAY, &mut values, bits(16), false);
+        for depth in [1.1, 1.25, 1.333, 1.6, 1.9] {
+            let [red, _, blue, density] = ray.value(depth);
+            assert!((density - cubic(depth - 1.0)).abs() < 1.0e-5, "{density} at {depth}");
+            assert!((red - 0.25).abs() < 1.0e-6 && (blue - 0.75).abs() < 1.0e-6);
+        }
+        let mut values = nodes(|_| -3.0);
+        assert_eq!(NodeRay::new(RAY, &mut values, bits(16), false).value(1.5)[3], 0.0);
+    }
+
+    #[test]
+    fn a_uniform_mist_has_its_closed_form() {
+        let density = 1.5;
+        for sampling in [Sampling::default(), Sampling { importance_count: 0, depth_count: 0, ..Sampling::default() }] {
+            let mut values = nodes(|_| density);
+            let found = NodeRay::new(RAY, &mut values, bits(16), false).composite(7, &sampling, &WHITE);
+            // The first sample stands behind the near bound, by a 64th of the ray at most.
+            let opacity = 1.0 - (-density).exp();
+            assert!((found.opacity - opacity).abs() < density / 64.0, "{} {opacity}", found.opacity);
+            let expected = 0.25 * found.opacity + 1.0 - found.opacity;
+            assert!((found.channels[0] - expected).abs() < 1.0e-5, "{:?}", found.channels);
+            assert!(found.depth > 1.3 && found.depth < 1.5, "{}", found.depth);
+        }
+    }
+
+    #[test]
+    fn nodes_that_were_not_evaluated_are_empty_before_a_surface_and_hidden_behind_it() {
+        // A wall of which two nodes are known.
+        let wall = |is_opaque: bool| {
+            let mut values = nodes(|_| 400.0);
+            let known = 0b11 << 6;
+            let ray = NodeRay::new(RAY, &mut values, known, is_opaque);
+            (ray.value(1.2)[3], ray.value(1.9)[3], ray.composite(0, &Sampling::default(), &WHITE))
+        };
+        let (before, behind, picture) = wall(true);
+        assert_eq!((before, behind), (0.0, 400.0));
+        assert!(picture.opacity > 0.999 && picture.depth > 1.3 && picture.depth < 1.45, "{picture:?}");
+        assert_eq!(wall(false).1, 0.0);
+        let mut values = nodes(|_| 400.0);
+        let nothing = NodeRay::new(RAY, &mut values, 0, false).composite(0, &Sampling::default(), &WHITE);
+        assert_eq!((nothing.channels, nothing.opacity, nothing.depth), (WHITE, 0.0, 2.0));
+    }
 }
