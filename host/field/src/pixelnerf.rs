@@ -278,8 +278,9 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn record(&self) -> Record {
         let Counts { latent_rows, mapped_rows, passes: [coarse, fine] } = self.counts;
-        let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, nodes, .. } =
-            self.options.omissions;
+        let Omissions {
+            latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, nodes, ..
+        } = self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
         let left_out = vec![

@@ -15,49 +15,25 @@ const LEAST_TRANSMITTANCE: f32 = 1.0e-4;
 /// The values of a ray at evenly spaced nodes.
 pub(super) struct NodeRay<'a> {
     pub(super) ray: TargetRay,
-    /// `[node]` of red, green, blue from 0 to 1, and density before it is rectified; of unknown nodes without meaning.
-    values: &'a [[f32; 4]],
-    /// Bit `node`: whether it is known.
-    known: u128,
+    /// `[node]` of red, green, blue from 0 to 1, and density before it is rectified.
+    pub(super) values: &'a [[f32; 4]],
 }
 
-impl<'a> NodeRay<'a> {
-    /// Fills the nodes beside known ones, and all behind the last one if nothing behind it is seen.
-    pub(super) fn new(ray: TargetRay, values: &'a mut [[f32; 4]], mut known: u128, is_opaque: bool) -> NodeRay<'a> {
-        let count = values.len();
-        if is_opaque && known != 0 {
-            let last = 127 - known.leading_zeros() as usize;
-            let behind = values[last];
-            values[last + 1..].fill(behind);
-            known |= bits(count) & !bits(last + 1);
-        }
-        let beside = (known << 1 | known >> 1) & bits(count) & !known;
-        for node in (0..count).filter(|node| beside >> node & 1 != 0) {
-            let from = if node > 0 && known >> (node - 1) & 1 != 0 { node - 1 } else { node + 1 };
-            values[node] = values[from];
-        }
-        NodeRay { ray, values, known: known | beside }
-    }
-
+impl NodeRay<'_> {
     /// Depth of a node.
     pub(super) fn depth(ray: &TargetRay, node: usize, count: usize) -> f32 {
         stratified_depth(ray.near, ray.far, node as u32, count as u32, 0.5)
     }
 
-    /// Red, green, blue from 0 to 1 and the rectified density at a depth, by cubic polynomials, or straight lines beside
-    /// unknown nodes; no density between those.
+    /// Red, green, blue from 0 to 1 and the rectified density at a depth, by cubic polynomials, at the ends by straight lines.
     fn value(&self, depth: f32) -> [f32; 4] {
         let count = self.values.len();
         let place = (depth - self.ray.near) / (self.ray.far - self.ray.near) * count as f32 - 0.5;
         let left = clamp(place, 0.0, (count - 1) as f32) as usize;
         let right = (left + 1).min(count - 1);
         let share = clamp(place - left as f32, 0.0, 1.0);
-        let is_known = |node: usize| self.known >> node & 1 != 0;
-        if !is_known(left) || !is_known(right) {
-            return [0.0; 4];
-        }
         let (a, b) = (self.values[left], self.values[right]);
-        let value = if left > 0 && right + 1 < count && is_known(left - 1) && is_known(right + 1) {
+        let value = if left > 0 && right + 1 < count {
             let weights = cubic_weights(share);
             let (before, behind) = (self.values[left - 1], self.values[right + 1]);
             [0, 1, 2, 3].map(|channel| {
@@ -75,16 +51,16 @@ impl<'a> NodeRay<'a> {
     pub(super) fn composite(&self, pixel: u32, sampling: &Sampling, background: &[f32; 3]) -> Composite<3> {
         let TargetRay { near, far, .. } = self.ray;
         let empty = Compositor::<3>::START.finish(background, far);
-        if self.known == 0 {
-            return empty;
-        }
+        let is_dense = |value: &[f32; 4]| value[3] > 0.0;
+        let ends = (self.values.iter().position(is_dense), self.values.iter().rposition(is_dense));
+        let (Some(first_node), Some(last_node)) = ends else { return empty };
         let words = [sampling.seed as u32, (sampling.seed >> 32) as u32];
         let count = sampling.coarse_count;
         let block = CoarseBlock { seed: words, sample_count: count, jitter: sampling.jitter };
-        // Only the samples between known nodes.
+        // Only the samples up to a node before and behind those with a density.
         let node_count = self.values.len() as u32;
-        let first = (self.known.trailing_zeros() * count / node_count).saturating_sub(1);
-        let last = ((128 - self.known.leading_zeros()) * count).div_ceil(node_count).min(count - 1);
+        let first = (first_node as u32).saturating_sub(1) * count / node_count;
+        let last = ((last_node as u32 + 2) * count).div_ceil(node_count).min(count - 1);
         let mut depths: Vec<f32> =
             (first..=last).map(|sample| coarse_depth(&self.ray, pixel, sample, &block)).collect();
         let behind = if last + 1 < count { coarse_depth(&self.ray, pixel, last + 1, &block) } else { far };
@@ -123,7 +99,7 @@ impl<'a> NodeRay<'a> {
             let [deviation, _] = random_draw(pixel, index, &block);
             added.push(clamp(centre + deviation * sampling.depth_deviation, near, far));
         }
-        // Outside of the known nodes there is nothing to see.
+        // Outside there is nothing to see.
         let front = depths[0];
         depths.extend(added.into_iter().filter(|depth| (front..behind).contains(depth)));
         depths.sort_unstable_by(f32::total_cmp);
@@ -151,20 +127,10 @@ impl<'a> NodeRay<'a> {
     }
 }
 
-/// The lowest `count` bits.
-pub(super) fn bits(count: usize) -> u128 {
-    if count >= 128 { u128::MAX } else { (1 << count) - 1 }
-}
-
 /// Weights of four nodes at equal distances for a place between the middle two, by the cubic polynomial through them.
 fn cubic_weights(share: f32) -> [f32; 4] {
     let (before, own, left, behind) = (share + 1.0, share, 1.0 - share, 2.0 - share);
-    [
-        -own * left * behind / 6.0,
-        before * left * behind / 2.0,
-        before * own * behind / 2.0,
-        -before * own * left / 6.0,
-    ]
+    [-own * left * behind / 6.0, before * left * behind / 2.0, before * own * behind / 2.0, -before * own * left / 6.0]
 }
 
 #[cfg(test)]
@@ -182,23 +148,21 @@ mod tests {
     #[test]
     fn cubic_densities_are_exact_and_never_negative() {
         let cubic = |depth: f32| 2.0 - 3.0 * depth + 8.0 * depth.powi(2) - 5.0 * depth.powi(3);
-        let mut values = nodes(cubic);
-        let ray = NodeRay::new(RAY, &mut values, bits(16), false);
+        let values = nodes(cubic);
+        let ray = NodeRay { ray: RAY, values: &values };
         for depth in [1.1, 1.25, 1.333, 1.6, 1.9] {
             let [red, _, blue, density] = ray.value(depth);
             assert!((density - cubic(depth - 1.0)).abs() < 1.0e-5, "{density} at {depth}");
             assert!((red - 0.25).abs() < 1.0e-6 && (blue - 0.75).abs() < 1.0e-6);
         }
-        let mut values = nodes(|_| -3.0);
-        assert_eq!(NodeRay::new(RAY, &mut values, bits(16), false).value(1.5)[3], 0.0);
+        assert_eq!(NodeRay { ray: RAY, values: &nodes(|_| -3.0) }.value(1.5)[3], 0.0);
     }
 
     #[test]
     fn a_uniform_mist_has_its_closed_form() {
         let density = 1.5;
         for sampling in [Sampling::default(), Sampling { importance_count: 0, depth_count: 0, ..Sampling::default() }] {
-            let mut values = nodes(|_| density);
-            let found = NodeRay::new(RAY, &mut values, bits(16), false).composite(7, &sampling, &WHITE);
+            let found = NodeRay { ray: RAY, values: &nodes(|_| density) }.composite(7, &sampling, &WHITE);
             // The first sample stands behind the near bound, by a 64th of the ray at most.
             let opacity = 1.0 - (-density).exp();
             assert!((found.opacity - opacity).abs() < density / 64.0, "{} {opacity}", found.opacity);
@@ -209,20 +173,11 @@ mod tests {
     }
 
     #[test]
-    fn nodes_that_were_not_evaluated_are_empty_before_a_surface_and_hidden_behind_it() {
-        // A wall of which two nodes are known.
-        let wall = |is_opaque: bool| {
-            let mut values = nodes(|_| 400.0);
-            let known = 0b11 << 6;
-            let ray = NodeRay::new(RAY, &mut values, known, is_opaque);
-            (ray.value(1.2)[3], ray.value(1.9)[3], ray.composite(0, &Sampling::default(), &WHITE))
-        };
-        let (before, behind, picture) = wall(true);
-        assert_eq!((before, behind), (0.0, 400.0));
-        assert!(picture.opacity > 0.999 && picture.depth > 1.3 && picture.depth < 1.45, "{picture:?}");
-        assert_eq!(wall(false).1, 0.0);
-        let mut values = nodes(|_| 400.0);
-        let nothing = NodeRay::new(RAY, &mut values, 0, false).composite(0, &Sampling::default(), &WHITE);
+    fn a_wall_and_nothing() {
+        let wall = nodes(|depth| if depth < 0.4 { -50.0 } else { 400.0 });
+        let found = NodeRay { ray: RAY, values: &wall }.composite(0, &Sampling::default(), &WHITE);
+        assert!(found.opacity > 0.999 && found.depth > 1.33 && found.depth < 1.47, "{found:?}");
+        let nothing = NodeRay { ray: RAY, values: &nodes(|_| -1.0) }.composite(0, &Sampling::default(), &WHITE);
         assert_eq!((nothing.channels, nothing.opacity, nothing.depth), (WHITE, 0.0, 2.0));
     }
 }
