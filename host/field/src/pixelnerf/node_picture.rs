@@ -134,7 +134,6 @@ impl<D: Device> Renderer<'_, D> {
             so_far.empty[*pixel as usize] = found | self.all_nodes() & !candidates[ray];
             so_far.keep(*pixel as usize, nodes);
         }
-        let mut results = vec![([0.0; 4], 0.0); pixels.len()];
         let (sampling, background, Marched { rays, values, .. }) = (&self.sampling, &self.background, &marched);
         let results = map(pixels.len(), 16, |ray| {
             let node_ray = NodeRay { ray: rays[ray], values: &values[ray * count..(ray + 1) * count] };
@@ -160,7 +159,7 @@ impl<D: Device> Renderer<'_, D> {
         let count = self.omissions.nodes as usize;
         let spacing = (self.cast.far - self.cast.near) / count as f32;
         let rays: Vec<TargetRay> = pixels.iter().map(|pixel| cast_ray(&self.cast, *pixel)).collect();
-        let (mut known, mut left) = (vec![0; pixels.len()], candidates.to_vec());
+        let (mut known, mut left) = (vec![0_u128; pixels.len()], candidates.to_vec());
         let mut transmittances = vec![1.0_f32; pixels.len()];
         loop {
             let mut points = Vec::new();
