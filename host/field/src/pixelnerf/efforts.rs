@@ -7,15 +7,16 @@ use crate::Effort;
 /// Nodes between which samples are interpolated, in 64ths of the samples of the first pass, with the largest difference between the rays
 /// around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
 /// (the example `efforts` of `viewfuse-evaluate`).
-const NODES: [(u32, f32, f32, f32); 8] = [
+const NODES: [(u32, f32, f32, f32); 9] = [
     (12, 0.25, 0.03, 0.01),
-    (16, 0.2, 0.02, 0.012),
-    (20, 0.2, 0.015, 0.014),
-    (24, 0.2, 0.012, 0.016),
-    (32, 0.15, 0.008, 0.02),
-    (40, 0.12, 0.007, 0.025),
-    (48, 0.1, 0.0065, 0.03),
-    (64, 0.06, 0.006, 0.045),
+    (16, 0.2, 0.021, 0.012),
+    (20, 0.2, 0.0167, 0.014),
+    (24, 0.2, 0.0135, 0.017),
+    (32, 0.15, 0.0092, 0.021),
+    (36, 0.13, 0.0078, 0.024),
+    (40, 0.12, 0.0068, 0.028),
+    (48, 0.1, 0.0054, 0.04),
+    (64, 0.06, 0.0036, 0.09),
 ];
 /// Both passes, without nodes.
 const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
