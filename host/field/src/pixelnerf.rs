@@ -263,10 +263,11 @@ impl<D: Device> Prepared for Views<'_, D> {
         &mut self,
         request: &Request<'_>,
         pixels: &[u32],
-        tolerance: f32,
+        _tolerance: f32,
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
-        let options = efforts::of_pixels(&self.field.options, tolerance);
+        // Whatever the tolerance: what leaves out empty parts of rays misses mist in its own check.
+        let options = efforts::exact(&self.field.options);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
         let views = self.used(request.views, &request.view_weights())?;
         let renderer = self.renderer(&views, request, options, progress);

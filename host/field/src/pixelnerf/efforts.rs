@@ -26,12 +26,10 @@ const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
         0.0021,
         0.32,
     ),
-    ("both passes, empty parts left out", Omissions { interpolation: 0.02, ..PARTS }, PARTS_ERROR, 0.42),
+    ("both passes, empty parts left out", Omissions { interpolation: 0.02, ..PARTS }, 0.0014, 0.42),
 ];
 /// Second-pass samples in empty parts of rays are left out; rays stay independent of one another.
 const PARTS: Omissions = Omissions { empty_space: 0, ..ALL };
-/// Its typical error.
-const PARTS_ERROR: f32 = 0.0014;
 const ALL: Omissions = Omissions::ALL;
 
 /// The efforts of a network with these options, the cheapest first. Counts of samples are shares of the options'. Whether
@@ -60,14 +58,4 @@ pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> 
 pub(super) fn exact(options: &PixelNerfOptions) -> PixelNerfOptions {
     let Omissions { unused_views, latent_layers, .. } = options.omissions;
     PixelNerfOptions { omissions: Omissions { unused_views, latent_layers, ..Omissions::NONE }, ..*options }
-}
-
-/// For single pixels whose error is typically at most `tolerance`.
-pub(super) fn of_pixels(options: &PixelNerfOptions, tolerance: f32) -> PixelNerfOptions {
-    let exact = exact(options);
-    if tolerance < PARTS_ERROR {
-        return exact;
-    }
-    let Omissions { unused_views, latent_layers, .. } = exact.omissions;
-    PixelNerfOptions { omissions: Omissions { unused_views, latent_layers, ..PARTS }, ..exact }
 }

@@ -25,8 +25,9 @@ const LEAST_FIRST_GRID: u32 = 8;
 const LEAST_OPTICAL_DEPTH: [f32; 2] = [512.0, 1.0];
 /// A node that nothing is known of.
 const EMPTY: [f32; 4] = [0.0; 4];
-/// Candidates of a ray at a time.
+/// Candidates of a ray at a time at least, and of all rays: fewer keep no device busy.
 const AT_ONCE: usize = 4;
+const LEAST_POINTS: usize = 4096;
 
 /// A picture so far.
 struct Unfinished {
@@ -163,8 +164,11 @@ impl<D: Device> Renderer<'_, D> {
         let mut transmittances = vec![1.0_f32; pixels.len()];
         loop {
             let mut points = Vec::new();
+            let is_left = |(left, transmittance): (&u128, &f32)| *left != 0 && *transmittance > self.early_termination;
+            let ray_count = left.iter().zip(&transmittances).filter(|ray| is_left(*ray)).count();
+            let at_once = AT_ONCE.max(LEAST_POINTS / ray_count.max(1));
             for (ray, left) in left.iter_mut().enumerate() {
-                for _ in 0..AT_ONCE {
+                for _ in 0..at_once {
                     if *left == 0 || transmittances[ray] <= self.early_termination {
                         break;
                     }
