@@ -9,6 +9,8 @@ mod efforts;
 mod encoder;
 mod memory;
 mod network;
+mod node_picture;
+mod node_ray;
 mod open;
 mod options;
 mod parameters;
@@ -222,7 +224,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let renderer = self.renderer(&views, request, options, progress);
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
-        let step = omissions.empty_space;
+        let step = if omissions.nodes > 0 { 0 } else { omissions.empty_space };
         let seen = match step > 1 {
             true => {
                 let mut probes = Evaluated::default();
@@ -232,7 +234,10 @@ impl<D: Device> Prepared for Views<'_, D> {
             }
             false => None,
         };
-        let mut rendered = renderer.picture(&mut workspace, seen.as_ref(), &mut evaluated)?;
+        let mut rendered = match omissions.nodes {
+            0 => renderer.picture(&mut workspace, seen.as_ref(), &mut evaluated)?,
+            _ => renderer.picture_between_nodes(&mut workspace, &mut evaluated)?,
+        };
         along_axis(&mut rendered, &renderer.cast);
         let rows_a_sample = request.views.len() * self.field.architecture.injected_count;
         self.counts.add(rows_a_sample, omissions.latent_layers, &evaluated);
@@ -258,10 +263,11 @@ impl<D: Device> Prepared for Views<'_, D> {
         &mut self,
         request: &Request<'_>,
         pixels: &[u32],
-        tolerance: f32,
+        _tolerance: f32,
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
-        let options = efforts::of_pixels(&self.field.options, tolerance);
+        // Whatever the tolerance: what leaves out empty parts of rays misses mist in its own check.
+        let options = efforts::exact(&self.field.options);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
         let views = self.used(request.views, &request.view_weights())?;
         let renderer = self.renderer(&views, request, options, progress);
@@ -273,22 +279,23 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn record(&self) -> Record {
         let Counts { latent_rows, mapped_rows, passes: [coarse, fine] } = self.counts;
-        let Omissions { latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, .. } =
-            self.options.omissions;
+        let Omissions {
+            latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, nodes, ..
+        } = self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
         let left_out = vec![
             line("latent layers at points", latent_layers, mapped_rows, latent_rows, "rounding"),
             line(
                 "first-pass samples",
-                empty_space > 1 || interpolation > 0.0,
+                empty_space > 1 || interpolation > 0.0 || nodes > 0,
                 omitted(coarse),
                 coarse.samples,
                 "objects between the probes; see `viewfuse pareto`",
             ),
             line(
                 "second-pass samples",
-                empty_rays || empty_parts || hidden_samples,
+                empty_rays || empty_parts || hidden_samples || nodes > 0,
                 omitted(fine),
                 fine.samples,
                 "surfaces that the first pass missed; those behind have at most the transmittance of early termination",

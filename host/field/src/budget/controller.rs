@@ -12,7 +12,7 @@ use viewfuse_weighting::sources::SourceWeights;
 
 /// Exact pixels of a round of a check: as many as take this share of the picture's work, in these bounds; and the most rounds
 /// until a check is decided.
-const CHECK_WORK: f64 = 0.2;
+const CHECK_WORK: f64 = 0.1;
 const ROUND: [usize; 2] = [24, 256];
 const ROUNDS: usize = 3;
 /// Pixels of a check may have this share of the bound as an error of their own: it adds a fiftieth to the squares.

@@ -1,25 +1,24 @@
 //! The ways to render a picture, from the cheapest to the exact one.
 
-use super::options::{Omissions, PixelNerfOptions, Sampling};
+use super::node_picture::MOST_NODES;
+use super::options::{Omissions, PixelNerfOptions};
 use crate::Effort;
 
-/// Samples of a single pass in 64ths of those of the first, with the largest difference between the rays
+/// Nodes between which samples are interpolated, in 64ths of the samples of the first pass, with the largest difference between the rays
 /// around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
 /// (the example `efforts` of `viewfuse-evaluate`).
-const ONE_PASS: [(u32, f32, f32, f32); 9] = [
-    (12, 0.25, 0.036, 0.018),
-    (16, 0.2, 0.026, 0.02),
-    (24, 0.2, 0.016, 0.022),
-    (32, 0.2, 0.0105, 0.024),
-    (40, 0.15, 0.0084, 0.028),
-    (48, 0.12, 0.007, 0.033),
-    (64, 0.08, 0.0053, 0.043),
-    (88, 0.06, 0.0046, 0.06),
-    (128, 0.04, 0.0041, 0.09),
+const NODES: [(u32, f32, f32, f32); 9] = [
+    (12, 0.25, 0.03, 0.01),
+    (16, 0.2, 0.021, 0.012),
+    (20, 0.2, 0.0167, 0.014),
+    (24, 0.2, 0.0135, 0.017),
+    (32, 0.15, 0.0092, 0.021),
+    (36, 0.13, 0.0078, 0.024),
+    (40, 0.12, 0.0068, 0.028),
+    (48, 0.1, 0.0054, 0.04),
+    (64, 0.06, 0.0036, 0.09),
 ];
-/// Pixels from probe to probe of a single pass: where probes miss something, the check finds it.
-const PROBE_STEP: u32 = 5;
-/// The same with both passes.
+/// Both passes, without nodes.
 const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
     (
         "both passes, empty space left out",
@@ -27,12 +26,10 @@ const TWO_PASSES: [(&str, Omissions, f32, f32); 2] = [
         0.0021,
         0.32,
     ),
-    ("both passes, empty parts left out", Omissions { interpolation: 0.02, ..PARTS }, PARTS_ERROR, 0.42),
+    ("both passes, empty parts left out", Omissions { interpolation: 0.02, ..PARTS }, 0.0014, 0.42),
 ];
 /// Second-pass samples in empty parts of rays are left out; rays stay independent of one another.
 const PARTS: Omissions = Omissions { empty_space: 0, ..ALL };
-/// Its typical error.
-const PARTS_ERROR: f32 = 0.0014;
 const ALL: Omissions = Omissions::ALL;
 
 /// The efforts of a network with these options, the cheapest first. Counts of samples are shares of the options'. Whether
@@ -44,20 +41,15 @@ pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> 
         latent_layers: options.omissions.latent_layers,
         ..omissions
     };
-    let one_pass = ONE_PASS.map(|(share, interpolation, error, work)| {
-        let coarse_count = (full.coarse_count * share).div_ceil(64).max(1);
-        let sampling = Sampling { coarse_count, importance_count: 0, depth_count: 0, ..full };
-        let probe_samples = coarse_count.div_ceil(2).max(full.coarse_count.div_ceil(4));
-        let omissions = keep(Omissions { probe_samples, interpolation, empty_space: PROBE_STEP, ..ALL });
-        (
-            Effort::new(format!("{coarse_count} samples, one pass"), error, work),
-            PixelNerfOptions { sampling, omissions },
-        )
+    let between_nodes = NODES.map(|(share, interpolation, error, work)| {
+        let nodes = (full.coarse_count * share).div_ceil(64).clamp(1, MOST_NODES);
+        let omissions = keep(Omissions { nodes, interpolation, ..ALL });
+        (Effort::new(format!("{nodes} nodes"), error, work), PixelNerfOptions { sampling: full, omissions })
     });
     let two_passes = TWO_PASSES.map(|(name, omissions, error, work)| {
         (Effort::new(name, error, work), PixelNerfOptions { sampling: full, omissions: keep(omissions) })
     });
-    let mut efforts: Vec<_> = one_pass.into_iter().chain(two_passes).collect();
+    let mut efforts: Vec<_> = between_nodes.into_iter().chain(two_passes).collect();
     efforts.push((Effort::exact(), exact(options)));
     efforts
 }
@@ -66,14 +58,4 @@ pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> 
 pub(super) fn exact(options: &PixelNerfOptions) -> PixelNerfOptions {
     let Omissions { unused_views, latent_layers, .. } = options.omissions;
     PixelNerfOptions { omissions: Omissions { unused_views, latent_layers, ..Omissions::NONE }, ..*options }
-}
-
-/// For single pixels whose error is typically at most `tolerance`.
-pub(super) fn of_pixels(options: &PixelNerfOptions, tolerance: f32) -> PixelNerfOptions {
-    let exact = exact(options);
-    if tolerance < PARTS_ERROR {
-        return exact;
-    }
-    let Omissions { unused_views, latent_layers, .. } = exact.omissions;
-    PixelNerfOptions { omissions: Omissions { unused_views, latent_layers, ..PARTS }, ..exact }
 }

@@ -68,6 +68,9 @@ pub struct Omissions {
     /// Rays between alike neighbours: a pixel is interpolated where the colours and opacities around it differ by no more
     /// than this in any channel. 0: every pixel has its ray.
     pub interpolation: f32,
+    /// Samples of both passes are interpolated along rays between this many evenly spaced nodes, at most 128, at which alone the
+    /// second pass's network is evaluated, and not in space that neighbouring rays find empty. 0: no nodes.
+    pub nodes: u32,
     /// Second-pass samples on rays whose first pass has an opacity below [`LEAST_OPACITY`].
     pub empty_rays: bool,
     /// Second-pass samples in parts of a ray that the first pass found empty, one part to either side included.
@@ -90,6 +93,7 @@ impl Omissions {
         probe_error: 0.0,
         probe_samples: 0,
         interpolation: 0.0,
+        nodes: 0,
         empty_rays: false,
         empty_parts: false,
         hidden_samples: false,
@@ -103,6 +107,7 @@ impl Omissions {
         probe_error: 1.0 / 128.0,
         probe_samples: 0,
         interpolation: 0.0,
+        nodes: 0,
         empty_rays: true,
         empty_parts: true,
         hidden_samples: true,

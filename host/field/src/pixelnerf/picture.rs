@@ -42,8 +42,7 @@ impl<D: Device> Renderer<'_, D> {
         picture: &mut Rendered,
     ) -> Result<(), FieldError> {
         let (width, height) = (picture.width, picture.height);
-        let most_difference = self.omissions.interpolation;
-        let far_difference = SAME_SURFACE * self.cast.far;
+        let (most_difference, far_difference) = self.interpolation();
         let mut step = widest_step(width.min(height));
         let grid = |step: u32| {
             let rows = (0..height).step_by(step as usize);
@@ -76,6 +75,11 @@ impl<D: Device> Renderer<'_, D> {
             evaluated.samples += interpolated * u64::from(samples);
         }
         Ok(())
+    }
+
+    /// The most that pixels may differ from one another in any channel, and in depth, for a pixel between to be interpolated.
+    pub(super) fn interpolation(&self) -> (f32, f32) {
+        (self.omissions.interpolation, SAME_SURFACE * self.cast.far)
     }
 
     /// Renders some pixels of a picture.
@@ -122,7 +126,7 @@ impl<D: Device> Renderer<'_, D> {
 }
 
 /// The step of the first grid: a power of two.
-fn widest_step(side: u32) -> u32 {
+pub(super) fn widest_step(side: u32) -> u32 {
     let mut step = 2;
     while step < WIDEST_STEP && side >= 2 * step * LEAST_GRID {
         step *= 2;
@@ -132,7 +136,7 @@ fn widest_step(side: u32) -> u32 {
 
 /// The mean colour and a depth of a pixel's two or four neighbours on the grid of `step`, if all of them are in the
 /// picture and alike.
-fn between(
+pub(super) fn between(
     picture: &Rendered,
     [column, row]: [u32; 2],
     step: u32,
