@@ -98,8 +98,7 @@ pub trait Prepared {
     }
 
     /// Colours and opacities of some pixels of a target, row-major indices: what [`Prepared::render`] would give with the last of
-    /// [`Prepared::efforts`], or with another one whose typical error is at most `tolerance`. Called only if [`Prepared::renders_pixels`];
-    /// all [`Request::views`] are encoded.
+    /// [`Prepared::efforts`]. Called only if [`Prepared::renders_pixels`]; all [`Request::views`] are encoded.
     ///
     /// # Errors
     /// [`FieldError`].
@@ -107,7 +106,6 @@ pub trait Prepared {
         &mut self,
         _request: &Request<'_>,
         _pixels: &[u32],
-        _tolerance: f32,
         _progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
         Ok(Vec::new())

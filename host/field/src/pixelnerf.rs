@@ -263,10 +263,9 @@ impl<D: Device> Prepared for Views<'_, D> {
         &mut self,
         request: &Request<'_>,
         pixels: &[u32],
-        _tolerance: f32,
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
-        // Whatever the tolerance: what leaves out empty parts of rays misses mist in its own check.
+        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
         let options = efforts::exact(&self.field.options);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
         let views = self.used(request.views, &request.view_weights())?;

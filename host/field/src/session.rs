@@ -143,17 +143,11 @@ impl<'a> Session<'a> {
         camera: &Camera,
         weights: &SourceWeights,
         pixels: &[u32],
-        tolerance: f32,
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 4]>, FieldError> {
         self.encode(weights, progress)?;
         let views = &self.views(weights);
-        self.prepared.exact_pixels(
-            &Request { camera, weights, views, early_termination: 0.0 },
-            pixels,
-            tolerance,
-            progress,
-        )
+        self.prepared.exact_pixels(&Request { camera, weights, views, early_termination: 0.0 }, pixels, progress)
     }
 
     /// The field's scalars that can be chosen for a scene.

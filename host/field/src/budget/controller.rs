@@ -15,8 +15,6 @@ use viewfuse_weighting::sources::SourceWeights;
 const CHECK_WORK: f64 = 0.1;
 const ROUND: [usize; 2] = [24, 256];
 const ROUNDS: usize = 3;
-/// Pixels of a check may have this share of the bound as an error of their own: it adds a fiftieth to the squares.
-const PIXEL_ERROR: f32 = 1.0 / 7.0;
 /// What is expected counts as much as this many draws.
 const EXPECTED_DRAWS: usize = 8;
 /// Pictures that keep another picture's choice have this much more error at most.
@@ -289,7 +287,7 @@ impl Controller {
             let draws = draw(rendered, count, self.pictures * ROUNDS as u64 + round as u64);
             let pixels: Vec<u32> = draws.iter().map(|draw| draw.pixel).collect();
             let Search { session, view, .. } = search;
-            let exact = session.exact_pixels(view.camera, view.all, &pixels, PIXEL_ERROR * most as f32, progress)?;
+            let exact = session.exact_pixels(view.camera, view.all, &pixels, progress)?;
             sample.add(rendered, &draws, &exact);
             estimate = sample.estimate();
             if estimate.upper <= most || estimate.value > most {

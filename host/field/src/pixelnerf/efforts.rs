@@ -4,8 +4,8 @@ use super::node_picture::MOST_NODES;
 use super::options::{Omissions, PixelNerfOptions};
 use crate::Effort;
 
-/// Nodes between which samples are interpolated, in 64ths of the samples of the first pass, with the largest difference between the rays
-/// around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
+/// Nodes between which samples are interpolated, in 64ths of the samples of the first pass, with the largest difference between
+/// the rays around an interpolated pixel, the error that is typical of it and its typical work. Measured on the included network
 /// (the example `efforts` of `viewfuse-evaluate`).
 const NODES: [(u32, f32, f32, f32); 9] = [
     (12, 0.25, 0.03, 0.01),

@@ -63,8 +63,6 @@ pub struct Omissions {
     /// The largest change of the probes' colours, root mean square, `1` from black to white: the largest threshold of a
     /// part's opacity that stays within it replaces [`LEAST_SHARE`]. 0: always [`LEAST_SHARE`].
     pub probe_error: f32,
-    /// Samples on a probe; 0: as many as in the first pass.
-    pub probe_samples: u32,
     /// Rays between alike neighbours: a pixel is interpolated where the colours and opacities around it differ by no more
     /// than this in any channel. 0: every pixel has its ray.
     pub interpolation: f32,
@@ -91,7 +89,6 @@ impl Omissions {
         latent_layers: false,
         empty_space: 0,
         probe_error: 0.0,
-        probe_samples: 0,
         interpolation: 0.0,
         nodes: 0,
         empty_rays: false,
@@ -105,7 +102,6 @@ impl Omissions {
         latent_layers: true,
         empty_space: 4,
         probe_error: 1.0 / 128.0,
-        probe_samples: 0,
         interpolation: 0.0,
         nodes: 0,
         empty_rays: true,

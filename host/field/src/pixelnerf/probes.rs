@@ -24,10 +24,7 @@ impl<D: Device> Renderer<'_, D> {
         let place = |index: u32, side: u32| (index * step).min(side - 1);
         let pixels: Vec<u32> =
             (0..columns * rows).map(|ray| place(ray / columns, height) * width + place(ray % columns, width)).collect();
-        let count = match self.omissions.probe_samples {
-            0 => self.sampling.coarse_count,
-            given => given,
-        };
+        let count = self.sampling.coarse_count;
         let mut values = self.zeros(pixels.len() * count as usize)?;
         let mut first_ray = 0;
         let mut changes = [0.0; SHARES.len()];
