@@ -37,8 +37,9 @@ pub(crate) fn train(parts: Parts, learning: &Learning, pictures: &[&Candidates])
         let rate = RATE * (f64::from(step + 1) / WARM_UP).min(1.0) * 0.5 * (1.0 + (PI * progress).cos());
         let [first, second] = DECAYS.map(|decay| 1.0 - decay.powi(step as i32 + 1));
         for (index, variable) in network.variables.iter().enumerate() {
-            let Some(gradient) = gradients.get(variable) else { continue };
-            means[index] = ((&means[index] * DECAYS[0])? + (gradient * (1.0 - DECAYS[0]))?)?;
+            // Without the graph that it was computed by, which the means would keep alive.
+            let Some(gradient) = gradients.get(variable).map(Tensor::detach) else { continue };
+            means[index] = ((&means[index] * DECAYS[0])? + (&gradient * (1.0 - DECAYS[0]))?)?;
             squares[index] = ((&squares[index] * DECAYS[1])? + (gradient.sqr()? * (1.0 - DECAYS[1]))?)?;
             let root = ((&squares[index] / second)?.sqrt()? + 1.0e-8)?;
             variable.set(&(variable.as_tensor() - ((&means[index] * (rate / first))? / root)?)?)?;
