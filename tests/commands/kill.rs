@@ -11,6 +11,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::output::journal::JOURNAL;
+use viewfuse::output::run::RECORD;
 use viewfuse_tests::command::{command, files_below, toy};
 use viewfuse_tests::scenes::Folder;
 
@@ -44,6 +45,9 @@ const COMMANDS: [&str; 19] = [
     "train weighting small/model.safetensors learn/toys --objects 1 --rays 4 --steps 4 --validate-every 4 \
      --write-every 0 -o OUT",
 ];
+
+/// Those of them that refuse a folder that is there.
+const NEVER_OVER: [&str; 2] = ["export", "scenes photograph"];
 
 /// What the commands read, made before the first kill.
 const INPUTS: [&str; 5] = ["toy", "learn", "small", "weighting", "run"];
@@ -119,9 +123,12 @@ fn is_hidden(path: &Path) -> bool {
     path.components().any(|part| part.as_os_str().to_string_lossy().starts_with('.'))
 }
 
-/// The first of the finished files that are no longer there. A journal goes when its run is done.
+/// The first of the finished files that are no longer there. A journal goes when its run is done, record and video of a render
+/// when another one begins to write over its pictures.
 fn lost<'a>(finished: &'a Files, now: &Files) -> Option<&'a PathBuf> {
-    finished.keys().find(|name| !name.ends_with(JOURNAL) && !now.contains_key(*name))
+    let may_go =
+        |name: &Path| name.ends_with(JOURNAL) || name.ends_with(RECORD) || name.file_stem() == Some("video".as_ref());
+    finished.keys().find(|name| !may_go(name) && !now.contains_key(*name))
 }
 
 /// What an undisturbed run wrote, and its time.
@@ -148,8 +155,9 @@ fn killed_at_any_moment() {
             first.push(undisturbed(folder.path(), arguments, &out));
         }
         let (like, time) = &first[kill % COMMANDS.len()];
-        // By turns into an empty folder and over what an earlier run finished. An export never goes over one that is there.
-        let is_over = (kill + kill / COMMANDS.len()) % 2 == 1 && !arguments.starts_with("export");
+        // By turns into an empty folder and over what an earlier run finished. Scenes never go over what is there.
+        let is_over = (kill % COMMANDS.len() + kill / COMMANDS.len()) % 2 == 1
+            && !NEVER_OVER.iter().any(|name| arguments.starts_with(name));
         if !is_over && out.is_dir() {
             fs::remove_dir_all(&out).expect("an output");
         }
