@@ -240,6 +240,8 @@ pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
             line.push(point.denoising.map_or(String::new(), |denoising| denoising.calls.to_string()));
         }
         line.extend(point.left_out.iter().flat_map(|row| [row.left_out.to_string(), row.of.to_string()]));
+        // Another program leaves out nothing that is counted here.
+        line.resize(header.len(), String::new());
         writer.write_record(&line)?;
     }
     writer.into_inner().map_err(|error| error.into_error().into())
