@@ -8,8 +8,9 @@ mod sizes;
 mod values;
 
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
-use viewfuse::field::genvs::{Architecture, Genvs, GenvsOptions, Omissions, test_networks};
+use viewfuse::field::genvs::{Architecture, Estimate, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse::field::{FieldError, Record, Rendered};
 use viewfuse::job::progress::{Progress, Silent};
 use viewfuse::scene::photographs::SourceImages;
@@ -125,6 +126,35 @@ fn the_seed_decides() {
     assert_eq!(with_seed(1), with_seed(1));
     let difference = largest_difference(&with_seed(1), &with_seed(1 << 40));
     assert!(difference > 0.05, "seeds that differ in their high words only: {difference}");
+}
+
+#[test]
+fn an_estimate_from_colours_adds_what_noise_hides() {
+    let made = |estimate| {
+        let mut architecture = Architecture::small();
+        architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
+        Genvs::new(test_networks::deterministic(&architecture), exact()).expect("a made network")
+    };
+    let (published, own) = (made(Estimate::Published), made(Estimate::FromColours));
+    assert_eq!(own.architecture().denoiser.as_ref().map(|denoiser| denoiser.estimate), Some(Estimate::FromColours));
+    let sources = sources(1);
+    let feature_count = own.architecture().encoder.feature_count;
+    let wave = |scale: f32| move |index: usize| scale * (0.7 * index as f32).sin();
+    let noisy: Vec<f32> = (0..16 * 16 * 3).map(wave(3.0)).collect();
+    let features: Vec<f32> = (0..16 * 16 * feature_count).map(wave(0.4)).collect();
+    for level in [0.1, 1.0, 80.0] {
+        let of = |field: &Genvs| {
+            let reference = Reference::new(field, &Cpu, &sources, &Silent).expect("sources");
+            reference.denoised(&noisy, &features, [16, 16], level).expect("a picture")
+        };
+        let share = f64::from(level).powi(2) / (f64::from(level).powi(2) + 0.25);
+        for (index, (own, published)) in of(&own).iter().zip(of(&published)).enumerate() {
+            let shown = 1.0 - f64::from(features[index / 3 * feature_count + index % 3]);
+            let difference = f64::from(*own) - f64::from(published);
+            // Two sums of numbers of at most 4, each rounded three times.
+            assert!((difference - share * shown).abs() < 2.0e-6, "{index} at {level}: {difference}");
+        }
+    }
 }
 
 #[test]

@@ -33,6 +33,7 @@ from safetensors.torch import load_file
 # The published network: channels and blocks of the trunk's levels, sizes of the point networks. Other members of the family
 # are read off their tensors.
 LEVELS = ((64, 3), (128, 4), (256, 6))
+SOURCE_SIDE = 128
 WIDTH, BLOCKS, INJECTED, OCTAVES, FREQUENCY = 512, 5, 3, 6, 1.5
 
 
@@ -100,21 +101,23 @@ def architecture():
 
 
 def parameters(model):
-    """Tensors by name, and where in a pixel its centre is (0 as published)."""
+    """Tensors by name, where in a pixel its centre is (0 as published), and the largest side of source images."""
     if model == "formula":
         gain = lambda name: 6 if "lin_out.weight" in name else 1
-        return {name: by_formula(name, shape, gain(name)) for name, shape in architecture()}, 0.0
+        return {name: by_formula(name, shape, gain(name)) for name, shape in architecture()}, 0.0, SOURCE_SIDE
     with safe_open(model, "pt") as file:
-        pixel_centre = float((file.metadata() or {}).get("viewfuse.pixel_centre", 0))
-    return {name: tensor.float().to(DEVICE) for name, tensor in load_file(model).items()}, pixel_centre
+        metadata = file.metadata() or {}
+    pixel_centre = float(metadata.get("viewfuse.pixel_centre", 0))
+    source_side = int(metadata.get("viewfuse.source_side", SOURCE_SIDE))
+    return {name: tensor.float().to(DEVICE) for name, tensor in load_file(model).items()}, pixel_centre, source_side
 
 
 # Network
 
 
 class PixelNerf:
-    def __init__(self, tensors, pixel_centre):
-        self.tensors, self.pixel_centre = tensors, pixel_centre
+    def __init__(self, tensors, pixel_centre, source_side):
+        self.tensors, self.pixel_centre, self.source_side = tensors, pixel_centre, source_side
         latent = tensors["mlp_coarse.lin_z.0.weight"].shape[1]
         self.levels, channels = [], tensors["encoder.model.conv1.weight"].shape[0]
         while channels < latent:
@@ -258,8 +261,9 @@ def fine_depths(rays, coarse, weights, depth, pixels, counts, seed):
 # Scenes
 
 
-def read_scene(folder, numbers):
-    """Images over white (view, 3, side, side) in [-1, 1], poses (view, 4, 4), focal length and centre of an SRN folder."""
+def read_scene(folder, numbers, most_side=None):
+    """Images over white (view, 3, side, side) in [-1, 1], poses (view, 4, 4), focal length and centre of an SRN folder.
+    Images of a multiple of `most_side` pixels are reduced to it by means."""
     names = sorted((path.stem for path in (folder / "pose").glob("*.txt")), key=lambda name: (len(name), name))
     lines = (folder / "intrinsics.txt").read_text().split("\n")
     focal, x, y = (float(word) for word in lines[0].split()[:3])
@@ -274,7 +278,13 @@ def read_scene(folder, numbers):
             raise SystemExit(f"{name}.png has {pixels.shape[1]}x{pixels.shape[0]} pixels; square ones are needed")
         over_white = pixels[..., :3] * pixels[..., 3:] + 1 - pixels[..., 3:]
         images.append(torch.from_numpy(2 * over_white - 1).permute(2, 0, 1))
-    return torch.stack(images).to(DEVICE), torch.stack(poses).to(DEVICE), focal, torch.tensor([x, y])
+    images = torch.stack(images)
+    times, rest = divmod(images.shape[-1], most_side or images.shape[-1])
+    if times > 1 or (times and rest):
+        if rest:
+            raise SystemExit(f"{folder} has {images.shape[-1]} pixels on a side, no multiple of {most_side}")
+        images, focal, x, y = F.avg_pool2d(images, times), focal / times, x / times, y / times
+    return images.to(DEVICE), torch.stack(poses).to(DEVICE), focal, torch.tensor([x, y])
 
 
 def cast_rays(pose, focal, centre, scale, size, pixel_centre, near_far):
@@ -300,7 +310,8 @@ def now():
 
 def render(options):
     network = PixelNerf(*parameters(options.model))
-    images, poses, focal, centre = read_scene(options.scene, [*options.sources, options.target])
+    numbers = [*options.sources, options.target]
+    images, poses, focal, centre = read_scene(options.scene, numbers, network.source_side)
     weights = torch.full((len(options.sources),), 1 / len(options.sources))
     if options.weights != "mean":
         weights = torch.tensor([float(weight) for weight in options.weights.split(",")])

@@ -23,7 +23,7 @@ mod volume;
 pub use architecture::MLP;
 pub use architecture::{
     ASPP_RATES, Architecture, Block, COLOUR_CHANNELS, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Encoder,
-    Level, Resampling, group_count,
+    Estimate, Level, Resampling, group_count,
 };
 pub use feature_image::{LAST_LENGTH, cast_block, ray_length};
 pub use open::{COMPUTABLE, open};

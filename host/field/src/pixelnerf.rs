@@ -41,9 +41,6 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 
-/// Longest side of a network's source photographs: the size at which the published ones were trained.
-pub const SOURCE_SIDE: u32 = 128;
-
 /// A PixelNeRF with its parameters, ready for any device.
 pub struct PixelNerf {
     architecture: Architecture,
@@ -132,7 +129,8 @@ impl PixelNerf {
 
 impl Field for PixelNerf {
     fn about(&self) -> About {
-        About { source_side: SourceSide::Pixels(SOURCE_SIDE), ends_rays: true, ..About::new("pixelnerf") }
+        let source_side = SourceSide::Pixels(self.architecture.source_side);
+        About { source_side, ends_rays: true, ..About::new("pixelnerf") }
     }
 
     fn prepare<'a, D: Device>(

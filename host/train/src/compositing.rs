@@ -15,24 +15,20 @@ pub(crate) fn coarse_depths(rays: &[TargetRay], count: usize, share: impl Fn(usi
     depths
 }
 
-/// `depths[ray][sample]` with `more` a ray, drawn where `weights[ray][sample]` of even parts are; sorted.
+/// Depths `[ray][sample]` of `more` samples a ray, drawn where the `weights[ray][sample]` of `count` even parts are.
 pub(crate) fn fine_depths(
     rays: &[TargetRay],
-    depths: &[f32],
+    count: usize,
     weights: &[f32],
     more: usize,
     share: impl Fn(usize, usize) -> f32,
 ) -> Vec<f32> {
     /// Added to every weight, as published, so that no part has probability 0.
     const FLOOR: f32 = 1.0e-5;
-    let count = depths.len() / rays.len();
-    let mut all = Vec::with_capacity(rays.len() * (count + more));
-    for (index, ray) in rays.iter().enumerate() {
-        let own = index * count..(index + 1) * count;
-        let weights = &weights[own.clone()];
+    let mut all = Vec::with_capacity(rays.len() * more);
+    for (index, (ray, weights)) in rays.iter().zip(weights.chunks_exact(count)).enumerate() {
         let total: f32 = weights.iter().map(|weight| weight + FLOOR).sum();
         let part = (ray.far - ray.near) / count as f32;
-        let mut row = depths[own].to_vec();
         for draw in 0..more {
             // Stratified: one number in each of `more` equal parts.
             let mut left = total * (draw as f32 + share(index, draw)) / more as f32;
@@ -41,12 +37,34 @@ pub(crate) fn fine_depths(
                 left -= weights[place] + FLOOR;
                 place += 1;
             }
-            row.push(ray.near + part * (place as f32 + (left / (weights[place] + FLOOR)).min(1.0)));
+            all.push(ray.near + part * (place as f32 + (left / (weights[place] + FLOOR)).min(1.0)));
         }
-        row.sort_by(f32::total_cmp);
-        all.extend(row);
     }
     all
+}
+
+/// The samples of two passes, each `[object][ray][sample]`, sorted by depth on every ray: their numbers among all samples,
+/// the first pass's before the second's, and their depths.
+pub(crate) fn merged(first: &[Vec<f32>], second: &[Vec<f32>], ray_count: usize) -> (Vec<u32>, Vec<Vec<f32>>) {
+    let [before, behind] = [first, second].map(|pass| pass.first().map_or(0, |depths| depths.len() / ray_count));
+    let first_count = first.iter().map(Vec::len).sum::<usize>();
+    let mut order = Vec::new();
+    let mut merge = |(object, (first, second)): (usize, (&Vec<f32>, &Vec<f32>))| {
+        let mut depths = Vec::with_capacity(first.len() + second.len());
+        for ray in 0..ray_count {
+            let own = |depths: &[f32], count: usize, start: usize| -> Vec<(f32, u32)> {
+                let number = start + (object * ray_count + ray) * count;
+                depths[ray * count..][..count].iter().copied().zip(number as u32..).collect()
+            };
+            let mut samples = [own(first, before, 0), own(second, behind, first_count)].concat();
+            samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+            order.extend(samples.iter().map(|(_, number)| *number));
+            depths.extend(samples.iter().map(|(depth, _)| *depth));
+        }
+        depths
+    };
+    let depths = first.iter().zip(second).enumerate().map(&mut merge).collect();
+    (order, depths)
 }
 
 /// The points of `depths[ray][sample]`.

@@ -16,12 +16,12 @@ use super::operations::{Apply, Look, LookSizes, Sight};
 use super::parameters::{Contents, Parameters, fan_in, random};
 use candle_core::{DType, Device, Result, Tensor};
 use layers::Layers;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::rays::cast_ray;
 use viewfuse_core::schedule::Preconditioning;
-use viewfuse_field::genvs::{Architecture, LAST_LENGTH, MLP, cast_block, ray_length};
+use viewfuse_field::genvs::{Architecture, Estimate, LAST_LENGTH, MLP, cast_block, ray_length};
 use viewfuse_nn::checkpoint::{Checkpoint, TensorShape};
 
 /// The prefix of the encoder's tensors.
@@ -87,7 +87,7 @@ impl Genvs {
             let values = vec![0.0; tensor.shape.iter().product()];
             tensors.push((tensor, values));
         }
-        Ok((tensors, BTreeMap::new()))
+        Ok((tensors, self.architecture.metadata()))
     }
 
     fn layers<'a>(&'a self, prefix: &'a str) -> Layers<'a> {
@@ -163,11 +163,52 @@ impl Genvs {
         denoiser::run(self.layers(""), sizes, &inputs, &levels)
     }
 
+    /// What the denoiser's estimate of the pictures behind noisy ones is without its network; see [`Estimate`].
+    pub(crate) fn without_network(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
+        let skipped = noisy.broadcast_mul(&each(at.iter().map(|at| at.skip), noisy)?)?;
+        match self.architecture.denoiser.as_ref().map(|denoiser| denoiser.estimate) {
+            Some(Estimate::FromColours) => {
+                let share = each(at.iter().map(|at| 1.0 - at.skip), noisy)?;
+                skipped + colours(features)?.broadcast_mul(&share)?
+            }
+            _ => Ok(skipped),
+        }
+    }
+
     /// The denoiser's estimate of the pictures behind noisy ones.
     pub(crate) fn denoised(&self, noisy: &Tensor, features: &Tensor, at: &[Preconditioning]) -> Result<Tensor> {
         let output = self.network(noisy, features, at)?.broadcast_mul(&each(at.iter().map(|at| at.output), noisy)?)?;
-        output + noisy.broadcast_mul(&each(at.iter().map(|at| at.skip), noisy)?)?
+        output + self.without_network(noisy, features, at)?
     }
+
+    /// The network of a checkpoint, to be trained further: with a new denoiser of this kind, or with its own.
+    ///
+    /// # Errors
+    /// As [`Genvs::frozen`].
+    pub(crate) fn continued(
+        checkpoint: &Checkpoint,
+        side: u32,
+        new_denoiser: Option<Estimate>,
+        dtype: DType,
+        seed: u64,
+    ) -> std::result::Result<Genvs, TrainError> {
+        let old = Genvs { is_frozen: false, ..Genvs::frozen(checkpoint, side, dtype)? };
+        let Some(estimate) = new_denoiser else { return Ok(old) };
+        let mut architecture = old.architecture.clone();
+        if let Some(denoiser) = &mut architecture.denoiser {
+            denoiser.estimate = estimate;
+        }
+        let new = Genvs::new(architecture, dtype, seed)?;
+        for (name, variable) in new.parameters.iter().filter(|(name, _)| !name.starts_with("denoiser.")) {
+            variable.set(old.parameters.get(name)?)?;
+        }
+        Ok(new)
+    }
+}
+
+/// The picture `[image][row][column][3]` in `[-1, 1]` of the first features: they are its difference from white.
+pub(crate) fn colours(features: &Tensor) -> Result<Tensor> {
+    1.0 - features.narrow(3, 0, 3)?
 }
 
 /// A number for each image, in a shape for products with images.

@@ -9,7 +9,7 @@
 
 use super::TrainError;
 use super::draw::{Draw, Purpose};
-use super::genvs::{Genvs, ViewCounts, Views, each};
+use super::genvs::{Genvs, ViewCounts, Views, colours, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
 use super::run::{self, Learner, Outcome, Schedule, Validated};
@@ -19,7 +19,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
-use viewfuse_field::genvs::Architecture;
+use viewfuse_field::genvs::{Architecture, Estimate};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
@@ -37,19 +37,27 @@ pub struct GenvsSettings {
     pub targets: usize,
     /// Samples of a ray, as many as in renders: samples shade themselves, so another number changes the brightness.
     pub samples: u32,
+    /// Share of the pictures that have the largest noise level, from 0 to 1.
+    pub share_of_largest: f32,
+    /// Whether a new denoiser's estimate starts from the colours of the feature image ([`Estimate::FromColours`]) or is the
+    /// published one.
+    pub from_colours: bool,
+    /// Whether a network that continues from a file begins with a new denoiser. Otherwise it keeps the file's.
+    pub new_denoiser: bool,
 }
 
 /// The numbers of sources of a step, one of which is drawn.
 const SOURCE_COUNTS: [usize; 4] = [1, 2, 3, 3];
 /// Mean and deviation of the logarithm of noise levels, as published.
 const LEVELS: [f32; 2] = [-1.2, 1.2];
-/// Share of the pictures with the largest level.
-const SHARE_OF_LARGEST: f32 = 0.25;
 /// Weight of the first features' squared error: that of the picture's at the largest level.
 const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
 /// Objects in validation, and views of each.
 const VALIDATION_OBJECTS: usize = 24;
 const VALIDATION_VIEWS: ViewCounts = ViewCounts { sources: 3, targets: 1 };
+
+/// The default of [`GenvsSettings::share_of_largest`].
+pub const SHARE_OF_LARGEST: f32 = 0.25;
 
 struct GenvsLearner {
     network: Genvs,
@@ -73,14 +81,24 @@ pub fn train_genvs(
     let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
     let least_views = most_sources + settings.targets.max(1);
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
-    let architecture = Architecture::narrow(settings.side as usize, settings.width);
+    if !(0.0..=1.0).contains(&settings.share_of_largest) {
+        let (name, value) = ("share_of_largest", f64::from(settings.share_of_largest));
+        return Err(TrainError::Setting { name, value, allowed: "it must be from 0 to 1" });
+    }
+    let mut architecture = Architecture::narrow(settings.side as usize, settings.width);
+    let estimate = if settings.from_colours { Estimate::FromColours } else { Estimate::Published };
+    architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
     let network = match from {
-        Some(checkpoint) => Genvs { is_frozen: false, ..Genvs::frozen(checkpoint, settings.side, DType::F32)? },
+        Some(checkpoint) => {
+            let new_denoiser = settings.new_denoiser.then_some(estimate);
+            Genvs::continued(checkpoint, settings.side, new_denoiser, DType::F32, schedule.seed)?
+        }
         None => Genvs::new(architecture, DType::F32, schedule.seed)?,
     };
     let denoiser = network.architecture.denoiser.as_ref();
     let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
-    let settings = GenvsSettings { width, ..*settings };
+    let from_colours = denoiser.is_some_and(|denoiser| denoiser.estimate == Estimate::FromColours);
+    let settings = GenvsSettings { width, from_colours, ..*settings };
     let record = run::settings("genvs", &settings, schedule, &data, from)?;
     let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings };
     run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
@@ -103,40 +121,36 @@ impl Noisy {
         Ok(Noisy { pictures, at: levels.iter().map(|level| Preconditioning::at(*level)).collect() })
     }
 
-    /// The network's target output: `(truth - c_skip noisy) / c_out`, of variance 1 at every level.
-    fn target(&self, truth: &Tensor) -> Result<Tensor> {
-        let skipped = self.pictures.broadcast_mul(&each(self.at.iter().map(|at| at.skip), truth)?)?;
-        (truth - skipped)?.broadcast_div(&each(self.at.iter().map(|at| at.output), truth)?)
+    /// The network's target output: what its estimate lacks without it, over `c_out`; of variance 1 at most.
+    fn target(&self, network: &Genvs, features: &Tensor, truth: &Tensor) -> Result<Tensor> {
+        let without = network.without_network(&self.pictures, features, &self.at)?;
+        (truth - without)?.broadcast_div(&each(self.at.iter().map(|at| at.output), truth)?)
     }
 }
 
-/// The noise levels of a step's pictures.
-fn levels(draw: &Draw, count: usize) -> Vec<f32> {
+/// The noise levels of a step's pictures, of which this share has the largest.
+fn levels(draw: &Draw, count: usize, share_of_largest: f32) -> Vec<f32> {
     let largest = NoiseSchedule::published().level(0, 2);
-    let level = |index: usize| match draw.uniform(Purpose::NoiseLevel, 2 * index) < SHARE_OF_LARGEST {
+    let level = |index: usize| match draw.uniform(Purpose::NoiseLevel, 2 * index) < share_of_largest {
         true => largest,
         false => (LEVELS[0] + LEVELS[1] * draw.normal(Purpose::NoiseLevel, 2 * index + 1)).exp(),
     };
     (0..count).map(level).collect()
 }
 
-/// The picture `[image][row][column][3]` in `[-1, 1]` of the first features: they are its difference from white.
-pub(super) fn colours(features: &Tensor) -> Result<Tensor> {
-    1.0 - features.narrow(3, 0, 3)?
-}
-
-/// The loss of some views, with noise by `draw`.
+/// The loss of some views, with noise by `draw`, for this share of the pictures of the largest level.
 pub(super) fn loss(
     network: &Genvs,
     views: &Views,
     weights: &Tensor,
     samples: &CoarseBlock,
+    share_of_largest: f32,
     draw: &Draw,
 ) -> Result<Tensor> {
     let features = network.features(&network.volumes(&views.pictures)?, weights, views, samples)?;
-    let noisy = Noisy::new(&views.truth, &levels(draw, views.truth.dim(0)?), draw)?;
+    let noisy = Noisy::new(&views.truth, &levels(draw, views.truth.dim(0)?, share_of_largest), draw)?;
     let said = network.network(&noisy.pictures, &features, &noisy.at)?;
-    let error = (said - noisy.target(&views.truth)?)?.sqr()?.mean_all()?;
+    let error = (said - noisy.target(network, &features, &views.truth)?)?.sqr()?.mean_all()?;
     let colour_error = (colours(&features)? - &views.truth)?.sqr()?.mean_all()?;
     error + (colour_error * FEATURES_WEIGHT)?
 }
@@ -179,7 +193,7 @@ impl Learner for GenvsLearner {
         let views = ViewCounts { sources, targets };
         let views = Views::draw(&self.scenes, draw, objects, views, self.network.parameters.dtype())?;
         let samples = CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: samples, jitter: 1.0 };
-        loss(&self.network, &views, &views.mean_weights()?, &samples, draw)
+        loss(&self.network, &views, &views.mean_weights()?, &samples, self.settings.share_of_largest, draw)
     }
 
     fn validate(&self) -> Result<Validated> {

@@ -1,6 +1,6 @@
 //! Images in the graph: `[image][row][column][channel]`, as kernels have them.
 
-use super::operations::{Apply, Convolution, Window};
+use super::operations::{AddEnlarged, Apply, Convolution, Window};
 use candle_core::{Result, Tensor};
 
 /// A convolution with weights as checkpoints have them, `[out][in][row][column]`, without bias.
@@ -48,25 +48,20 @@ pub(crate) fn max_pool(images: &Tensor) -> Result<Tensor> {
     along(&along(images, 1)?, 2)
 }
 
-/// Bilinear upsampling with aligned corners, as matrix products with constant matrices.
+/// Bilinear upsampling with aligned corners.
 pub(crate) fn enlarge(images: &Tensor, height: usize, width: usize) -> Result<Tensor> {
-    let [count, in_height, in_width, channels] = dims4(images)?;
-    if (in_height, in_width) == (height, width) {
+    let [count, rows, columns, channels] = dims4(images)?;
+    if (rows, columns) == (height, width) {
         return Ok(images.clone());
     }
-    let mixing = |outer: usize, inner: usize| -> Result<Tensor> {
-        let mut values = vec![0_f32; outer * inner];
-        for (index, row) in values.chunks_exact_mut(inner).enumerate() {
-            let at = viewfuse_core::network::resample::aligned(index as u32, outer as u32, inner as u32);
-            let (before, behind, share) = viewfuse_core::lookup::split(at, inner as u32);
-            row[before] += 1.0 - share;
-            row[behind] += share;
-        }
-        Tensor::from_vec(values, (outer, inner), images.device())?.to_dtype(images.dtype())
-    };
-    let rows = images.contiguous()?.reshape((count, in_height, in_width * channels))?;
-    let tall = mixing(height, in_height)?.broadcast_matmul(&rows)?.reshape((count * height, in_width, channels))?;
-    mixing(width, in_width)?.broadcast_matmul(&tall)?.reshape((count, height, width, channels))
+    add_enlarged(&Tensor::zeros((count, height, width, channels), images.dtype(), images.device())?, images)
+}
+
+/// Images with smaller ones, which are enlarged as [`enlarge`] does, added.
+pub(crate) fn add_enlarged(images: &Tensor, small: &Tensor) -> Result<Tensor> {
+    let (size, [_, rows, columns, _]) = (dims4(images)?, dims4(small)?);
+    let operation = AddEnlarged { size, small: [rows, columns] };
+    images.contiguous()?.apply_op2(&small.contiguous()?, Apply(operation))
 }
 
 /// The four sizes of images.

@@ -43,7 +43,7 @@ mod state;
 mod weighting_learner;
 
 pub use attention::Embedding;
-pub use genvs_learner::{GenvsSettings, train_genvs};
+pub use genvs_learner::{GenvsSettings, SHARE_OF_LARGEST, train_genvs};
 pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
 pub use state::check_state;

@@ -6,6 +6,7 @@
 
 mod convolve;
 mod density;
+mod enlarge;
 mod linear;
 mod look;
 mod normalise;
@@ -13,6 +14,7 @@ mod point_network;
 
 pub(crate) use convolve::{Convolution, DepthwiseConvolution, Window};
 pub(crate) use density::RectifiedDensity;
+pub(crate) use enlarge::AddEnlarged;
 pub(crate) use look::{Look, LookSizes, Sight};
 pub(crate) use normalise::Normalise;
 pub(crate) use point_network::{PointNetwork, PointNetworkSizes, Points};

@@ -7,12 +7,12 @@ mod tests;
 
 use super::TrainError;
 use super::batch::Batch;
-use super::compositing::{coarse_depths, fine_depths, points, weights as sample_weights};
+use super::compositing::{coarse_depths, fine_depths, merged, points, weights as sample_weights};
 use super::draw::{Draw, Purpose};
-use super::images::{convolve, dims4, enlarge, max_pool};
+use super::images::{add_enlarged, convolve, dims4, max_pool};
 use super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, Window};
 use super::parameters::{Contents, Parameters, fan_in, random};
-use candle_core::{DType, Device, Result, Tensor};
+use candle_core::{D, DType, Device, Result, Tensor};
 use std::sync::Arc;
 use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
@@ -94,6 +94,31 @@ impl PixelNerf {
         Ok(PixelNerf { architecture, parameters, is_frozen: true })
     }
 
+    /// The network of a checkpoint, to be trained further, with `levels` levels of the trunk if it has fewer. New levels are
+    /// as in a new network, and the point network's weights for them are zero: what it says is the same at first.
+    ///
+    /// # Errors
+    /// As [`PixelNerf::frozen`].
+    pub(crate) fn continued(
+        checkpoint: &Checkpoint,
+        levels: usize,
+        dtype: DType,
+        seed: u64,
+    ) -> std::result::Result<PixelNerf, TrainError> {
+        let old = PixelNerf { is_frozen: false, ..PixelNerf::frozen(checkpoint, dtype)? };
+        if levels <= old.architecture.levels.len() {
+            return Ok(old);
+        }
+        let new = PixelNerf::new(old.architecture.clone().with_levels(levels), dtype, seed)?;
+        for (name, variable) in new.parameters.iter() {
+            let Ok(values) = old.parameters.get(name) else { continue };
+            // Only the layers for latents have other shapes: more columns.
+            let more = variable.dim(D::Minus1)? - values.dim(D::Minus1)?;
+            variable.set(&values.pad_with_zeros(D::Minus1, 0, more)?)?;
+        }
+        Ok(new)
+    }
+
     /// Its tensors and metadata.
     pub(crate) fn checkpoint(&self) -> Result<Contents> {
         let mut tensors = self.parameters.values()?;
@@ -131,7 +156,7 @@ impl PixelNerf {
         let stem = Window { size: 7, stride: 2, padding: 3, dilation: 1 };
         let first = self.normalised(pictures, "conv1", "bn1", stem, true)?.relu()?;
         let [count, height, width, mut channels] = dims4(&first)?;
-        let mut latents = vec![first.clone()];
+        let mut levels = vec![first.clone()];
         let mut image = max_pool(&first)?;
         for (level, sizes) in (1..).zip(&self.architecture.levels) {
             for block in 0..sizes.block_count {
@@ -154,15 +179,26 @@ impl PixelNerf {
                 image = (inside + beside)?.relu()?;
                 channels = sizes.channels;
             }
-            latents.push(enlarge(&image, height, width)?);
+            levels.push(image.clone());
         }
-        let latents = Tensor::cat(&latents, 3)?.reshape((count * height * width, ()))?;
         let layers = |leaf: &str| -> Result<Tensor> {
             let names = (0..self.architecture.injected_count).map(|block| format!("mlp_coarse.lin_z.{block}.{leaf}"));
             Tensor::cat(&names.map(|name| self.parameters.get(&name)).collect::<Result<Vec<_>>>()?, 0)
         };
-        let added = latents.matmul(&layers("weight")?.t()?)?.broadcast_add(&layers("bias")?)?;
-        added.reshape((count, height, width, ()))
+        // Layers and enlargement are linear: each level goes through its columns while it is small.
+        let (weights, mut first_channel) = (layers("weight")?, 0);
+        let mut added = None;
+        for level in &levels {
+            let [_, rows, columns, channels] = dims4(level)?;
+            let own = weights.narrow(1, first_channel, channels)?.t()?.contiguous()?;
+            let mapped = level.contiguous()?.reshape((count * rows * columns, channels))?.matmul(&own)?;
+            added = Some(match added {
+                None => mapped.broadcast_add(&layers("bias")?)?.reshape((count, height, width, ()))?,
+                Some(added) => add_enlarged(&added, &mapped.reshape((count, rows, columns, ()))?)?,
+            });
+            first_channel += channels;
+        }
+        Ok(added.unwrap_or_else(|| unreachable!("the stem is the first level")))
     }
 
     /// The point network's parameters in the order of [`PointNetworkSizes::parameter_count`].
@@ -194,40 +230,41 @@ impl PixelNerf {
     }
 
     /// The colours of a batch's rays, `[object and ray][3]` in `[0, 1]`, over white, with weights `[object][view]` of the
-    /// views. The first pass, which places the samples of the second, is not differentiated.
+    /// views. The samples of both passes are differentiated, the depths of the second are not.
     pub(crate) fn render(&self, batch: &Batch, weights: &Tensor, draw: &Draw, counts: SampleCounts) -> Result<Tensor> {
         let (mut grids, mut parameters) = (self.grids(&batch.pictures)?, self.point_parameters()?);
         if self.is_frozen {
             (grids, parameters) = (grids.detach(), parameters.detach());
         }
         let seen = Seen { cameras: &batch.cameras, grids: &grids, weights, parameters: &parameters };
-        let (plain_grids, plain_weights, plain_parameters) = (grids.detach(), weights.detach(), parameters.detach());
-        let plain = Seen {
-            cameras: &batch.cameras,
-            grids: &plain_grids,
-            weights: &plain_weights,
-            parameters: &plain_parameters,
-        };
         let rays = batch.rays[0].len();
         let share = |object: usize, purpose: Purpose| {
             move |ray: usize, sample: usize| draw.uniform(purpose, ((object * rays + ray) << 7) + sample)
         };
-        let mut depths: Vec<Vec<f32>> = batch
+        let coarse: Vec<Vec<f32>> = batch
             .rays
             .iter()
             .enumerate()
             .map(|(object, rays)| coarse_depths(rays, counts.coarse, share(object, Purpose::Samples)))
             .collect();
+        let (mut raw, mut lengths) = self.sampled(&seen, batch, &coarse)?;
         if counts.fine > 0 {
-            let (raw, lengths) = self.sampled(&plain, batch, &depths)?;
-            let weights = sample_weights(&density(&raw, &lengths)?, &lengths)?.to_dtype(DType::F32)?;
+            let weights = sample_weights(&density(&raw.detach(), &lengths)?, &lengths)?.to_dtype(DType::F32)?;
             let weights = weights.flatten_all()?.to_vec1::<f32>()?;
-            for (object, (depths, weights)) in depths.iter_mut().zip(weights.chunks(rays * counts.coarse)).enumerate() {
-                let share = share(object, Purpose::FineSamples);
-                *depths = fine_depths(&batch.rays[object], depths, weights, counts.fine, share);
-            }
+            let fine: Vec<Vec<f32>> = (0..coarse.len())
+                .map(|object| {
+                    let weights = &weights[object * rays * counts.coarse..][..rays * counts.coarse];
+                    let share = share(object, Purpose::FineSamples);
+                    fine_depths(&batch.rays[object], counts.coarse, weights, counts.fine, share)
+                })
+                .collect();
+            // The first pass's samples are the second's too: what the network says there is known.
+            let (more, _) = self.sampled(&seen, batch, &fine)?;
+            let (order, depths) = merged(&coarse, &fine, rays);
+            let order = Tensor::from_vec(order, raw.dim(0)? + more.dim(0)?, &Device::Cpu)?;
+            raw = Tensor::cat(&[&raw, &more], 0)?.index_select(&order, 0)?;
+            lengths = sample_lengths(batch, &depths, raw.dtype())?;
         }
-        let (raw, lengths) = self.sampled(&seen, batch, &depths)?;
         let weights = sample_weights(&density(&raw, &lengths)?, &lengths)?;
         let colours = logistic(&raw.narrow(1, 0, 3)?)?.reshape((lengths.dim(0)?, lengths.dim(1)?, 3))?;
         let sum = weights.unsqueeze(1)?.matmul(&colours)?.squeeze(1)?;
@@ -235,16 +272,23 @@ impl PixelNerf {
         sum.broadcast_add(&(1.0 - weights.sum_keepdim(1)?)?)
     }
 
-    /// The network's outputs at samples, and their lengths `[object and ray][sample]`.
+    /// The network's outputs at samples `[object and ray and sample][4]`, and their lengths `[object and ray][sample]`.
     fn sampled(&self, seen: &Seen<'_>, batch: &Batch, depths: &[Vec<f32>]) -> Result<(Tensor, Tensor)> {
         let points: Vec<Vec<RayPoint>> =
             batch.rays.iter().zip(depths).map(|(rays, depths)| points(rays, depths)).collect();
         let raw = self.raw(seen, &points)?;
-        let lengths: Vec<f32> = points.iter().flatten().map(|point| point.length).collect();
-        let rays = batch.rays.len() * batch.rays[0].len();
-        let lengths = Tensor::from_vec(lengths, (rays, raw.dim(0)? / rays), &Device::Cpu)?.to_dtype(raw.dtype())?;
+        let lengths = sample_lengths(batch, depths, raw.dtype())?;
         Ok((raw, lengths))
     }
+}
+
+/// The lengths `[object and ray][sample]` of samples at depths `[object][ray][sample]`.
+fn sample_lengths(batch: &Batch, depths: &[Vec<f32>], dtype: DType) -> Result<Tensor> {
+    let all = batch.rays.iter().zip(depths).flat_map(|(rays, depths)| points(rays, depths));
+    let lengths: Vec<f32> = all.map(|point| point.length).collect();
+    let rays = batch.rays.len() * batch.rays[0].len();
+    let count = lengths.len() / rays;
+    Tensor::from_vec(lengths, (rays, count), &Device::Cpu)?.to_dtype(dtype)
 }
 
 /// The point network's inputs.

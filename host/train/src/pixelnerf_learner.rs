@@ -19,7 +19,10 @@ use viewfuse_nn::checkpoint::Checkpoint;
 pub struct PixelNerfSettings {
     /// Width of the point network; the trunk's width follows from it. A network that continues from a file has the file's.
     pub width: usize,
-    /// Side of the pictures.
+    /// Levels of the trunk behind its first convolution, 1 to 4; see [`Architecture::with_levels`]. `None`: 3, or those of the
+    /// file that a network continues from. More than the file's are added, and change nothing at first.
+    pub levels: Option<usize>,
+    /// Side of the pictures, which the network is then given when it renders.
     pub side: u32,
     /// Objects of a step.
     pub objects: usize,
@@ -31,6 +34,9 @@ pub struct PixelNerfSettings {
     pub fine: usize,
 }
 
+/// Levels of a new network's trunk, and the most: those of the published trunk.
+const LEVELS: usize = 3;
+const MOST_LEVELS: usize = 4;
 /// Largest width, side and count of the settings.
 const LARGEST: usize = 1024;
 /// Most samples of a step times the width: so many numbers a layer has, of 4 bytes.
@@ -39,7 +45,8 @@ const LARGEST_LAYER: usize = 1 << 28;
 impl PixelNerfSettings {
     /// Refuses numbers with which nothing is computed, or that no memory holds.
     fn check(&self) -> std::result::Result<(), TrainError> {
-        let PixelNerfSettings { width, side, objects, rays, coarse, fine } = *self;
+        let PixelNerfSettings { width, levels, side, objects, rays, coarse, fine } = *self;
+        let levels = levels.unwrap_or(LEVELS);
         let numbers = [
             ("width", width, 1, "it must be from 1 to 1024"),
             ("side", side as usize, 16, "it must be from 16 to 1024 pixels"),
@@ -52,6 +59,13 @@ impl PixelNerfSettings {
             numbers.iter().find(|(_, value, least, _)| !(*least..=LARGEST).contains(value))
         {
             return Err(TrainError::Setting { name, value: value as f64, allowed });
+        }
+        if !(1..=MOST_LEVELS).contains(&levels) {
+            return Err(TrainError::Setting {
+                name: "levels",
+                value: levels as f64,
+                allowed: "it must be from 1 to 4",
+            });
         }
         let layer = objects * rays * (coarse + fine) * width;
         if layer > LARGEST_LAYER {
@@ -93,11 +107,13 @@ pub fn train_pixelnerf(
     let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
     let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
-    let network = match from {
-        Some(checkpoint) => PixelNerf { is_frozen: false, ..PixelNerf::frozen(checkpoint, DType::F32)? },
-        None => PixelNerf::new(architecture, DType::F32, schedule.seed)?,
+    let mut network = match from {
+        Some(checkpoint) => PixelNerf::continued(checkpoint, settings.levels.unwrap_or(1), DType::F32, schedule.seed)?,
+        None => PixelNerf::new(architecture.with_levels(settings.levels.unwrap_or(LEVELS)), DType::F32, schedule.seed)?,
     };
-    let settings = PixelNerfSettings { width: network.architecture.width, ..*settings };
+    network.architecture.source_side = settings.side;
+    let Architecture { width, ref levels, .. } = network.architecture;
+    let settings = PixelNerfSettings { width, levels: Some(levels.len()), ..*settings };
     let record = run::settings("pixelnerf", &settings, schedule, &data, from)?;
     let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings };
     run::run(&learner, schedule, &record, "PSNR dB", folder, progress)

@@ -6,7 +6,7 @@ use super::attention::{Attention, Embedding};
 use super::batch::{Batch, BatchSize, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views};
-use super::genvs_learner;
+use super::genvs_learner::{self, SHARE_OF_LARGEST};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::pixelnerf_learner;
@@ -130,7 +130,8 @@ impl Learner for WeightingLearner {
                 let views = Views::draw(&self.scenes, draw, objects, views, dtype)?;
                 let samples =
                     CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: GENVS_SAMPLES, jitter: 1.0 };
-                genvs_learner::loss(network, &views, &self.of_views(&views)?, &samples, draw)
+                let weights = self.of_views(&views)?;
+                genvs_learner::loss(network, &views, &weights, &samples, SHARE_OF_LARGEST, draw)
             }
         }
     }

@@ -10,8 +10,8 @@ use viewfuse_job::files::check_writable;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_train::{
-    Embedding, GenvsSettings, Outcome, PixelNerfSettings, Schedule, WeightingSettings, train_genvs, train_pixelnerf,
-    train_weighting,
+    Embedding, GenvsSettings, Outcome, PixelNerfSettings, SHARE_OF_LARGEST, Schedule, WeightingSettings, train_genvs,
+    train_pixelnerf, train_weighting,
 };
 
 /// The file of a run that holds the trained network.
@@ -85,6 +85,10 @@ struct PixelNerfArguments {
     /// Width of the point network
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = count)]
     width: usize,
+    /// Levels of the trunk, 1 to 4: with more, a pixel's features depend on more of the photograph. More than those of the
+    /// file of --from are added [default: 3, or those of the file]
+    #[arg(long, value_name = "N", value_parser = levels)]
+    levels: Option<usize>,
     /// Side of the pictures, pixels, a multiple of 16
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = side)]
     side: u32,
@@ -124,6 +128,28 @@ struct GenvsArguments {
     /// Samples of a ray: as many as in renders
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
     samples: u32,
+    /// Share of the pictures that have the largest noise level, 0 to 1
+    #[arg(long, value_name = "SHARE", default_value_t = SHARE_OF_LARGEST, value_parser = share)]
+    largest_share: f32,
+    /// What a new denoiser's estimate is relative to: the colours of the feature image, or nothing, as published
+    #[arg(long, value_enum, default_value = "colours")]
+    estimate: EstimateName,
+    /// With --from: begin with a new denoiser
+    #[arg(long, requires = "from")]
+    new_denoiser: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum EstimateName {
+    Colours,
+    Published,
+}
+
+fn share(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("a number from 0 to 1 is needed".to_owned()),
+    }
 }
 
 fn width(text: &str) -> Result<usize, String> {
@@ -136,6 +162,11 @@ fn side(text: &str) -> Result<u32, String> {
 
 fn count(text: &str) -> Result<usize, String> {
     number(text, 1).map(|number| number as usize)
+}
+
+fn levels(text: &str) -> Result<usize, String> {
+    let fits = |levels: &usize| (1..=4).contains(levels);
+    count(text).ok().filter(fits).ok_or_else(|| "a whole number from 1 to 4 is needed".to_owned())
 }
 
 fn samples(text: &str) -> Result<usize, String> {
@@ -210,9 +241,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
-    let PixelNerfArguments { run, from, width, side, objects, rays, coarse, fine } = arguments;
-    let settings =
-        PixelNerfSettings { width: *width, side: *side, objects: *objects, rays: *rays, coarse: *coarse, fine: *fine };
+    let &PixelNerfArguments { ref run, ref from, width, levels, side, objects, rays, coarse, fine } = arguments;
+    let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
@@ -224,9 +254,11 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
 }
 
 fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
-    let GenvsArguments { run, from, width, side, objects, targets, samples } = arguments;
+    let &GenvsArguments { ref run, ref from, width, side, objects, targets, samples, .. } = arguments;
+    let &GenvsArguments { largest_share: share_of_largest, estimate, new_denoiser, .. } = arguments;
+    let from_colours = estimate == EstimateName::Colours;
     let settings =
-        GenvsSettings { width: *width, side: *side, objects: *objects, targets: *targets, samples: *samples };
+        GenvsSettings { width, side, objects, targets, samples, share_of_largest, from_colours, new_denoiser };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;

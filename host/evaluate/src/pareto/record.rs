@@ -246,3 +246,50 @@ pub fn csv_of(record: &ParetoRecord) -> Result<Vec<u8>, csv::Error> {
     }
     writer.into_inner().map_err(|error| error.into_error().into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_programs_row_has_all_columns() {
+        let mut own = DeviceRecord::beside("CPU", 1.0, 2.0);
+        let left_out = LeftOut { what: "volume rows", switch: true, left_out: 3, of: 4, cost: "nothing" };
+        own.points[0].left_out = vec![left_out];
+        own.points[0].denoising = Some(Denoising {
+            sampler: "heun",
+            levels: Some(25),
+            tolerance: None,
+            noise: [80.0, 0.002],
+            churn: 0.0,
+            early_termination: None,
+            reuse: None,
+            calls: 49,
+            saved_calls: 0,
+        });
+        let record = ParetoRecord {
+            viewfuse: "0",
+            scene: "scene".to_owned(),
+            field: "genvs",
+            model: None,
+            weighting: "mean".to_owned(),
+            seed: 0,
+            size: [8, 8],
+            sources: Vec::new(),
+            targets: Vec::new(),
+            round_count: 1,
+            devices: vec![own, DeviceRecord::beside("PyTorch", 4.0, 2.0)],
+            failures: Vec::new(),
+        };
+        let table = csv_of(&record).expect("a table");
+        let mut reader = csv::Reader::from_reader(table.as_slice());
+        let header: Vec<String> = reader.headers().expect("a header").iter().map(str::to_owned).collect();
+        assert_eq!(header[13..], ["calls", "volume_rows_left_out", "volume_rows_of"]);
+        // The reader refuses rows of different lengths.
+        let rows: Vec<Vec<String>> =
+            reader.records().map(|row| row.expect("as many columns").iter().map(str::to_owned).collect()).collect();
+        assert_eq!(rows[0][13..], ["49", "3", "4"]);
+        assert_eq!((rows[1][1].as_str(), rows[1][7].as_str()), ("PyTorch", "0.5000"));
+        assert_eq!(rows[1][13..], ["", "", ""]);
+    }
+}

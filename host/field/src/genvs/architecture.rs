@@ -12,10 +12,11 @@
 mod denoiser;
 mod encoder;
 
-pub use denoiser::{Block, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Resampling, group_count};
+pub use denoiser::{Block, Convolution, Denoiser, DenoiserLevel, DenoiserStep, Estimate, Resampling, group_count};
 pub use encoder::{ASPP_RATES, Encoder};
 pub use viewfuse_nn::resnet::Level;
 
+use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
 
 /// Channels of a picture.
@@ -90,6 +91,7 @@ impl Architecture {
         let feature_count = sizes.size(&format!("{MLP}.0.weight"), 2, 1)?;
         let mlp_width = sizes.size(&format!("{MLP}.0.weight"), 2, 0)?;
         let encoder = Encoder::of(&sizes, feature_count)?;
+        let has_colours = feature_count >= COLOUR_CHANNELS;
         let has_denoiser = checkpoint.shapes().keys().any(|name| name.starts_with("denoiser."));
         let denoiser = if has_denoiser { Some(Denoiser::of(&sizes)?) } else { None };
         match &denoiser {
@@ -99,7 +101,12 @@ impl Architecture {
                     denoiser.in_channels
                 )));
             }
-            None if feature_count < COLOUR_CHANNELS => {
+            Some(denoiser) if denoiser.estimate == Estimate::FromColours && !has_colours => {
+                return Err(sizes.refuse(format!(
+                    "the denoiser starts from colours, and the {feature_count} features of a point cannot be a colour"
+                )));
+            }
+            None if !has_colours => {
                 return Err(sizes.refuse(format!(
                     "it has no denoiser, and the {feature_count} features of a point cannot be a colour"
                 )));
@@ -136,6 +143,14 @@ impl Architecture {
         }
         tensors.extend(self.denoiser.iter().flat_map(|denoiser| denoiser.tensors()));
         tensors
+    }
+
+    /// Sizes in a checkpoint's metadata that its tensors do not determine.
+    pub fn metadata(&self) -> BTreeMap<String, String> {
+        match &self.denoiser {
+            Some(denoiser) => denoiser.metadata(),
+            None => BTreeMap::from([(IMAGE_SIDE.to_owned(), self.image_side.to_string())]),
+        }
     }
 
     /// Optional tensors of official checkpoints: counters, the filters with which the denoiser halves and

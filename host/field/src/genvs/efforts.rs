@@ -1,26 +1,97 @@
 //! The runs of the denoiser, from the shortest to the published one.
 
+use super::Estimate;
 use super::sampling::{Plan, Steps};
 use crate::Effort;
 use viewfuse_core::sampler::Sampler;
+use viewfuse_core::schedule::NoiseSchedule;
 
-/// Calls of the denoiser, with the error that is typical of so many (the example `efforts` of `viewfuse-evaluate`).
-const CALLS: [(u32, f32); 7] = [(2, 0.12), (3, 0.05), (4, 0.044), (6, 0.02), (8, 0.0146), (12, 0.003), (18, 0.0008)];
+/// Calls of the denoiser, with the error that is typical of so many, from noise alone and from the colours of the feature
+/// image (the example `efforts` of `viewfuse-evaluate`, on the network of the published size and on the included one).
+const CALLS: [(u32, [f32; 2]); 8] = [
+    (2, [0.12, 0.08]),
+    (3, [0.08, 0.033]),
+    (4, [0.05, 0.019]),
+    (5, [0.03, 0.013]),
+    (6, [0.018, 0.01]),
+    (8, [0.012, 0.008]),
+    (12, [0.004, 0.0035]),
+    (18, [0.0008, 0.0008]),
+];
+/// So few calls have other levels than the published ones, of which a good part is spent where the picture hardly changes:
+/// they begin at a lower level, and end at a higher one, whose estimate is the picture.
+const FEW: u32 = 8;
+/// Their largest level, from noise alone and from the colours of the feature image.
+const FROM_NOISE: f32 = 20.0;
+const FROM_COLOURS: f32 = 10.0;
+/// Their smallest level; very few calls end earlier.
+const SMALLEST: f32 = 0.05;
+const VERY_FEW: (u32, f32) = (4, 0.1);
 
 /// The share of the exact run's work that no number of calls changes: encoding, and the feature image.
 const FIXED_WORK: f32 = 0.06;
 
 /// The efforts of a run with this schedule and seed, the cheapest first.
-pub(super) fn of(plan: &Plan) -> Vec<(Effort, Plan)> {
+pub(super) fn of(plan: &Plan, estimate: Estimate) -> Vec<(Effort, Plan)> {
     let exact = Plan { steps: Plan::published(plan.seed).steps, early_termination: None, ..*plan };
     let all_calls = match exact.steps {
         Steps::Fixed { sampler, level_count } => sampler.call_count(level_count),
         Steps::Chosen { most_calls, .. } => most_calls,
     };
-    let few = CALLS.map(|(calls, error)| {
-        let steps = Steps::Fixed { sampler: Sampler::Ipndm, level_count: calls };
+    let few = CALLS.map(|(calls, [from_noise, from_colours])| {
         let work = FIXED_WORK + (1.0 - FIXED_WORK) * calls as f32 / all_calls as f32;
-        (Effort::new(format!("{calls} calls of the denoiser"), error, work), Plan { steps, ..exact })
+        let error = if estimate == Estimate::FromColours { from_colours } else { from_noise };
+        (Effort::new(format!("{calls} calls of the denoiser"), error, work), in_calls(&exact, estimate, calls))
     });
     few.into_iter().chain([(Effort::exact(), exact)]).collect()
+}
+
+/// The plan with so many calls; few have their own levels, as far as these lie between the plan's.
+pub(super) fn in_calls(plan: &Plan, estimate: Estimate, calls: u32) -> Plan {
+    let plan = Plan { steps: Steps::Fixed { sampler: Sampler::Ipndm, level_count: calls }, ..*plan };
+    if calls > FEW {
+        return plan;
+    }
+    let [largest, smallest] = [0, 1].map(|index| plan.schedule.level(index, 2));
+    let from_colours = estimate == Estimate::FromColours;
+    let begin = if from_colours { FROM_COLOURS } else { FROM_NOISE };
+    let end = if calls <= VERY_FEW.0 { VERY_FEW.1 } else { SMALLEST };
+    match NoiseSchedule::new(smallest.max(end), largest.min(begin)) {
+        Ok(schedule) => Plan { schedule, from_colours, ..plan },
+        Err(_) => plan,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ends(plan: &Plan) -> [f32; 2] {
+        [0, 1].map(|index| plan.schedule.level(index, 2))
+    }
+
+    #[test]
+    fn few_calls_have_levels_of_their_own() {
+        let all = of(&Plan::fast(3), Estimate::FromColours);
+        let (first, exact) = (&all[0].1, &all[all.len() - 1].1);
+        assert_eq!((ends(first), first.from_colours, first.seed), ([FROM_COLOURS, VERY_FEW.1], true, 3));
+        assert_eq!((ends(exact), exact.from_colours), ([80.0, 0.002], false));
+        assert_eq!(*exact, Plan { early_termination: None, ..Plan::published(3) });
+        let published = of(&Plan::fast(3), Estimate::Published);
+        assert_eq!((ends(&published[0].1), published[0].1.from_colours), ([FROM_NOISE, VERY_FEW.1], false));
+        assert_eq!(ends(&published[5].1), [FROM_NOISE, SMALLEST]);
+        assert_eq!(ends(&published[6].1), [80.0, 0.002]);
+    }
+
+    #[test]
+    fn given_levels_are_kept() {
+        let given = |smallest, largest| {
+            let schedule = NoiseSchedule::new(smallest, largest).expect("levels");
+            ends(&of(&Plan { schedule, ..Plan::fast(0) }, Estimate::Published)[0].1)
+        };
+        assert_eq!(given(0.5, 5.0), [5.0, 0.5]);
+        // Not in the order of the few calls' levels: left as they are.
+        assert_eq!(given(0.01, 0.05), [0.05, 0.01]);
+        assert_eq!(given(30.0, 60.0), [60.0, 30.0]);
+    }
 }

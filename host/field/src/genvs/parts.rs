@@ -1,6 +1,6 @@
 //! The network's parts on a device and their evaluation. NaN and infinity are reported at the part that produced them.
 
-use super::architecture::{Architecture, COLOUR_CHANNELS};
+use super::architecture::{Architecture, COLOUR_CHANNELS, Estimate};
 use super::denoiser::Denoiser;
 use super::encoder::Encoder;
 use super::feature_image::{PointNetwork, Views, render};
@@ -27,7 +27,14 @@ pub(super) struct Parts<D: Device> {
     encoder: Encoder<D>,
     points: PointNetwork<D>,
     /// Without a denoiser, the first features are the picture.
-    denoiser: Option<Denoiser<D>>,
+    denoiser: Option<(Denoiser<D>, Estimate)>,
+}
+
+/// What a denoiser is given beside the noisy picture.
+pub(super) struct Condition<'a, D: Device> {
+    features: &'a Image<D>,
+    /// The colours that the features show, `[row][column][3]` in `[-1, 1]`, for [`Estimate::FromColours`].
+    colours: Option<D::Buffer<f32>>,
 }
 
 impl<D: Device> Parts<D> {
@@ -46,7 +53,7 @@ impl<D: Device> Parts<D> {
         let denoiser = architecture.denoiser.as_ref().map(|denoiser| {
             let sides: Vec<u32> =
                 (0..denoiser.levels.len()).map(|level| (denoiser.image_side >> level) as u32).collect();
-            Denoiser::load(&loader("denoiser.model."), side, &sides)
+            Denoiser::load(&loader("denoiser.model."), side, &sides).map(|loaded| (loaded, denoiser.estimate))
         });
         Ok(Parts {
             encoder: Encoder::load(&loader("pixel_nerf_net.encoder."), &architecture.encoder, side)?,
@@ -113,28 +120,61 @@ impl<D: Device> Parts<D> {
             let colours = leading_channels(scratch, features, COLOUR_CHANNELS as u32)?;
             return Ok(Sampled { picture: colours.values, levels: Vec::new(), left_out: 0 });
         }
+        let condition = self.condition(device, scratch, features)?;
+        let start = match (start, &condition.colours) {
+            (Start::Noise, Some(picture)) if plan.from_colours => {
+                Start::Picture { picture, level: plan.schedule.level(0, 2) }
+            }
+            (start, _) => start,
+        };
         sample(device, plan, count, start, progress, |noisy, level, denoised| {
-            Ok(self.denoise(device, scratch, noisy, features, level, denoised)?)
+            Ok(self.denoise(device, scratch, noisy, &condition, level, denoised)?)
         })
     }
 
-    /// The denoiser's estimate of the picture behind a noisy one of a level, given the features:
-    /// `c_skip x + c_out F(c_in x)`. Without a denoiser, nothing is written.
+    /// The denoiser's condition for a feature image.
+    pub(super) fn condition<'a>(
+        &self,
+        device: &D,
+        scratch: &mut Scratch<'_, D>,
+        features: &'a Image<D>,
+    ) -> Result<Condition<'a, D>, DeviceError> {
+        let mut colours = None;
+        if matches!(self.denoiser, Some((_, Estimate::FromColours))) {
+            let first = leading_channels(scratch, features, COLOUR_CHANNELS as u32)?;
+            let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
+            let white = device.upload(&vec![1.0; count])?;
+            let mut shown = device.zeros(count)?;
+            let mix = Mix { state: 1.0, results: [-1.0, 0.0, 0.0, 0.0] };
+            device.mix_pictures(&mix, count as u32, &white, &first.values, &white, &white, &white, &mut shown)?;
+            scratch.recycle(first);
+            colours = Some(shown);
+        }
+        Ok(Condition { features, colours })
+    }
+
+    /// The denoiser's estimate of the picture behind a noisy one of a level; see [`Estimate`]. Without a denoiser, nothing
+    /// is written.
     pub(super) fn denoise(
         &self,
         device: &D,
         scratch: &mut Scratch<'_, D>,
         noisy: &D::Buffer<f32>,
-        features: &Image<D>,
+        condition: &Condition<'_, D>,
         level: f32,
         denoised: &mut D::Buffer<f32>,
     ) -> Result<(), DeviceError> {
-        let Some(denoiser) = &self.denoiser else { return Ok(()) };
+        let Some((denoiser, _)) = &self.denoiser else { return Ok(()) };
         let at = Preconditioning::at(level);
-        let output = denoiser.run(scratch, noisy, features, &at)?;
-        let mix = Mix { state: at.skip, results: [at.output, 0.0, 0.0, 0.0] };
+        let output = denoiser.run(scratch, noisy, condition.features, &at)?;
         let (count, unused) = (output.size.pixel_count() * output.size.channels, noisy);
-        device.mix_pictures(&mix, count, noisy, &output.values, unused, unused, unused, denoised)?;
+        let (colours, of_colours) = match &condition.colours {
+            // Cancels only where the share is invisible.
+            Some(colours) => (colours, 1.0 - at.skip),
+            None => (unused, 0.0),
+        };
+        let mix = Mix { state: at.skip, results: [at.output, of_colours, 0.0, 0.0] };
+        device.mix_pictures(&mix, count, noisy, &output.values, colours, unused, unused, denoised)?;
         scratch.recycle(output);
         Ok(())
     }

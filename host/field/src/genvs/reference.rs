@@ -129,9 +129,10 @@ impl<'a, D: Device> Reference<'a, D> {
         let Views { device, parts, .. } = &self.views;
         let mut scratch = Scratch::new(*device);
         let features = self.condition(&mut scratch, features, size)?;
+        let condition = parts.condition(*device, &mut scratch, &features)?;
         let noisy = device.upload(noisy)?;
         let mut denoised = device.zeros(size[0] as usize * size[1] as usize * super::COLOUR_CHANNELS)?;
-        parts.denoise(*device, &mut scratch, &noisy, &features, level, &mut denoised)?;
+        parts.denoise(*device, &mut scratch, &noisy, &condition, level, &mut denoised)?;
         Ok(device.download(&denoised)?)
     }
 

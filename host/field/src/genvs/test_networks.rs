@@ -1,7 +1,6 @@
 //! Test networks: checkpoints with deterministic initialisation, for comparison with other implementations and for timing.
 
-use super::architecture::{Architecture, IMAGE_SIDE};
-use std::collections::BTreeMap;
+use super::architecture::Architecture;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::initialisation;
 
@@ -12,11 +11,7 @@ const GAINS: [(&str, f32); 2] =
 /// Every tensor by [`initialisation`], computed when it is read. With [`Architecture::published`] it is the network of the
 /// reference values.
 pub fn deterministic(architecture: &Architecture) -> Checkpoint {
-    let metadata = match architecture.denoiser {
-        Some(_) => BTreeMap::new(),
-        None => BTreeMap::from([(IMAGE_SIDE.to_owned(), architecture.image_side.to_string())]),
-    };
-    Checkpoint::computed("genvs", architecture.tensors(), metadata, |tensor| {
+    Checkpoint::computed("genvs", architecture.tensors(), architecture.metadata(), |tensor| {
         let mut values = initialisation::tensor(&tensor.name, &tensor.shape);
         if let Some((_, gain)) = GAINS.iter().find(|(name, _)| *name == tensor.name) {
             values.iter_mut().for_each(|value| *value *= gain);

@@ -177,14 +177,19 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn efforts(&self) -> Vec<Effort> {
-        match self.field.architecture.denoiser {
-            Some(_) => efforts::of(&self.field.options.plan).into_iter().map(|(effort, _)| effort).collect(),
+        match &self.field.architecture.denoiser {
+            Some(denoiser) => {
+                let all = efforts::of(&self.field.options.plan, denoiser.estimate);
+                all.into_iter().map(|(effort, _)| effort).collect()
+            }
             None => Vec::new(),
         }
     }
 
     fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        if let Some((_, plan)) = efforts::of(&self.field.options.plan).into_iter().nth(effort) {
+        if let Some(denoiser) = &self.field.architecture.denoiser
+            && let Some((_, plan)) = efforts::of(&self.field.options.plan, denoiser.estimate).into_iter().nth(effort)
+        {
             self.plan = plan;
         }
         Ok(Encodings::Kept)

@@ -34,7 +34,15 @@ pub struct Architecture {
     pub has_fine: bool,
     /// Where in a pixel its centre is; see [`viewfuse_core::rays::CastBlock::pixel_centre`]. 0 as published.
     pub pixel_centre: f32,
+    /// Longest side of source photographs, pixels: the size at which the network was trained. Larger ones are resized, since
+    /// the trunk's features are of that size.
+    pub source_side: u32,
 }
+
+/// Longest side of the published networks' source photographs; also of checkpoints that do not tell theirs.
+const SOURCE_SIDE: u32 = 128;
+/// The largest side that a checkpoint may tell.
+const LARGEST_SIDE: f32 = 65536.0;
 
 /// The two point networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +77,7 @@ impl Architecture {
             frequency: 1.5,
             has_fine: true,
             pixel_centre: 0.0,
+            source_side: SOURCE_SIDE,
         }
     }
 
@@ -82,6 +91,16 @@ impl Architecture {
             width,
             ..Architecture::published()
         }
+    }
+
+    /// The same with `count` levels of the trunk: each new one has twice the channels of the one before it, and one block.
+    pub fn with_levels(mut self, count: usize) -> Architecture {
+        self.levels.truncate(count);
+        while self.levels.len() < count {
+            let before = self.levels.last().map_or(self.stem_channels, |level| level.channels);
+            self.levels.push(Level { channels: 2 * before, block_count: 1 });
+        }
+        self
     }
 
     /// Channels of the latents: those of the stem and of all levels behind one another.
@@ -156,6 +175,7 @@ impl Architecture {
             frequency: frequency(&sizes, (embedded_len - 6) / 6)?,
             has_fine: checkpoint.shapes().keys().any(|name| name.starts_with("mlp_fine.")),
             pixel_centre: sizes.number("viewfuse.pixel_centre", 0.0)?,
+            source_side: source_side(&sizes)?,
         };
         checkpoint.check(&architecture.tensors(), |name| architecture.is_optional(name))?;
         Ok(architecture)
@@ -208,6 +228,7 @@ impl Architecture {
         BTreeMap::from([
             number("viewfuse.frequency", self.frequency),
             number("viewfuse.pixel_centre", self.pixel_centre),
+            number("viewfuse.source_side", self.source_side as f32),
         ])
     }
 
@@ -220,6 +241,18 @@ impl Architecture {
 fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count: usize) {
     tensors.push(TensorShape { name: format!("{name}.weight"), shape: vec![out_count, in_count] });
     tensors.push(TensorShape { name: format!("{name}.bias"), shape: vec![out_count] });
+}
+
+/// The longest side of source photographs, from the metadata.
+fn source_side(sizes: &Sizes<'_>) -> Result<u32, CheckpointError> {
+    const KEY: &str = "viewfuse.source_side";
+    let side = sizes.number(KEY, SOURCE_SIDE as f32)?;
+    if !(1.0..=LARGEST_SIDE).contains(&side) || side.fract() != 0.0 {
+        return Err(
+            sizes.refuse(format!("its metadata says {KEY} = {side}, which is not a whole number from 1 to 65536"))
+        );
+    }
+    Ok(side as u32)
 }
 
 /// The lowest frequency: from the checkpoint's table if it has one, otherwise the published one.

@@ -6,7 +6,7 @@ use super::super::genvs_learner::loss;
 use super::super::operations::{Apply, Convolution, Look, LookSizes, Normalise, Operation, Sight, Window};
 use super::super::parameters::Parameters;
 use super::super::slopes::{assert_close, assert_slopes, mixed, noise, orbit, photographs, tensor, variable};
-use super::{Genvs, Views, each};
+use super::{Genvs, Views, colours, each};
 use candle_core::{DType, Result, Tensor, Var};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -16,7 +16,7 @@ use viewfuse_core::schedule::Preconditioning;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::genvs::reference::Reference;
 use viewfuse_field::genvs::{
-    Architecture, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, ray_length, test_networks,
+    Architecture, Estimate, Genvs as Field, GenvsOptions, LAST_LENGTH, cast_block, ray_length, test_networks,
 };
 use viewfuse_field::learned::default_near_far;
 use viewfuse_job::progress::Silent;
@@ -53,9 +53,22 @@ fn views(sources: &SourceImages, targets: &[CameraBlock], object_count: usize) -
     }
 }
 
+/// The small member, with a denoiser whose estimate is this.
+fn small(estimate: Estimate) -> Architecture {
+    let mut architecture = Architecture::small();
+    architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
+    architecture
+}
+
 #[test]
 fn the_graph_is_the_renderers() {
-    let made = test_networks::deterministic(&Architecture::small());
+    for estimate in [Estimate::Published, Estimate::FromColours] {
+        assert_graph_is_the_renderers(estimate);
+    }
+}
+
+fn assert_graph_is_the_renderers(estimate: Estimate) {
+    let made = test_networks::deterministic(&small(estimate));
     let network = Genvs::frozen(&made, 64, DType::F64).expect("a network");
     let field = Field::new(made, GenvsOptions::default()).expect("a network");
     let (sources, target) = (photographs(3, 64), target(64, 2.0));
@@ -156,17 +169,41 @@ fn looking_has_its_slopes() {
 
 #[test]
 fn the_loss_has_its_slopes() {
-    let made = test_networks::deterministic(&Architecture::narrow(32, 4));
+    let mut architecture = Architecture::narrow(32, 4);
+    architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = Estimate::FromColours);
+    let made = test_networks::deterministic(&architecture);
     let network = Genvs { is_frozen: false, ..Genvs::frozen(&made, 32, DType::F64).expect("a network") };
     let views = views(&photographs(2, 32), &[target(32, 2.0), target(32, 0.5)], 2);
     let samples = CoarseBlock { seed: [1, 2], sample_count: 4, jitter: 1.0 };
     let weights = variable(&[2, 2], 30);
-    let value = || loss(&network, &views, &weights, &samples, &Draw { seed: 1, step: 2 });
+    let value = || loss(&network, &views, &weights, &samples, 0.25, &Draw { seed: 1, step: 2 });
     // Every seventh parameter: each costs the loss twice, and every operation has its own test.
     let mut all: Vec<(&str, &Var)> = network.parameters.iter().step_by(7).collect();
     all.push(("weights", &weights));
     // A short step: between its ends no rectification may turn.
     assert_slopes(&all, 1.0e-8, 1.0e-3, value);
+}
+
+#[test]
+fn a_new_denoiser_shows_the_colours_and_leaves_the_volumes() {
+    let old = test_networks::deterministic(&Architecture::narrow(32, 4));
+    let network = Genvs::continued(&old, 32, Some(Estimate::FromColours), DType::F32, 1).expect("a network");
+    let kept = Genvs::continued(&old, 32, None, DType::F32, 1).expect("a network");
+    for (name, variable) in kept.parameters.iter() {
+        let new = network.parameters.get(name).expect("the same names");
+        let numbers = |tensor: &Tensor| tensor.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
+        let is_same = numbers(variable) == numbers(new);
+        assert!(is_same || name.starts_with("denoiser."), "{name} changed");
+        assert!(!is_same || !name.ends_with("enc.32x32_conv.weight"), "the denoiser is the old one");
+    }
+    // Its last layer is zero: where noise hides everything, the estimate is what the features show.
+    let features = noise(&[1, 32, 32, 16], 4).to_dtype(DType::F32).expect("features");
+    let noisy = (noise(&[1, 32, 32, 3], 3) * 80.0).and_then(|all| all.to_dtype(DType::F32)).expect("noise");
+    let denoised = network.denoised(&noisy, &features, &[Preconditioning::at(80.0)]).expect("a picture");
+    let shown = colours(&features).and_then(|all| all.to_dtype(DType::F64)).expect("colours");
+    let denoised = denoised.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
+    // c_skip is 4e-5 there, times noise of up to 4 deviations of 80.
+    assert_close(&denoised, &shown, 5.0e-3);
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! PixelNeRF's point network as one operation: a view's blocks, fusion of the views, the blocks behind.
 //!
 //! Chunks of some dozens of points go through all layers, so that activations stay in a core's caches; the backward pass
-//! computes them again. The library's operations would move 90 times the activations through memory for the same
-//! work.
+//! computes them again, for the points that have a gradient: most of a ray's are in empty space or behind a surface. The
+//! library's operations would move 90 times the activations through memory for the same work.
 
 use super::convolve::sum;
 use super::linear::{layer_gradient, linear, linear_back, rectified};
@@ -16,6 +16,9 @@ use viewfuse_core::rays::RayPoint;
 
 /// Points of a chunk.
 const CHUNK: usize = 64;
+/// A point is left out of the backward pass if its gradient is less than this share of the points' mean (sums of
+/// magnitudes). All that is left out together is then at most this share of the whole.
+const NEGLIGIBLE: f64 = 1.0e-4;
 
 /// Sizes of the network.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,9 +128,9 @@ impl Points {
     }
 
     /// Rows `[view][point]` of some points of an object.
-    fn rows(&self, object: usize, points: &Range<usize>) -> impl Iterator<Item = usize> + use<> {
-        let (views, count, points) = (self.view_count, self.point_count, points.clone());
-        (0..views).flat_map(move |view| points.clone().map(move |point| (object * views + view) * count + point))
+    fn rows<'a>(&self, object: usize, points: &'a [usize]) -> impl Iterator<Item = usize> + use<'a> {
+        let (views, count) = (self.view_count, self.point_count);
+        (0..views).flat_map(move |view| points.iter().map(move |point| (object * views + view) * count + point))
     }
 }
 
@@ -175,7 +178,7 @@ impl PointNetwork {
         ((0..views).map(|view| if sees(view) { own[view] / all } else { T::zero() }).collect(), all)
     }
 
-    fn run<T: Real>(&self, [grids, weights, parameters]: [&[T]; 3], object: usize, chunk: &Range<usize>) -> Way<T> {
+    fn run<T: Real>(&self, [grids, weights, parameters]: [&[T]; 3], object: usize, chunk: &[usize]) -> Way<T> {
         let PointNetworkSizes { embedded_len, width, block_count, injected_count } = self.sizes;
         let points = &*self.points;
         let row_count = points.view_count * chunk.len();
@@ -217,10 +220,10 @@ impl PointNetwork {
         Way { embedded, flows, insides, of_views, last: flow, raw }
     }
 
-    fn fuse<T: Real>(&self, of_views: &[T], weights: &[T], object: usize, chunk: &Range<usize>) -> Vec<T> {
+    fn fuse<T: Real>(&self, of_views: &[T], weights: &[T], object: usize, chunk: &[usize]) -> Vec<T> {
         let width = self.sizes.width;
         let mut fused = vec![T::zero(); chunk.len() * width];
-        for (index, (point, own)) in chunk.clone().zip(fused.chunks_exact_mut(width)).enumerate() {
+        for (index, (&point, own)) in chunk.iter().zip(fused.chunks_exact_mut(width)).enumerate() {
             for (view, share) in self.shares(weights, object, point).0.into_iter().enumerate() {
                 let from = &of_views[(view * chunk.len() + index) * width..][..width];
                 own.iter_mut().zip(from).for_each(|(own, from)| *own += *from * share);
@@ -235,7 +238,7 @@ impl PointNetwork {
         [grids, weights, parameters]: [&[T]; 3],
         gradient: &[T],
         object: usize,
-        chunk: &Range<usize>,
+        chunk: &[usize],
         [of_grids, of_weights, of_parameters]: [&mut [T]; 3],
     ) {
         let PointNetworkSizes { embedded_len, width, block_count, injected_count } = self.sizes;
@@ -283,12 +286,12 @@ impl PointNetwork {
         weights: &[T],
         fused: &[T],
         object: usize,
-        chunk: &Range<usize>,
+        chunk: &[usize],
         of_weights: &mut [T],
     ) -> Vec<T> {
         let width = self.sizes.width;
         let mut flow = vec![T::zero(); of_views.len()];
-        for (index, (point, own)) in chunk.clone().zip(fused.chunks_exact(width)).enumerate() {
+        for (index, (&point, own)) in chunk.iter().zip(fused.chunks_exact(width)).enumerate() {
             let (shares, all) = self.shares(weights, object, point);
             let mut dots = Vec::with_capacity(shares.len());
             for (view, share) in shares.iter().enumerate() {
@@ -312,9 +315,16 @@ impl PointNetwork {
         flow
     }
 
-    fn chunks(&self) -> impl Iterator<Item = Range<usize>> + use<> {
-        let count = self.points.point_count;
-        (0..count).step_by(CHUNK).map(move |start| start..(start + CHUNK).min(count))
+    /// The points of each object whose gradient, of `[object and point][4]`, is not negligible.
+    pub(crate) fn with_gradient<T: Real>(&self, gradient: &[T]) -> Vec<Vec<usize>> {
+        let points = &*self.points;
+        let own = |row: &[T]| row.iter().map(|value| value.to_f64().abs()).sum::<f64>();
+        let all: f64 = gradient.chunks_exact(4).map(own).sum();
+        let least = NEGLIGIBLE * all / (points.object_count * points.point_count) as f64;
+        // NaN is no less than anything: it stays and shows itself.
+        let is_kept = |point: &usize, rows: &[T]| !(own(&rows[4 * point..][..4]) <= least);
+        let of = |rows: &[T]| (0..points.point_count).filter(|point| is_kept(point, rows)).collect();
+        gradient.chunks_exact(4 * points.point_count).map(of).collect()
     }
 }
 
@@ -326,8 +336,10 @@ impl Operation<3> for PointNetwork {
     }
 
     fn forward<T: Real>(&self, inputs: [&[T]; 3]) -> Vec<T> {
-        let chunks: Vec<(usize, Range<usize>)> =
-            (0..self.points.object_count).flat_map(|object| self.chunks().map(move |chunk| (object, chunk))).collect();
+        let all: Vec<usize> = (0..self.points.point_count).collect();
+        let chunks: Vec<(usize, &[usize])> = (0..self.points.object_count)
+            .flat_map(|object| all.chunks(CHUNK).map(move |chunk| (object, chunk)))
+            .collect();
         let raws: Vec<Vec<T>> = chunks.par_iter().map(|(object, chunk)| self.run(inputs, *object, chunk).raw).collect();
         raws.concat()
     }
@@ -336,19 +348,19 @@ impl Operation<3> for PointNetwork {
         let points = &*self.points;
         let grid_len = points.view_count * self.node_count * self.node_len();
         // One object after another, so that sums are in one order.
-        let one = |object: usize| {
+        let one = |(object, kept): (usize, &Vec<usize>)| {
             let mut of_grids = vec![T::zero(); if self.is_frozen { 0 } else { grid_len }];
             let mut of_weights = vec![T::zero(); points.view_count];
             let mut of_parameters = vec![T::zero(); if self.is_frozen { 0 } else { inputs[2].len() }];
-            for chunk in self.chunks() {
-                let rows = object * points.point_count + chunk.start..object * points.point_count + chunk.end;
-                let gradient = &gradient[4 * rows.start..4 * rows.end];
+            for chunk in kept.chunks(CHUNK) {
+                let row = |point: &usize| &gradient[4 * (object * points.point_count + point)..][..4];
+                let own: Vec<T> = chunk.iter().flat_map(row).copied().collect();
                 let gradients = [&mut of_grids[..], &mut of_weights[..], &mut of_parameters[..]];
-                self.back(inputs, gradient, object, &chunk, gradients);
+                self.back(inputs, &own, object, chunk, gradients);
             }
             (of_grids, of_weights, of_parameters)
         };
-        let all: Vec<_> = (0..points.object_count).into_par_iter().map(one).collect();
+        let all: Vec<_> = self.with_gradient(gradient).par_iter().enumerate().map(one).collect();
         let (mut of_grids, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
         for (grids, weights, parameters) in all {
             of_grids.extend(grids);

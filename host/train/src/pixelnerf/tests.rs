@@ -2,7 +2,7 @@
 
 use super::super::attention::{Attention, Embedding};
 use super::super::batch::{Batch, Targets};
-use super::super::compositing::{coarse_depths, fine_depths, points, weights as sample_weights};
+use super::super::compositing::{coarse_depths, fine_depths, merged, points, weights as sample_weights};
 use super::super::draw::Draw;
 use super::super::images::{enlarge, max_pool};
 use super::super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, RectifiedDensity};
@@ -83,6 +83,26 @@ fn the_graph_is_the_renderers() {
     let shares = sample_weights(&super::density(&raw, &lengths).expect("densities"), &lengths).expect("weights");
     let looked = reference.look(Pass::Coarse, &weights, &rays, &depths).expect("rays");
     assert_close(&looked.weights, &shares, 1.0e-4);
+}
+
+#[test]
+fn new_levels_change_nothing_at_first() {
+    let old = network(8);
+    let (tensors, metadata) = old.checkpoint().expect("tensors");
+    let file = Checkpoint::in_memory("made", tensors, metadata);
+    let same = PixelNerf::continued(&file, 1, DType::F64, 5).expect("a network");
+    let new = PixelNerf::continued(&file, 4, DType::F64, 5).expect("a network");
+    assert_eq!([&same, &new].map(|network| network.architecture.levels.len()), [2, 4]);
+    assert!(new.parameters.get("encoder.model.layer4.0.conv1.weight").is_ok());
+    let pictures = noise(&[1, 32, 32, 3], 7);
+    let grids = |network: &PixelNerf| {
+        network.grids(&pictures).and_then(|grids| grids.flatten_all()?.to_vec1::<f64>()).expect("grids")
+    };
+    assert_eq!(grids(&same), grids(&new));
+    // The written file is read as it was trained.
+    let (tensors, metadata) = new.checkpoint().expect("tensors");
+    let read = Architecture::of(&Checkpoint::in_memory("made", tensors, metadata)).expect("a network");
+    assert_eq!(read, new.architecture);
 }
 
 fn point_network(is_frozen: bool) -> PointNetwork {
@@ -174,10 +194,38 @@ fn fine_samples_lie_where_weights_are() {
     let rays = vec![TargetRay { near: 1.0, far: 2.0, ..TargetRay::default() }];
     let depths = coarse_depths(&rays, 4, |_, _| 0.5);
     assert_eq!(depths, [1.125, 1.375, 1.625, 1.875]);
-    let all = fine_depths(&rays, &depths, &[0.0, 0.0, 1.0, 0.0], 8, |_, _| 0.5);
+    let fine = fine_depths(&rays, 4, &[0.0, 0.0, 1.0, 0.0], 8, |_, _| 0.5);
+    let (order, all) = merged(&[depths.clone()], &[fine.clone()], 1);
+    let all = &all[0];
     assert_eq!(all.len(), 12);
     assert!(all.is_sorted());
     assert_eq!(all.iter().filter(|depth| (1.5..1.75).contains(*depth)).count(), 9, "{all:?}");
+    let both = [depths, fine].concat();
+    assert_eq!(order.iter().map(|number| both[*number as usize]).collect::<Vec<f32>>(), *all);
+}
+
+#[test]
+fn samples_of_two_passes_are_numbered_over_objects_and_rays() {
+    // Two objects with two rays each, two samples a ray in the first pass and one in the second.
+    let first = [vec![1.0, 3.0, 1.0, 3.0], vec![2.0, 4.0, 2.0, 4.0]];
+    let second = [vec![2.0, 0.5], vec![5.0, 3.0]];
+    let (order, depths) = merged(&first, &second, 2);
+    assert_eq!(order, [0, 8, 1, 9, 2, 3, 4, 5, 10, 6, 11, 7]);
+    assert_eq!(depths, [vec![1.0, 2.0, 3.0, 0.5, 1.0, 3.0], vec![2.0, 4.0, 5.0, 2.0, 3.0, 4.0]]);
+}
+
+#[test]
+fn points_without_a_gradient_are_left_out_of_the_backward_pass() {
+    let network = point_network(false);
+    let count = 2 * network.points.point_count;
+    let mut gradient = vec![0.0_f64; 4 * count];
+    gradient[4 * 3 + 1] = 1.0;
+    gradient[4 * 5] = -1.0e-3;
+    gradient[4 * (count - 1) + 2] = 1.0e-9;
+    // The mean is 1 / 144; a ten thousandth of it is above 1e-9 and below 1e-3.
+    assert_eq!(network.with_gradient(&gradient), [vec![3, 5], vec![]]);
+    gradient[4 * (count - 1) + 2] = f64::NAN;
+    assert_eq!(network.with_gradient(&gradient)[1].len(), network.points.point_count, "NaN shows itself");
 }
 
 fn scene(side: u32, count: u32) -> TrainingScene {

@@ -2,6 +2,7 @@
 //! Space of Diffusion-Based Generative Models"), block by block.
 
 use super::{COLOUR_CHANNELS, with_bias};
+use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{CheckpointError, Sizes, TensorShape};
 
 /// The prefix of its tensors' names.
@@ -41,6 +42,20 @@ pub struct Denoiser {
     pub levels: Vec<DenoiserLevel>,
     /// Blocks of a level in the encoder. The decoder has one more.
     pub block_count: usize,
+    /// What its estimate is relative to.
+    pub estimate: Estimate,
+}
+
+/// The denoiser's estimate of the picture behind a noisy one `x`, from the network's output `F`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimate {
+    /// `c_skip x + c_out F`, as published (Karras et al. 2022, equation 7).
+    #[default]
+    Published,
+    /// `c_skip x + c_out F + (1 - c_skip) C`, with the colours `C` that the first three features show, which are its
+    /// difference from white. Where noise hides the picture, `F = 0` gives these colours instead of grey: the network
+    /// only learns what they lack. Not published.
+    FromColours,
 }
 
 /// A 3x3 convolution with bias.
@@ -108,7 +123,31 @@ pub enum DenoiserStep {
     Residual(Convolution),
 }
 
+/// The metadata key of [`Estimate`]: the name of one that is not the published one.
+const ESTIMATE: &str = "viewfuse.estimate";
+const FROM_COLOURS: &str = "colours";
+
+impl Estimate {
+    fn of(sizes: &Sizes<'_>) -> Result<Estimate, CheckpointError> {
+        match sizes.checkpoint().metadata().get(ESTIMATE).map(String::as_str) {
+            None => Ok(Estimate::Published),
+            Some(FROM_COLOURS) => Ok(Estimate::FromColours),
+            Some(other) => {
+                Err(sizes.refuse(format!("its metadata says {ESTIMATE} = '{other}'; only '{FROM_COLOURS}' is known")))
+            }
+        }
+    }
+}
+
 impl Denoiser {
+    /// Sizes in a checkpoint's metadata that its tensors do not determine.
+    pub(super) fn metadata(&self) -> BTreeMap<String, String> {
+        match self.estimate {
+            Estimate::Published => BTreeMap::new(),
+            Estimate::FromColours => BTreeMap::from([(ESTIMATE.to_owned(), FROM_COLOURS.to_owned())]),
+        }
+    }
+
     /// Those of the published network.
     pub(super) fn published(in_channels: usize) -> Denoiser {
         Denoiser::with_multipliers([128, in_channels, 128, 4], &[1, 1, 2, 2, 2])
@@ -141,6 +180,7 @@ impl Denoiser {
             embedding_channels: 4 * base_channels,
             levels: multipliers.iter().enumerate().map(level).collect(),
             block_count,
+            estimate: Estimate::Published,
         }
     }
 
@@ -187,6 +227,7 @@ impl Denoiser {
             embedding_channels: sizes.size(&format!("{PREFIX}.map_layer0.weight"), 2, 0)?,
             levels: (0..level_count).map(level).collect::<Result<_, CheckpointError>>()?,
             block_count,
+            estimate: Estimate::of(sizes)?,
         };
         denoiser.check(sizes)?;
         Ok(denoiser)

@@ -16,6 +16,10 @@ pub struct Plan {
     pub churn: Churn,
     /// The run stops when no value of the picture will change by more than this; `None` to run to the last level.
     pub early_termination: Option<f32>,
+    /// Whether a denoiser that knows the colours of the feature image starts from them with noise of the largest level,
+    /// instead of from noise alone. Above some level its estimate hardly depends on the noisy picture, and calls there are
+    /// left out.
+    pub from_colours: bool,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -43,7 +47,8 @@ impl Plan {
     /// The published run: Heun's method over 25 levels from 80 to 0.002, 49 calls.
     pub fn published(seed: u64) -> Plan {
         let steps = Steps::Fixed { sampler: Sampler::Heun, level_count: 25 };
-        Plan { steps, schedule: NoiseSchedule::published(), churn: Churn::NONE, early_termination: None, seed }
+        let (schedule, churn) = (NoiseSchedule::published(), Churn::NONE);
+        Plan { steps, schedule, churn, early_termination: None, from_colours: false, seed }
     }
 
     /// The default: `ipndm` with 10 calls, a fifth of the published run's, and an early stop when no visible change
