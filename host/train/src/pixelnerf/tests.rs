@@ -195,7 +195,7 @@ fn fine_samples_lie_where_weights_are() {
     let depths = coarse_depths(&rays, 4, |_, _| 0.5);
     assert_eq!(depths, [1.125, 1.375, 1.625, 1.875]);
     let fine = fine_depths(&rays, 4, &[0.0, 0.0, 1.0, 0.0], 8, |_, _| 0.5);
-    let (order, all) = merged(&[depths.clone()], &[fine.clone()], 1);
+    let (order, all) = merged(std::slice::from_ref(&depths), std::slice::from_ref(&fine), 1);
     let all = &all[0];
     assert_eq!(all.len(), 12);
     assert!(all.is_sorted());
