@@ -3,6 +3,7 @@
 use super::Estimate;
 use super::sampling::{Plan, Steps};
 use crate::Effort;
+use std::ops::RangeInclusive;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::schedule::NoiseSchedule;
 
@@ -19,8 +20,9 @@ const CALLS: [(u32, [f32; 2]); 8] = [
     (18, [0.0008, 0.0008]),
 ];
 /// So few calls have other levels than the published ones, of which a good part is spent where the picture hardly changes:
-/// they begin at a lower level, and end at a higher one, whose estimate is the picture.
-const FEW: u32 = 8;
+/// they begin at a lower level, and end at a higher one, whose estimate is the picture. A single call is at the largest
+/// level, where the estimate is the mean of all pictures that the sources allow.
+const FEW: RangeInclusive<u32> = 2..=8;
 /// Their largest level, from noise alone and from the colours of the feature image.
 const FROM_NOISE: f32 = 20.0;
 const FROM_COLOURS: f32 = 10.0;
@@ -49,7 +51,7 @@ pub(super) fn of(plan: &Plan, estimate: Estimate) -> Vec<(Effort, Plan)> {
 /// The plan with so many calls; few have their own levels, as far as these lie between the plan's.
 pub(super) fn in_calls(plan: &Plan, estimate: Estimate, calls: u32) -> Plan {
     let plan = Plan { steps: Steps::Fixed { sampler: Sampler::Ipndm, level_count: calls }, ..*plan };
-    if calls > FEW {
+    if !FEW.contains(&calls) {
         return plan;
     }
     let [largest, smallest] = [0, 1].map(|index| plan.schedule.level(index, 2));
@@ -81,6 +83,8 @@ mod tests {
         assert_eq!((ends(&published[0].1), published[0].1.from_colours), ([FROM_NOISE, VERY_FEW.1], false));
         assert_eq!(ends(&published[5].1), [FROM_NOISE, SMALLEST]);
         assert_eq!(ends(&published[6].1), [80.0, 0.002]);
+        let single = in_calls(&Plan::fast(3), Estimate::FromColours, 1);
+        assert_eq!((ends(&single), single.from_colours), ([80.0, 0.002], false));
     }
 
     #[test]
