@@ -1,8 +1,7 @@
 //! Opens a GeNVS from a checkpoint with a person's options.
 
-use super::efforts::in_calls;
 use super::sampling::{Plan, Steps};
-use super::{Estimate, Genvs, GenvsOptions, Omissions, Rays};
+use super::{Genvs, GenvsOptions, Omissions, Rays};
 use crate::AnyField;
 use crate::options::{Computable, FieldOptions, OpenError};
 use viewfuse_core::sampler::churn::Churn;
@@ -36,34 +35,12 @@ pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, 
         reuse: options.reuse,
         half_volumes: options.half_volumes,
     };
-    let mut field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options), omissions })?;
-    if let Some(denoiser) = &field.architecture().denoiser
-        && let Some(plan) = short(options, &field.options().plan, denoiser.estimate)
-    {
-        field = field.with_options(GenvsOptions { plan, ..field.options() });
-    }
+    let field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options), omissions })?;
     match (options.given().first(), &field.architecture().denoiser) {
         // All options of this family alone concern the denoiser or sequences of pictures.
         (Some(option), None) => Err(OpenError::cannot(*option, "has no denoiser")),
         _ => Ok(AnyField::new(field)),
     }
-}
-
-/// Calls of a denoiser that starts from the colours of the feature image, unless an option says otherwise: as near to the
-/// published run as ten from noise.
-const FROM_COLOURS: u32 = 6;
-
-/// The run with few calls and their own levels, if the options leave the levels open.
-fn short(options: &FieldOptions, plan: &Plan, estimate: Estimate) -> Option<Plan> {
-    let FieldOptions { exact, sampler, noise, tolerance, churn, steps, .. } = options;
-    if *exact || sampler.is_some() || noise.is_some() || tolerance.is_some() || churn.is_some() {
-        return None;
-    }
-    let calls = match estimate {
-        Estimate::Published => *steps,
-        Estimate::FromColours => Some(steps.unwrap_or(FROM_COLOURS)),
-    };
-    calls.map(|calls| in_calls(plan, estimate, calls))
 }
 
 /// The published run if nothing may be left out, otherwise the fast one; given options take precedence.
