@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use viewfuse::field::genvs::{
-    Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Level, Resampling, group_count, test_networks,
+    Architecture, Block, Denoiser, DenoiserLevel, DenoiserStep, Encoder, Estimate, Level, Resampling, group_count,
+    test_networks,
 };
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::{Checkpoint, Precision, TensorShape};
@@ -292,6 +293,17 @@ fn without_a_denoiser() {
         .saying("viewfuse.image_side", "40")
         .refused("images of 40 pixels on a side; the encoder takes multiples of 16");
     network().with("denoiser.model.map_augment.weight", &[32, 6]).refused("no first convolution that tells the side");
+}
+
+#[test]
+fn estimates_are_read_and_unknown_ones_refused() {
+    let of = |tensors: Tensors| Architecture::of(&tensors.checkpoint()).expect("as it says").denoiser;
+    let estimate = |tensors| of(tensors).expect("a denoiser").estimate;
+    assert_eq!(estimate(Tensors::small()), Estimate::Published);
+    assert_eq!(estimate(Tensors::small().saying("viewfuse.estimate", "colours")), Estimate::FromColours);
+    Tensors::small()
+        .saying("viewfuse.estimate", "color")
+        .refused("its metadata says viewfuse.estimate = 'color'; only 'colours' is known");
 }
 
 #[test]

@@ -4,6 +4,7 @@ mod damage;
 mod fuzz;
 mod genvs;
 mod malice;
+mod pixelnerf;
 mod reading;
 mod snapshots;
 mod tensors;

@@ -24,7 +24,7 @@ viewfuse_tests::trials![
 
 /// Small enough for a second a run.
 const PIXELNERF: &str = "train pixelnerf learn/toys --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
-    --validate-every 10 --write-every 0";
+    --sources 1,2,3,5 --sides 32,64 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every 10 --write-every 0";
 const GENVS: &str =
     "train genvs learn/toys --width 4 --objects 1 --samples 8 --steps 3 --validate-every 3 --write-every 0";
 
@@ -168,6 +168,9 @@ fn wrong_input_is_told() {
         refused("train pixelnerf learn/toys --steps 1000000 -o /proc/out", &["/proc/out/", "cannot be written"]);
     }
     assert_wrong_arguments(BINARY, folder.path(), "train genvs learn/toys -o out --width 5", &["a multiple of 4"]);
+    let attention = "train pixelnerf learn/toys -o out --weights cross-attention";
+    assert_wrong_arguments(BINARY, folder.path(), attention, &["--weights", "formulas only"]);
+    refused("train pixelnerf learn/toys -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
     assert!(!folder.path().join("out").exists());
 }
 
@@ -187,6 +190,22 @@ fn numbers_without_sense_are_refused() {
         wrong("pixelnerf", &format!("--coarse {value}"), &["--coarse", "from 2 to 1024"]);
     }
     wrong("pixelnerf", "--fine 100000", &["--fine", "from 1 to 1024"]);
+    for value in ["0", "5", "3.5"] {
+        wrong("pixelnerf", &format!("--levels {value}"), &["--levels", "from 1 to 4"]);
+    }
+    for value in ["0", "2,300", "2,,3", "two"] {
+        wrong("pixelnerf", &format!("--sources {value}"), &["--sources"]);
+    }
+    for value in ["0", "nan", "1.5", "-0.5"] {
+        wrong("pixelnerf", &format!("--least-crop={value}"), &["--least-crop", "above 0, at most 1"]);
+        if value != "0" {
+            wrong("genvs", &format!("--largest-share={value}"), &["--largest-share", "from 0 to 1"]);
+        }
+    }
+    wrong("pixelnerf", "--sides 32,33", &["--sides", "a multiple of 16"]);
+    wrong("genvs", "--new-denoiser", &["--from"]);
+    let larger = "train pixelnerf learn/toys -o out --side 32 --sides 32,48";
+    assert_refused(BINARY, folder.path(), larger, &["sides is 48", "a multiple of 16 from 16 to the side"]);
     for value in ["0", "8", "100000"] {
         wrong("pixelnerf", &format!("--side {value}"), &["--side", "a multiple of 16 from 16 to 1024"]);
     }

@@ -1,10 +1,16 @@
 //! The batch of a step: a few objects, with some views of each as sources and rays of others as targets.
 
+#[cfg(test)]
+mod tests;
+
 use super::draw::{Draw, Purpose};
-use super::scenes::TrainingScene;
-use candle_core::{DType, Device, Result, Tensor};
+use super::scenes::{Cut, TrainingScene, inputs};
+use candle_core::{DType, Device, Error, Result, Tensor};
 use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::pose::Pose;
 use viewfuse_core::rays::{CastBlock, TargetRay, cast_ray};
+use viewfuse_core::weighting::{Scheme, weigh};
+use viewfuse_weighting::sources::SourcePoses;
 
 /// Share of the rays that are drawn from the rectangle around the object.
 const SHARE_WITHIN_BOUNDS: f32 = 0.7;
@@ -15,6 +21,32 @@ pub(crate) struct BatchSize {
     pub(crate) objects: usize,
     /// Rays of each object.
     pub(crate) rays: usize,
+}
+
+/// The sources of each object in a batch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Shown {
+    /// How many.
+    pub(crate) count: usize,
+    /// Side of their pictures; `None`: that of the scenes'.
+    pub(crate) side: Option<u32>,
+    /// Least share of a photograph's side that a source shows; 1 for whole photographs.
+    pub(crate) least_crop: f32,
+}
+
+impl Shown {
+    /// Whole photographs at their size.
+    pub(crate) fn whole(count: usize) -> Shown {
+        Shown { count, side: None, least_crop: 1.0 }
+    }
+
+    /// What source number `index` of a batch shows of a photograph of this side: a square somewhere in it.
+    fn cut(self, draw: &Draw, index: usize, whole: u32) -> Cut {
+        let share = 1.0 - (1.0 - self.least_crop) * draw.uniform(Purpose::Crops, 3 * index);
+        let size = ((share * whole as f32).round() as u32).clamp(1, whole);
+        let place = |which| draw.below(Purpose::Crops, 3 * index + which, (whole - size + 1) as usize) as u32;
+        Cut { left: place(1), top: place(2), size, side: self.side.unwrap_or(whole) }
+    }
 }
 
 /// Sources and target rays of some objects.
@@ -43,18 +75,18 @@ pub(crate) enum Targets {
 }
 
 impl Batch {
-    /// Draws objects at random, of each `view_count` sources and the rays.
+    /// Draws objects at random, of each the sources and the rays.
     pub(crate) fn draw(
         scenes: &[TrainingScene],
         draw: &Draw,
         size: BatchSize,
-        view_count: usize,
+        shown: Shown,
         targets: Targets,
         dtype: DType,
     ) -> Result<Batch> {
         let objects: Vec<usize> =
             (0..size.objects).map(|index| draw.below(Purpose::Objects, index, scenes.len())).collect();
-        Batch::of(scenes, &objects, draw, size.rays, view_count, targets, dtype)
+        Batch::of(scenes, &objects, draw, size.rays, shown, targets, dtype)
     }
 
     /// As [`Batch::draw`], of these objects.
@@ -63,20 +95,25 @@ impl Batch {
         objects: &[usize],
         draw: &Draw,
         ray_count: usize,
-        view_count: usize,
+        shown: Shown,
         targets: Targets,
         dtype: DType,
     ) -> Result<Batch> {
         let (mut pictures, mut truth) = (Vec::new(), Vec::new());
         let mut batch = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let mut side = 0;
+        let mut source_side = 0;
         for (index, &object) in objects.iter().enumerate() {
             let scene = &scenes[object];
-            side = scene.pictures[0].width();
+            let side = scene.pictures[0].width();
             let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), scene.cameras.len());
-            let (sources, others) = order.split_at(view_count.min(order.len() - 1));
-            for &view in sources {
-                pictures.extend(scene.shown(view));
+            let (views, others) = order.split_at(shown.count.min(order.len() - 1));
+            let mut sources = Vec::with_capacity(views.len());
+            for (place, &view) in views.iter().enumerate() {
+                let cut = shown.cut(draw, index * views.len() + place, side);
+                let (camera, picture) = scene.source(view, cut).map_err(Error::wrap)?;
+                pictures.extend(inputs(&picture));
+                source_side = picture.width() as usize;
+                sources.push(camera);
             }
             let mut rays = Vec::with_capacity(ray_count);
             for ray in 0..ray_count {
@@ -94,17 +131,29 @@ impl Batch {
                 rays.push(ray_through(scene, view, column, row));
                 truth.extend(scene.colour(view, column, row));
             }
-            batch.0.push(sources.iter().map(|&view| scene.cameras[view]).collect::<Vec<_>>());
-            batch.1.push(sources.iter().map(|&view| scene.blocks[view]).collect::<Vec<_>>());
+            batch.1.push(sources.iter().map(|camera| camera.block(0)).collect::<Vec<_>>());
+            batch.0.push(sources);
             batch.2.push(scene.cameras[others[0]]);
             batch.3.push(rays);
         }
         let (sources, cameras, targets, rays) = batch;
-        let side = side as usize;
-        let pictures = Tensor::from_vec(pictures, (objects.len() * sources[0].len(), side, side, 3), &Device::Cpu)?;
+        let shape = (objects.len() * sources[0].len(), source_side, source_side, 3);
+        let pictures = Tensor::from_vec(pictures, shape, &Device::Cpu)?;
         let truth = Tensor::from_vec(truth, (objects.len() * ray_count, 3), &Device::Cpu)?;
         let (pictures, truth) = (pictures.to_dtype(dtype)?, truth.to_dtype(dtype)?);
         Ok(Batch { sources, cameras, pictures, targets, rays, truth })
+    }
+
+    /// Weights `[object][view]` by a scheme, for the target view of each object.
+    pub(crate) fn weights(&self, scheme: Scheme) -> Result<Tensor> {
+        let mut weights = Vec::new();
+        for (sources, target) in self.sources.iter().zip(&self.targets) {
+            let poses: Vec<Pose> = sources.iter().map(|camera| camera.pose).collect();
+            let poses = SourcePoses::new(&poses).map_err(Error::wrap)?;
+            weights.extend_from_slice(&weigh(scheme, &poses, &target.pose).values()[..sources.len()]);
+        }
+        let shape = (self.sources.len(), self.sources[0].len());
+        Tensor::from_vec(weights, shape, &Device::Cpu)?.to_dtype(self.truth.dtype())
     }
 
     /// Equal weights `[object][view]`.

@@ -22,6 +22,12 @@ pub(crate) enum Purpose {
     NoiseLevel,
     /// Noise on pictures.
     Noise,
+    /// The side of sources.
+    Sides,
+    /// What sources show of photographs.
+    Crops,
+    /// The weighting scheme.
+    Schemes,
 }
 
 /// The draws of one step.

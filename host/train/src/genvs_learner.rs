@@ -39,9 +39,8 @@ pub struct GenvsSettings {
     pub samples: u32,
     /// Share of the pictures that have the largest noise level, from 0 to 1.
     pub share_of_largest: f32,
-    /// Whether a new denoiser's estimate starts from the colours of the feature image ([`Estimate::FromColours`]) or is the
-    /// published one.
-    pub from_colours: bool,
+    /// What a new denoiser's estimate is relative to.
+    pub estimate: Estimate,
     /// Whether a network that continues from a file begins with a new denoiser. Otherwise it keeps the file's.
     pub new_denoiser: bool,
 }
@@ -86,7 +85,7 @@ pub fn train_genvs(
         return Err(TrainError::Setting { name, value, allowed: "it must be from 0 to 1" });
     }
     let mut architecture = Architecture::narrow(settings.side as usize, settings.width);
-    let estimate = if settings.from_colours { Estimate::FromColours } else { Estimate::Published };
+    let estimate = settings.estimate;
     architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
     let network = match from {
         Some(checkpoint) => {
@@ -97,8 +96,8 @@ pub fn train_genvs(
     };
     let denoiser = network.architecture.denoiser.as_ref();
     let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
-    let from_colours = denoiser.is_some_and(|denoiser| denoiser.estimate == Estimate::FromColours);
-    let settings = GenvsSettings { width, from_colours, ..*settings };
+    let estimate = denoiser.map_or(estimate, |denoiser| denoiser.estimate);
+    let settings = GenvsSettings { width, estimate, ..*settings };
     let record = run::settings("genvs", &settings, schedule, &data, from)?;
     let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings };
     run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)

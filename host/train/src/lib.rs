@@ -44,7 +44,7 @@ mod weighting_learner;
 
 pub use attention::Embedding;
 pub use genvs_learner::{GenvsSettings, SHARE_OF_LARGEST, train_genvs};
-pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
+pub use pixelnerf_learner::{PixelNerfSettings, Variety, train_pixelnerf};
 pub use run::{Outcome, Schedule};
 pub use state::check_state;
 pub use weighting_learner::{WeightingSettings, train_weighting};

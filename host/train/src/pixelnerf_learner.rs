@@ -1,21 +1,23 @@
-//! A small PixelNeRF, with equal weights of the views as published.
+//! A small PixelNeRF. With equal weights of the views, as published, unless schemes are given.
 
 use super::TrainError;
-use super::batch::{Batch, BatchSize, Targets};
+use super::batch::{Batch, BatchSize, Shown, Targets};
 use super::draw::{Draw, Purpose};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
 use candle_core::{DType, Result, Tensor};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::path::{Path, PathBuf};
+use viewfuse_core::weighting::Scheme;
 use viewfuse_field::pixelnerf::architecture::Architecture;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
+use viewfuse_weighting::sources::MOST_SOURCES;
 
 /// The settings of a run besides its schedule and scenes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PixelNerfSettings {
     /// Width of the point network; the trunk's width follows from it. A network that continues from a file has the file's.
     pub width: usize,
@@ -32,6 +34,41 @@ pub struct PixelNerfSettings {
     pub coarse: usize,
     /// Samples that the second pass adds.
     pub fine: usize,
+    /// What differs from step to step.
+    pub variety: Variety,
+}
+
+/// What differs from step to step, so that a network works with more than one kind of sources: of each list one is drawn.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Variety {
+    /// Numbers of sources, at least 1.
+    pub sources: Vec<usize>,
+    /// Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are always of
+    /// pictures of the settings' side.
+    pub sides: Vec<u32>,
+    /// Each source shows a square somewhere in its photograph, of at least this share of its side and at most the whole,
+    /// above 0; 1: always the whole.
+    pub least_crop: f32,
+    /// Weighting schemes. With any other than the mean, all rays of an object are of one target view, as weights are.
+    #[serde(serialize_with = "texts")]
+    pub schemes: Vec<Scheme>,
+}
+
+impl Default for Variety {
+    /// Whole photographs at the settings' side with equal weights; mostly three, so that the network works with few sources,
+    /// sometimes one or more, so that it works with any weights.
+    fn default() -> Variety {
+        Variety {
+            sources: vec![1, 2, 3, 3, 3, 3, 4, 6],
+            sides: Vec::new(),
+            least_crop: 1.0,
+            schemes: vec![Scheme::MEAN],
+        }
+    }
+}
+
+fn texts<S: Serializer>(schemes: &[Scheme], serializer: S) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_seq(schemes.iter().map(Scheme::to_string))
 }
 
 /// Levels of a new network's trunk, and the most: those of the published trunk.
@@ -45,7 +82,7 @@ const LARGEST_LAYER: usize = 1 << 28;
 impl PixelNerfSettings {
     /// Refuses numbers with which nothing is computed, or that no memory holds.
     fn check(&self) -> std::result::Result<(), TrainError> {
-        let PixelNerfSettings { width, levels, side, objects, rays, coarse, fine } = *self;
+        let &PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, ref variety } = self;
         let levels = levels.unwrap_or(LEVELS);
         let numbers = [
             ("width", width, 1, "it must be from 1 to 1024"),
@@ -72,13 +109,40 @@ impl PixelNerfSettings {
             let allowed = "objects times rays times samples times width must be at most 2^28";
             return Err(TrainError::Setting { name: "objects", value: objects as f64, allowed });
         }
-        Ok(())
+        variety.check(side)
     }
 }
 
-/// The numbers of sources of a step, one of which is drawn: mostly three, so that the network works with few sources,
-/// sometimes one or more, so that it works with any weights.
-const SOURCE_COUNTS: [usize; 8] = [1, 2, 3, 3, 3, 3, 4, 6];
+impl Variety {
+    fn check(&self, side: u32) -> std::result::Result<(), TrainError> {
+        let refuse = |name, value, allowed| Err(TrainError::Setting { name, value, allowed });
+        if let Some(count) = self.sources.iter().find(|count| !(1..=MOST_SOURCES).contains(*count)) {
+            return refuse("sources", *count as f64, "it must be from 1 to 256");
+        }
+        if self.sources.is_empty() || self.schemes.is_empty() {
+            let name = if self.sources.is_empty() { "sources" } else { "schemes" };
+            return refuse(name, 0.0, "at least one is needed");
+        }
+        let fits = |own: &u32| (16..=side).contains(own) && own.is_multiple_of(16);
+        if let Some(own) = self.sides.iter().find(|own| !fits(own)) {
+            return refuse("sides", f64::from(*own), "it must be a multiple of 16 from 16 to the side");
+        }
+        if !(self.least_crop > 0.0 && self.least_crop <= 1.0) {
+            return refuse("least_crop", f64::from(self.least_crop), "it must be above 0 and at most 1");
+        }
+        Ok(())
+    }
+
+    /// The sources of a step, and its scheme.
+    fn drawn(&self, draw: &Draw) -> (Shown, Scheme) {
+        let pick = |purpose, count| draw.below(purpose, 0, count);
+        let count = self.sources[pick(Purpose::SourceCount, self.sources.len())];
+        let side = self.sides.get(pick(Purpose::Sides, self.sides.len())).copied();
+        let scheme = self.schemes[pick(Purpose::Schemes, self.schemes.len())];
+        (Shown { count, side, least_crop: self.least_crop }, scheme)
+    }
+}
+
 /// Objects in validation, rays of each, sources, and samples.
 const VALIDATION: BatchSize = BatchSize { objects: 24, rays: 192 };
 const VALIDATION_SOURCES: usize = 3;
@@ -104,7 +168,7 @@ pub fn train_pixelnerf(
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
     settings.check()?;
-    let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
+    let most_sources = settings.variety.sources.iter().copied().max().unwrap_or(1);
     let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
     let mut network = match from {
@@ -113,7 +177,7 @@ pub fn train_pixelnerf(
     };
     network.architecture.source_side = settings.side;
     let Architecture { width, ref levels, .. } = network.architecture;
-    let settings = PixelNerfSettings { width, levels: Some(levels.len()), ..*settings };
+    let settings = PixelNerfSettings { width, levels: Some(levels.len()), ..settings.clone() };
     let record = run::settings("pixelnerf", &settings, schedule, &data, from)?;
     let learner = PixelNerfLearner { network, scenes: data.training, validation: data.validation, settings };
     run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
@@ -138,7 +202,8 @@ pub(super) fn score(
     for object in 0..count {
         let draw = Draw { seed: 0, step: u32::MAX - object as u32 };
         let dtype = network.parameters.dtype();
-        let batch = Batch::of(scenes, &[object], &draw, VALIDATION.rays, source_count, targets, dtype)?;
+        let shown = Shown::whole(source_count);
+        let batch = Batch::of(scenes, &[object], &draw, VALIDATION.rays, shown, targets, dtype)?;
         let colours = network.render(&batch, &weigh(&batch)?, &draw, VALIDATION_SAMPLES)?;
         sum += decibels(&(colours - &batch.truth)?.sqr()?.mean_all()?)?;
     }
@@ -152,10 +217,11 @@ impl Learner for PixelNerfLearner {
 
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let PixelNerfSettings { objects, rays, coarse, fine, .. } = self.settings;
-        let views = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
+        let (shown, scheme) = self.settings.variety.drawn(draw);
+        let targets = if scheme == Scheme::MEAN { Targets::Many } else { Targets::One };
         let size = BatchSize { objects, rays };
-        let batch = Batch::draw(&self.scenes, draw, size, views, Targets::Many, self.network.parameters.dtype())?;
-        let colours = self.network.render(&batch, &batch.mean_weights()?, draw, SampleCounts { coarse, fine })?;
+        let batch = Batch::draw(&self.scenes, draw, size, shown, targets, self.network.parameters.dtype())?;
+        let colours = self.network.render(&batch, &batch.weights(scheme)?, draw, SampleCounts { coarse, fine })?;
         (colours - &batch.truth)?.sqr()?.mean_all()
     }
 

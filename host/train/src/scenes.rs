@@ -1,12 +1,12 @@
 //! Training scenes in memory: pictures over white at the training size, with their cameras.
 
 use super::TrainError;
-use image::imageops::{FilterType, resize};
+use image::imageops::{FilterType, crop_imm, resize};
 use image::{Rgb, RgbImage};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
 use std::path::PathBuf;
-use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::camera::{Camera, CameraBlock, Pinhole, PinholeError};
 use viewfuse_field::learned::default_near_far;
 use viewfuse_job::digest::hexadecimal;
 use viewfuse_job::progress::Progress;
@@ -52,6 +52,15 @@ impl Data {
         }
         hexadecimal(&digest.finalize())
     }
+}
+
+/// A square part of a picture, and the side to which it is resampled, all in pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Cut {
+    pub(crate) left: u32,
+    pub(crate) top: u32,
+    pub(crate) size: u32,
+    pub(crate) side: u32,
 }
 
 /// One object with all its views.
@@ -133,10 +142,33 @@ impl TrainingScene {
         self.pictures[view].get_pixel(column, row).0.map(|value| f32::from(value) / 255.0)
     }
 
-    /// A picture as a network's input: `[row][column][channel]`, in `[-1, 1]`.
-    pub(crate) fn shown(&self, view: usize) -> impl Iterator<Item = f32> + '_ {
-        self.pictures[view].as_raw().iter().map(|value| f32::from(*value) / 127.5 - 1.0)
+    /// A part of a view as a source: its camera and its picture.
+    ///
+    /// # Errors
+    /// [`PinholeError`] if the part is empty or so small that its focal length has no meaning.
+    pub(crate) fn source(&self, view: usize, cut: Cut) -> Result<(Camera, RgbImage), PinholeError> {
+        let Cut { left, top, size, side } = cut;
+        let (camera, picture) = (self.cameras[view], &self.pictures[view]);
+        if (left, top, size, side) == (0, 0, picture.width(), picture.width()) {
+            return Ok((camera, picture.clone()));
+        }
+        let [x, y] = camera.pinhole.principal();
+        let principal = [x - left as f32, y - top as f32];
+        let pinhole = Pinhole::new(camera.pinhole.focal(), principal, size, size)?.resized(side, side)?;
+        let part = crop_imm(picture, left, top, size, size).to_image();
+        let part = if size == side { part } else { resize(&part, side, side, FilterType::Triangle) };
+        Ok((Camera { pinhole, ..camera }, part))
     }
+
+    /// A view's picture as a network's input.
+    pub(crate) fn shown(&self, view: usize) -> impl Iterator<Item = f32> + '_ {
+        inputs(&self.pictures[view])
+    }
+}
+
+/// A picture as a network's input: `[row][column][channel]`, in `[-1, 1]`.
+pub(crate) fn inputs(picture: &RgbImage) -> impl Iterator<Item = f32> + '_ {
+    picture.as_raw().iter().map(|value| f32::from(*value) / 127.5 - 1.0)
 }
 
 fn over_white(pixels: &image::RgbaImage) -> RgbImage {

@@ -1,8 +1,11 @@
 //! Helpers of the training tests: toy photographs, random draws, comparison, and gradients compared with slopes.
 
+use super::scenes::TrainingScene;
 use candle_core::{DType, Device, Result, Tensor, Var};
+use std::path::PathBuf;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::random::normal;
+use viewfuse_field::learned::default_near_far;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
 use viewfuse_synthetic::{Orbit, render, toy};
 
@@ -26,6 +29,28 @@ pub(super) fn photographs(count: u32, side: u32) -> SourceImages {
         points: Vec::new(),
         near_far: None,
         warning: None,
+    }
+}
+
+/// A training scene of toy photographs.
+pub(super) fn scene(side: u32, count: u32) -> TrainingScene {
+    let sources = photographs(count, side);
+    let pictures: Vec<image::RgbImage> = sources
+        .images
+        .iter()
+        .map(|image| {
+            let values = image.texels.iter().flat_map(|[r, g, b, a]| [r, g, b].map(|c| ((c + 1.0 - a) * 255.0) as u8));
+            image::RgbImage::from_raw(side, side, values.collect()).expect("as many pixels")
+        })
+        .collect();
+    let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+    TrainingScene {
+        path: PathBuf::from("made"),
+        blocks: cameras.iter().map(|camera| camera.block(0)).collect(),
+        bounds: vec![[2, 2, side - 3, side - 3]; count as usize],
+        near_far: default_near_far(&cameras),
+        cameras,
+        pictures,
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::TrainError;
 use super::attention::{Attention, Embedding};
-use super::batch::{Batch, BatchSize, Targets};
+use super::batch::{Batch, BatchSize, Shown, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views};
 use super::genvs_learner::{self, SHARE_OF_LARGEST};
@@ -121,7 +121,7 @@ impl Learner for WeightingLearner {
         match &self.network {
             Frozen::PixelNerf(network) => {
                 let size = BatchSize { objects, rays };
-                let batch = Batch::draw(&self.scenes, draw, size, sources, Targets::One, dtype)?;
+                let batch = Batch::draw(&self.scenes, draw, size, Shown::whole(sources), Targets::One, dtype)?;
                 let colours = network.render(&batch, &self.of_batch(&batch)?, draw, SAMPLES)?;
                 (colours - &batch.truth)?.sqr()?.mean_all()
             }

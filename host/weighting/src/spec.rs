@@ -119,6 +119,14 @@ impl WeightingSpec {
             Kind::Formula(_) | Kind::CrossAttention => None,
         }
     }
+
+    /// The formula, if it is one.
+    pub fn formula(&self) -> Option<Scheme> {
+        match self.kind {
+            Kind::Formula(scheme) => Some(scheme),
+            Kind::CrossAttention | Kind::Attention(_) => None,
+        }
+    }
 }
 
 impl Default for WeightingSpec {

@@ -6,13 +6,16 @@ use super::{on_threads, say};
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use viewfuse_core::weighting::Scheme;
+use viewfuse_field::genvs::Estimate;
 use viewfuse_job::files::check_writable;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_train::{
-    Embedding, GenvsSettings, Outcome, PixelNerfSettings, SHARE_OF_LARGEST, Schedule, WeightingSettings, train_genvs,
-    train_pixelnerf, train_weighting,
+    Embedding, GenvsSettings, Outcome, PixelNerfSettings, SHARE_OF_LARGEST, Schedule, Variety, WeightingSettings,
+    train_genvs, train_pixelnerf, train_weighting,
 };
+use viewfuse_weighting::{WeightingError, WeightingSpec};
 
 /// The file of a run that holds the trained network.
 const MODEL: &str = "model.safetensors";
@@ -104,6 +107,48 @@ struct PixelNerfArguments {
     /// Samples that the second pass adds
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = added_samples)]
     fine: usize,
+    /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=256))]
+    sources: Vec<u16>,
+    /// Sides of the sources' pictures, multiples of 16 up to --side; each step draws one of the list [default: --side]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = side)]
+    sides: Vec<u32>,
+    /// Let each source show only a square of its photograph, somewhere in it, of at least this share of its side
+    #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = crop)]
+    least_crop: f32,
+    /// The views' weights: a formula, mean, error:alpha=1, ...; of several, each step draws one [default: mean]
+    #[arg(long, value_name = "SCHEME", value_parser = formula)]
+    weights: Vec<Scheme>,
+}
+
+impl PixelNerfArguments {
+    fn variety(&self) -> Variety {
+        let PixelNerfArguments { sources, sides, least_crop, weights, .. } = self;
+        let default = Variety::default();
+        Variety {
+            sources: if sources.is_empty() {
+                default.sources
+            } else {
+                sources.iter().map(|n| usize::from(*n)).collect()
+            },
+            sides: sides.clone(),
+            least_crop: *least_crop,
+            schemes: if weights.is_empty() { default.schemes } else { weights.clone() },
+        }
+    }
+}
+
+fn crop(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(share) if share > 0.0 && share <= 1.0 => Ok(share),
+        _ => Err("a number above 0, at most 1, is needed".to_owned()),
+    }
+}
+
+fn formula(text: &str) -> Result<Scheme, String> {
+    let spec: WeightingSpec = text.parse().map_err(|error: WeightingError| error.to_string())?;
+    spec.formula()
+        .ok_or_else(|| "networks are trained with formulas only (`train weighting` trains attention)".to_owned())
 }
 
 #[derive(Args)]
@@ -139,7 +184,8 @@ struct GenvsArguments {
     new_denoiser: bool,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// See [`Estimate`].
+#[derive(Clone, Copy, ValueEnum)]
 enum EstimateName {
     Colours,
     Published,
@@ -241,8 +287,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 }
 
 fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
-    let &PixelNerfArguments { ref run, ref from, width, levels, side, objects, rays, coarse, fine } = arguments;
-    let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine };
+    let &PixelNerfArguments { ref run, ref from, width, levels, side, objects, rays, coarse, fine, .. } = arguments;
+    let variety = arguments.variety();
+    let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, variety };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
@@ -256,9 +303,11 @@ fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
 fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
     let &GenvsArguments { ref run, ref from, width, side, objects, targets, samples, .. } = arguments;
     let &GenvsArguments { largest_share: share_of_largest, estimate, new_denoiser, .. } = arguments;
-    let from_colours = estimate == EstimateName::Colours;
-    let settings =
-        GenvsSettings { width, side, objects, targets, samples, share_of_largest, from_colours, new_denoiser };
+    let estimate = match estimate {
+        EstimateName::Colours => Estimate::FromColours,
+        EstimateName::Published => Estimate::Published,
+    };
+    let settings = GenvsSettings { width, side, objects, targets, samples, share_of_largest, estimate, new_denoiser };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;

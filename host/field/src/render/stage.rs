@@ -137,6 +137,11 @@ impl<'a> Stage<'a> {
         set.map(|_| ()).map_err(|error| RenderError::of(error, self.scene))
     }
 
+    /// Whether the field can render single pixels, with which a bounded picture is checked.
+    pub fn renders_pixels(&self) -> bool {
+        self.session.renders_pixels()
+    }
+
     /// The field's scalars that can be chosen for a scene.
     pub fn tunables(&self) -> &'static [Tunable] {
         self.session.tunables()

@@ -1,16 +1,14 @@
 //! The graph says what the renderer says, and its gradients are slopes.
 
 use super::super::attention::{Attention, Embedding};
-use super::super::batch::{Batch, Targets};
+use super::super::batch::{Batch, Shown, Targets};
 use super::super::compositing::{coarse_depths, fine_depths, merged, points, weights as sample_weights};
 use super::super::draw::Draw;
 use super::super::images::{enlarge, max_pool};
 use super::super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, RectifiedDensity};
-use super::super::scenes::TrainingScene;
-use super::super::slopes::{assert_close, assert_slopes, mixed, noise, orbit, photographs, tensor, variable};
+use super::super::slopes::{assert_close, assert_slopes, mixed, noise, orbit, photographs, scene, tensor, variable};
 use super::{PixelNerf, SampleCounts, Seen};
 use candle_core::{DType, Result, Tensor, Var};
-use std::path::PathBuf;
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::pixelnerf::EmbedBlock;
@@ -228,27 +226,6 @@ fn points_without_a_gradient_are_left_out_of_the_backward_pass() {
     assert_eq!(network.with_gradient(&gradient)[1].len(), network.points.point_count, "NaN shows itself");
 }
 
-fn scene(side: u32, count: u32) -> TrainingScene {
-    let sources = photographs(count, side);
-    let pictures: Vec<image::RgbImage> = sources
-        .images
-        .iter()
-        .map(|image| {
-            let values = image.texels.iter().flat_map(|[r, g, b, a]| [r, g, b].map(|c| ((c + 1.0 - a) * 255.0) as u8));
-            image::RgbImage::from_raw(side, side, values.collect()).expect("as many pixels")
-        })
-        .collect();
-    let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-    TrainingScene {
-        path: PathBuf::from("made"),
-        blocks: cameras.iter().map(|camera| camera.block(0)).collect(),
-        bounds: vec![[2, 2, side - 3, side - 3]; count as usize],
-        near_far: default_near_far(&cameras),
-        cameras,
-        pictures,
-    }
-}
-
 #[test]
 fn the_loss_has_its_slopes() {
     let network = network(8);
@@ -257,7 +234,7 @@ fn the_loss_has_its_slopes() {
     bias.set(&tensor(vec![0.1, -0.2, 0.3, 4.0], &[4], DType::F64)).expect("the same shape");
     let scenes = [scene(16, 5)];
     let draw = Draw { seed: 1, step: 2 };
-    let batch = Batch::of(&scenes, &[0, 0], &draw, 9, 2, Targets::One, DType::F64).expect("a batch");
+    let batch = Batch::of(&scenes, &[0, 0], &draw, 9, Shown::whole(2), Targets::One, DType::F64).expect("a batch");
     let weights = Var::from_tensor(&tensor(vec![0.7, 0.3, 0.4, 0.6], &[2, 2], DType::F64)).expect("weights");
     let value = || {
         let colours = network.render(&batch, &weights, &draw, SampleCounts { coarse: 6, fine: 0 })?;
@@ -273,7 +250,7 @@ fn a_batch_is_a_function_of_seed_and_step() {
     let scenes = [scene(16, 6), scene(16, 7)];
     let batch = |step: u32| {
         let draw = Draw { seed: 5, step };
-        Batch::of(&scenes, &[0, 1], &draw, 20, 3, Targets::Many, DType::F32).expect("a batch")
+        Batch::of(&scenes, &[0, 1], &draw, 20, Shown::whole(3), Targets::Many, DType::F32).expect("a batch")
     };
     let numbers = |batch: &Batch| batch.truth.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
     assert_eq!(numbers(&batch(1)), numbers(&batch(1)));

@@ -2,6 +2,7 @@
 //! Space of Diffusion-Based Generative Models"), block by block.
 
 use super::{COLOUR_CHANNELS, with_bias};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::{CheckpointError, Sizes, TensorShape};
 
@@ -47,7 +48,8 @@ pub struct Denoiser {
 }
 
 /// The denoiser's estimate of the picture behind a noisy one `x`, from the network's output `F`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Estimate {
     /// `c_skip x + c_out F`, as published (Karras et al. 2022, equation 7).
     #[default]
