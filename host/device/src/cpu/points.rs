@@ -3,6 +3,7 @@
 use crate::parallel::for_each_row;
 use pulp::Arch;
 use viewfuse_core::camera::CameraBlock;
+use viewfuse_core::half_precision::{Halves, f16_value};
 use viewfuse_core::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace, in_view_axes, visible_weight, waves};
 use viewfuse_core::rays::RayPoint;
 
@@ -53,18 +54,54 @@ pub(super) fn gather_latents(
     residual: Option<&[f32]>,
     gathered: &mut [f32],
 ) {
+    let channels = block.channel_count as usize;
+    gather_rows(block, views, points, residual, gathered, |place, values| {
+        look_up(place, place.nodes.map(|node| &grid[node..node + channels]), values);
+    });
+}
+
+/// The rows of a view, each looked up at its place, with the residual if there is one.
+#[inline(always)]
+fn gather_rows(
+    block: &GatherBlock,
+    views: &[CameraBlock],
+    points: &[RayPoint],
+    residual: Option<&[f32]>,
+    gathered: &mut [f32],
+    look_up: impl Fn(&GridPlace, &mut [f32]) + Sync,
+) {
     let (first, channels, point_count) = (block.first(), block.channel_count as usize, block.point_count as usize);
     for_each_row(&mut gathered[first..first + point_count * channels], channels, 16384, |point, gathered| {
         let place = GridPlace::of(&views[block.view as usize], &points[point], block);
-        let nodes = place.nodes.map(|node| &grid[node..node + channels]);
         // As wide as the machine can.
         Arch::new().dispatch(|| {
-            look_up(&place, nodes, gathered);
+            look_up(&place, gathered);
             if let Some(residual) = residual {
                 let residual = &residual[first + point * channels..];
                 gathered.iter_mut().zip(residual).for_each(|(value, residual)| *value += residual);
             }
         });
+    });
+}
+
+pub(super) fn gather_latents_f16(
+    block: &GatherBlock,
+    views: &[CameraBlock],
+    points: &[RayPoint],
+    grid: &[u32],
+    residual: Option<&[f32]>,
+    gathered: &mut [f32],
+) {
+    let channels = block.channel_count as usize;
+    gather_rows(block, views, points, residual, gathered, |place, values| {
+        if channels.is_multiple_of(2) {
+            let nodes = place.nodes.map(|node| &grid[node / 2..(node + channels) / 2]);
+            look_up_f16(place, nodes, values);
+        } else {
+            // Rows of odd length begin within a word.
+            let grid = Halves(grid);
+            values.iter_mut().enumerate().for_each(|(channel, value)| *value = place.value(&grid, channel));
+        }
     });
 }
 
@@ -84,5 +121,21 @@ fn look_up(place: &GridPlace, nodes: [&[f32]; 4], values: &mut [f32]) {
         let upper = a + (b - a) * place.share_x;
         let lower = c + (d - c) * place.share_x;
         *value = upper + (lower - upper) * place.share_y;
+    }
+}
+
+/// As [`look_up`], from words of two channels each.
+#[inline(always)]
+fn look_up_f16(place: &GridPlace, nodes: [&[u32]; 4], values: &mut [f32]) {
+    let [upper_left, upper_right, lower_left, lower_right] = nodes;
+    let upper = upper_left.iter().zip(upper_right);
+    let lower = lower_left.iter().zip(lower_right);
+    for (pair, ((a, b), (c, d))) in values.as_chunks_mut::<2>().0.iter_mut().zip(upper.zip(lower)) {
+        *pair = [0, 16].map(|shift| {
+            let [a, b, c, d] = [a, b, c, d].map(|word| f16_value(word >> shift));
+            let upper = a + (b - a) * place.share_x;
+            let lower = c + (d - c) * place.share_x;
+            upper + (lower - upper) * place.share_y
+        });
     }
 }
