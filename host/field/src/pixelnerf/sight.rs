@@ -33,18 +33,24 @@ pub(super) struct Group {
 impl Sight {
     /// Whether a view has weight 0 somewhere on a target's rays: everywhere, or because an end of a ray is behind it.
     pub(super) fn is_partial(&self, cast: &CastBlock) -> bool {
-        let width = cast.camera.width as usize;
+        if self.weights.contains(&0.0) {
+            return true;
+        }
+        let in_front = |point: &Vec3| self.cameras.iter().all(|camera| is_in_front(camera, *point));
+        // Where the frustum around the rays is in front of all views, no ray has to be looked at.
+        if frustum(cast).iter().all(in_front) {
+            return false;
+        }
+        let width = cast.camera.width;
         let is_behind = |row: usize| {
-            let mut pixels = row * width..(row + 1) * width;
+            let mut pixels = row as u32 * width..(row as u32 + 1) * width;
             pixels.any(|pixel| {
-                let ray = cast_ray(cast, pixel as u32);
-                let [near, far] = [ray.near, ray.far].map(|depth| {
-                    Vec3::from_array([0, 1, 2].map(|axis| ray.origin[axis] + ray.direction[axis] * depth))
-                });
-                !self.cameras.iter().all(|camera| is_in_front(camera, near) && is_in_front(camera, far))
+                let ray = cast_ray(cast, pixel);
+                let (origin, direction) = (Vec3::from_array(ray.origin), Vec3::from_array(ray.direction));
+                [ray.near, ray.far].iter().any(|depth| !in_front(&(origin + direction * *depth)))
             })
         };
-        self.weights.contains(&0.0) || map(cast.camera.height as usize, 64, is_behind).contains(&true)
+        map(cast.camera.height as usize, 64, is_behind).contains(&true)
     }
 
     /// Points by the views in front of which they are.
@@ -75,6 +81,17 @@ impl Sight {
         }
         Group { views, weights: shares, points: indices }
     }
+}
+
+/// Corners of the frustum that holds all rays between their bounds.
+fn frustum(cast: &CastBlock) -> [Vec3; 8] {
+    let camera = &cast.camera;
+    let (width, height) = (camera.width as f32, camera.height as f32);
+    let towards = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)].map(|(x, y)| camera.towards(x, y));
+    // Bounds are along rays, whose depths along the principal axis are smaller.
+    let longest = towards.iter().map(|towards| towards.length()).fold(1.0, f32::max);
+    let depths = [cast.near / longest, cast.far];
+    std::array::from_fn(|corner| camera.centre_world() + towards[corner % 4] * depths[corner / 4])
 }
 
 impl<D: Device> Network<'_, D> {
