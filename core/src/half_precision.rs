@@ -55,6 +55,20 @@ pub fn fetch_f16(words: &(impl Fetch<u32> + ?Sized), index: usize) -> f32 {
     f16_value(words.fetch(index / 2) >> (16 * (index as u32 % 2)))
 }
 
+/// Words as the numbers that they hold, two in each.
+#[derive(Clone, Copy)]
+pub struct Halves<'a, W: ?Sized>(
+    /// The words.
+    pub &'a W,
+);
+
+impl<W: Fetch<u32> + ?Sized> Fetch<f32> for Halves<'_, W> {
+    #[inline(always)]
+    fn fetch(&self, index: usize) -> f32 {
+        fetch_f16(self.0, index)
+    }
+}
+
 /// Word `element`: numbers `2 element` and the one behind it, where there is one.
 #[inline]
 pub fn packed_f16(numbers: &(impl Fetch<f32> + ?Sized), number_count: u32, element: usize) -> u32 {

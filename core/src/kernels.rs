@@ -162,6 +162,15 @@ macro_rules! for_each_kernel {
                 read numbers: f32,
                 write words: u32,
             }
+            /// As `gather_latents`, from the words of a grid in half precision. An element is four channels of a point.
+            GatherLatentsF16 gather_latents_f16(block: GatherBlock) [0..block.point_count * block.four_count()]
+            by pixelnerf::gathered_value_f16, twin {
+                read views: CameraBlock,
+                read points: RayPoint,
+                read grid: u32,
+                optional residual: f32 = grid if !block.has_residual,
+                write gathered: f32,
+            }
             /// As `gather_volume`, from the words of a volume in half precision. An element is a feature of a point.
             GatherVolumeF16 gather_volume_f16(block: VolumeBlock) [0..block.point_count * block.feature_count]
             by genvs::volume_value_f16, twin {

@@ -5,6 +5,7 @@
 //! fused by [`crate::fuse::fuse_element`].
 
 use crate::camera::CameraBlock;
+use crate::half_precision::Halves;
 use crate::lookup::split;
 use crate::math::{exact_power_of_two, exp, max, sin_cos};
 use crate::pages::Fetch;
@@ -100,14 +101,16 @@ pub fn visible_weight(
     own / all
 }
 
-fn is_in_front(camera: &CameraBlock, position: Vec3) -> bool {
+/// Whether a world point is in front of a view, whose weight is 0 there if it is not; not for NaN.
+#[inline]
+pub fn is_in_front(camera: &CameraBlock, position: Vec3) -> bool {
     camera.pose.rotate_to_camera(position - camera.centre_world()).z > LEAST_DEPTH
 }
 
 /// As in [`CameraBlock::project`].
 const LEAST_DEPTH: f32 = 1.0e-20;
 
-/// A dispatch of [`gathered_value`], as plain data.
+/// A dispatch of [`gathered_value`] or [`gathered_value_f16`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct GatherBlock {
@@ -201,6 +204,20 @@ pub fn gathered_value(
     let camera = views.fetch(block.view as usize);
     let value = GridPlace::of(&camera, &points.fetch(point), block).value(grid, channel);
     if block.has_residual != 0 { residual.fetch(element) + value } else { value }
+}
+
+/// As [`gathered_value`], from a grid of numbers in half precision, two in a word: they are read exactly, and sums are in
+/// `f32`.
+#[inline]
+pub fn gathered_value_f16(
+    views: &(impl Fetch<CameraBlock> + ?Sized),
+    points: &(impl Fetch<RayPoint> + ?Sized),
+    grid: &(impl Fetch<u32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
+    block: &GatherBlock,
+    element: usize,
+) -> f32 {
+    gathered_value(views, points, &Halves(grid), residual, block, element)
 }
 
 /// Radiance from the network's four outputs `raw[channel]` at a point: red, green, blue in `[0, 1]` (logistic function, 1

@@ -76,7 +76,9 @@ fn wrong_bounds_are_refused() {
         wrong(&format!("--max-time={time}"), &["--max-time", time]);
     }
     wrong("--max-error 40dB --max-time 1s", &["--max-error", "--max-time"]);
-    for other in ["--exact", "--compute space", "--probe-step 8", "--steps 3", "--half-volumes", "--reuse 2"] {
+    for other in
+        ["--exact", "--compute space", "--probe-step 8", "--half-latents", "--steps 3", "--half-volumes", "--reuse 2"]
+    {
         let option = other.split(' ').next().unwrap_or(other);
         wrong(&format!("--model body:16 --max-error 40dB {other}"), &["--max-error", option]);
     }

@@ -223,7 +223,9 @@ fn arguments_of_another_network() {
         );
         assert_wrong(&format!("render toy {option} -o out"), &["required arguments were not provided"]);
     }
-    for option in ["--published-depth", "--probe-step 8", "--compute layers", "--compute views,hidden"] {
+    for option in
+        ["--published-depth", "--probe-step 8", "--half-latents", "--compute layers", "--compute views,hidden"]
+    {
         let name = option.split(' ').next().unwrap_or(option);
         wrong(
             &format!("--model genvs:small {option}"),
@@ -268,6 +270,7 @@ fn wrong_arguments_of_genvs() {
     }
     wrong("--exact --reuse 2", &["--exact", "--reuse"]);
     wrong("--exact --half-volumes", &["--exact", "--half-volumes"]);
+    assert_wrong("render toy --model body:8 --exact --half-latents -o out", &["--exact", "--half-latents"]);
     wrong("--exact --compute rows", &["--exact", "--compute"]);
     for name in ["genvs:", "genvs:64"] {
         assert_wrong(&format!("render toy --model {name} -o out"), &[name, "genvs:small"]);

@@ -1,7 +1,9 @@
 //! PixelNeRF as a whole, on the CPU, with small made networks.
 
 mod extremes;
+mod halves;
 mod omissions;
+mod sight;
 mod sizes;
 
 use viewfuse::device::cpu::Cpu;

@@ -16,8 +16,11 @@ use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding};
 use viewfuse_core::composite::{CompositeBlock, composite_samples};
 use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, fine_depth, merged_depth, random_draw};
 use viewfuse_core::fuse::{FuseBlock, fuse_element};
+use viewfuse_core::half_precision::packed_f16;
 use viewfuse_core::pages::StartingAt;
-use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, embedded_value, gathered_value, radiance, visible_weight};
+use viewfuse_core::pixelnerf::{
+    EmbedBlock, GatherBlock, embedded_value, gathered_value, gathered_value_f16, radiance, visible_weight,
+};
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
 use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
@@ -324,7 +327,7 @@ fn points_are_core_s() {
 fn gather_latents_is_core_s() {
     let world = World::new(1);
     let (views, there, grid) = (&world.views, points_of(&world, 40), numbers(20, 5 * 6 * 6));
-    let (words, at) = (vectors::cameras(views), vectors::points(&there));
+    let (cameras, at) = (vectors::cameras(views), vectors::points(&there));
     let residual = numbers(21, views.len() * 240);
     for has_residual in [0, 1] {
         let block = GatherBlock {
@@ -339,11 +342,21 @@ fn gather_latents_is_core_s() {
         };
         let mut gathered = vec![UNTOUCHED; views.len() * 240];
         dispatch(block, 80, |id, push| {
-            points::gather_latents(id, push, &words, &at, &grid, &residual, &mut gathered);
+            points::gather_latents(id, push, &cameras, &at, &grid, &residual, &mut gathered);
         });
         let own = StartingAt { all: &residual[..], first: 240 };
         let expected: Vec<f32> =
             (0..240).map(|at| gathered_value(&views[..], &there[..], &grid[..], &own, &block, at)).collect();
+        assert_eq!(gathered[240..480], expected);
+        assert_eq!(gathered.iter().filter(|value| **value == UNTOUCHED).count(), gathered.len() - 240);
+
+        let words: Vec<u32> = (0..90).map(|word| packed_f16(&grid[..], 180, word)).collect();
+        let mut gathered = vec![UNTOUCHED; views.len() * 240];
+        dispatch(block, 80, |id, push| {
+            points::gather_latents_f16(id, push, &cameras, &at, &words, &residual, &mut gathered);
+        });
+        let expected: Vec<f32> =
+            (0..240).map(|at| gathered_value_f16(&views[..], &there[..], &words[..], &own, &block, at)).collect();
         assert_eq!(gathered[240..480], expected);
         assert_eq!(gathered.iter().filter(|value| **value == UNTOUCHED).count(), gathered.len() - 240);
     }

@@ -62,7 +62,7 @@ families! {
     /// [`super::pixelnerf`].
     PixelNerf {
         title: "PixelNeRF", prefix: "encoder.model.", open: super::pixelnerf::open,
-        options: &["published-depth", "probe-step", "probe-error"],
+        options: &["published-depth", "probe-step", "probe-error", "half-latents"],
         computable: super::pixelnerf::COMPUTABLE,
         test_networks: &[
             TestNetwork { name: "formula", small: Small::Width, checkpoint: super::pixelnerf::test_networks::deterministic_of_width },

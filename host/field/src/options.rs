@@ -26,6 +26,8 @@ pub struct FieldOptions {
     pub probe_step: Option<u32>,
     /// The largest change of the probes' colours.
     pub probe_error: Option<f32>,
+    /// Keep the grids of latents that points look up in half precision (f16).
+    pub half_latents: bool,
     /// The largest and the smallest noise level.
     pub noise: Option<NoiseSchedule>,
     /// The sampler.
@@ -49,6 +51,7 @@ impl FieldOptions {
             ("published-depth", self.published_depth),
             ("probe-step", self.probe_step.is_some()),
             ("probe-error", self.probe_error.is_some()),
+            ("half-latents", self.half_latents),
             ("sampler", self.sampler.is_some()),
             ("steps", self.steps.is_some()),
             ("tolerance", self.tolerance.is_some()),

@@ -7,6 +7,7 @@
 pub mod architecture;
 mod efforts;
 mod encoder;
+mod grid;
 mod memory;
 mod network;
 mod node_picture;
@@ -18,6 +19,7 @@ mod pass;
 mod picture;
 mod probes;
 pub mod reference;
+mod sight;
 pub mod test_networks;
 
 pub use architecture::{Architecture, Level, Pass};
@@ -29,9 +31,11 @@ use super::{
     About, Effort, Encoding, Encodings, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide,
 };
 use encoder::{ViewLatents, encode};
+use grid::Grid;
 use network::{Network, Workspace};
 use parameters::{DeviceParameters, HostParameters};
 use pass::{Evaluated, Renderer};
+use sight::Sight;
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
@@ -70,6 +74,12 @@ struct Views<'a, D: Device> {
 struct Counts {
     latent_rows: u64,
     mapped_rows: u64,
+    /// Of grids, as computed.
+    latent_bytes: u64,
+    /// As kept.
+    kept_bytes: u64,
+    /// Views at points, of samples that were evaluated.
+    point_views: u64,
     passes: [Evaluated; 2],
 }
 
@@ -155,14 +165,28 @@ impl<D: Device> Views<'_, D> {
         }
     }
 
-    /// Some of the views, with these weights.
-    fn used(&self, views: &[usize], weights: &[f32]) -> Result<network::Views<'_, D>, DeviceError> {
+    /// Some of the views, with these weights, for a target's rays or for any points.
+    fn used(
+        &self,
+        views: &[usize],
+        weights: &[f32],
+        target: Option<&CastBlock>,
+    ) -> Result<network::Views<'_, D>, DeviceError> {
         let cameras: Vec<CameraBlock> = views.iter().map(|view| self.cameras[*view]).collect();
+        let sight = Sight { cameras, weights: weights.to_vec() };
+        let target = target.filter(|_| self.field.options.omissions.unseen_points);
         Ok(network::Views {
-            cameras: self.device.upload(&cameras)?,
+            cameras: self.device.upload(&sight.cameras)?,
             weights: self.device.upload(weights)?,
             latents: views.iter().filter_map(|view| self.latents[*view].as_ref()).collect(),
+            sight: target.is_some_and(|cast| sight.is_partial(cast)).then_some(sight),
         })
+    }
+
+    /// A target's rays.
+    fn cast(&self, request: &Request<'_>) -> CastBlock {
+        let ([near, far], camera) = (self.near_far, request.camera.block(0));
+        CastBlock { camera, near, far, pixel_centre: self.field.architecture.pixel_centre, along_axis: 0 }
     }
 
     /// What renders a target's rays with these options.
@@ -173,8 +197,6 @@ impl<D: Device> Views<'_, D> {
         options: PixelNerfOptions,
         progress: &'r dyn Progress,
     ) -> Renderer<'r, D> {
-        let [near, far] = self.near_far;
-        let (camera, pixel_centre) = (request.camera.block(0), self.field.architecture.pixel_centre);
         let PixelNerfOptions { sampling, omissions } = options;
         Renderer {
             device: self.device,
@@ -184,7 +206,7 @@ impl<D: Device> Views<'_, D> {
             sampling,
             omissions,
             early_termination: request.early_termination,
-            cast: CastBlock { camera, near, far, pixel_centre, along_axis: 0 },
+            cast: self.cast(request),
             background: self.background,
             progress,
         }
@@ -197,9 +219,13 @@ impl<D: Device> Views<'_, D> {
     }
 
     fn encode_view(&mut self, view: usize) -> Result<(), DeviceError> {
-        let PixelNerf { architecture, options, .. } = self.field;
-        let maps = options.omissions.latent_layers;
-        self.latents[view] = Some(encode(self.device, architecture, &self.parameters, &self.images[view], maps)?);
+        let PixelNerf { architecture, options: PixelNerfOptions { omissions, .. }, .. } = self.field;
+        let encoded = encode(self.device, architecture, &self.parameters, &self.images[view], omissions)?;
+        for [kept, whole] in encoded.grids.iter().flatten().map(Grid::bytes) {
+            self.counts.kept_bytes += kept;
+            self.counts.latent_bytes += whole;
+        }
+        self.latents[view] = Some(encoded);
         Ok(())
     }
 }
@@ -218,7 +244,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let PixelNerfOptions { sampling, omissions } = options;
         let Request { camera, .. } = request;
         let most_points = (camera.pinhole.width() * camera.pinhole.height() * sampling.coarse_count) as usize;
-        let views = self.used(request.views, &request.view_weights())?;
+        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
         let renderer = self.renderer(&views, request, options, progress);
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
@@ -228,6 +254,7 @@ impl<D: Device> Prepared for Views<'_, D> {
                 let mut probes = Evaluated::default();
                 let seen = renderer.probe(&mut workspace, step, &mut probes)?;
                 evaluated[0].evaluated += probes.evaluated;
+                evaluated[0].unseen += probes.unseen;
                 Some(seen)
             }
             false => None,
@@ -237,8 +264,9 @@ impl<D: Device> Prepared for Views<'_, D> {
             _ => renderer.picture_between_nodes(&mut workspace, &mut evaluated)?,
         };
         along_axis(&mut rendered, &renderer.cast);
-        let rows_a_sample = request.views.len() * self.field.architecture.injected_count;
-        self.counts.add(rows_a_sample, omissions.latent_layers, &evaluated);
+        let PixelNerf { architecture, options, .. } = self.field;
+        let views_and_layers = [request.views.len(), architecture.injected_count].map(|count| count as u64);
+        self.counts.add(views_and_layers, options.omissions.latent_layers, &evaluated);
         Ok(rendered)
     }
 
@@ -266,7 +294,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
         let options = efforts::exact(&self.field.options);
         let most_points = pixels.len() * options.sampling.coarse_count as usize;
-        let views = self.used(request.views, &request.view_weights())?;
+        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
         let renderer = self.renderer(&views, request, options, progress);
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
@@ -275,14 +303,26 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn record(&self) -> Record {
-        let Counts { latent_rows, mapped_rows, passes: [coarse, fine] } = self.counts;
+        let Counts { latent_rows, mapped_rows, latent_bytes, kept_bytes, point_views, passes: [coarse, fine] } =
+            self.counts;
         let Omissions {
-            latent_layers, empty_space, empty_rays, empty_parts, hidden_samples, interpolation, nodes, ..
+            latent_layers,
+            half_latents,
+            unseen_points,
+            empty_space,
+            empty_rays,
+            empty_parts,
+            hidden_samples,
+            interpolation,
+            nodes,
+            ..
         } = self.options.omissions;
         let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
         let left_out = vec![
             line("latent layers at points", latent_layers, mapped_rows, latent_rows, "rounding"),
+            line("latent bytes", half_latents, latent_bytes - kept_bytes, latent_bytes, "2^-11 of a latent"),
+            line("views at points", unseen_points, coarse.unseen + fine.unseen, point_views, "nothing"),
             line(
                 "first-pass samples",
                 empty_space > 1 || interpolation > 0.0 || nodes > 0,
@@ -304,9 +344,11 @@ impl<D: Device> Prepared for Views<'_, D> {
 }
 
 impl Counts {
-    /// Adds a picture whose samples each took this many rows of latent layers.
-    fn add(&mut self, rows_a_sample: usize, maps: bool, evaluated: &[Evaluated; 2]) {
-        let rows = rows_a_sample as u64 * (evaluated[0].evaluated + evaluated[1].evaluated);
+    /// Adds a picture from so many views, with so many latent layers in each.
+    fn add(&mut self, [views, layers]: [u64; 2], maps: bool, evaluated: &[Evaluated; 2]) {
+        let point_views = views * (evaluated[0].evaluated + evaluated[1].evaluated);
+        self.point_views += point_views;
+        let rows = layers * (point_views - evaluated[0].unseen - evaluated[1].unseen);
         self.latent_rows += rows;
         if maps {
             self.mapped_rows += rows;
@@ -314,6 +356,7 @@ impl Counts {
         for (total, own) in self.passes.iter_mut().zip(evaluated) {
             total.samples += own.samples;
             total.evaluated += own.evaluated;
+            total.unseen += own.unseen;
         }
     }
 }

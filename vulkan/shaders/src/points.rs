@@ -4,6 +4,7 @@ use crate::loads::{CameraWords, Cameras, PointWords, Points};
 use crate::{Piece, Push};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
+use viewfuse_core::half_precision::Halves;
 use viewfuse_core::pages::{Fetch, StartingAt};
 use viewfuse_core::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace};
 
@@ -58,6 +59,38 @@ pub fn gather_latents(
     if id.x >= push.piece.count {
         return;
     }
+    gather_four(push, id, views, points, grid, residual, gathered);
+}
+
+/// As [`gather_latents`], from a grid in half precision.
+#[spirv(compute(threads(64), entry_point_name = "gather_latents_f16"))]
+#[allow(clippy::too_many_arguments)]
+pub fn gather_latents_f16(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<GatherBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] views: &[CameraWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] points: &[PointWords],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] grid: &[u32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 3)] residual: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 4)] gathered: &mut [f32],
+) {
+    if id.x >= push.piece.count {
+        return;
+    }
+    gather_four(push, id, views, points, &Halves(grid), residual, gathered);
+}
+
+/// Four channels of a point, with the residual if there is one.
+#[inline(always)]
+fn gather_four(
+    push: &Push<GatherBlock>,
+    id: UVec3,
+    views: &[CameraWords],
+    points: &[PointWords],
+    grid: &(impl Fetch<f32> + ?Sized),
+    residual: &[f32],
+    gathered: &mut [f32],
+) {
     let block = &push.parameters;
     let element = push.piece.first + id.x;
     let (point, four) = (element / block.four_count(), element % block.four_count());

@@ -18,18 +18,23 @@ use viewfuse_vulkan::kernel::Kernel;
 /// Views with their grids: a dispatch each.
 #[derive(Clone, Debug)]
 pub struct Job {
-    block: GatherBlock,
-    views: Vec<CameraBlock>,
-    points: Vec<RayPoint>,
+    pub(super) block: GatherBlock,
+    pub(super) views: Vec<CameraBlock>,
+    pub(super) points: Vec<RayPoint>,
     /// `[view]`: `[row][column][channel]`.
-    grids: Vec<Vec<f32>>,
+    pub(super) grids: Vec<Vec<f32>>,
     /// `[view][point][channel]`, or nothing.
-    residual: Vec<f32>,
+    pub(super) residual: Vec<f32>,
 }
 
 impl Job {
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.views.len() * self.points.len() * self.block.channel_count as usize
+    }
+
+    /// Fours of channels: the elements of its dispatches.
+    pub(super) fn four_count(&self) -> usize {
+        self.views.len() * self.points.len() * self.block.four_count() as usize
     }
 }
 
@@ -64,6 +69,45 @@ fn job(random: &mut Random, size: u32, index: usize, [view_count, channel_count]
     job
 }
 
+/// Jobs with odd and even numbers of channels.
+pub(super) fn jobs(random: &mut Random, size: u32) -> Vec<Job> {
+    let kinds = [[1, 1], [2, 3], [3, 64], [1, 5], [2, 65], [1, 2], [4, 16], [2, 1]];
+    kinds.into_iter().enumerate().map(|(index, kind)| job(random, size, index, kind)).collect()
+}
+
+/// The gathered values.
+pub(super) fn expected(jobs: &[Job]) -> Vec<Option<Bounded>> {
+    let mut expected = Vec::new();
+    for Job { block, views, points, grids, residual } in jobs {
+        let mut gathered = Vec::new();
+        for (view, grid) in views.iter().zip(grids) {
+            let row = |point: usize| match point_oracle::gather(view, grid, &points[point], block) {
+                Some(values) => values.into_iter().map(Some).collect(),
+                None => vec![None; block.channel_count as usize],
+            };
+            gathered.extend(map(points.len(), 1, row).into_iter().flatten());
+        }
+        for (value, residual) in gathered.iter_mut().zip(residual) {
+            *value = value.map(|value| value + Bounded::from(*residual));
+        }
+        expected.extend(gathered);
+    }
+    expected
+}
+
+/// For every kernel that gathers from grids.
+pub(super) const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
+/// Their inputs, changed by 1 %.
+pub(super) const SPOILERS: &[Spoiler<Vec<Job>>] = &[
+    ("views", |jobs| jobs.iter_mut().flat_map(|job| &mut job.views).for_each(|view| view.intrinsics[0] *= 1.01)),
+    ("points", |jobs| {
+        jobs.iter_mut().flat_map(|job| &mut job.points).for_each(|point| point.position[1] *= 1.01);
+    }),
+    ("grid", |jobs| jobs.iter_mut().for_each(|job| job.grids[0].iter_mut().for_each(|node| *node *= 1.01))),
+    ("residual", |jobs| jobs.iter_mut().for_each(|job| job.residual.iter_mut().for_each(|residual| *residual *= 1.01))),
+    ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.pixel_centre *= 1.01)),
+];
+
 /// See the module.
 pub enum GatherLatents {}
 
@@ -71,33 +115,20 @@ impl Case for GatherLatents {
     const KERNEL: Kernel = Kernel::GatherLatents;
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
-    const LIMITS: Limits = Limits { tolerance: 5.0e-3, least: 1.0e-2 };
+    const LIMITS: Limits = LIMITS;
     const REASON: &'static str = "errors of a projection, in pixels, times the change of the grid over a node; two mixtures; \
         undecided where a point is on the view's plane to within rounding";
-    const SPOILERS: &'static [Spoiler<Vec<Job>>] = &[
-        ("views", |jobs| jobs.iter_mut().flat_map(|job| &mut job.views).for_each(|view| view.intrinsics[0] *= 1.01)),
-        ("points", |jobs| {
-            jobs.iter_mut().flat_map(|job| &mut job.points).for_each(|point| point.position[1] *= 1.01);
-        }),
-        ("grid", |jobs| jobs.iter_mut().for_each(|job| job.grids[0].iter_mut().for_each(|node| *node *= 1.01))),
-        ("residual", |jobs| {
-            jobs.iter_mut().for_each(|job| job.residual.iter_mut().for_each(|residual| *residual *= 1.01))
-        }),
-        ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.pixel_centre *= 1.01)),
-    ];
+    const SPOILERS: &'static [Spoiler<Vec<Job>>] = SPOILERS;
 
     type Inputs = Vec<Job>;
     type Loaded<D: Device> = Vec<LoadedJob<D>>;
 
     fn inputs(seed: u64, size: u32) -> Vec<Job> {
-        let random = &mut random(16, seed, size);
-        let kinds = [[1, 1], [2, 3], [3, 64], [1, 5], [2, 65], [1, 2], [4, 16], [2, 1]];
-        kinds.into_iter().enumerate().map(|(index, kind)| job(random, size, index, kind)).collect()
+        jobs(&mut random(16, seed, size), size)
     }
 
     fn element_count(jobs: &Vec<Job>) -> usize {
-        let elements = |job: &Job| job.views.len() * job.points.len() * job.block.four_count() as usize;
-        jobs.iter().map(elements).sum()
+        jobs.iter().map(Job::four_count).sum()
     }
 
     fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
@@ -130,21 +161,6 @@ impl Case for GatherLatents {
     }
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
-        let mut expected = Vec::new();
-        for Job { block, views, points, grids, residual } in jobs {
-            let mut gathered = Vec::new();
-            for (view, grid) in views.iter().zip(grids) {
-                let row = |point: usize| match point_oracle::gather(view, grid, &points[point], block) {
-                    Some(values) => values.into_iter().map(Some).collect(),
-                    None => vec![None; block.channel_count as usize],
-                };
-                gathered.extend(map(points.len(), 1, row).into_iter().flatten());
-            }
-            for (value, residual) in gathered.iter_mut().zip(residual) {
-                *value = value.map(|value| value + Bounded::from(*residual));
-            }
-            expected.extend(gathered);
-        }
-        expected
+        expected(jobs)
     }
 }

@@ -16,12 +16,12 @@ use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The nearest number in half precision, none larger than the largest.
-fn nearest(number: f32) -> f16 {
+pub(super) fn nearest(number: f32) -> f16 {
     f16::from_f32(number.clamp(-f16::MAX.to_f32(), f16::MAX.to_f32()))
 }
 
 /// Two in a word, the lower half first.
-fn packed(numbers: &[f32]) -> Vec<u32> {
+pub(super) fn packed(numbers: &[f32]) -> Vec<u32> {
     let bits = |number: Option<&f32>| number.map_or(0, |number| u32::from(nearest(*number).to_bits()));
     numbers.chunks(2).map(|pair| bits(pair.first()) | bits(pair.get(1)) << 16).collect()
 }

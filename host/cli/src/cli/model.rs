@@ -71,6 +71,9 @@ pub(crate) struct ModelOptions {
     /// black to white [default: 1/128]
     #[arg(long, value_name = "ERROR", value_parser = parse_share, requires = "model", help_heading = PIXELNERF)]
     probe_error: Option<f32>,
+    /// Keep the latents that points look up in half precision (f16): half of their memory
+    #[arg(long, requires = "model", conflicts_with = "exact", help_heading = PIXELNERF)]
+    half_latents: bool,
     #[command(flatten)]
     run: RunOptions,
 }
@@ -137,9 +140,18 @@ impl ModelOptions {
 
     /// Opens the field. With `reuse`, a GeNVS starts each frame from the one before at that noise level.
     pub(crate) fn open(&self, seed: u64, reuse: Option<f32>) -> anyhow::Result<AnyField> {
-        let ModelOptions { exact, probe_step, probe_error, .. } = *self;
+        let ModelOptions { exact, probe_step, probe_error, half_latents, .. } = *self;
         let compute = self.compute.clone();
-        let options = FieldOptions { seed, exact, compute, probe_step, probe_error, reuse, ..FieldOptions::default() };
+        let options = FieldOptions {
+            seed,
+            exact,
+            compute,
+            probe_step,
+            probe_error,
+            half_latents,
+            reuse,
+            ..FieldOptions::default()
+        };
         self.network.open_with(self.run.given_to(options))
     }
 }

@@ -52,8 +52,8 @@ impl PictureOptions {
 }
 
 /// Options that a bound replaces: it chooses what is left out.
-const CHOSEN_BY_A_BOUND: [&str; 8] =
-    ["exact", "compute", "probe_step", "probe_error", "sampler", "steps", "tolerance", "half_volumes"];
+const CHOSEN_BY_A_BOUND: [&str; 9] =
+    ["exact", "compute", "probe_step", "probe_error", "half_latents", "sampler", "steps", "tolerance", "half_volumes"];
 
 /// A bound on the error or the time of each picture.
 #[derive(Args)]

@@ -56,12 +56,14 @@ const HIDDEN: Omissions = Omissions { hidden_samples: true, ..NONE };
 /// PixelNeRF: each of these alone, everything else exact. Words, what is left out, `--leave-out`,
 /// `--early-termination`.
 #[rustfmt::skip]
-const ALONE: [(&str, Omissions, f32, f32); 16] = [
+const ALONE: [(&str, Omissions, f32, f32); 18] = [
     ("unused views",    VIEWS,                                     0.0,  0.0),
     ("leave out 0.01",  VIEWS,                                     0.01, 0.0),
     ("leave out 0.05",  VIEWS,                                     0.05, 0.0),
     ("leave out 0.1",   VIEWS,                                     0.1,  0.0),
     ("latent layers",   Omissions { latent_layers: true, ..NONE }, 0.0,  0.0),
+    ("half latents",    Omissions { half_latents: true, ..NONE },  0.0,  0.0),
+    ("unseen points",   Omissions { unseen_points: true, ..NONE }, 0.0,  0.0),
     ("empty space, 2",  Omissions { empty_space: 2, ..NONE },      0.0,  0.0),
     ("empty space, 4",  Omissions { empty_space: 4, ..NONE },      0.0,  0.0),
     ("empty space, 8",  Omissions { empty_space: 8, ..NONE },      0.0,  0.0),
@@ -78,9 +80,10 @@ const ALONE: [(&str, Omissions, f32, f32); 16] = [
 /// PixelNeRF: all but each of these, because omissions that are harmless alone may not be so together. Words as
 /// `--compute` takes them.
 #[rustfmt::skip]
-const ALL_BUT: [(&str, Omissions); 6] = [
+const ALL_BUT: [(&str, Omissions); 7] = [
     ("views",  Omissions { unused_views: false, ..Omissions::ALL }),
     ("layers", Omissions { latent_layers: false, ..Omissions::ALL }),
+    ("behind", Omissions { unseen_points: false, ..Omissions::ALL }),
     ("space",  Omissions { empty_space: 0, ..Omissions::ALL }),
     ("rays",   Omissions { empty_rays: false, ..Omissions::ALL }),
     ("parts",  Omissions { empty_parts: false, ..Omissions::ALL }),

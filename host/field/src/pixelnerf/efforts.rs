@@ -33,12 +33,14 @@ const PARTS: Omissions = Omissions { empty_space: 0, ..ALL };
 const ALL: Omissions = Omissions::ALL;
 
 /// The efforts of a network with these options, the cheapest first. Counts of samples are shares of the options'. Whether
-/// latent layers are applied on the grid does not change: views are encoded for it.
+/// latent layers are applied on the grid, and in which precision grids are kept, does not change: views are encoded for it.
 pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> {
     let full = options.sampling;
     let keep = |omissions: Omissions| Omissions {
         unused_views: options.omissions.unused_views,
         latent_layers: options.omissions.latent_layers,
+        half_latents: options.omissions.half_latents,
+        unseen_points: options.omissions.unseen_points,
         ..omissions
     };
     let between_nodes = NODES.map(|(share, interpolation, error, work)| {
@@ -54,8 +56,9 @@ pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> 
     efforts
 }
 
-/// Nothing is left out of a picture but what costs only rounding.
+/// Nothing is left out of a picture but what costs nothing or rounding.
 pub(super) fn exact(options: &PixelNerfOptions) -> PixelNerfOptions {
-    let Omissions { unused_views, latent_layers, .. } = options.omissions;
-    PixelNerfOptions { omissions: Omissions { unused_views, latent_layers, ..Omissions::NONE }, ..*options }
+    let Omissions { unused_views, latent_layers, half_latents, unseen_points, .. } = options.omissions;
+    let omissions = Omissions { unused_views, latent_layers, half_latents, unseen_points, ..Omissions::NONE };
+    PixelNerfOptions { omissions, ..*options }
 }

@@ -2,6 +2,8 @@
 //! outputs of the layers `lin_z` for them.
 
 use super::architecture::Architecture;
+use super::grid::Grid;
+use super::options::Omissions;
 use super::parameters::{DeviceParameters, PointNetwork};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
@@ -15,49 +17,47 @@ use viewfuse_nn::scratch::Scratch;
 /// A view's encoding.
 pub(super) struct ViewLatents<D: Device> {
     /// Grids for look-ups at points: the latents themselves, or their `lin_z` outputs, `[network][block]`.
-    pub(super) grids: Vec<Vec<D::Buffer<f32>>>,
+    pub(super) grids: Vec<Vec<Grid<D>>>,
     /// Rows and columns of a grid.
     pub(super) grid_size: [u32; 2],
 }
 
-/// Encodes an image (red, green, blue in `[-1, 1]`). With `maps`, the grids are the outputs of each network's `lin_z`;
-/// without, the only grid holds the latents.
+/// Encodes an image (red, green, blue in `[-1, 1]`). With `latent_layers` left out at points, the grids are the outputs of each
+/// network's `lin_z`; otherwise the only grid holds the latents. Each grid is packed before the next one is computed.
 pub(super) fn encode<D: Device>(
     device: &D,
     architecture: &Architecture,
     parameters: &DeviceParameters<D>,
     image: &Image<D>,
-    maps: bool,
+    omissions: &Omissions,
 ) -> Result<ViewLatents<D>, DeviceError> {
     let latents = run_trunk(device, architecture, &parameters.trunk, image)?;
     let grid_size = [latents.size.height, latents.size.width];
-    let grids = match maps {
-        false => vec![vec![latents.values]],
-        true => {
-            let grids = parameters.networks.iter().map(|network| map_latents(device, network, &latents));
-            grids.collect::<Result<_, _>>()?
+    let nodes = latents.size.pixel_count();
+    let grid = |values, channels: u32| Grid::new(device, values, nodes * channels, omissions.half_latents);
+    let grids = if omissions.latent_layers {
+        let mut all = Vec::new();
+        for PointNetwork { lin_z, .. } in &parameters.networks {
+            let maps = lin_z.iter().map(|layer| grid(map_latents(device, layer, &latents)?, layer.out_count));
+            all.push(maps.collect::<Result<_, _>>()?);
         }
+        all
+    } else {
+        vec![vec![grid(latents.values, latents.size.channels)?]]
     };
     Ok(ViewLatents { grids, grid_size })
 }
 
-/// Every `lin_z` of a network at every node, `[block]`: `[row][column][width]`.
-fn map_latents<D: Device>(
-    device: &D,
-    network: &PointNetwork<Linear<D>>,
-    latents: &Image<D>,
-) -> Result<Vec<D::Buffer<f32>>, DeviceError> {
+/// A `lin_z` at every node: `[row][column][width]`.
+fn map_latents<D: Device>(device: &D, layer: &Linear<D>, latents: &Image<D>) -> Result<D::Buffer<f32>, DeviceError> {
     let row_count = latents.size.pixel_count();
-    let map = |layer: &Linear<D>| {
-        let mut grid = device.zeros(row_count as usize * layer.out_count as usize)?;
-        layer.run(device, row_count, LinearOptions::PLAIN, &latents.values, None, &mut grid)?;
-        Ok(grid)
-    };
-    network.lin_z.iter().map(map).collect()
+    let mut values = device.zeros(row_count as usize * layer.out_count as usize)?;
+    layer.run(device, row_count, LinearOptions::PLAIN, &latents.values, None, &mut values)?;
+    Ok(values)
 }
 
 /// The latents `[row][column][channel]`: the stem's channels, then each level's.
-fn run_trunk<D: Device>(
+pub(super) fn run_trunk<D: Device>(
     device: &D,
     architecture: &Architecture,
     trunk: &ResNet<Convolution<D>>,

@@ -3,6 +3,7 @@
 use super::architecture::Architecture;
 use super::encoder::ViewLatents;
 use super::parameters::PointNetwork;
+use super::sight::Sight;
 use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
@@ -26,6 +27,8 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) weights: D::Buffer<f32>,
     /// Their encodings.
     pub(super) latents: Vec<&'a ViewLatents<D>>,
+    /// The same cameras and weights on the host, where a view has weight 0 at some points and is left out there.
+    pub(super) sight: Option<Sight>,
 }
 
 /// Buffers for activations, reused for every chunk of points.
@@ -159,7 +162,7 @@ impl<D: Device> Network<'_, D> {
         for (view, known) in (0..).zip(&views.latents) {
             let block = self.gather(known, view, point_count, channel_count);
             let Workspace { points, latents, .. } = workspace;
-            self.device.gather_latents(&block, &views.cameras, points, &known.grids[0][0], None, latents)?;
+            known.grids[0][0].gather(self.device, &block, &views.cameras, points, None, latents)?;
         }
         Ok(())
     }
@@ -179,7 +182,7 @@ impl<D: Device> Network<'_, D> {
                 for (view, known) in (0..).zip(&views.latents) {
                     let gather = self.gather(known, view, point_count, width);
                     let grid = &known.grids[network][block];
-                    self.device.gather_latents(&gather, &views.cameras, points, grid, Some(flow), next)?;
+                    grid.gather(self.device, &gather, &views.cameras, points, Some(flow), next)?;
                 }
             }
             None => {

@@ -124,8 +124,8 @@ impl<D: Device> Renderer<'_, D> {
         so_far: &mut Unfinished,
     ) -> Result<(), FieldError> {
         let count = self.omissions.nodes as usize;
-        let marched = self.march(workspace, pixels, candidates, values)?;
         let pass = if self.sampling.counts()[1] > 0 { 1 } else { 0 };
+        let marched = self.march(workspace, pixels, candidates, values, &mut evaluated[pass])?;
         evaluated[pass].evaluated += marched.known.iter().map(|known| u64::from(known.count_ones())).sum::<u64>();
         let least = self.least_density();
         for (ray, pixel) in pixels.iter().enumerate() {
@@ -156,6 +156,7 @@ impl<D: Device> Renderer<'_, D> {
         pixels: &[u32],
         candidates: &[u128],
         mut values: Vec<[f32; 4]>,
+        evaluated: &mut Evaluated,
     ) -> Result<Marched, FieldError> {
         let count = self.omissions.nodes as usize;
         let spacing = (self.cast.far - self.cast.near) / count as f32;
@@ -182,7 +183,7 @@ impl<D: Device> Renderer<'_, D> {
                 break;
             }
             for some in points.chunks(workspace.point_count as usize) {
-                let raw = self.ask_at(workspace, some)?;
+                let raw = self.ask_at(workspace, some, evaluated)?;
                 for (point, raw) in some.iter().zip(raw.as_chunks::<4>().0) {
                     let [red, green, blue, _] = radiance(raw, point);
                     values[point.sample as usize] = [red, green, blue, raw[3]];
@@ -203,12 +204,17 @@ impl<D: Device> Renderer<'_, D> {
     }
 
     /// The second pass's raw outputs at points, four each; more than there are points.
-    fn ask_at(&self, workspace: &mut Workspace<D>, points: &[RayPoint]) -> Result<Vec<f32>, FieldError> {
+    fn ask_at(
+        &self,
+        workspace: &mut Workspace<D>,
+        points: &[RayPoint],
+        evaluated: &mut Evaluated,
+    ) -> Result<Vec<f32>, FieldError> {
         self.progress.check()?;
         let own = replace(&mut workspace.points, self.device.upload(points)?);
-        let asked = self.fine.ask(workspace, self.views, points.len() as u32);
+        let asked = self.fine.ask_seeing(workspace, self.views, points.len() as u32);
         workspace.points = own;
-        asked?;
+        evaluated.unseen += asked?;
         Ok(self.device.download(&workspace.raw)?)
     }
 

@@ -8,6 +8,7 @@ use viewfuse_nn::checkpoint::Checkpoint;
 /// Omissions that `compute` switches off.
 pub const COMPUTABLE: &[Computable] = &[
     ("layers", "PixelNeRF: latent layers at every point instead of once on the grid"),
+    ("behind", "PixelNeRF: views at points behind their cameras, where their weight is 0"),
     ("space", "PixelNeRF: first-pass samples in empty space"),
     ("rays", "PixelNeRF: second-pass samples on empty rays"),
     ("parts", "PixelNeRF: second-pass samples in empty parts of rays"),
@@ -41,6 +42,8 @@ pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, 
     let omissions = Omissions {
         unused_views: !computes("views"),
         latent_layers: !computes("layers"),
+        half_latents: options.half_latents,
+        unseen_points: !computes("behind"),
         empty_space: if computes("space") { 0 } else { options.probe_step.unwrap_or(usual.empty_space) },
         probe_error: if options.exact { 0.0 } else { options.probe_error.unwrap_or(usual.probe_error) },
         interpolation: usual.interpolation,

@@ -57,6 +57,11 @@ pub struct Omissions {
     /// Latent layers at points: they are applied once at every node of a view's grid, before looking up. Exact up to
     /// rounding, because looking up is linear.
     pub latent_layers: bool,
+    /// Half of the bits of the grids that points look up (f16): latents, or the outputs of latent layers, have a relative error
+    /// of at most 2^-11, and are limited to 65504.
+    pub half_latents: bool,
+    /// Views at points behind their cameras, where their weight is 0. Exact.
+    pub unseen_points: bool,
     /// First-pass samples in empty space: one ray in every square of this side in pixels (a probe) is computed first, the
     /// others only where the four probes around them are not empty. 0 or 1: no probes.
     pub empty_space: u32,
@@ -87,6 +92,8 @@ impl Omissions {
     pub const NONE: Omissions = Omissions {
         unused_views: false,
         latent_layers: false,
+        half_latents: false,
+        unseen_points: false,
         empty_space: 0,
         probe_error: 0.0,
         interpolation: 0.0,
@@ -96,10 +103,12 @@ impl Omissions {
         hidden_samples: false,
     };
 
-    /// The default omissions: all but those that only a bound on the error switches on.
+    /// The default omissions: all but half precision, and those that only a bound on the error switches on.
     pub const ALL: Omissions = Omissions {
         unused_views: true,
         latent_layers: true,
+        half_latents: false,
+        unseen_points: true,
         empty_space: 4,
         probe_error: 1.0 / 128.0,
         interpolation: 0.0,

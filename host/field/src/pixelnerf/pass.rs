@@ -34,6 +34,8 @@ pub(super) fn ray_bytes(coarse_count: u32, fine_count: u32) -> usize {
 pub(super) struct Evaluated {
     pub(super) samples: u64,
     pub(super) evaluated: u64,
+    /// Views of these that were left out because their weight is 0.
+    pub(super) unseen: u64,
 }
 
 /// The weights of a first pass along some rays.
@@ -204,7 +206,7 @@ impl<D: Device> Renderer<'_, D> {
             let block = PlaceBlock { sample_count: samples.count, first, ..PlaceBlock::default() };
             let all = list.samples.as_ref();
             device.place_points(&block, count, all, &rays.rays, &samples.depths, &mut workspace.points)?;
-            network.ask(workspace, self.views, count)?;
+            evaluated.unseen += network.ask_seeing(workspace, self.views, count)?;
             device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values)?;
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! The parts of a render on given inputs, for comparison with reference values.
 
-use super::encoder::encode;
+use super::encoder::run_trunk;
 use super::network::Workspace;
 use super::{Architecture, Pass, PixelNerf, Views};
 use crate::FieldError;
@@ -55,8 +55,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let mut all = Vec::new();
         let Views { field, device, parameters, .. } = &self.views;
         for image in &self.views.images {
-            let view = encode(*device, &field.architecture, parameters, image, false)?;
-            all.extend(device.download(&view.grids[0][0])?);
+            all.extend(device.download(&run_trunk(*device, &field.architecture, &parameters.trunk, image)?.values)?);
         }
         Ok(all)
     }
@@ -74,7 +73,7 @@ impl<'a, D: Device> Reference<'a, D> {
             }
         }
         let Views { field, device, .. } = &self.views;
-        let views = self.views.used(&all, weights)?;
+        let views = self.views.used(&all, weights, None)?;
         let maps = field.options.omissions.latent_layers;
         let mut workspace = Workspace::new(*device, &field.architecture, all.len(), points.len(), maps)?;
         let network = self.views.network(pass);
