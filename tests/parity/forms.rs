@@ -1,8 +1,9 @@
-//! Every form of every tiled kernel: against `f64` as the first form is, with the same bits as that one, and chosen by
-//! measuring where none is asked for.
+//! Every form of every tiled kernel that a device can run: against `f64` as the first form is, with the same bits as that
+//! one, and chosen by measuring where none is asked for.
 
 use super::Parity;
 use libtest_mimic::{Failed, Trial};
+use std::process::Command;
 use std::sync::Arc;
 use viewfuse::check::case::{Case, Visitor};
 use viewfuse::check::cases::visit;
@@ -30,13 +31,49 @@ pub(super) fn trials(instance: &Arc<Instance>, adapter: &Adapter) -> Vec<Trial> 
         }))
     };
     let tiled = Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
-    let others =
-        |kernel: Kernel| kernel.forms().iter().filter(|form| **form != Form::Single).map(move |form| (kernel, *form));
+    let has_subgroups = adapter.subgroup_size.is_some();
+    let is_there = move |form: &&Form| **form != Form::Single && (has_subgroups || !form.needs_subgroups());
+    let others = |kernel: Kernel| kernel.forms().iter().filter(is_there).map(move |form| (kernel, *form));
     let mut trials: Vec<Trial> = tiled.flat_map(others).map(|(kernel, form)| of_form(kernel, form)).collect();
     let (instance, adapter) = (instance.clone(), adapter.clone());
     let name = format!("{}::a_form_is_measured_and_remembered", adapter.name);
-    trials.push(ready(Trial::test(name, move || measured_and_remembered(&instance, &adapter))));
+    let measured = (instance.clone(), adapter.clone());
+    trials.push(ready(Trial::test(name, move || measured_and_remembered(&measured.0, &measured.1))));
+    if has_subgroups && adapter.name.starts_with("llvmpipe") {
+        trials.push(ready(Trial::test(format!("{}::of_wider_subgroups", adapter.name), of_wider_subgroups)));
+    }
+    if !has_subgroups {
+        let name = format!("{}::a_form_that_the_device_lacks_is_refused", adapter.name);
+        trials.push(ready(Trial::test(name, move || refused(&instance, &adapter))));
+    }
     trials
+}
+
+/// Lavapipe's usual subgroups have eight invocations. In another process it has some of sixteen, which take another way.
+fn of_wider_subgroups() -> Result<(), Failed> {
+    let mut again = Command::new(std::env::current_exe()?);
+    let output = again.args(["--nocapture", "::subgroup"]).env("LP_NATIVE_VECTOR_WIDTH", "512").output()?;
+    let said = String::from_utf8_lossy(&output.stdout);
+    let tiled = Kernel::ALL.into_iter().filter(|kernel| kernel.is_tiled());
+    let is_tried = |kernel: Kernel| {
+        let name = format!("512 bits)::{}::subgroup", kernel.name());
+        said.lines().any(|line| line.contains(&name) && line.ends_with("ok"))
+    };
+    let missing: Vec<&str> = tiled.filter(|kernel| !is_tried(*kernel)).map(Kernel::name).collect();
+    match output.status.success() && missing.is_empty() {
+        true => Ok(()),
+        false => Err(format!("not right in subgroups of sixteen: {missing:?}\n{said}").into()),
+    }
+}
+
+/// A form is never replaced by another one silently.
+fn refused(instance: &Arc<Instance>, adapter: &Adapter) -> Result<(), Failed> {
+    let options = GpuOptions { form: Some(Form::Subgroup), ..GpuOptions::default() };
+    match Vulkan::open(instance, adapter, &options) {
+        Ok(_) => Err("a device without fitting subgroups was opened for them".into()),
+        Err(error) if error.to_string().contains("subgroups of 8 to 64 invocations") => Ok(()),
+        Err(error) => Err(error.to_string().into()),
+    }
 }
 
 struct SameBits<'a> {

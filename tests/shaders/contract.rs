@@ -4,24 +4,35 @@ use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{Capability, Decoration, ExecutionMode, Op, StorageClass};
 use std::sync::LazyLock;
 use viewfuse_shader_compiler::refine::{read, refine};
-use viewfuse_shader_compiler::stamp::MODULE;
-use viewfuse_tests::contract::{breaches, entry_points};
+use viewfuse_shader_compiler::split::{Modules, split};
+use viewfuse_tests::contract::{Part, breaches, entry_points};
+use viewfuse_tests::places::repository;
 use viewfuse_vulkan::kernel::Kernel;
 
-fn bytes() -> Vec<u8> {
-    std::fs::read(viewfuse_tests::places::repository().join(MODULE)).expect("the compiled kernels")
-}
+static COMPILED: LazyLock<Modules> = LazyLock::new(|| Modules::read(&repository()).expect("the compiled kernels"));
 
 fn kernels() -> Module {
-    static KERNELS: LazyLock<Module> = LazyLock::new(|| read(&bytes()).expect("SPIR-V"));
+    static KERNELS: LazyLock<Module> = LazyLock::new(|| read(&COMPILED.kernels).expect("SPIR-V"));
     KERNELS.clone()
+}
+
+fn subgroups() -> Module {
+    static SUBGROUPS: LazyLock<Module> = LazyLock::new(|| read(&COMPILED.subgroups).expect("SPIR-V"));
+    SUBGROUPS.clone()
 }
 
 /// Breaches of the compiled kernels with one change.
 fn breaches_with(change: impl FnOnce(&mut Module)) -> Vec<String> {
     let mut module = kernels();
     change(&mut module);
-    breaches(&module)
+    breaches(Part::Kernels, &module)
+}
+
+/// Breaches of the forms by subgroups with one change.
+fn subgroup_breaches_with(change: impl FnOnce(&mut Module)) -> Vec<String> {
+    let mut module = subgroups();
+    change(&mut module);
+    breaches(Part::Subgroups, &module)
 }
 
 /// The one breach, which says `what`.
@@ -39,21 +50,92 @@ fn entry(module: &Module, kernel: Kernel) -> u32 {
 
 #[test]
 fn the_kernels_are_what_the_list_says() {
-    assert_eq!(breaches(&kernels()), Vec::<String>::new());
+    assert_eq!(breaches(Part::Kernels, &kernels()), Vec::<String>::new());
+    assert_eq!(breaches(Part::Subgroups, &subgroups()), Vec::<String>::new());
 }
 
 #[test]
 fn reading_and_writing_changes_nothing() {
-    let bytes = bytes();
-    assert!(refine(&bytes).expect("SPIR-V") == bytes);
+    for bytes in [&COMPILED.kernels, &COMPILED.subgroups] {
+        assert!(refine(bytes).expect("SPIR-V") == *bytes);
+    }
+}
+
+#[test]
+fn a_module_that_is_split_goes_to_one_side() {
+    let nothing = |module: &[u8]| read(module).expect("SPIR-V").functions.is_empty();
+    let Modules { kernels, subgroups } = split(&COMPILED.kernels).expect("SPIR-V");
+    assert!(kernels == COMPILED.kernels && nothing(&subgroups));
+    let Modules { kernels, subgroups } = split(&COMPILED.subgroups).expect("SPIR-V");
+    assert!(subgroups == COMPILED.subgroups && nothing(&kernels));
+    let capabilities = |bytes: &[u8]| read(bytes).expect("SPIR-V").capabilities.len();
+    assert_eq!([capabilities(&kernels), capabilities(&subgroups)], [2, 5]);
+    assert!(split(b"# What kernels.spv was made from").is_err());
+}
+
+#[test]
+fn the_other_module_is_seen() {
+    let said = breaches(Part::Kernels, &subgroups());
+    assert!(said.iter().any(|said| said == "linear_subgroup: not a kernel"), "{said:?}");
+    assert!(said.iter().any(|said| said == "linear_buffered: no entry point"), "{said:?}");
+    let said = breaches(Part::Subgroups, &kernels());
+    assert!(said.iter().any(|said| said == "linear: not a kernel"), "{said:?}");
+}
+
+#[test]
+fn numbers_that_leave_a_subgroup_are_seen() {
+    let shuffles = |module: &mut Module, change: &dyn Fn(&mut Instruction)| {
+        for_each(module, Op::GroupNonUniformShuffle, change);
+    };
+    // The number of another invocation is no scope.
+    let said = subgroup_breaches_with(|module| {
+        let scopes: Vec<u32> = module
+            .types_global_values
+            .iter()
+            .filter(|kind| kind.class.opcode == Op::Constant && kind.operands[0] == Operand::LiteralBit32(2))
+            .filter_map(|kind| kind.result_id)
+            .collect();
+        shuffles(module, &|shuffle| shuffle.operands[0] = Operand::IdRef(scopes[0]));
+    });
+    assert!(!said.is_empty() && said.iter().all(|said| said.contains("numbers pass in scope 2")), "{said:?}");
+    let is_passing = |instruction: &Instruction| {
+        matches!(instruction.class.opcode, Op::GroupNonUniformShuffle | Op::GroupNonUniformBroadcast)
+    };
+    let said = subgroup_breaches_with(|module| {
+        for block in module.functions.iter_mut().flat_map(|function| &mut function.blocks) {
+            block.instructions.retain(|instruction| !is_passing(instruction));
+        }
+    });
+    let none = entry_points(Part::Subgroups).map(|(_, _, name)| format!("{name}: 0 operations of subgroups"));
+    assert_eq!(said, none.collect::<Vec<_>>());
+    // One that is in the module for every device.
+    let said = breaches_with(|module| {
+        let entry = entry(module, Kernel::Linear);
+        let function = module.functions.iter_mut().find(|function| function.def_id() == Some(entry)).expect("linear");
+        let barrier = function.blocks.iter_mut().flat_map(|block| &mut block.instructions);
+        let barrier = barrier.into_iter().find(|instruction| instruction.class.opcode == Op::ControlBarrier);
+        let barrier = barrier.expect("a barrier");
+        barrier.class = Instruction::new(Op::GroupNonUniformElect, None, None, Vec::new()).class;
+        barrier.operands.truncate(1);
+    });
+    assert!(said.contains(&"linear: 1 operations of subgroups".to_owned()), "{said:?}");
+}
+
+#[test]
+fn a_subgroup_of_another_size_than_told_is_seen() {
+    let said = subgroup_breaches_with(|module| {
+        let specialised = Operand::Decoration(Decoration::SpecId);
+        module.annotations.retain(|annotation| annotation.operands.get(1) != Some(&specialised));
+    });
+    assert_eq!(said.len(), entry_points(Part::Subgroups).count(), "{said:?}");
+    assert!(said.iter().all(|said| said.contains("does not use the specialisation constant")), "{said:?}");
 }
 
 #[test]
 fn a_text_is_no_module() {
     assert!(read(b"# What kernels.spv was made from").is_err());
     // Cut within a function: a whole number of declarations would be a module.
-    let bytes = bytes();
-    assert!(read(&bytes[..bytes.len() / 2]).is_err());
+    assert!(read(&COMPILED.kernels[..COMPILED.kernels.len() / 2]).is_err());
 }
 
 #[test]
@@ -79,7 +161,7 @@ fn a_wrong_workgroup_size_is_seen() {
 
 #[test]
 fn a_missing_entry_point_is_seen() {
-    for (_, name) in entry_points() {
+    for (_, _, name) in entry_points(Part::Kernels) {
         let said = breaches_with(|module| {
             let named = Operand::LiteralString(name.to_owned());
             module.entry_points.retain(|point| point.operands[2] != named);
@@ -113,7 +195,7 @@ fn a_missing_or_moved_binding_is_seen() {
         assert_eq!(missing.len(), strange.len(), "{said:?}");
         moved += missing.len();
     }
-    assert_eq!(moved, entry_points().map(|(kernel, _)| kernel.binding_count()).sum::<usize>());
+    assert_eq!(moved, entry_points(Part::Kernels).map(|(kernel, _, _)| kernel.binding_count()).sum::<usize>());
     let said = breaches_with(|module| {
         let set = Operand::Decoration(Decoration::DescriptorSet);
         let set = module.annotations.iter_mut().find(|annotation| annotation.operands.get(1) == Some(&set));
@@ -209,7 +291,8 @@ fn arithmetic_that_could_be_contracted_is_seen() {
     module.annotations.remove(mark);
     let bytes: Vec<u8> =
         rspirv::binary::Assemble::assemble(&module).iter().flat_map(|word| word.to_le_bytes()).collect();
-    assert_eq!(breaches(&read(&refine(&bytes).expect("SPIR-V")).expect("SPIR-V")), Vec::<String>::new());
+    let again = read(&refine(&bytes).expect("SPIR-V")).expect("SPIR-V");
+    assert_eq!(breaches(Part::Kernels, &again), Vec::<String>::new());
 }
 
 #[test]
@@ -236,7 +319,7 @@ fn for_each(module: &mut Module, operation: Op, change: impl FnMut(&mut Instruct
 
 /// The entry points of tiled kernels, in all forms.
 fn tiled() -> impl Iterator<Item = &'static str> {
-    entry_points().filter(|(kernel, _)| kernel.is_tiled()).map(|(_, name)| name)
+    entry_points(Part::Kernels).filter(|(kernel, _, _)| kernel.is_tiled()).map(|(_, _, name)| name)
 }
 
 #[test]

@@ -2,19 +2,20 @@
 
 use std::fs;
 use std::path::Path;
-use viewfuse_shader_compiler::stamp::{Inputs, LIBRARIES, MODULE, SOURCES, STAMP, Stamp, StampError};
+use viewfuse_shader_compiler::split::Modules;
+use viewfuse_shader_compiler::stamp::{Inputs, LIBRARIES, MODULE, SOURCES, STAMP, SUBGROUPS, Stamp, StampError};
 use viewfuse_tests::places::repository;
 
 /// What differs between a repository and what its stamp says.
 fn stale(root: &Path) -> Vec<String> {
-    let module = fs::read(root.join(MODULE)).expect("the module");
-    Stamp::read(root).expect("the stamp").stale(&Inputs::read(root).expect("the sources"), &module)
+    let modules = Modules::read(root).expect("the modules");
+    Stamp::read(root).expect("the stamp").stale(&Inputs::read(root).expect("the sources"), &modules)
 }
 
 /// A copy of everything that a stamp speaks of.
 fn copy() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    for path in SOURCES.into_iter().chain([MODULE, STAMP, "Cargo.lock"]) {
+    for path in SOURCES.into_iter().chain([MODULE, SUBGROUPS, STAMP, "Cargo.lock"]) {
         copy_all(&repository().join(path), &folder.path().join(path));
     }
     folder
@@ -100,11 +101,16 @@ fn a_changed_lock_is_noticed() {
 
 #[test]
 fn another_module_is_noticed() {
-    let folder = copy();
-    let mut module = fs::read(folder.path().join(MODULE)).expect("the module");
-    module[100] ^= 1;
-    fs::write(folder.path().join(MODULE), module).expect("a file");
-    assert_eq!(stale(folder.path()), [format!("{MODULE} is not the module that {STAMP} describes")]);
+    for name in [MODULE, SUBGROUPS] {
+        let folder = copy();
+        let mut module = fs::read(folder.path().join(name)).expect("the module");
+        module[100] ^= 1;
+        fs::write(folder.path().join(name), module).expect("a file");
+        assert_eq!(stale(folder.path()), [format!("{name} is not the module that {STAMP} describes")]);
+        fs::remove_file(folder.path().join(name)).expect("the module");
+        let error = Modules::read(folder.path()).expect_err("no module");
+        assert!(error.to_string().contains(name), "{error}");
+    }
 }
 
 #[test]

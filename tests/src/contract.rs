@@ -7,7 +7,7 @@ use rspirv::spirv::{
     Op, Scope, StorageClass, Word,
 };
 use std::collections::{BTreeMap, BTreeSet};
-use viewfuse_vulkan::kernel::{Access, Array, Kernel, Layout, SHARED_BYTES, WORKGROUP};
+use viewfuse_vulkan::kernel::{Access, Array, Form, Kernel, Layout, SHARED_BYTES, WORKGROUP};
 
 /// `Sqrt` of `GLSL.std.450`: the only function that is the device's.
 const SQUARE_ROOT: u32 = 31;
@@ -18,9 +18,42 @@ const SHARING: MemorySemantics = MemorySemantics::ACQUIRE_RELEASE
     .union(MemorySemantics::MAKE_AVAILABLE)
     .union(MemorySemantics::MAKE_VISIBLE);
 
-/// Every breach as a sentence, none if the module is what [`Kernel::ALL`] says.
-pub fn breaches(module: &Module) -> Vec<String> {
-    let mut breaches = Breaches { declarations: Declarations::new(module), said: Vec::new() };
+/// Which module: what a device must have for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The kernels for every device.
+    Kernels,
+    /// The forms that need operations of subgroups.
+    Subgroups,
+}
+
+impl Part {
+    /// What a device must have for it.
+    fn capabilities(self) -> &'static [Capability] {
+        match self {
+            Part::Kernels => &[Capability::Shader, Capability::VulkanMemoryModel],
+            Part::Subgroups => &[
+                Capability::Shader,
+                Capability::VulkanMemoryModel,
+                Capability::GroupNonUniform,
+                Capability::GroupNonUniformBallot,
+                Capability::GroupNonUniformShuffle,
+            ],
+        }
+    }
+
+    /// The number of its specialisation constant: a page's length, or the size of a subgroup.
+    fn constant(self) -> u32 {
+        match self {
+            Part::Kernels => 0,
+            Part::Subgroups => 1,
+        }
+    }
+}
+
+/// Every breach as a sentence, none if the module is what [`Kernel::ALL`] says of its part.
+pub fn breaches(part: Part, module: &Module) -> Vec<String> {
+    let mut breaches = Breaches { part, declarations: Declarations::new(module), said: Vec::new() };
     breaches.look_at_header(module);
     let mut entries = BTreeMap::new();
     for entry in &module.entry_points {
@@ -28,13 +61,13 @@ pub fn breaches(module: &Module) -> Vec<String> {
         breaches.unless(entry.operands[0] == Operand::ExecutionModel(ExecutionModel::GLCompute), || {
             format!("{name}: not a compute shader")
         });
-        breaches.unless(entry_points().any(|(_, known)| known == name), || format!("{name}: not a kernel"));
+        breaches.unless(entry_points(part).any(|(_, _, known)| known == name), || format!("{name}: not a kernel"));
         let double = entries.insert(name.clone(), id_of(entry, 1));
         breaches.unless(double.is_none(), || format!("{name}: two entry points"));
     }
-    for (kernel, name) in entry_points() {
+    for (kernel, form, name) in entry_points(part) {
         match entries.get(name) {
-            Some(entry) => breaches.look_at_kernel(module, kernel, name, *entry),
+            Some(entry) => breaches.look_at_kernel(module, (kernel, form), name, *entry),
             None => breaches.said.push(format!("{name}: no entry point")),
         }
     }
@@ -42,13 +75,15 @@ pub fn breaches(module: &Module) -> Vec<String> {
     breaches.said
 }
 
-/// Every entry point that should be there: one for each kernel and form.
-pub fn entry_points() -> impl Iterator<Item = (Kernel, &'static str)> {
-    let of_kernel = |kernel: Kernel| kernel.forms().iter().map(move |form| (kernel, kernel.entry_point(*form)));
-    Kernel::ALL.into_iter().flat_map(of_kernel)
+/// Every entry point that should be in a module: one for each kernel and form.
+pub fn entry_points(part: Part) -> impl Iterator<Item = (Kernel, Form, &'static str)> {
+    let of_kernel = |kernel: Kernel| kernel.forms().iter().map(move |form| (kernel, *form, kernel.entry_point(*form)));
+    let is_here = move |(_, form, _): &(Kernel, Form, &str)| form.needs_subgroups() == (part == Part::Subgroups);
+    Kernel::ALL.into_iter().flat_map(of_kernel).filter(is_here)
 }
 
 struct Breaches<'a> {
+    part: Part,
     declarations: Declarations<'a>,
     said: Vec<String>,
 }
@@ -67,9 +102,12 @@ impl Breaches<'_> {
         });
         let capabilities: BTreeSet<String> =
             module.capabilities.iter().map(|capability| format!("{:?}", capability.operands[0])).collect();
-        let allowed = [Capability::Shader, Capability::VulkanMemoryModel];
-        let allowed: BTreeSet<String> =
-            allowed.iter().map(|capability| format!("{:?}", Operand::Capability(*capability))).collect();
+        let allowed: BTreeSet<String> = self
+            .part
+            .capabilities()
+            .iter()
+            .map(|capability| format!("{:?}", Operand::Capability(*capability)))
+            .collect();
         self.unless(capabilities == allowed, || format!("capabilities {capabilities:?}, not {allowed:?}"));
         for extension in &module.extensions {
             let name = extension.operands[0].unwrap_literal_string();
@@ -91,18 +129,21 @@ impl Breaches<'_> {
         self.unless(of_pointers == 0, || format!("{of_pointers} composites of pointers, where addressing is logical"));
         for constant in &module.types_global_values {
             let number = constant.result_id.and_then(|id| self.declarations.decorated(id, Decoration::SpecId));
-            self.unless(number.is_none_or(|number| number == 0), || format!("specialisation constant {number:?}"));
-            if number == Some(0) {
+            let known = self.part.constant();
+            self.unless(number.is_none_or(|number| number == known), || format!("specialisation constant {number:?}"));
+            if number == Some(known) {
                 let kind = self.declarations.definition(constant.result_type.expect("a constant's type"));
                 let is_u32 = kind.class.opcode == Op::TypeInt && kind.operands[0] == Operand::LiteralBit32(32);
-                self.unless(is_u32 && constant.operands[0] == Operand::LiteralBit32(0), || {
+                // The size of a subgroup is always told.
+                let is_told = known > 0 || constant.operands[0] == Operand::LiteralBit32(0);
+                self.unless(is_u32 && is_told, || {
                     "the specialisation constant is not a u32 that is 0 unless told".to_owned()
                 });
             }
         }
     }
 
-    fn look_at_kernel(&mut self, module: &Module, kernel: Kernel, name: &str, entry: Word) {
+    fn look_at_kernel(&mut self, module: &Module, (kernel, form): (Kernel, Form), name: &str, entry: Word) {
         let sizes: Vec<&[Operand]> = module
             .execution_modes
             .iter()
@@ -130,12 +171,13 @@ impl Breaches<'_> {
         self.unless(pushed == [Content::Fixed { bytes: kernel.push_bytes() }], || {
             format!("{name}: push constants {pushed:?}, not {} bytes", kernel.push_bytes())
         });
-        self.unless(specialised == kernel.has_pages(), || {
+        self.unless(specialised == (kernel.has_pages() || form.needs_subgroups()), || {
             format!("{name}: {} the specialisation constant", if specialised { "uses" } else { "does not use" })
         });
         self.look_at_buffers(kernel, name, &buffers);
         self.look_at_accesses(name, &functions);
-        self.look_at_sharing(kernel, name, &shared, &functions);
+        self.look_at_sharing(kernel.is_tiled() && !form.needs_subgroups(), name, &shared, &functions);
+        self.look_at_subgroups(name, &functions);
     }
 
     fn look_at_buffers(&mut self, kernel: Kernel, name: &str, buffers: &[Word]) {
@@ -193,10 +235,25 @@ impl Breaches<'_> {
         }
     }
 
+    /// Numbers pass between invocations only within a subgroup, and only in the module for devices that can do that.
+    fn look_at_subgroups(&mut self, name: &str, functions: &[&Function]) {
+        let mut passed = 0;
+        for instruction in functions.iter().flat_map(|function| instructions(function)) {
+            if format!("{:?}", instruction.class.opcode).starts_with("GroupNonUniform") {
+                passed += 1;
+                let scope = self.declarations.constant(id_of(instruction, 0));
+                self.unless(scope == Scope::Subgroup as u32, || format!("{name}: numbers pass in scope {scope}"));
+            }
+        }
+        self.unless((passed > 0) == (self.part == Part::Subgroups), || {
+            format!("{name}: {passed} operations of subgroups")
+        });
+    }
+
     /// Tiles are computed in memory that the workgroup really shares; other kernels have none, and wait for nobody.
-    fn look_at_sharing(&mut self, kernel: Kernel, name: &str, shared: &[Word], functions: &[&Function]) {
+    fn look_at_sharing(&mut self, is_sharing: bool, name: &str, shared: &[Word], functions: &[&Function]) {
         let bytes: usize = shared.iter().map(|variable| self.declarations.variable_bytes(*variable)).sum();
-        self.unless((bytes > 0) == kernel.is_tiled() && bytes <= SHARED_BYTES, || {
+        self.unless((bytes > 0) == is_sharing && bytes <= SHARED_BYTES, || {
             format!("{name}: {bytes} bytes of a workgroup's memory")
         });
         let (mut private, mut barriers) = (0, 0);
@@ -222,7 +279,7 @@ impl Breaches<'_> {
             }
         }
         self.unless(private == 0, || format!("{name}: {private} accesses to shared memory are private"));
-        self.unless((barriers > 0) == kernel.is_tiled(), || format!("{name}: {barriers} barriers"));
+        self.unless((barriers > 0) == is_sharing, || format!("{name}: {barriers} barriers"));
     }
 
     fn look_at_arithmetic(&mut self, module: &Module) {

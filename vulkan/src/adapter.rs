@@ -3,6 +3,7 @@
 use crate::error::{Missing, VulkanError, failed};
 use crate::instance::Instance;
 use crate::kernel::{Kernel, WORKGROUP};
+use crate::subgroups::fitting_size;
 use ash::{ext, khr, vk};
 use std::fmt;
 
@@ -72,6 +73,9 @@ pub struct Adapter {
     pub memory: u64,
     /// The limits by which work is split.
     pub limits: Limits,
+    /// Invocations of a subgroup in [`Form::Subgroup`](crate::kernel::Form::Subgroup); `None` if the device cannot run that
+    /// form.
+    pub subgroup_size: Option<u32>,
     /// Missing requirements; if there are any, it cannot be opened.
     pub missing: Vec<Missing>,
     pub(crate) queue_family: u32,
@@ -149,6 +153,13 @@ impl Adapter {
         if has_memory_budget {
             extensions.push(ext::memory_budget::NAME);
         }
+        let mut subgroup_size = None;
+        if properties.api_version >= vk::API_VERSION_1_1 && has(ext::subgroup_size_control::NAME) {
+            subgroup_size = fitting_size(instance, raw);
+        }
+        if subgroup_size.is_some() {
+            extensions.push(ext::subgroup_size_control::NAME);
+        }
         let has_model = memory_model(instance, raw, properties.api_version, has(khr::vulkan_memory_model::NAME));
         Adapter {
             raw,
@@ -178,6 +189,7 @@ impl Adapter {
                 workgroup_count: own.max_compute_work_group_count[0],
                 memory,
             },
+            subgroup_size,
             missing: missing(&properties, has_model, family.is_some()),
             queue_family: family.unwrap_or(0),
             timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),

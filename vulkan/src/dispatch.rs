@@ -73,15 +73,15 @@ impl Gpu {
         if let Some(form) = self.form {
             return Ok(form);
         }
-        let candidates = class.candidates();
+        let candidates = class.candidates(self.is_software, self.handle.subgroup_size().is_some());
         if candidates.len() == 1 {
             return Ok(candidates[0]);
         }
-        if let Some(form) = state.choices.get(class) {
+        if let Some(form) = state.choices.get(class).filter(|form| candidates.contains(form)) {
             return Ok(form);
         }
         let mut fastest = (Form::Single, Duration::MAX);
-        for &form in candidates {
+        for form in candidates {
             let time = self.time_form(state, job, class, form)?;
             if time < fastest.1 {
                 fastest = (form, time);

@@ -75,16 +75,28 @@ impl Class {
         Class { shape, key: (kernel.name().to_owned(), sizes) }
     }
 
-    /// The forms that come into question, [`Form::Single`] first: none that would leave half of its tiles empty.
-    pub(crate) fn candidates(&self) -> &'static [Form] {
+    /// The forms that come into question, [`Form::Single`] first: none that would leave half of its tiles empty, none that
+    /// the device cannot run, and none that does not pay on a device of its kind.
+    pub(crate) fn candidates(&self, is_software: bool, has_subgroups: bool) -> Vec<Form> {
         let Shape { row_count, inner_count, column_count } = self.shape;
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
-        match (column_count > TILE, row_count > TILE) {
-            _ if work < LEAST_WORK => &[Form::Single],
-            (false, _) => &[Form::Single],
-            (true, false) => &[Form::Single, Form::Double],
-            (true, true) => &Form::ALL,
+        if work < LEAST_WORK {
+            return vec![Form::Single];
         }
+        let comes_into_question = |form: &Form| {
+            let [rows, columns] = form.tiles();
+            let is_filled = (rows == 1 || row_count > TILE) && (columns == 1 || column_count > TILE);
+            let is_able = match form {
+                Form::Subgroup => has_subgroups,
+                // A processor has nothing to do while it waits for a fetch: a second buffer is only work.
+                Form::Buffered => !is_software,
+                // Compiling it costs a software driver seconds, and it gains a tenth on the forms that remain.
+                Form::Quadruple => !(is_software && has_subgroups),
+                Form::Single | Form::Double => true,
+            };
+            is_filled && is_able
+        };
+        Form::ALL.into_iter().filter(comes_into_question).collect()
     }
 
     /// Elements of a measurement: the first rows, whole groups of tiles of every form.
@@ -166,10 +178,24 @@ mod tests {
 
     #[test]
     fn empty_tiles_and_little_work_are_no_candidates() {
-        assert_eq!(class(4096, 512, 512).candidates(), Form::ALL);
-        assert_eq!(class(4096, 512, 64).candidates(), [Form::Single]);
-        assert_eq!(class(64, 4096, 512).candidates(), [Form::Single, Form::Double]);
-        assert_eq!(class(128, 128, 128).candidates(), [Form::Single]);
+        let candidates = |rows, inner, columns| class(rows, inner, columns).candidates(false, true);
+        assert_eq!(candidates(4096, 512, 512), Form::ALL);
+        assert_eq!(candidates(4096, 512, 64), [Form::Single, Form::Subgroup]);
+        assert_eq!(candidates(64, 4096, 512), [Form::Single, Form::Double, Form::Buffered, Form::Subgroup]);
+        assert_eq!(candidates(128, 128, 128), [Form::Single]);
+    }
+
+    #[test]
+    fn candidates_depend_on_the_device() {
+        let all = Form::ALL.map(|form| form.name());
+        let names = |is_software, has_subgroups| -> Vec<&str> {
+            let candidates = class(4096, 512, 512).candidates(is_software, has_subgroups);
+            candidates.into_iter().map(Form::name).collect()
+        };
+        assert_eq!(names(false, true), all);
+        assert_eq!(names(false, false), ["single", "double", "quadruple", "buffered"]);
+        assert_eq!(names(true, true), ["single", "double", "subgroup"]);
+        assert_eq!(names(true, false), ["single", "double", "quadruple"]);
     }
 
     #[test]
@@ -177,7 +203,7 @@ mod tests {
         // Five tiles of columns: four bands of two tiles of rows.
         let class = class(10_000, 64, 300);
         let groups = Form::ALL.map(|form| class.measured_elements(form, true) / WORKGROUP);
-        assert_eq!(groups, [4 * 5, 4 * 3, 2 * 3]);
+        assert_eq!(groups, [4 * 5, 4 * 3, 2 * 3, 4 * 3, 4 * 5]);
         let whole = class.measured_elements(Form::Single, false);
         assert_eq!(whole, Form::Single.elements(10_000, 300));
     }

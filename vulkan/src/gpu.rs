@@ -2,7 +2,7 @@
 
 use crate::adapter::{Adapter, AdapterKind, Limits};
 use crate::buffer::Array;
-use crate::error::VulkanError;
+use crate::error::{Missing, VulkanError};
 use crate::forms::Choices;
 use crate::handle::{Handle, Memory};
 use crate::instance::Instance;
@@ -99,7 +99,7 @@ impl Gpu {
     /// Opens a device.
     ///
     /// # Errors
-    /// [`VulkanError::Missing`] if it lacks a requirement, and others if Vulkan fails.
+    /// [`VulkanError::Missing`] if it lacks a requirement, also of [`GpuOptions::form`], and others if Vulkan fails.
     pub fn open(instance: &Arc<Instance>, adapter: &Adapter, options: &GpuOptions) -> Result<Gpu, VulkanError> {
         if adapter.instance_number != instance.number {
             let detail = format!("{} was found by another instance of Vulkan", adapter.name);
@@ -116,6 +116,10 @@ impl Gpu {
             workgroup_count: own.workgroup_count.min(lower.workgroup_count).max(1),
             memory: own.memory.min(lower.memory),
         };
+        if options.form.is_some_and(Form::needs_subgroups) && adapter.subgroup_size.is_none() {
+            let missing = vec![Missing::Feature("subgroups of 8 to 64 invocations")];
+            return Err(VulkanError::Missing { device: adapter.name.clone(), missing });
+        }
         let handle = Arc::new(Handle::open(instance, adapter, limits)?);
         let timestamps = (adapter.timestamp_bits > 0).then_some((adapter.timestamp_period, adapter.timestamp_bits));
         let time_limit = options.time_limit_on(adapter.kind);

@@ -37,10 +37,16 @@ impl Handle {
             .queue_priorities(&priorities)];
         let extensions: Vec<_> = adapter.extensions.iter().map(|name| name.as_ptr()).collect();
         let mut model = vk::PhysicalDeviceVulkanMemoryModelFeatures::default().vulkan_memory_model(true);
-        let info = vk::DeviceCreateInfo::default()
+        let mut subgroups = vk::PhysicalDeviceSubgroupSizeControlFeaturesEXT::default()
+            .subgroup_size_control(true)
+            .compute_full_subgroups(true);
+        let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
             .push_next(&mut model);
+        if adapter.subgroup_size.is_some() {
+            info = info.push_next(&mut subgroups);
+        }
         // SAFETY: everything that `info` points to lives until the call returns; the adapter has what is enabled.
         let device =
             unsafe { instance.raw.create_device(adapter.raw, &info, None) }.map_err(|result| match result {
@@ -83,6 +89,11 @@ impl Handle {
     /// What is remembered depends on.
     pub(crate) fn identity(&self) -> Identity {
         self.adapter.identity
+    }
+
+    /// Invocations of a subgroup, where kernels may use them.
+    pub(crate) fn subgroup_size(&self) -> Option<u32> {
+        self.adapter.subgroup_size
     }
 
     /// Whether this many more bytes are available.

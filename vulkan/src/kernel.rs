@@ -7,7 +7,8 @@
 //! All arrays are storage buffers of descriptor set 0, numbered in the order of the row. An array in [`Layout::Pages`]
 //! takes [`MOST_PAGES`](viewfuse_core::pages::MOST_PAGES) bindings. Push constants are the kernel's parameters, then the
 //! [`Piece`]. The specialisation constant 0, where a kernel binds pages, is the binary logarithm of a page's length, or 0
-//! if all of the scene lies on first pages: choosing pages is then left out of the pipeline.
+//! if all of the scene lies on first pages: choosing pages is then left out of the pipeline. The constant 1, of
+//! [`Form::Subgroup`], is the size of a subgroup.
 
 pub use viewfuse_core::kernels::{Access, Array, Form, Kernel, Layout, Piece, SHARED_BYTES, WORKGROUP, tile_elements};
 pub use viewfuse_core::network::tile::TILE;

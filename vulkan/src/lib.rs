@@ -6,7 +6,8 @@
 //! ```text
 //! error                          the errors, with numbers
 //! kernel                         the list of kernels: names, arrays, parameters
-//! messages, instance, adapter    the loader, its drivers, their devices and missing requirements
+//! messages, instance             the loader and its drivers
+//! subgroups, adapter             devices, what they can do, and missing requirements
 //! handle, buffer                 an opened device, memory in it
 //! forms                          forms of tiles: what is measured, what is chosen
 //! pipelines, submissions         pipelines of kernels, submitted commands
@@ -30,6 +31,7 @@ pub mod kernel;
 mod messages;
 mod pipelines;
 mod remembered;
+mod subgroups;
 mod submissions;
 mod transfers;
 

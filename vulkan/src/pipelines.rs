@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 /// The kernels, as `cargo shaders` compiles them.
 pub(crate) const MODULE: &[u8] = include_bytes!("kernels.spv");
+/// Those that need operations of subgroups.
+pub(crate) const SUBGROUPS: &[u8] = include_bytes!("subgroups.spv");
 
 /// The pipeline of a kernel.
 #[derive(Clone, Copy)]
@@ -22,6 +24,8 @@ pub(crate) struct Pipeline {
 /// All pipelines of a device.
 pub(crate) struct Pipelines {
     module: vk::ShaderModule,
+    /// That of the kernels that need operations of subgroups; null on a device without these.
+    subgroups: vk::ShaderModule,
     cache: vk::PipelineCache,
     layouts: HashMap<Kernel, (vk::DescriptorSetLayout, vk::PipelineLayout)>,
     /// The data that the cache began with.
@@ -34,17 +38,17 @@ impl Pipelines {
     pub(crate) fn new(handle: &Arc<Handle>) -> Result<Pipelines, VulkanError> {
         let mut pipelines = Pipelines {
             module: vk::ShaderModule::null(),
+            subgroups: vk::ShaderModule::null(),
             cache: vk::PipelineCache::null(),
             layouts: HashMap::new(),
             recalled: Vec::new(),
             pipelines: HashMap::new(),
             handle: handle.clone(),
         };
-        let code: Vec<u32> = MODULE.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
-        let info = vk::ShaderModuleCreateInfo::default().code(&code);
-        // SAFETY: the module was validated when it was made; the device has the feature that it needs.
-        pipelines.module = unsafe { handle.device.create_shader_module(&info, None) }
-            .map_err(|result| handle.failure("vkCreateShaderModule", result))?;
+        pipelines.module = shader_module(handle, MODULE)?;
+        if handle.subgroup_size().is_some() {
+            pipelines.subgroups = shader_module(handle, SUBGROUPS)?;
+        }
         // SAFETY: an empty cache needs nothing.
         pipelines.cache = unsafe { handle.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
             .map_err(|result| handle.failure("vkCreatePipelineCache", result))?;
@@ -126,17 +130,30 @@ impl Pipelines {
         layout: vk::PipelineLayout,
         page_shift: u32,
     ) -> Result<vk::Pipeline, VulkanError> {
-        let entries = [vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: size_of::<u32>() }];
-        let data = page_shift.to_ne_bytes();
-        let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+        let subgroup_size = self.handle.subgroup_size().unwrap_or_default();
+        let data: [u32; 2] = [page_shift, subgroup_size];
+        let entry = |constant_id: u32| vk::SpecializationMapEntry {
+            constant_id,
+            offset: constant_id * size_of::<u32>() as u32,
+            size: size_of::<u32>(),
+        };
+        let entries = [entry(0), entry(1)];
+        let used = if form.needs_subgroups() { &entries[1..] } else { &entries[..1] };
+        let specialization = vk::SpecializationInfo::default().map_entries(used).data(bytemuck::bytes_of(&data));
+        let mut required =
+            vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT::default().required_subgroup_size(subgroup_size);
         // No kernel's name has a zero in it.
         let name = CString::new(kernel.entry_point(form)).unwrap_or_default();
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(self.module)
+            .module(if form.needs_subgroups() { self.subgroups } else { self.module })
             .name(&name);
-        if kernel.has_pages() {
+        if kernel.has_pages() || form.needs_subgroups() {
             stage = stage.specialization_info(&specialization);
+        }
+        if form.needs_subgroups() {
+            let full = vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS_EXT;
+            stage = stage.flags(full).push_next(&mut required);
         }
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         // SAFETY: the module has an entry point of this name with these bindings: a test reads it back.
@@ -165,6 +182,15 @@ impl Drop for Pipelines {
             }
             device.destroy_pipeline_cache(self.cache, None);
             device.destroy_shader_module(self.module, None);
+            device.destroy_shader_module(self.subgroups, None);
         }
     }
+}
+
+fn shader_module(handle: &Handle, bytes: &[u8]) -> Result<vk::ShaderModule, VulkanError> {
+    let code: Vec<u32> = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+    let info = vk::ShaderModuleCreateInfo::default().code(&code);
+    // SAFETY: the module was validated when it was made; the device has the features that it needs.
+    unsafe { handle.device.create_shader_module(&info, None) }
+        .map_err(|result| handle.failure("vkCreateShaderModule", result))
 }

@@ -1,7 +1,7 @@
 //! What a device remembers from one process to the next: compiled pipelines and the fastest forms.
 //!
 //! ```text
-//! head       magic, module's checksum, vendor, device, driver's version, cache UUID
+//! head       magic, the modules' checksum, vendor, device, driver's version, cache UUID
 //! lengths    of the forms and of the pipelines
 //! forms      text, a line a class
 //! pipelines  the data of a VkPipelineCache
@@ -14,7 +14,7 @@
 use crate::adapter::Identity;
 use crate::forms::Choices;
 use crate::gpu::Gpu;
-use crate::pipelines::MODULE;
+use crate::pipelines::{MODULE, SUBGROUPS};
 
 const MAGIC: &[u8; 16] = b"viewfuse device\x02";
 /// Bytes of the head, of the lengths and of a checksum.
@@ -28,7 +28,10 @@ const CACHE_VERSION: u32 = 1;
 impl Identity {
     fn head(&self) -> Vec<u8> {
         let mut head = MAGIC.to_vec();
-        head.extend(crc32fast::hash(MODULE).to_le_bytes());
+        let mut modules = crc32fast::Hasher::new();
+        modules.update(MODULE);
+        modules.update(SUBGROUPS);
+        head.extend(modules.finalize().to_le_bytes());
         for number in [self.vendor, self.device, self.driver] {
             head.extend(number.to_le_bytes());
         }

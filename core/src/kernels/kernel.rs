@@ -29,19 +29,31 @@ pub enum Form {
     /// Two by two tiles: 128 rows, 128 columns, 256 sums an invocation, more than a GPU keeps in registers. For drivers on
     /// a CPU, where loads are dear.
     Quadruple,
+    /// Two tiles beside each other as [`Form::Double`], double-buffered: while a step is multiplied, the next one is fetched
+    /// into the other half of the workgroup's memory. There is one barrier a step instead of two.
+    Buffered,
+    /// One tile, whose rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are
+    /// no barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
+    Subgroup,
 }
 
 impl Form {
     /// Every form.
-    pub const ALL: [Form; 3] = [Form::Single, Form::Double, Form::Quadruple];
+    pub const ALL: [Form; 5] = [Form::Single, Form::Double, Form::Quadruple, Form::Buffered, Form::Subgroup];
 
     /// Rows and columns in tiles.
     pub const fn tiles(self) -> [u32; 2] {
         match self {
-            Form::Single => [1, 1],
-            Form::Double => [1, 2],
+            Form::Single | Form::Subgroup => [1, 1],
+            Form::Double | Form::Buffered => [1, 2],
             Form::Quadruple => [2, 2],
         }
+    }
+
+    /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own, which
+    /// only devices with these operations take. A subgroup is full and has 8 to 64 invocations, a power of two.
+    pub const fn needs_subgroups(self) -> bool {
+        matches!(self, Form::Subgroup)
     }
 
     /// Elements of a tiled kernel with so many outputs: whole groups of tiles, each invocation 8 times 8 outputs of a tile.
@@ -56,6 +68,8 @@ impl Form {
             Form::Single => "single",
             Form::Double => "double",
             Form::Quadruple => "quadruple",
+            Form::Buffered => "buffered",
+            Form::Subgroup => "subgroup",
         }
     }
 }
@@ -189,6 +203,12 @@ macro_rules! list {
                     },
                     Form::Quadruple => match self {
                         $(Kernel::$Kernel => concat!(stringify!($method), "_quadruple"),)+
+                    },
+                    Form::Buffered => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_buffered"),)+
+                    },
+                    Form::Subgroup => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_subgroup"),)+
                     },
                 }
             }

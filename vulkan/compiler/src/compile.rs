@@ -1,4 +1,4 @@
-//! Compiles the sources to a module.
+//! Compiles the sources to modules.
 //!
 //! rust-gpu's optimiser (SPIRV-Tools) is left out: it may rewrite float arithmetic that is not marked against
 //! contraction, such as `(a - b) + b` to `a`, and the marks come after it. rust-gpu's own passes (inlining, memory to
@@ -6,11 +6,12 @@
 
 use crate::backend::{Backend, Toolchain};
 use crate::refine::{RefineError, refine};
+use crate::split::{CAPABILITIES, Modules, split};
 use spirv_builder::{SpirvBuilder, SpirvBuilderError};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The target of the module: Vulkan 1.1 and later.
+/// The target of the modules: Vulkan 1.1 and later.
 pub const TARGET: &str = "spirv-unknown-vulkan1.1";
 
 /// Why compiling failed.
@@ -40,14 +41,15 @@ pub enum CompileError {
     },
 }
 
-/// The module as bytes, of the sources in the repository `root`, built in `target`.
+/// The modules of the sources in the repository `root`, built in `target`.
 ///
 /// # Errors
 /// [`CompileError`].
-pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Vec<u8>, CompileError> {
+pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Modules, CompileError> {
     let mut builder = SpirvBuilder::new(root.join("vulkan").join("shaders"), TARGET);
     builder.rustc_codegen_spirv_location = Some(backend.code_generator.clone());
     builder.target_dir_path = Some(target.to_path_buf());
+    builder.capabilities = CAPABILITIES.to_vec();
     builder.extra_args = vec!["--no-spirv-opt".to_owned()];
     // This is not a build script: no instructions to cargo.
     builder.build_script.defaults = false;
@@ -57,7 +59,8 @@ pub fn compile(backend: &Backend, root: &Path, target: &Path) -> Result<Vec<u8>,
     let compiled = builder.build()?;
     let path = compiled.module.unwrap_single();
     let bytes = std::fs::read(path).map_err(|source| CompileError::Read { path: path.to_path_buf(), source })?;
-    Ok(refine(&bytes)?)
+    let Modules { kernels, subgroups } = split(&bytes)?;
+    Ok(Modules { kernels: refine(&kernels)?, subgroups: refine(&subgroups)? })
 }
 
 /// Validates a module by `spirv-val`, for the versions of Vulkan that it is meant for. Returns whether the program

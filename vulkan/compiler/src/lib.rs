@@ -1,15 +1,17 @@
-//! Makes `kernels.spv`, the kernels as one SPIR-V module, from the entry points in `vulkan/shaders`.
+//! Makes `kernels.spv`, the kernels as one SPIR-V module, and `subgroups.spv`, those that need operations of subgroups, from
+//! the entry points in `vulkan/shaders`.
 //!
-//! The module is checked in: users of viewfuse need no shader compiler. `cargo shaders` compiles it again,
-//! `cargo shaders --check` compares it with a fresh compilation.
+//! The modules are checked in: users of viewfuse need no shader compiler. `cargo shaders` compiles them again,
+//! `cargo shaders --check` compares them with a fresh compilation.
 //!
 //! ```text
 //! backend   finds the compiler               a folder named by RUST_GPU_HOME, a cache, or the official toolchain
-//! compile   sources -> module                spirv-builder, without its optimiser
+//! compile   sources -> modules               spirv-builder, without its optimiser
+//! split     module -> modules                what needs operations of subgroups is a module of its own
 //! legalise  module -> module                 no composites of pointers
 //! share     module -> module                 workgroup memory is visible to all its invocations
 //! refine    module -> module                 no paths, no contraction of float arithmetic
-//! stamp     the sources of the module        sha256 of the sources and locked versions; kernels.toml
+//! stamp     the sources of the modules       sha256 of the sources and locked versions; kernels.toml
 //! ```
 
 pub mod backend;
@@ -17,4 +19,5 @@ pub mod compile;
 pub mod legalise;
 pub mod refine;
 pub mod share;
+pub mod split;
 pub mod stamp;

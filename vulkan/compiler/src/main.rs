@@ -1,4 +1,4 @@
-//! `cargo shaders`: writes `kernels.spv` and `kernels.toml`, or checks that they are up to date.
+//! `cargo shaders`: writes `kernels.spv`, `subgroups.spv` and `kernels.toml`, or checks that they are up to date.
 
 use std::env;
 use std::error::Error;
@@ -8,10 +8,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use viewfuse_shader_compiler::backend::{Backend, BackendError, HOME_VARIABLE, Toolchain};
 use viewfuse_shader_compiler::compile::{compile, validate};
-use viewfuse_shader_compiler::stamp::{Inputs, MODULE, STAMP, Stamp, sha256};
+use viewfuse_shader_compiler::split::Modules;
+use viewfuse_shader_compiler::stamp::{Inputs, MODULE, STAMP, SUBGROUPS, Stamp};
 
 const USAGE: &str = "usage: cargo shaders [--check]
-Makes vulkan/src/kernels.spv and kernels.toml from the sources.
+Makes vulkan/src/kernels.spv, subgroups.spv and kernels.toml from the sources.
   --check    writes nothing; compiles and compares, exit code 1 if anything differs
 Exit code 3 if there is no shader compiler.";
 
@@ -60,39 +61,49 @@ fn run(check: bool) -> Result<ExitCode, Box<dyn Error>> {
     let program = env::current_exe()?;
     let target =
         program.parent().and_then(Path::parent).ok_or("the program is not in a target folder")?.join("shaders");
-    let module = compile(&backend, &root, &target)?;
-    let validated = validate(&module, &target)?;
-    let stamp = Stamp { compiler: backend.version()?, module: sha256(&module), inputs };
+    let modules = compile(&backend, &root, &target)?;
+    let validated = validate(&modules.kernels, &target)? && validate(&modules.subgroups, &target)?;
+    let stamp = Stamp::new(backend.version()?, &modules, inputs);
     if check {
-        return compare(&root, &module, &stamp);
+        return compare(&root, &modules, &stamp);
     }
-    fs::write(root.join(MODULE), &module).map_err(|error| format!("{MODULE}: {error}"))?;
+    for (name, bytes) in named(&modules) {
+        fs::write(root.join(name), bytes).map_err(|error| format!("{name}: {error}"))?;
+    }
     fs::write(root.join(STAMP), stamp.text()).map_err(|error| format!("{STAMP}: {error}"))?;
     let validated = if validated { "accepted by spirv-val" } else { "not validated: spirv-val is not installed" };
-    println!("{MODULE}: {} bytes by {}; {validated}", module.len(), stamp.compiler);
+    for (name, bytes) in named(&modules) {
+        println!("{name}: {} bytes by {}; {validated}", bytes.len(), stamp.compiler);
+    }
     Ok(ExitCode::SUCCESS)
 }
 
-/// Compares the fresh compilation with the checked-in module.
-fn compare(root: &Path, module: &[u8], compiled: &Stamp) -> Result<ExitCode, Box<dyn Error>> {
-    let stored = fs::read(root.join(MODULE)).map_err(|error| format!("{MODULE}: {error}"))?;
+fn named(modules: &Modules) -> [(&'static str, &[u8]); 2] {
+    [(MODULE, &modules.kernels), (SUBGROUPS, &modules.subgroups)]
+}
+
+/// Compares the fresh compilation with the checked-in modules.
+fn compare(root: &Path, modules: &Modules, compiled: &Stamp) -> Result<ExitCode, Box<dyn Error>> {
+    let stored = Modules::read(root)?;
     let stamp = Stamp::read(root)?;
     let mut stale = stamp.stale(&compiled.inputs, &stored);
-    if stored != module {
-        stale.push(format!(
-            "{MODULE} is stale: it has {} bytes, compiled by {}; compiled now: {} bytes by {}",
-            stored.len(),
-            stamp.compiler,
-            module.len(),
-            compiled.compiler
-        ));
+    for ((name, stored), (_, module)) in named(&stored).into_iter().zip(named(modules)) {
+        if stored != module {
+            stale.push(format!(
+                "{name} is stale: it has {} bytes, compiled by {}; compiled now: {} bytes by {}",
+                stored.len(),
+                stamp.compiler,
+                module.len(),
+                compiled.compiler
+            ));
+        }
     }
     if stale.is_empty() {
-        println!("{MODULE} is up to date");
+        println!("{MODULE} and {SUBGROUPS} are up to date");
         return Ok(ExitCode::SUCCESS);
     }
     stale.iter().for_each(|difference| eprintln!("{difference}"));
-    eprintln!("stale: run `cargo shaders` and commit {MODULE} and {STAMP}");
+    eprintln!("stale: run `cargo shaders` and commit {MODULE}, {SUBGROUPS} and {STAMP}");
     Ok(ExitCode::FAILURE)
 }
 

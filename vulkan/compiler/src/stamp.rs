@@ -1,30 +1,34 @@
-//! The sources of a module: `kernels.toml`.
+//! The sources of the modules: `kernels.toml`.
 //!
-//! It holds the sha256 of every file that determines the module's bytes, the locked versions of the libraries that become
-//! part of it, the sha256 of the module and the version of the compiler. So a test without a compiler finds a stale module.
+//! It holds the sha256 of every file that determines the modules' bytes, the locked versions of the libraries that become
+//! part of them, the sha256 of the modules and the version of the compiler. So a test without a compiler finds a stale module.
 
+use crate::split::Modules;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The module, relative to the repository.
+/// The module for every device, relative to the repository.
 pub const MODULE: &str = "vulkan/src/kernels.spv";
-/// Its stamp.
+/// The module for devices with the operations of subgroups.
+pub const SUBGROUPS: &str = "vulkan/src/subgroups.spv";
+/// Their stamp.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
-/// The module's source files, and folders with all their Rust files.
-pub const SOURCES: [&str; 8] = [
+/// The modules' source files, and folders with all their Rust files.
+pub const SOURCES: [&str; 9] = [
     "core/Cargo.toml",
     "core/src",
     "vulkan/compiler/src/compile.rs",
     "vulkan/compiler/src/legalise.rs",
     "vulkan/compiler/src/refine.rs",
     "vulkan/compiler/src/share.rs",
+    "vulkan/compiler/src/split.rs",
     "vulkan/shaders/Cargo.toml",
     "vulkan/shaders/src",
 ];
-/// Libraries with code in the module.
+/// Libraries with code in the modules.
 pub const LIBRARIES: [&str; 6] = ["bytemuck", "bytemuck_derive", "glam", "libm", "spirv-std", "spirv-std-macros"];
 
 /// Why the stamp cannot be computed or read.
@@ -56,7 +60,7 @@ pub enum StampError {
     },
 }
 
-/// The inputs that determine a module's bytes.
+/// The inputs that determine the modules' bytes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Inputs {
     /// Locked versions by library, with their checksums.
@@ -65,14 +69,16 @@ pub struct Inputs {
     pub sources: BTreeMap<String, String>,
 }
 
-/// A module's inputs and compiler.
+/// The modules' inputs and compiler.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stamp {
     /// Versions of rust-gpu and rustc.
     pub compiler: String,
-    /// sha256 of the module.
+    /// sha256 of the module for every device.
     pub module: String,
-    /// Its stamp.
+    /// sha256 of the module for devices with the operations of subgroups.
+    pub subgroups: String,
+    /// What they were made from.
     #[serde(flatten)]
     pub inputs: Inputs,
 }
@@ -88,6 +94,20 @@ struct Locked {
     version: String,
     #[serde(default)]
     checksum: String,
+}
+
+impl Modules {
+    /// The checked-in modules.
+    ///
+    /// # Errors
+    /// [`StampError`], with the file.
+    pub fn read(root: &Path) -> Result<Modules, StampError> {
+        let bytes = |name| {
+            let path = root.join(name);
+            fs::read(&path).map_err(|source| StampError::File { path, source })
+        };
+        Ok(Modules { kernels: bytes(MODULE)?, subgroups: bytes(SUBGROUPS)? })
+    }
 }
 
 impl Inputs {
@@ -133,8 +153,9 @@ impl Stamp {
     /// The file's text.
     pub fn text(&self) -> String {
         let mut text = format!(
-            "# What kernels.spv was made from; written by `cargo shaders`.\ncompiler = {:?}\nmodule = {:?}\n",
-            self.compiler, self.module
+            "# What kernels.spv and subgroups.spv were made from; written by `cargo shaders`.\n\
+             compiler = {:?}\nmodule = {:?}\nsubgroups = {:?}\n",
+            self.compiler, self.module, self.subgroups
         );
         for (name, table) in [("libraries", &self.inputs.libraries), ("sources", &self.inputs.sources)] {
             text += &format!("\n[{name}]\n");
@@ -145,12 +166,18 @@ impl Stamp {
         text
     }
 
-    /// Whether a module was made from these inputs: every difference as a sentence that names it, none if it is fresh.
-    pub fn stale(&self, inputs: &Inputs, module: &[u8]) -> Vec<String> {
+    /// Of modules that were made from these inputs.
+    pub fn new(compiler: String, modules: &Modules, inputs: Inputs) -> Stamp {
+        Stamp { compiler, module: sha256(&modules.kernels), subgroups: sha256(&modules.subgroups), inputs }
+    }
+
+    /// Whether modules were made from these inputs: every difference as a sentence that names it, none if they are fresh.
+    pub fn stale(&self, inputs: &Inputs, modules: &Modules) -> Vec<String> {
         let mut stale = differences("library", &self.inputs.libraries, &inputs.libraries);
         stale.extend(differences("source", &self.inputs.sources, &inputs.sources));
-        if sha256(module) != self.module {
-            stale.push(format!("{MODULE} is not the module that {STAMP} describes"));
+        let found = [(MODULE, &modules.kernels, &self.module), (SUBGROUPS, &modules.subgroups, &self.subgroups)];
+        for (name, _, _) in found.into_iter().filter(|(_, bytes, described)| sha256(bytes) != **described) {
+            stale.push(format!("{name} is not the module that {STAMP} describes"));
         }
         stale
     }

@@ -3,9 +3,9 @@
 //! An entry point has the name of its kernel and takes its arrays in the order of the kernel's row
 //! ([`viewfuse_core::kernels`]), its parameters and the [`Piece`] as push constants. It checks whether its element
 //! exists, calls the kernel's body in `viewfuse-core` or the parts of that body, and stores the result. Arrays that may
-//! be longer than a device can bind at once come as four pages. Elements of several numbers are loaded as vectors (`loads`). Two things are computed here: the matrix products of
-//! tiled kernels are summed in workgroup memory (`tile`), and a few short loops over a ray's samples or a row's columns
-//! are in the entry point.
+//! be longer than a device can bind at once come as four pages. Elements of several numbers are loaded as vectors
+//! (`loads`). Two things are computed here: the matrix products of tiled kernels are summed in workgroup memory or by
+//! subgroups (`tile`), and a few short loops over a ray's samples or a row's columns are in the entry point.
 //!
 //! On the host the same entry points are plain functions, which tests call.
 #![cfg_attr(target_arch = "spirv", no_std)]
@@ -13,6 +13,7 @@
 pub mod compositing;
 pub mod group_norm;
 pub mod limits;
+pub mod linear;
 pub mod lists;
 pub mod loads;
 pub mod matrices;

@@ -1,7 +1,7 @@
 //! Matrix products of two computed matrices, and softmax.
 
 use crate::Push;
-use crate::tile::{Double, Quadruple, Shape, Shared, ShortShared, Single, Tiles};
+use crate::tile::{Buffered, Double, Quadruple, Shape, Shared, ShortShared, Single, Subgroup, Tiles};
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
@@ -75,6 +75,38 @@ pub fn matrix_product_quadruple(
     #[spirv(workgroup)] more_columns: &mut ShortShared,
 ) {
     product_of(id, push, left, right, outputs, Quadruple { rows, more_rows, columns, more_columns });
+}
+
+/// A part of two tiles of rows and columns, double-buffered: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "matrix_product_buffered"))]
+#[allow(clippy::too_many_arguments)]
+pub fn matrix_product_buffered(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(push_constant)] push: &Push<MatrixBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] right: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] outputs: &mut [f32],
+    #[spirv(workgroup)] rows: &mut Shared,
+    #[spirv(workgroup)] columns: &mut Shared,
+    #[spirv(workgroup)] more_columns: &mut Shared,
+) {
+    product_of(id, push, left, right, outputs, Buffered { rows, columns, more_columns });
+}
+
+/// A part of a tile of rows and columns, by subgroups: invocation `first + id.x`.
+#[spirv(compute(threads(64), entry_point_name = "matrix_product_subgroup"))]
+#[allow(clippy::too_many_arguments)]
+pub fn matrix_product_subgroup(
+    #[spirv(global_invocation_id)] id: UVec3,
+    #[spirv(subgroup_id)] subgroup: u32,
+    #[spirv(subgroup_local_invocation_id)] lane: u32,
+    #[spirv(spec_constant(id = 1, default = 32))] size: u32,
+    #[spirv(push_constant)] push: &Push<MatrixBlock>,
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] left: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] right: &[f32],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] outputs: &mut [f32],
+) {
+    product_of(id, push, left, right, outputs, Subgroup { size, subgroup, lane });
 }
 
 /// Weights of the scores in row number `first + id.x`; the parameter is how many columns a row has.

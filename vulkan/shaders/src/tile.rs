@@ -6,6 +6,12 @@
 //! This code must not panic, see [`crate::unchecked`]. Closures capture by value: a module with logical addressing cannot
 //! hold references to references.
 
+mod buffered;
+mod subgroup;
+
+pub(crate) use buffered::Buffered;
+pub(crate) use subgroup::Subgroup;
+
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
@@ -14,10 +20,10 @@ use viewfuse_core::network::tile::{Sums, TILE};
 
 /// Inner indices of a step.
 const STEP: u32 = 16;
-/// The same where two tiles of rows and two of columns must fit into the memory of a workgroup.
-const SHORT_STEP: u32 = 8;
+/// The same where two tiles of rows and two of columns must fit into the memory of a workgroup, or two steps of three.
+pub(crate) const SHORT_STEP: u32 = 8;
 /// Fours of a tile's rows or columns.
-const FOURS: u32 = TILE / 4;
+pub(crate) const FOURS: u32 = TILE / 4;
 /// Fours from an inner index to the next: odd, so that neighbouring indices lie in different banks of the memory.
 const STRIDE: u32 = FOURS + 1;
 
@@ -39,22 +45,27 @@ pub(crate) struct Shape {
 
 /// An invocation's place.
 #[derive(Clone, Copy)]
-struct Place {
+pub(crate) struct Place {
     /// Its number in the workgroup.
-    own: u32,
+    pub(crate) own: u32,
     /// First row and column of the workgroup's first tile.
-    first_row: u32,
-    first_column: u32,
+    pub(crate) first_row: u32,
+    pub(crate) first_column: u32,
     /// Its own place in the rows and columns of a tile.
-    own_row: u32,
-    own_column: u32,
+    pub(crate) own_row: u32,
+    pub(crate) own_column: u32,
 }
 
 impl Place {
     #[inline(always)]
     fn new(invocation: u32, shape: Shape, form: Form) -> Place {
+        Place::of(invocation / TILE, invocation % TILE, shape, form)
+    }
+
+    /// That of invocation `own` in a workgroup.
+    #[inline(always)]
+    pub(crate) fn of(group: u32, own: u32, shape: Shape, form: Form) -> Place {
         let [rows, columns] = form.tiles();
-        let (group, own) = (invocation / TILE, invocation % TILE);
         let group_columns = shape.column_count.div_ceil(TILE * columns);
         Place {
             own,
@@ -66,7 +77,7 @@ impl Place {
     }
 }
 
-/// The workgroup memory of a [`Form`].
+/// The workgroup memory of a [`Form`], or what it has in its place.
 pub(crate) trait Tiles {
     /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
     /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices,
@@ -261,7 +272,7 @@ fn fetch_columns<const N: usize>(
 
 /// Stores an invocation's sums of a tile, as far as the outputs go.
 #[inline(always)]
-fn store_sums(
+pub(crate) fn store_sums(
     mut sums: Sums,
     place: Place,
     first_row: u32,
@@ -299,7 +310,7 @@ fn place<const N: usize>(inner: u32, four: u32) -> usize {
 
 /// The numbers of an inner index that invocation `own` needs.
 #[inline(always)]
-fn read_fours<const N: usize>(shared: &[Vec4; N], inner: u32, own: u32) -> [Vec4; 2] {
+pub(crate) fn read_fours<const N: usize>(shared: &[Vec4; N], inner: u32, own: u32) -> [Vec4; 2] {
     [read(shared, inner, Sums::place(own, 0) / 4), read(shared, inner, Sums::place(own, 4) / 4)]
 }
 
@@ -312,14 +323,14 @@ fn read<const N: usize>(shared: &[Vec4; N], inner: u32, four: u32) -> Vec4 {
 
 #[inline(always)]
 #[allow(unsafe_code)]
-fn write<const N: usize>(shared: &mut [Vec4; N], inner: u32, four: u32, value: Vec4) {
+pub(crate) fn write<const N: usize>(shared: &mut [Vec4; N], inner: u32, four: u32, value: Vec4) {
     // SAFETY: a place is within the array.
     unsafe { *shared.index_unchecked_mut(place::<N>(inner, four)) = value };
 }
 
 /// A workgroup barrier: each invocation waits for all, and then sees the others' writes.
 #[inline(always)]
-fn wait_for_all() {
+pub(crate) fn wait_for_all() {
     const WORKGROUP: u32 = Scope::Workgroup as u32;
     const SHARED: u32 = Semantics::WORKGROUP_MEMORY.bits()
         | Semantics::ACQUIRE_RELEASE.bits()

@@ -1,0 +1,97 @@
+//! One tile, whose rows pass between the invocations of a subgroup ([`Form::Subgroup`]).
+//!
+//! Eight neighbours of a subgroup need the same eight rows and different columns. Each of them loads one of these rows,
+//! eight inner indices at once, and gets the other rows from the others. The columns come straight from the buffer: neighbours
+//! load what lies next to one another. No memory of the workgroup and no barrier is used.
+//!
+//! A subgroup has 8, 16, 32 or 64 invocations, all of which take part: the pipeline demands full subgroups of the size that
+//! its specialisation constant says.
+
+use super::{Place, Shape, Tiles, store_sums};
+use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
+use spirv_std::glam::Vec4;
+use viewfuse_core::kernels::Form;
+use viewfuse_core::network::tile::{Sums, TILE};
+
+/// Invocations that need the same rows, and inner indices that each of them loads at once.
+const CLUSTER: u32 = Sums::SIDE;
+
+/// Where an invocation is in its workgroup: what [`Form::Subgroup`] has in the place of memory.
+#[derive(Clone, Copy)]
+pub(crate) struct Subgroup {
+    /// Invocations of a subgroup.
+    pub(crate) size: u32,
+    /// The subgroup's number in the workgroup.
+    pub(crate) subgroup: u32,
+    /// The invocation's number in the subgroup.
+    pub(crate) lane: u32,
+}
+
+impl Tiles for Subgroup {
+    #[inline(always)]
+    fn multiply(
+        self,
+        invocation: u32,
+        shape: Shape,
+        left: impl Fn(u32, u32) -> f32 + Copy,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+        mut store: impl FnMut(u32, u32, f32),
+    ) {
+        // Which invocations are in a subgroup is the driver's choice: the number in the workgroup follows from that.
+        let own = (self.subgroup * self.size + self.lane) % TILE;
+        let place = Place::of(invocation / TILE, own, shape, Form::Subgroup);
+        let row = (place.first_row + Sums::place(place.own_row, place.own_column)).min(shape.row_count - 1);
+        let column = place.first_column + Sums::place(place.own_column, 0);
+        let left = move |inner: u32| left(row, inner.min(shape.inner_count - 1));
+        let right = move |inner: u32, column: u32| right(inner, column.min(shape.column_count - 1));
+        let fetch_four = move |inner: u32, column: u32| {
+            Vec4::new(
+                right(inner, column),
+                right(inner, column + 1),
+                right(inner, column + 2),
+                right(inner, column + 3),
+            )
+        };
+        let mut sums = Sums::ZERO;
+        let mut start = 0;
+        while start < shape.inner_count {
+            let mut near = Vec4::new(left(start), left(start + 1), left(start + 2), left(start + 3));
+            let mut far = Vec4::new(left(start + 4), left(start + 5), left(start + 6), left(start + 7));
+            let end = shape.inner_count.min(start + CLUSTER);
+            let mut inner = start;
+            while inner < end {
+                let rows = self.rows_of_all(near.x);
+                sums.add(rows, [fetch_four(inner, column), fetch_four(inner, column + Sums::place(0, 4))]);
+                near = Vec4::new(near.y, near.z, near.w, far.x);
+                far = Vec4::new(far.y, far.z, far.w, 0.0);
+                inner += 1;
+            }
+            start += CLUSTER;
+        }
+        store_sums(sums, place, place.first_row, place.first_column, shape, &mut store);
+    }
+}
+
+impl Subgroup {
+    /// The numbers of the eight invocations that need the same rows, in the order of the rows.
+    #[inline(always)]
+    fn rows_of_all(self, own: f32) -> [Vec4; 2] {
+        if self.size == CLUSTER {
+            return [
+                Vec4::new(first::<0>(own), first::<1>(own), first::<2>(own), first::<3>(own)),
+                Vec4::new(first::<4>(own), first::<5>(own), first::<6>(own), first::<7>(own)),
+            ];
+        }
+        let first = self.lane / CLUSTER * CLUSTER;
+        let of = move |row: u32| subgroup_shuffle(own, first + row);
+        [Vec4::new(of(0), of(1), of(2), of(3)), Vec4::new(of(4), of(5), of(6), of(7))]
+    }
+}
+
+/// The number of an invocation among the subgroup's first eight.
+#[inline(always)]
+#[allow(unsafe_code)]
+fn first<const LANE: u32>(own: f32) -> f32 {
+    // SAFETY: a full subgroup has at least eight invocations, and all of them are here.
+    unsafe { subgroup_broadcast_const::<f32, LANE>(own) }
+}
