@@ -78,7 +78,12 @@ fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
     // A run of other settings is not gone on with, and nothing of it is lost.
     let before = bytes(path, "whole/state.safetensors");
     let other = PIXELNERF.replace("--rays 12", "--rays 13");
-    assert_refused(BINARY, path, &format!("{other} -o whole"), &["whole/state.safetensors", "settings was", "rays"]);
+    assert_refused(
+        BINARY,
+        path,
+        &format!("{other} -o whole"),
+        &["whole/state.safetensors", "settings.rays was 12 and is 13"],
+    );
     assert_eq!(bytes(path, "whole/state.safetensors"), before);
 
     // The weighting for it: the same again, with both embeddings; a scheme that evaluate knows.
@@ -203,7 +208,7 @@ fn numbers_without_sense_are_refused() {
         }
     }
     wrong("pixelnerf", "--sides 32,33", &["--sides", "a multiple of 16"]);
-    wrong("genvs", "--new-denoiser", &["--from"]);
+    wrong("genvs", "--new-denoiser", &["required arguments"]);
     let larger = "train pixelnerf learn/toys -o out --side 32 --sides 32,48";
     assert_refused(BINARY, folder.path(), larger, &["sides is 48", "a multiple of 16 from 16 to the side"]);
     for value in ["0", "8", "100000"] {

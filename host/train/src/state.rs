@@ -9,6 +9,7 @@ use candle_core::{DType, Device, Tensor, Var};
 use safetensors::SafeTensors;
 use safetensors::tensor::{Dtype, TensorView};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use viewfuse_job::files::{read_at_most, write_whole};
@@ -81,7 +82,7 @@ impl Learned<'_> {
 /// Writes the state.
 pub(crate) fn write(
     path: &Path,
-    settings: &serde_json::Value,
+    settings: &Value,
     progressed: &Progressed,
     learned: &Learned<'_>,
 ) -> Result<(), TrainError> {
@@ -108,11 +109,7 @@ pub(crate) fn write(
 ///
 /// # Errors
 /// [`TrainError::OtherRun`] if it has other settings, [`TrainError::State`] if it is invalid.
-pub(crate) fn read(
-    path: &Path,
-    settings: &serde_json::Value,
-    learned: &Learned<'_>,
-) -> Result<Option<Progressed>, TrainError> {
+pub(crate) fn read(path: &Path, settings: &Value, learned: &Learned<'_>) -> Result<Option<Progressed>, TrainError> {
     let wrong = |reason: String| TrainError::State { path: path.to_path_buf(), reason };
     let bytes = match read_at_most(path, LONGEST_STATE) {
         // An empty file is of a machine that lost its power: there is nothing to continue.
@@ -148,7 +145,7 @@ pub(crate) fn read(
 /// The content of a file with a state.
 struct Saved<'a> {
     file: SafeTensors<'a>,
-    settings: serde_json::Value,
+    settings: Value,
     progressed: Progressed,
 }
 
@@ -176,14 +173,21 @@ pub fn check_state(path: &Path) -> Result<u32, TrainError> {
 }
 
 /// The first difference of the settings, as text.
-fn difference(earlier: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
-    let (Some(earlier), Some(now)) = (earlier.as_object(), now.as_object()) else {
+fn difference(earlier: &Value, now: &Value) -> Option<String> {
+    if !(earlier.is_object() && now.is_object()) {
         return (earlier != now).then(|| "its settings are not a list".to_owned());
-    };
-    let keys = earlier.keys().chain(now.keys());
-    let differing = keys.into_iter().find(|key| earlier.get(*key) != now.get(*key))?;
-    let shown = |settings: &serde_json::Map<String, serde_json::Value>| {
-        settings.get(differing).map_or("nothing".to_owned(), ToString::to_string)
-    };
-    Some(format!("{differing} was {} and is {}", shown(earlier), shown(now)))
+    }
+    first_difference("", Some(earlier), Some(now))
+}
+
+/// The first value that differs, by its keys from the outside inwards: `settings.rays was 12 and is 13`.
+fn first_difference(place: &str, earlier: Option<&Value>, now: Option<&Value>) -> Option<String> {
+    if let (Some(Value::Object(earlier)), Some(Value::Object(now))) = (earlier, now) {
+        return earlier.keys().chain(now.keys()).find_map(|key| {
+            let place = if place.is_empty() { key.clone() } else { format!("{place}.{key}") };
+            first_difference(&place, earlier.get(key), now.get(key))
+        });
+    }
+    let shown = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
+    (earlier != now).then(|| format!("{place} was {} and is {}", shown(earlier), shown(now)))
 }
