@@ -263,6 +263,17 @@ impl Sampler {
         self.step_by(&history.levels, known, next)
     }
 
+    /// What the step to `next` adds to the step by one result less: the size of the error of such a step, without another
+    /// call (embedded solutions of two orders). `None` where a step has one result only.
+    pub fn embedded_difference(self, history: &History, next: f32) -> Option<Mix> {
+        let known = if self.result_count() < history.count { self.result_count() } else { history.count };
+        if known < 2 || !(next < history.levels[0]) {
+            return None;
+        }
+        let less = self.step_by(&history.levels, known - 1, next);
+        Some(self.step_by(&history.levels, known, next).beyond(&less))
+    }
+
     /// The correction of a step that reached level `reached`, from what was kept of the calls at the levels of the history
     /// and, as the newest result, of the one at the level reached; of which state, [`Corrected`] says. Where nothing is
     /// corrected, the state.

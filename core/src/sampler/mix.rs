@@ -32,6 +32,12 @@ impl Mix {
         mixed_element(self, &[state], &[*a], &[*b], &[*c], &[*d], 0)
     }
 
+    /// The difference from another combination of the same state and results.
+    pub(super) fn beyond(&self, other: &Mix) -> Mix {
+        let ([a, b, c, d], [p, q, r, s]) = (self.results, other.results);
+        Mix { state: self.state - other.state, results: [a - p, b - q, c - r, d - s] }
+    }
+
     /// The difference between a corrector's and a predictor's combination of the same state: the corrector's newest
     /// result is one that the predictor does not have.
     pub fn correction_beyond(&self, predictor: &Mix) -> Mix {

@@ -2,16 +2,17 @@
 //!
 //! `cargo run --release -p viewfuse-evaluate --example efforts -- FOLDER SOURCES TARGETS [MODEL]`
 //!
-//! SOURCES and TARGETS are lists of views as the command takes them. Errors are root mean squares over the targets, times
+//! SOURCES and TARGETS are lists of views as the command takes them, MODEL is a checkpoint or the name of a test network. Errors are root mean squares over the targets, times
 //! the least of three rounds, sources' encodings included.
 
 use anyhow::Context;
 use std::path::Path;
 use std::time::Instant;
 use viewfuse_device::cpu::Cpu;
+use viewfuse_field::AnyField;
+use viewfuse_field::family::{self, Family};
 use viewfuse_field::options::FieldOptions;
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
-use viewfuse_field::{AnyField, family};
 use viewfuse_job::progress::Silent;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::Scene;
@@ -27,7 +28,7 @@ fn main() -> anyhow::Result<()> {
     };
     let scene = Scene::open(Path::new(folder))?;
     let field = match model.first() {
-        Some(file) => family::open(Checkpoint::open(Path::new(file))?, &FieldOptions::default())?,
+        Some(name) => family::open(checkpoint(name)?, &FieldOptions::default())?,
         None => AnyField::default(),
     };
     let selection =
@@ -84,6 +85,15 @@ fn main() -> anyhow::Result<()> {
         before = Some(colours);
     }
     Ok(())
+}
+
+/// A file, or a test network of its published size.
+fn checkpoint(name: &str) -> anyhow::Result<Checkpoint> {
+    let networks = Family::ALL.into_iter().flat_map(Family::test_networks);
+    match networks.into_iter().find(|network| network.name == name) {
+        Some(network) => Ok((network.checkpoint)(None)),
+        None => Ok(Checkpoint::open(Path::new(name))?),
+    }
 }
 
 /// Root mean square over pixels and channels.

@@ -92,6 +92,17 @@ pub trait Prepared {
         Ok(Encodings::Kept)
     }
 
+    /// Whether the field can tell the error of a picture of an effort from its own steps, by [`Prepared::estimated_error`].
+    fn estimates_errors(&self) -> bool {
+        false
+    }
+
+    /// The root mean square difference of the last picture from the exact one, colours from 0 to 1. Called only if
+    /// [`Prepared::estimates_errors`], after [`Prepared::set_effort`].
+    fn estimated_error(&self) -> f32 {
+        f32::INFINITY
+    }
+
     /// Whether the field can render pixels alone, by [`Prepared::exact_pixels`], because they are independent of one another.
     fn renders_pixels(&self) -> bool {
         false

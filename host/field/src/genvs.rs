@@ -106,6 +106,8 @@ impl Genvs {
             memory_estimate: self.memory_estimate(device, &sizes),
             earlier: None,
             plan: self.options.plan,
+            effort: None,
+            error: f32::INFINITY,
             features: None,
             counts: Counts::default(),
         })

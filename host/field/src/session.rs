@@ -129,6 +129,16 @@ impl<'a> Session<'a> {
         Ok(encodings)
     }
 
+    /// See [`Prepared::estimates_errors`].
+    pub fn estimates_errors(&self) -> bool {
+        self.prepared.estimates_errors()
+    }
+
+    /// See [`Prepared::estimated_error`].
+    pub fn estimated_error(&self) -> f32 {
+        self.prepared.estimated_error()
+    }
+
     /// See [`Prepared::renders_pixels`].
     pub fn renders_pixels(&self) -> bool {
         self.prepared.renders_pixels()

@@ -199,3 +199,32 @@ fn verdicts() {
     assert_eq!(change_to_come(0.0, 1.0, 1.01 * UNDECIDED_ABOVE), f32::INFINITY);
     assert_eq!(change_to_come(0.0, 0.01, 0.01), f32::INFINITY);
 }
+
+#[test]
+fn embedded_differences_are_between_orders() {
+    // Even steps down to 1: Adams and Bashforth's coefficients of so many results less those of one result less, times -1.
+    let history = |levels: &[f32]| {
+        let mut history = History::NONE;
+        levels.iter().for_each(|level| history.push(*level));
+        history
+    };
+    let difference = |levels: &[f32]| Sampler::Ipndm.embedded_difference(&history(levels), 1.0).expect("two orders");
+    assert_eq!(difference(&[3.0, 2.0]), Mix { state: 0.0, results: [-0.5, 0.5, 0.0, 0.0] });
+    let third = difference(&[4.0, 3.0, 2.0]);
+    let expected = [-5.0, 10.0, -5.0, 0.0].map(|twelfths| twelfths / 12.0);
+    let off = third.results.iter().zip(expected).map(|(own, expected)| (own - expected).abs());
+    assert!(third.state == 0.0 && off.fold(0.0, f32::max) < 1.0e-6, "{third:?}");
+    for sampler in Sampler::ALL {
+        // A single result, and a level that is not lower, tell nothing.
+        assert_eq!(sampler.embedded_difference(&history(&[2.0]), 1.0), None, "{sampler}");
+        assert_eq!(sampler.embedded_difference(&history(&[3.0, 2.0]), 2.0), None, "{sampler}");
+        // What the step adds to that by one result less, for all that have two.
+        let (two, one) = (sampler.step(&history(&[3.0, 2.0]), 1.0), sampler.step(&history(&[2.0]), 1.0));
+        match sampler.embedded_difference(&history(&[3.0, 2.0]), 1.0) {
+            Some(mix) => (0..4).for_each(|index| {
+                assert!((two.results[index] - one.results[index] - mix.results[index]).abs() < 1.0e-6, "{sampler}");
+            }),
+            None => assert!(sampler.is_single_step(), "{sampler}"),
+        }
+    }
+}

@@ -26,8 +26,9 @@ pub(super) struct Draw {
     pub(super) weight: f64,
 }
 
-/// `count` pixels of a picture, with repetition, along the rows at equal steps of cumulative probability from a random
-/// begin: neighbours are seldom drawn together.
+/// `count` pixels of a picture, with repetition: along the rows, one at random from each of `count` parts of equal probability
+/// (stratified sampling). Neighbours are seldom drawn together. Equal steps from a single random begin would do that too, but where
+/// a step is about a row all draws are in one column.
 pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
     let contrasts = contrasts(picture);
     let contrast: f64 = contrasts.iter().sum();
@@ -37,17 +38,15 @@ pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
     let seen_share = if seen > 0.0 { SEEN_SHARE } else { 0.0 };
     let contrast_share = if contrast > 0.0 { 1.0 - EVEN_SHARE - SEEN_SHARE } else { 0.0 };
     let even_share = 1.0 - seen_share - contrast_share;
-    let step = 1.0 / count.max(1) as f64;
-    let mut next = step * f64::from(uniform(seed, count as u32, 0));
+    let at = |draw: usize| (draw as f64 + f64::from(uniform(seed, draw as u32, 0))) / count.max(1) as f64;
     let (mut draws, mut reached) = (Vec::with_capacity(count), 0.0);
     for (pixel, (own, colour)) in contrasts.iter().zip(&picture.colours).enumerate() {
         let of_contrast = if contrast > 0.0 { own / contrast } else { 0.0 };
         let of_seen = if is_seen(colour) { 1.0 / seen } else { 0.0 };
         let probability = even_share * even + seen_share * of_seen + contrast_share * of_contrast;
         reached += probability;
-        while next < reached && draws.len() < count {
+        while draws.len() < count && at(draws.len()) < reached {
             draws.push(Draw { pixel: pixel as u32, weight: even / probability });
-            next += step;
         }
     }
     draws
@@ -161,6 +160,16 @@ mod tests {
         assert!(draws.iter().all(|draw| (draw.weight - 1.0).abs() < 1.0e-9), "{draws:?}");
         let rows: Vec<u32> = draws.iter().map(|draw| draw.pixel / 512).collect();
         assert_eq!(rows, (0..8).collect::<Vec<u32>>());
+    }
+
+    #[test]
+    fn draws_of_one_a_row_are_not_in_one_column() {
+        let colours = vec![[0.5; 4]; 24 * 24];
+        let flat = Rendered { colours, depths: Vec::new(), confidences: Vec::new(), width: 24, height: 24 };
+        let meets = |seed: &u64| draw(&flat, 24, *seed).iter().any(|draw| draw.pixel % 24 == 5);
+        // 1 - (23 / 24)^24 is 0.64.
+        let share = (0..1000).filter(meets).count() as f64 / 1000.0;
+        assert!((share - 0.64).abs() < 0.05, "{share}");
     }
 
     #[test]

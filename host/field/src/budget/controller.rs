@@ -4,7 +4,7 @@ use super::check::{Sample, draw};
 use super::deadline::Deadline;
 use super::expected::Expected;
 use super::{Bound, Estimate, Kept, Tried, embedded};
-use crate::{Effort, Encodings, FieldError, Rendered, Session};
+use crate::{Effort, FieldError, Rendered, Session};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
@@ -19,12 +19,25 @@ const ROUNDS: usize = 3;
 const EXPECTED_DRAWS: usize = 8;
 /// Pictures that keep another picture's choice have this much more error at most.
 const OTHER_PICTURES: f64 = 1.3;
+/// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was for nothing.
+const MOST_COMPARED: f32 = 0.7;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
 /// After an exact picture, only one of so many tries less.
 const EXACT_PICTURES: u64 = 8;
 /// The share of the time that must be left for estimating the error of a picture with a bounded time.
 const CHECK_SHARE: f64 = 0.25;
+
+/// How errors are estimated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Judge {
+    /// From exact pixels.
+    Pixels,
+    /// By the field, from its own steps.
+    Steps,
+    /// By comparing two pictures.
+    Comparison,
+}
 
 /// What a picture is rendered from.
 #[derive(Clone, Copy)]
@@ -43,13 +56,10 @@ pub(crate) struct View<'a> {
 pub(crate) struct Controller {
     bound: Bound,
     expected: Expected,
-    /// Whether errors are estimated from exact pixels; otherwise by comparing two pictures.
-    by_pixels: bool,
-    /// Whether another effort encodes the sources again.
-    encodes_again: bool,
-    /// The effort that was chosen by comparing two, its estimate, and the pictures until the next comparison.
-    compared: Option<(usize, Estimate, u32)>,
-    /// The effort of the last picture that was checked by pixels, and its estimate.
+    judge: Judge,
+    /// The effort that was chosen by comparing two, for the whole run, and its estimate.
+    compared: Option<(usize, Estimate)>,
+    /// The effort of the last picture that was checked alone, and its estimate.
     last: Option<(usize, Estimate)>,
     pictures: u64,
 }
@@ -67,10 +77,15 @@ struct Search<'s, 'a> {
 }
 
 impl Controller {
-    /// For these efforts of a field, which can render pixels alone or not. Without any, the field has a single way to render.
-    pub(crate) fn new(bound: Bound, efforts: Vec<Effort>, by_pixels: bool) -> Controller {
-        let expected = Expected::new(efforts, if by_pixels { 1.0 } else { embedded::SAFETY });
-        Controller { bound, expected, by_pixels, encodes_again: false, compared: None, last: None, pictures: 0 }
+    /// For the efforts of a session's field. Without any, the field has a single way to render.
+    pub(crate) fn new(bound: Bound, session: &Session<'_>) -> Controller {
+        let (judge, safety) = match (session.renders_pixels(), session.estimates_errors()) {
+            (true, _) => (Judge::Pixels, 1.0),
+            (false, true) => (Judge::Steps, embedded::SAFETY),
+            (false, false) => (Judge::Comparison, OTHER_PICTURES * embedded::SAFETY),
+        };
+        let expected = Expected::new(session.efforts(), safety);
+        Controller { bound, expected, judge, compared: None, last: None, pictures: 0 }
     }
 
     /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
@@ -92,6 +107,10 @@ impl Controller {
         self.pictures += 1;
         let (start, encode) = (Instant::now(), Duration::ZERO);
         let mut search = Search { session, view, start, encode, tried: Vec::new() };
+        if self.judge == Judge::Steps {
+            // The field's steps do not tell what leaving out views costs.
+            search.view.used = view.all;
+        }
         let (rendered, effort, error, is_kept) = match self.bound {
             Bound::Error(most) => {
                 let (rendered, effort, estimate) = self.within_error(&mut search, f64::from(most), progress)?;
@@ -116,7 +135,7 @@ impl Controller {
     ) -> Result<(Rendered, usize, Estimate), FieldError> {
         // A quarter of the bound is left to early termination, at most.
         let termination = search.view.early_termination.min(0.25 * most as f32);
-        if !self.by_pixels {
+        if self.judge == Judge::Comparison {
             return self.by_comparison(search, most, termination, progress);
         }
         let mut effort = self.begin(most);
@@ -126,7 +145,10 @@ impl Controller {
                 self.last = Some((effort, Estimate::EXACT));
                 return Ok((rendered, effort, Estimate::EXACT));
             }
-            let estimate = self.check(search, &rendered, effort, ROUNDS, most, progress)?;
+            let estimate = match self.judge {
+                Judge::Steps => by_steps(search.session, termination),
+                _ => self.check(search, &rendered, effort, ROUNDS, most, progress)?,
+            };
             self.expected.learn(effort, estimate);
             if estimate.upper <= most {
                 self.last = Some((effort, estimate));
@@ -137,7 +159,8 @@ impl Controller {
         }
     }
 
-    /// For fields whose pixels cannot be computed alone: compares pictures of two efforts.
+    /// For fields that tell no errors and whose pixels cannot be computed alone: compares pictures of two efforts. Another effort
+    /// encodes the sources of such fields again, so the first comparison chooses for the whole run.
     fn by_comparison(
         &mut self,
         search: &mut Search<'_, '_>,
@@ -147,29 +170,24 @@ impl Controller {
     ) -> Result<(Rendered, usize, Estimate), FieldError> {
         // Both pictures leave out the same views, which the comparison would not see.
         search.view.used = search.view.all;
-        let known = self.compared.map(|(effort, ..)| effort);
-        if let Some((effort, estimate, pictures_left)) = &mut self.compared {
-            let (effort, estimate) = (*effort, *estimate);
-            if *pictures_left > 0 {
-                *pictures_left -= 1;
-                return Ok((self.picture(search, effort, termination, progress)?, effort, estimate));
-            }
+        if let Some((effort, estimate)) = self.compared {
+            return Ok((self.picture(search, effort, termination, progress)?, effort, estimate));
         }
-        let mut effort = known.unwrap_or_else(|| self.expected.cheapest_within(most));
-        if self.expected.is_exact(effort) {
-            let rendered = self.picture(search, effort, termination, progress)?;
-            return Ok(self.compared_to(rendered, [effort; 2], [Estimate::EXACT; 2]));
-        }
-        effort = effort.max(1);
+        let exact = self.expected.efforts.len() - 1;
+        let mut effort = self.expected.cheapest_within(most).clamp(1.min(exact), exact);
         let mut below = self.expected.below(effort);
+        let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_work).sum();
+        if effort == exact || work > MOST_COMPARED {
+            let rendered = self.picture(search, exact, termination, progress)?;
+            return Ok(self.compared_to(rendered, [exact; 2], [Estimate::EXACT; 2]));
+        }
         let mut cheaper = self.picture(search, below, termination, progress)?;
         loop {
             let rendered = self.picture(search, effort, termination, progress)?;
             let typical = |effort: usize| f64::from(self.expected.efforts[effort].typical_error);
             let found = embedded::estimate(&rendered, &cheaper, typical(below) / typical(effort));
-            let variation = if self.encodes_again { OTHER_PICTURES } else { 1.0 };
             let with_termination = |estimate: Estimate| Estimate {
-                upper: variation * estimate.upper + f64::from(termination),
+                upper: OTHER_PICTURES * estimate.upper + f64::from(termination),
                 ..estimate
             };
             let of_cheaper = with_termination(found.cheaper);
@@ -190,16 +208,14 @@ impl Controller {
         }
     }
 
-    /// Keeps the choice for some pictures: one after the first comparison, then twice as many; for the whole run if another
-    /// effort encodes the sources again. The efforts and estimates are those of this picture, and of the next ones.
+    /// Keeps a choice for the run. The efforts and estimates are those of this picture, and of the next ones.
     fn compared_to(
         &mut self,
         rendered: Rendered,
         [effort, next]: [usize; 2],
         [estimate, of_next]: [Estimate; 2],
     ) -> (Rendered, usize, Estimate) {
-        let pictures = u32::try_from(self.pictures).unwrap_or(u32::MAX);
-        self.compared = Some((next, of_next, if self.encodes_again { u32::MAX } else { pictures }));
+        self.compared = Some((next, of_next));
         (rendered, effort, estimate)
     }
 
@@ -236,7 +252,11 @@ impl Controller {
             return Ok((rendered, effort, Some(Estimate::EXACT), is_kept));
         }
         let mut estimate = None;
-        if self.by_pixels && left() > CHECK_SHARE * most.as_secs_f64() {
+        if self.judge == Judge::Steps {
+            // A picture that was interrupted left no estimate.
+            estimate = Some(by_steps(search.session, search.view.early_termination));
+        }
+        if self.judge == Judge::Pixels && left() > CHECK_SHARE * most.as_secs_f64() {
             match self.check(search, &rendered, effort, 1, 0.0, &deadline) {
                 Ok(found) => estimate = Some(found),
                 Err(FieldError::Interrupted(_)) if !progress.is_cancelled() => {}
@@ -258,7 +278,7 @@ impl Controller {
         let Search { session, view, encode, .. } = search;
         let (weights, early_termination) = if is_exact { (view.all, 0.0) } else { (view.used, early_termination) };
         let start = Instant::now();
-        self.encodes_again |= session.set_effort(effort, progress)? == Encodings::Dropped;
+        session.set_effort(effort, progress)?;
         session.encode(weights, progress)?;
         *encode += start.elapsed();
         let start = Instant::now();
@@ -314,4 +334,10 @@ impl Controller {
     fn tried(&self, effort: usize, error: Option<Estimate>) -> Tried {
         Tried { effort: self.expected.efforts[effort].name.clone(), error }
     }
+}
+
+/// The error of the last picture by the field's own steps. `termination` is what early termination may cost.
+fn by_steps(session: &Session<'_>, termination: f32) -> Estimate {
+    let value = f64::from(session.estimated_error());
+    Estimate { value, upper: embedded::SAFETY * value + f64::from(termination), pixels: 0 }
 }

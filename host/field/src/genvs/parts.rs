@@ -5,7 +5,7 @@ use super::denoiser::Denoiser;
 use super::encoder::Encoder;
 use super::feature_image::{PointNetwork, Views, render};
 use super::ray_sampling::RaySampling;
-use super::sampling::{Plan, Sampled, Start, sample};
+use super::sampling::{Accuracy, Plan, Sampled, Start, sample};
 use super::volume::Volume;
 use crate::FieldError;
 use crate::finite::{check_finite, check_finite_on};
@@ -118,7 +118,12 @@ impl<D: Device> Parts<D> {
         let count = features.size.pixel_count() as usize * COLOUR_CHANNELS;
         if self.denoiser.is_none() {
             let colours = leading_channels(scratch, features, COLOUR_CHANNELS as u32)?;
-            return Ok(Sampled { picture: colours.values, levels: Vec::new(), left_out: 0 });
+            return Ok(Sampled {
+                picture: colours.values,
+                levels: Vec::new(),
+                left_out: 0,
+                accuracy: Accuracy::default(),
+            });
         }
         let condition = self.condition(device, scratch, features)?;
         let start = match (start, &condition.colours) {

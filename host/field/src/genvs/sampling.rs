@@ -52,6 +52,17 @@ pub struct Sampled<D: Device> {
     /// The planned calls that were left out, because of an earlier picture or because the picture did not change any more.
     /// With adaptive levels no number is planned, and this is 0.
     pub left_out: u32,
+    /// How little the steps over levels may have erred.
+    pub accuracy: Accuracy,
+}
+
+/// What a run over levels tells of its error without further calls. Root mean squares over the values, 0 where there are none.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Accuracy {
+    /// The steps' differences from steps by one result less (embedded solutions of two orders): the root of their squares' sum.
+    pub steps: f32,
+    /// What the last call changed in the picture.
+    pub last_change: f32,
 }
 
 impl<D: Device> Sampled<D> {

@@ -32,6 +32,9 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) earlier: Option<(Size, D::Buffer<f32>)>,
     /// The denoiser's run: the field's own, or that of an effort.
     pub(super) plan: Plan,
+    /// The effort that was set, and the estimated error of the last picture with it.
+    pub(super) effort: Option<usize>,
+    pub(super) error: f32,
     /// The last frame's feature image: another effort for the same frame uses it again.
     pub(super) features: Option<(Seen, Image<D>)>,
     pub(super) counts: Counts,
@@ -167,6 +170,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         };
         let sampled = self.parts.picture(device, &mut scratch, &features, &self.plan, start, progress)?;
         self.features = Some((seen, features));
+        self.error = self.effort.map_or(f32::INFINITY, |effort| efforts::error_of(effort, sampled.accuracy));
         self.counts.calls += u64::from(sampled.call_count());
         self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
         let values = device.download(&sampled.picture)?;
@@ -190,9 +194,17 @@ impl<D: Device> Prepared for Views<'_, D> {
         if let Some(denoiser) = &self.field.architecture.denoiser
             && let Some((_, plan)) = efforts::of(&self.field.options.plan, denoiser.estimate).into_iter().nth(effort)
         {
-            self.plan = plan;
+            (self.plan, self.effort) = (plan, Some(effort));
         }
         Ok(Encodings::Kept)
+    }
+
+    fn estimates_errors(&self) -> bool {
+        self.field.architecture.denoiser.is_some()
+    }
+
+    fn estimated_error(&self) -> f32 {
+        self.error
     }
 
     fn record(&self) -> Record {

@@ -1,8 +1,8 @@
 //! A picture from rays whose samples are interpolated between nodes: which nodes of which rays are evaluated.
 //!
 //! Grids of rays follow one another, the widest first. On a ray of the first grid all nodes are candidates, on the others those
-//! that its neighbours on the grid before did not find empty; the others are the mean of the neighbours' nodes, so that thin mist
-//! is not lost. Candidates are evaluated some at a time, from the front, until the ray is opaque.
+//! that its neighbours on the grid before did not find empty (in small pictures these and the next ones: see [`SMALL`]); the others
+//! are the mean of the neighbours' nodes, so that thin mist is not lost. Candidates are evaluated some at a time, from the front, until the ray is opaque.
 
 use super::network::Workspace;
 use super::node_ray::NodeRay;
@@ -20,6 +20,9 @@ pub(super) const MOST_NODES: u32 = 128;
 /// The widest first grid, in pixels, and the rows and columns that it has at least.
 const WIDEST_FIRST_STEP: u32 = 16;
 const LEAST_FIRST_GRID: u32 = 8;
+/// In a picture of fewer pixels, a single one of the background's colour instead of the object's is more than an error of 40 dB, and
+/// few checked pixels hardly meet it: a corner of one pixel, whose neighbours on the grid before are empty, may not be lost.
+const SMALL: u32 = 2000;
 /// A node is empty if a whole ray of its density has less optical depth than the first over the square of the number of nodes,
 /// and than the second.
 const LEAST_OPTICAL_DEPTH: [f32; 2] = [512.0, 1.0];
@@ -64,6 +67,7 @@ impl<D: Device> Renderer<'_, D> {
         let mut so_far = Unfinished { picture, empty: vec![0; count], values, node_count };
         let (most_difference, far_difference) = self.interpolation();
         let most_step = widest_step(width.min(height));
+        let is_small = width * height < SMALL;
         let mut step = first_step(width.min(height));
         let grid = |step: u32| {
             let rows = (0..height).step_by(step as usize);
@@ -79,9 +83,10 @@ impl<D: Device> Renderer<'_, D> {
             for [column, row] in grid(half).filter(|place| place.iter().any(|place| !place.is_multiple_of(step))) {
                 let pixel = (row * width + column) as usize;
                 let around = so_far.around([column, row], step);
-                let empty = around.iter().fold(u128::MAX, |empty, pixel| empty & so_far.empty[*pixel]);
+                let empty = so_far.empty_around(around, step, if is_small { step } else { 0 });
                 let is_alike = || between(&so_far.picture, [column, row], step, most_difference, far_difference);
-                match (step <= most_step).then(is_alike).flatten() {
+                let may_be_alike = step <= most_step && (!is_small || empty == self.all_nodes());
+                match may_be_alike.then(is_alike).flatten() {
                     Some((colour, depth)) => {
                         so_far.picture.colours[pixel] = colour;
                         so_far.picture.depths[pixel] = depth;
@@ -238,6 +243,20 @@ impl Unfinished {
         let ([left, right], [top, bottom]) = (ends(column, width), ends(row, height));
         [[left, top], [right, top], [left, bottom], [right, bottom]]
             .map(|[column, row]| (row * width + column) as usize)
+    }
+
+    /// The nodes that are empty at the four neighbours of a pixel on the grid of `step`, and at those up to `reach` pixels beyond.
+    fn empty_around(&self, around: [usize; 4], step: u32, reach: u32) -> u128 {
+        let Rendered { width, height, .. } = self.picture;
+        let place = |pixel: usize| [pixel as u32 % width, pixel as u32 / width];
+        let ([left, top], [right, bottom]) = (place(around[0]), place(around[3]));
+        let on_grid = |first: u32, last: u32, side: u32| {
+            (first.saturating_sub(reach)..=(last + reach).min(side - 1)).step_by(step as usize)
+        };
+        let rows = on_grid(top, bottom, height);
+        let pixels =
+            rows.flat_map(|row| on_grid(left, right, width).map(move |column| (row * width + column) as usize));
+        pixels.fold(u128::MAX, |empty, pixel| empty & self.empty[pixel])
     }
 
     /// Where the nodes of a pixel are; none in odd rows and columns.

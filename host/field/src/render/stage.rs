@@ -92,7 +92,7 @@ impl<'a> Stage<'a> {
             .map_err(|error| RenderError::of(error, scene))?;
         session.tune(&options.settings);
         let views = sources.to_vec();
-        let controller = options.bound.map(|bound| Controller::new(bound, session.efforts(), session.renders_pixels()));
+        let controller = options.bound.map(|bound| Controller::new(bound, &session));
         Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, controller, costs })
     }
 

@@ -31,15 +31,19 @@ use viewfuse_weighting::sources::SourceWeights;
 
 pub use planes::TargetPlanes;
 
-/// Most other sources that a source is compared with, those with the greatest weights: run time is linear in the
-/// sources.
-const NEIGHBOURS: usize = 4;
 /// Most planes of a frustum in pictures that are only compared with one another.
 const TRIAL_PLANES: u32 = 32;
 
-/// Shares of the side at which views are compared and of the planes, with the error and the work that are typical of them
-/// (the example `efforts` of `viewfuse-evaluate`).
-const EFFORTS: [(f32, f32, f32, f32); 3] = [(0.25, 0.5, 0.05, 0.1), (0.5, 1.0, 0.028, 0.3), (0.75, 1.0, 0.0148, 0.6)];
+/// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
+/// work that are typical of them (the example `efforts` of `viewfuse-evaluate`, on the sample room and on herz_jesus_p8).
+const EFFORTS: [(f32, f32, usize, f32, f32); 6] = [
+    (0.25, 0.5, 4, 0.055, 0.09),
+    (0.5, 1.0, 1, 0.029, 0.2),
+    (0.75, 1.0, 1, 0.0185, 0.38),
+    (1.0, 1.0, 1, 0.014, 0.62),
+    (1.0, 1.0, 2, 0.0085, 0.74),
+    (1.0, 1.0, 3, 0.0045, 0.86),
+];
 
 const NEAR_COST: &str = "near cost";
 const DISSENT_SHARE: &str = "dissent share";
@@ -53,14 +57,22 @@ const TUNABLES: &[Tunable] = &[
 ];
 
 /// The settings that serve most scenes.
-const DEFAULT: Sweep =
-    Sweep { plane_count: 64, match_side: 256, near_cost: 0.01, dissent_share: 0.0625, temperature: TEMPERATURE };
+const DEFAULT: Sweep = Sweep {
+    plane_count: 64,
+    neighbours: 4,
+    match_side: 256,
+    near_cost: 0.01,
+    dissent_share: 0.0625,
+    temperature: TEMPERATURE,
+};
 
 /// Settings of the sweep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sweep {
     /// Planes of a frustum: a multiple of 16, at most 128.
     pub plane_count: u32,
+    /// Most other sources that a source is compared with, those with the greatest weights: run time is linear in the sources.
+    pub neighbours: usize,
     /// Longest side at which views are compared, in pixels. Colours are blended at the size of the pictures.
     pub match_side: u32,
     /// Cost of the nearest plane relative to the farthest one: of equal matches the farther one is chosen.
@@ -207,14 +219,15 @@ fn swept(
 }
 
 impl<D: Device> Views<'_, D> {
-    /// The settings with shares of the side at which the sources are compared, and of the planes.
-    fn at(&self, share: f32, planes: f32) -> Sweep {
+    /// The settings with shares of the side at which the sources are compared and of the planes, and with at most so many
+    /// neighbours.
+    fn at(&self, share: f32, planes: f32, neighbours: usize) -> Sweep {
         let side = self.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let reduced = (share * side as f32).round().max(1.0) as u32;
         // The whole side is the settings' own: targets may be larger than the sources.
         let match_side = if share < 1.0 { reduced } else { self.defaults.match_side };
         let plane_count = (self.defaults.plane_count as f32 * planes).round() as u32;
-        Sweep { plane_count, match_side, ..self.settings }
+        Sweep { plane_count, match_side, neighbours: neighbours.min(self.defaults.neighbours), ..self.settings }
     }
 
     /// Planes for a camera.
@@ -287,7 +300,7 @@ impl<D: Device> Prepared for Views<'_, D> {
         let others = (0..cameras.len()).filter(|other| *other != view);
         let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
         weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        weights.truncate(NEIGHBOURS);
+        weights.truncate(self.settings.neighbours);
         weights.push((view, 1.0));
         let swept = swept(cameras, cameras, &weights, None, None);
         let matching = self.settings.matching(self.device, self.has_silhouettes);
@@ -303,8 +316,8 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn tune(&mut self, settings: &[Setting]) {
-        let Sweep { plane_count, match_side, .. } = self.settings;
-        self.settings = Sweep { plane_count, match_side, ..self.defaults };
+        let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
+        self.settings = Sweep { plane_count, match_side, neighbours, ..self.defaults };
         for Setting { name, value } in settings {
             if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
                 *scalar = *value;
@@ -317,16 +330,20 @@ impl<D: Device> Prepared for Views<'_, D> {
     }
 
     fn efforts(&self) -> Vec<Effort> {
-        let named = |(share, planes, error, work): (f32, f32, f32, f32)| {
-            let Sweep { plane_count, match_side, .. } = self.at(share, planes);
-            Effort::new(format!("matching at {match_side} pixels, {plane_count} planes"), error, work)
+        let named = |(share, planes, neighbours, error, work): (f32, f32, usize, f32, f32)| {
+            let Sweep { plane_count, match_side, neighbours, .. } = self.at(share, planes, neighbours);
+            let name =
+                format!("matching at {match_side} pixels, {plane_count} planes, {neighbours} neighbours a source");
+            Effort::new(name, error, work)
         };
         EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
     }
 
     fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        let (share, planes) = EFFORTS.get(effort).map_or((1.0, 1.0), |(share, planes, ..)| (*share, *planes));
-        let settings = self.at(share, planes);
+        let settings = match EFFORTS.get(effort) {
+            Some((share, planes, neighbours, ..)) => self.at(*share, *planes, *neighbours),
+            None => self.at(1.0, 1.0, self.defaults.neighbours),
+        };
         if settings == self.settings {
             return Ok(Encodings::Kept);
         }

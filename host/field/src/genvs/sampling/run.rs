@@ -1,6 +1,6 @@
 //! The run for one picture.
 
-use super::{Plan, Sampled, Start};
+use super::{Accuracy, Plan, Sampled, Start};
 use crate::FieldError;
 use crate::finite::download_finite;
 use std::collections::VecDeque;
@@ -29,6 +29,10 @@ pub(super) struct Run<'a, D: Device, F> {
     levels: Vec<f32>,
     /// The denoiser's last result, and its level.
     last: Option<(Vec<f32>, f32)>,
+    /// Of the steps so far: the sum of the squares of their embedded differences.
+    step_squares: f32,
+    /// Of the last call.
+    last_change: f32,
 }
 
 /// A result of the denoiser: on the device, and on the host.
@@ -59,6 +63,8 @@ where
             history: History::NONE,
             levels: Vec::new(),
             last: None,
+            step_squares: 0.0,
+            last_change: 0.0,
         }
     }
 
@@ -98,6 +104,7 @@ where
                 self.free.extend([begun, std::mem::replace(&mut state, corrected)]);
             }
             self.keep(sampler, sigma, &state, denoised)?;
+            self.note_difference(sampler, next, &state)?;
             let mut reached = self.mixed(&sampler.step(&self.history, next), &state, None)?;
             if sampler.corrected() == Corrected::ByAnotherCall {
                 let there = self.call(&reached, next)?;
@@ -174,6 +181,10 @@ where
         let values = download_finite(self.device, &buffer, &format!("denoising at level {sigma}"), "denoised picture")?;
         self.levels.push(sigma);
         self.progress.step();
+        if let Some((before, _)) = &self.last {
+            let changes: Vec<f32> = values.iter().zip(before).map(|(now, then)| now - then).collect();
+            self.last_change = root_mean_square(&changes);
+        }
         Ok(Denoised { buffer, values })
     }
 
@@ -209,6 +220,16 @@ where
         self.history.push(sigma);
         self.results.push_front(kept);
         self.free.extend(self.results.drain(self.history.count().min(sampler.result_count()) as usize..));
+        Ok(())
+    }
+
+    /// Notes the difference of the step to a level from one by one result less.
+    fn note_difference(&mut self, sampler: Sampler, next: f32, state: &D::Buffer<f32>) -> Result<(), FieldError> {
+        if let Some(mix) = sampler.embedded_difference(&self.history, next) {
+            let difference = self.mixed(&mix, state, None)?;
+            self.step_squares += root_mean_square(&self.device.download(&difference)?).powi(2);
+            self.free.push(difference);
+        }
         Ok(())
     }
 
@@ -273,7 +294,8 @@ where
 
     fn finished(self, picture: D::Buffer<f32>, planned: u32) -> Sampled<D> {
         let made = u32::try_from(self.levels.len()).unwrap_or(u32::MAX);
-        Sampled { picture, levels: self.levels, left_out: planned.saturating_sub(made) }
+        let accuracy = Accuracy { steps: self.step_squares.sqrt(), last_change: self.last_change };
+        Sampled { picture, levels: self.levels, left_out: planned.saturating_sub(made), accuracy }
     }
 }
 
