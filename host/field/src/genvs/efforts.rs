@@ -16,7 +16,7 @@ const CALLS: [(u32, [f32; 2], Relative); 8] = [
     (4, [0.05, 0.019], Relative::ToSteps(1.35)),
     (5, [0.03, 0.013], Relative::ToSteps(1.05)),
     (6, [0.018, 0.01], Relative::ToSteps(0.64)),
-    (8, [0.012, 0.008], Relative::ToSteps(0.65)),
+    (8, [0.009, 0.008], Relative::ToSteps(0.65)),
     (12, [0.004, 0.0035], Relative::ToSteps(0.3)),
     (18, [0.0008, 0.0008], Relative::ToSteps(0.17)),
 ];
