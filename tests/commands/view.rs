@@ -42,7 +42,15 @@ fn done_with_warnings(folder: &Path, arguments: &str) {
     assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
 }
 
-const COARSE: &str = "document.getElementById('picture')?.dataset.kind === 'coarse'";
+/// Whether a coarse picture was on the page since [`NOTE_COARSE`]; it is there only until the full one is.
+const COARSE: &str = "window.sawCoarse";
+const NOTE_COARSE: &str = "(() => {
+    const picture = document.getElementById('picture');
+    window.sawCoarse = false;
+    if (window.coarseObserver) return;
+    window.coarseObserver = new MutationObserver(() => { window.sawCoarse ||= picture.dataset.kind === 'coarse'; });
+    window.coarseObserver.observe(picture, { attributes: true });
+})()";
 const WEIGHTS: &str = "[...document.querySelectorAll('#sources output')].map((own) => Number(own.dataset.weight))";
 const COUNT: &str = "Number(document.getElementById('picture').dataset.pictures)";
 

@@ -4,7 +4,7 @@ use super::super::browser::{self, Browser, InBrowser};
 use super::super::{assert_near, numbers};
 use super::devtools::{Chromium, Tab};
 use super::program::request;
-use super::{COARSE, COUNT, WEIGHTS, done_with_warnings, keep, room, weights};
+use super::{COARSE, COUNT, NOTE_COARSE, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
 use serde_json::json;
@@ -63,6 +63,7 @@ fn a_hand_turns_the_view(browser: &Browser) {
     // A drag turns the view: coarse pictures on the way, a full one at its end.
     let [x, y] = tab.middle_of("#picture");
     let before = tab.number(COUNT);
+    tab.evaluate(NOTE_COARSE);
     tab.mouse("mousePressed", [x, y], json!({}));
     tab.mouse("mouseMoved", [x + 120.0, y + 20.0], json!({}));
     tab.wait_for(COARSE);
@@ -89,10 +90,12 @@ fn a_hand_turns_the_view(browser: &Browser) {
             .number(&format!("Math.max(...matrixOf(pose).flat().map((own, i) => Math.abs(own - {place}.flat()[i])))"));
         assert!(gap < 1.0e-9, "{there} and {back}: {gap}");
     }
+    tab.evaluate(NOTE_COARSE);
     tab.key("0");
     tab.wait_for(COARSE);
     tab.wait_for(FULL);
     assert!(canvas(&tab) == first, "the start is what it was");
+    tab.evaluate(NOTE_COARSE);
     tab.mouse("mouseWheel", [x, y], json!({"deltaX": 0, "deltaY": -300}));
     tab.wait_for(COARSE);
     assert_ne!(tab.text(matrix), place);
@@ -133,6 +136,7 @@ fn tabs_come_and_go(browser: &Browser) {
     first.wait_for(FULL);
     second.wait_for(FULL);
     let [x, y] = second.middle_of("#picture");
+    second.evaluate(NOTE_COARSE);
     second.drag([x, y], [x + 150.0, y], 5);
     second.wait_for(COARSE);
     second.wait_for(FULL);
@@ -144,6 +148,7 @@ fn tabs_come_and_go(browser: &Browser) {
     second.mouse("mousePressed", [x, y], json!({}));
     second.mouse("mouseMoved", [x + 50.0, y], json!({}));
     second.close();
+    first.evaluate(NOTE_COARSE);
     first.key("ArrowLeft");
     first.wait_for(COARSE);
     first.wait_for(FULL);
@@ -169,6 +174,7 @@ fn a_phone_shows_all_of_it(browser: &Browser) {
     keep(&tab, "phone.png");
     // One finger turns, two move.
     let [x, y] = tab.middle_of("#picture");
+    tab.evaluate(NOTE_COARSE);
     tab.touch("touchStart", &[[x, y]]);
     tab.touch("touchMove", &[[x + 40.0, y]]);
     tab.touch("touchMove", &[[x + 80.0, y]]);
