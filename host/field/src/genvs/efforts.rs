@@ -64,7 +64,8 @@ pub(super) fn of(plan: &Plan, estimate: Estimate) -> Vec<(Effort, Plan)> {
     let few = CALLS.map(|(calls, [from_noise, from_colours], _)| {
         let work = FIXED_WORK + (1.0 - FIXED_WORK) * calls as f32 / all_calls as f32;
         let error = if estimate == Estimate::FromColours { from_colours } else { from_noise };
-        (Effort::new(format!("{calls} calls of the denoiser"), error, work), in_calls(&exact, estimate, calls))
+        let plan = Plan { compares_orders: true, ..in_calls(&exact, estimate, calls) };
+        (Effort::new(format!("{calls} calls of the denoiser"), error, work), plan)
     });
     few.into_iter().chain([(Effort::exact(), exact)]).collect()
 }

@@ -59,6 +59,7 @@ fn plan(options: &FieldOptions) -> Plan {
         steps,
         schedule: options.noise.unwrap_or_else(NoiseSchedule::published),
         from_colours: false,
+        compares_orders: false,
         churn: Churn { amount: options.churn.unwrap_or(0.0), ..Churn::NONE },
         early_termination: plan.early_termination.filter(|_| !options.computes("calls")),
         seed,

@@ -59,7 +59,8 @@ pub struct Sampled<D: Device> {
 /// What a run over levels tells of its error without further calls. Root mean squares over the values, 0 where there are none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Accuracy {
-    /// The steps' differences from steps by one result less (embedded solutions of two orders): the root of their squares' sum.
+    /// The steps' differences from steps by one result less (embedded solutions of two orders): the root of their squares' sum. 0
+    /// without [`Plan::compares_orders`].
     pub steps: f32,
     /// What the last call changed in the picture.
     pub last_change: f32,

@@ -20,6 +20,8 @@ pub struct Plan {
     /// instead of from noise alone. Above some level its estimate hardly depends on the noisy picture, and calls there are
     /// left out.
     pub from_colours: bool,
+    /// Whether [`Accuracy`](super::Accuracy) has the differences of steps, for which each step brings a picture back from the device.
+    pub compares_orders: bool,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -48,7 +50,7 @@ impl Plan {
     pub fn published(seed: u64) -> Plan {
         let steps = Steps::Fixed { sampler: Sampler::Heun, level_count: 25 };
         let (schedule, churn) = (NoiseSchedule::published(), Churn::NONE);
-        Plan { steps, schedule, churn, early_termination: None, from_colours: false, seed }
+        Plan { steps, schedule, churn, early_termination: None, from_colours: false, compares_orders: false, seed }
     }
 
     /// The default: `ipndm` with 10 calls, a fifth of the published run's, and an early stop when no visible change

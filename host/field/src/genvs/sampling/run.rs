@@ -225,7 +225,9 @@ where
 
     /// Notes the difference of the step to a level from one by one result less.
     fn note_difference(&mut self, sampler: Sampler, next: f32, state: &D::Buffer<f32>) -> Result<(), FieldError> {
-        if let Some(mix) = sampler.embedded_difference(&self.history, next) {
+        if self.plan.compares_orders
+            && let Some(mix) = sampler.embedded_difference(&self.history, next)
+        {
             let difference = self.mixed(&mix, state, None)?;
             self.step_squares += root_mean_square(&self.device.download(&difference)?).powi(2);
             self.free.push(difference);
