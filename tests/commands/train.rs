@@ -25,8 +25,8 @@ viewfuse_tests::trials![
 /// Small enough for a second a run.
 const PIXELNERF: &str = "train pixelnerf learn/toys --width 16 --objects 2 --rays 12 --coarse 8 --fine 4 --steps 30 \
     --sources 1,2,3,5 --sides 32,64 --least-crop 0.7 --weights mean --weights error:alpha=1 --validate-every 10 --write-every 0";
-const GENVS: &str =
-    "train genvs learn/toys --width 4 --objects 1 --samples 8 --steps 3 --validate-every 3 --write-every 0";
+const GENVS: &str = "train genvs learn/toys --width 4 --objects 1 --samples 8 --steps 3 --sources 1,3 --least-crop 0.7 \
+    --weights error:alpha=1 --weights mean --validate-every 3 --write-every 0";
 
 fn scenes() -> Folder {
     let folder = Folder::new();
@@ -176,6 +176,7 @@ fn wrong_input_is_told() {
     let attention = "train pixelnerf learn/toys -o out --weights cross-attention";
     assert_wrong_arguments(BINARY, folder.path(), attention, &["--weights", "formulas only"]);
     refused("train pixelnerf learn/toys -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
+    refused("train genvs learn/toys -o out --sources 3,9 --targets 2", &["has 10 photographs; 11 are needed"]);
     assert!(!folder.path().join("out").exists());
 }
 
@@ -200,6 +201,7 @@ fn numbers_without_sense_are_refused() {
     }
     for value in ["0", "2,300", "2,,3", "two"] {
         wrong("pixelnerf", &format!("--sources {value}"), &["--sources"]);
+        wrong("genvs", &format!("--sources {value}"), &["--sources"]);
     }
     for value in ["0", "nan", "1.5", "-0.5"] {
         wrong("pixelnerf", &format!("--least-crop={value}"), &["--least-crop", "above 0, at most 1"]);

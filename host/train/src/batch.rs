@@ -5,12 +5,11 @@ mod tests;
 
 use super::draw::{Draw, Purpose};
 use super::scenes::{Cut, TrainingScene, inputs};
+use super::weights;
 use candle_core::{DType, Device, Error, Result, Tensor};
 use viewfuse_core::camera::{Camera, CameraBlock};
-use viewfuse_core::pose::Pose;
 use viewfuse_core::rays::{CastBlock, TargetRay, cast_ray};
-use viewfuse_core::weighting::{Scheme, weigh};
-use viewfuse_weighting::sources::SourcePoses;
+use viewfuse_core::weighting::Scheme;
 
 /// Share of the rays that are drawn from the rectangle around the object.
 const SHARE_WITHIN_BOUNDS: f32 = 0.7;
@@ -41,7 +40,7 @@ impl Shown {
     }
 
     /// What source number `index` of a batch shows of a photograph of this side: a square somewhere in it.
-    fn cut(self, draw: &Draw, index: usize, whole: u32) -> Cut {
+    pub(crate) fn cut(self, draw: &Draw, index: usize, whole: u32) -> Cut {
         let share = 1.0 - (1.0 - self.least_crop) * draw.uniform(Purpose::Crops, 3 * index);
         let size = ((share * whole as f32).round() as u32).clamp(1, whole);
         let place = |which| draw.below(Purpose::Crops, 3 * index + which, (whole - size + 1) as usize) as u32;
@@ -72,6 +71,13 @@ pub(crate) enum Targets {
     Many,
     /// One view of an object for all rays, not a source.
     One,
+}
+
+impl Targets {
+    /// As a scheme allows: weights other than equal ones are for one target view.
+    pub(crate) fn of(scheme: Scheme) -> Targets {
+        if scheme == Scheme::MEAN { Targets::Many } else { Targets::One }
+    }
 }
 
 impl Batch {
@@ -146,20 +152,7 @@ impl Batch {
 
     /// Weights `[object][view]` by a scheme, for the target view of each object.
     pub(crate) fn weights(&self, scheme: Scheme) -> Result<Tensor> {
-        let mut weights = Vec::new();
-        for (sources, target) in self.sources.iter().zip(&self.targets) {
-            let poses: Vec<Pose> = sources.iter().map(|camera| camera.pose).collect();
-            let poses = SourcePoses::new(&poses).map_err(Error::wrap)?;
-            weights.extend_from_slice(&weigh(scheme, &poses, &target.pose).values()[..sources.len()]);
-        }
-        let shape = (self.sources.len(), self.sources[0].len());
-        Tensor::from_vec(weights, shape, &Device::Cpu)?.to_dtype(self.truth.dtype())
-    }
-
-    /// Equal weights `[object][view]`.
-    pub(crate) fn mean_weights(&self) -> Result<Tensor> {
-        let (objects, views) = (self.sources.len(), self.sources[0].len());
-        Tensor::full(1.0 / views as f64, (objects, views), &Device::Cpu)?.to_dtype(self.truth.dtype())
+        weights::of_scheme(scheme, &self.sources, self.targets.iter(), self.truth.dtype())
     }
 }
 

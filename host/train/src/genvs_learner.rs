@@ -1,4 +1,4 @@
-//! A small GeNVS, with equal weights of the views as published.
+//! A small GeNVS. With equal weights of the views, as published, unless schemes are given.
 //!
 //! The loss is that of "Elucidating the design space of diffusion-based generative models" (Karras et al. 2022): noise of a
 //! random level on the ground truth, the squared error of the network's output, all levels with one weight. Two changes are
@@ -8,23 +8,26 @@
 //! the minimum of the squared error.
 
 use super::TrainError;
+use super::batch::Shown;
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views, colours, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
 use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
+use super::variety::Variety;
 use candle_core::{DType, Device, Result, Tensor};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
+use viewfuse_core::weighting::Scheme;
 use viewfuse_field::genvs::{Architecture, Estimate};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// The settings of a run besides its schedule and scenes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GenvsSettings {
     /// Channels of the denoiser's first level; see [`Architecture::narrow`]. A network that continues from a file has the
     /// file's.
@@ -33,7 +36,7 @@ pub struct GenvsSettings {
     pub side: u32,
     /// Objects of a step.
     pub objects: usize,
-    /// Targets of each.
+    /// Targets of each. One in steps with another scheme than the mean, see [`Variety::schemes`].
     pub targets: usize,
     /// Samples of a ray, as many as in renders: samples shade themselves, so another number changes the brightness.
     pub samples: u32,
@@ -43,17 +46,17 @@ pub struct GenvsSettings {
     pub estimate: Estimate,
     /// Whether a network that continues from a file begins with a new denoiser. Otherwise it keeps the file's.
     pub new_denoiser: bool,
+    /// What differs from step to step. Sides are those of the settings: [`Variety::sides`] is empty.
+    pub variety: Variety,
 }
 
-/// The numbers of sources of a step, one of which is drawn.
-const SOURCE_COUNTS: [usize; 4] = [1, 2, 3, 3];
 /// Mean and deviation of the logarithm of noise levels, as published.
 const LEVELS: [f32; 2] = [-1.2, 1.2];
 /// Weight of the first features' squared error: that of the picture's at the largest level.
 const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
 /// Objects in validation, and views of each.
 const VALIDATION_OBJECTS: usize = 24;
-const VALIDATION_VIEWS: ViewCounts = ViewCounts { sources: 3, targets: 1 };
+const VALIDATION_SOURCES: usize = 3;
 
 /// The default of [`GenvsSettings::share_of_largest`].
 pub const SHARE_OF_LARGEST: f32 = 0.25;
@@ -63,6 +66,20 @@ struct GenvsLearner {
     scenes: Vec<TrainingScene>,
     validation: Vec<TrainingScene>,
     settings: GenvsSettings,
+}
+
+impl GenvsSettings {
+    /// Refuses numbers with which nothing is computed.
+    fn check(&self) -> std::result::Result<(), TrainError> {
+        let refuse = |name, value, allowed| Err(TrainError::Setting { name, value, allowed });
+        if !(0.0..=1.0).contains(&self.share_of_largest) {
+            return refuse("share_of_largest", f64::from(self.share_of_largest), "it must be from 0 to 1");
+        }
+        if let Some(side) = self.variety.sides.first() {
+            return refuse("sides", f64::from(*side), "a GeNVS's volumes are made for pictures of one side");
+        }
+        self.variety.check(self.side)
+    }
 }
 
 /// Trains a GeNVS in `folder`, or continues there: from scratch, or from a trained network.
@@ -77,13 +94,9 @@ pub fn train_genvs(
     folder: &Path,
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
-    let most_sources = SOURCE_COUNTS.into_iter().max().unwrap_or(1);
-    let least_views = most_sources + settings.targets.max(1);
+    settings.check()?;
+    let least_views = settings.variety.most_sources() + settings.targets.max(1);
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
-    if !(0.0..=1.0).contains(&settings.share_of_largest) {
-        let (name, value) = ("share_of_largest", f64::from(settings.share_of_largest));
-        return Err(TrainError::Setting { name, value, allowed: "it must be from 0 to 1" });
-    }
     let mut architecture = Architecture::narrow(settings.side as usize, settings.width);
     let estimate = settings.estimate;
     architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
@@ -97,7 +110,7 @@ pub fn train_genvs(
     let denoiser = network.architecture.denoiser.as_ref();
     let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
     let estimate = denoiser.map_or(estimate, |denoiser| denoiser.estimate);
-    let settings = GenvsSettings { width, estimate, ..*settings };
+    let settings = GenvsSettings { width, estimate, ..settings.clone() };
     let record = run::settings("genvs", &settings, schedule, &data, from)?;
     let learner = GenvsLearner { network, scenes: data.training, validation: data.validation, settings };
     run::run(&learner, schedule, &record, "PSNR dB of one call", folder, progress)
@@ -187,19 +200,19 @@ impl Learner for GenvsLearner {
     }
 
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
-        let GenvsSettings { objects, targets, samples, .. } = self.settings;
-        let sources = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
+        let GenvsSettings { objects, targets, samples, share_of_largest, ref variety, .. } = self.settings;
+        let (sources, scheme) = variety.drawn(draw);
+        let targets = if scheme == Scheme::MEAN { targets } else { 1 };
         let views = ViewCounts { sources, targets };
         let views = Views::draw(&self.scenes, draw, objects, views, self.network.parameters.dtype())?;
         let samples = CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: samples, jitter: 1.0 };
-        loss(&self.network, &views, &views.mean_weights()?, &samples, self.settings.share_of_largest, draw)
+        loss(&self.network, &views, &views.weights(scheme)?, &samples, share_of_largest, draw)
     }
 
     fn validate(&self) -> Result<Validated> {
-        let [score, colour_score] =
-            scores(&self.network, &self.validation, VALIDATION_VIEWS, self.settings.samples, &|views| {
-                views.mean_weights()
-            })?;
+        let views = ViewCounts { sources: Shown::whole(VALIDATION_SOURCES), targets: 1 };
+        let weigh = |views: &Views| views.weights(self.settings.variety.schemes[0]);
+        let [score, colour_score] = scores(&self.network, &self.validation, views, self.settings.samples, &weigh)?;
         Ok(Validated { score, remark: format!("features {colour_score:.3} dB") })
     }
 

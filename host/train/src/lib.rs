@@ -8,7 +8,9 @@
 //! ```text
 //! scenes       pictures and cameras in memory            TrainingScene
 //! draw         random numbers of a step                  Draw
+//! variety      what differs from step to step            Variety
 //! batch        sources and target rays of a step         Batch
+//! weights      of a batch's views, by a scheme           of_scheme
 //! operations   gradients of our own kernels              Convolution, PointNetwork, Look
 //! parameters   trained parameters                        Parameters
 //! images, compositing     parts of the graphs
@@ -40,13 +42,16 @@ mod scenes;
 #[cfg(test)]
 mod slopes;
 mod state;
+mod variety;
 mod weighting_learner;
+mod weights;
 
 pub use attention::Embedding;
 pub use genvs_learner::{GenvsSettings, SHARE_OF_LARGEST, train_genvs};
-pub use pixelnerf_learner::{PixelNerfSettings, Variety, train_pixelnerf};
+pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
 pub use state::check_state;
+pub use variety::Variety;
 pub use weighting_learner::{WeightingSettings, train_weighting};
 
 use std::path::PathBuf;

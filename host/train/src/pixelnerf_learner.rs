@@ -2,19 +2,18 @@
 
 use super::TrainError;
 use super::batch::{Batch, BatchSize, Shown, Targets};
-use super::draw::{Draw, Purpose};
+use super::draw::Draw;
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
+use super::variety::Variety;
 use candle_core::{DType, Result, Tensor};
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
-use viewfuse_core::weighting::Scheme;
 use viewfuse_field::pixelnerf::architecture::Architecture;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
-use viewfuse_weighting::sources::MOST_SOURCES;
 
 /// The settings of a run besides its schedule and scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -36,39 +35,6 @@ pub struct PixelNerfSettings {
     pub fine: usize,
     /// What differs from step to step.
     pub variety: Variety,
-}
-
-/// What differs from step to step, so that a network works with more than one kind of sources: of each list one is drawn.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Variety {
-    /// Numbers of sources, at least 1.
-    pub sources: Vec<usize>,
-    /// Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are always of
-    /// pictures of the settings' side.
-    pub sides: Vec<u32>,
-    /// Each source shows a square somewhere in its photograph, of at least this share of its side and at most the whole,
-    /// above 0; 1: always the whole.
-    pub least_crop: f32,
-    /// Weighting schemes. With any other than the mean, all rays of an object are of one target view, as weights are.
-    #[serde(serialize_with = "texts")]
-    pub schemes: Vec<Scheme>,
-}
-
-impl Default for Variety {
-    /// Whole photographs at the settings' side with equal weights; mostly three, so that the network works with few sources,
-    /// sometimes one or more, so that it works with any weights.
-    fn default() -> Variety {
-        Variety {
-            sources: vec![1, 2, 3, 3, 3, 3, 4, 6],
-            sides: Vec::new(),
-            least_crop: 1.0,
-            schemes: vec![Scheme::MEAN],
-        }
-    }
-}
-
-fn texts<S: Serializer>(schemes: &[Scheme], serializer: S) -> std::result::Result<S::Ok, S::Error> {
-    serializer.collect_seq(schemes.iter().map(Scheme::to_string))
 }
 
 /// Levels of a new network's trunk, and the most: those of the published trunk.
@@ -113,36 +79,6 @@ impl PixelNerfSettings {
     }
 }
 
-impl Variety {
-    fn check(&self, side: u32) -> std::result::Result<(), TrainError> {
-        let refuse = |name, value, allowed| Err(TrainError::Setting { name, value, allowed });
-        if let Some(count) = self.sources.iter().find(|count| !(1..=MOST_SOURCES).contains(*count)) {
-            return refuse("sources", *count as f64, "it must be from 1 to 256");
-        }
-        if self.sources.is_empty() || self.schemes.is_empty() {
-            let name = if self.sources.is_empty() { "sources" } else { "schemes" };
-            return refuse(name, 0.0, "at least one is needed");
-        }
-        let fits = |own: &u32| (16..=side).contains(own) && own.is_multiple_of(16);
-        if let Some(own) = self.sides.iter().find(|own| !fits(own)) {
-            return refuse("sides", f64::from(*own), "it must be a multiple of 16 from 16 to the side");
-        }
-        if !(self.least_crop > 0.0 && self.least_crop <= 1.0) {
-            return refuse("least_crop", f64::from(self.least_crop), "it must be above 0 and at most 1");
-        }
-        Ok(())
-    }
-
-    /// The sources of a step, and its scheme.
-    fn drawn(&self, draw: &Draw) -> (Shown, Scheme) {
-        let pick = |purpose, count| draw.below(purpose, 0, count);
-        let count = self.sources[pick(Purpose::SourceCount, self.sources.len())];
-        let side = self.sides.get(pick(Purpose::Sides, self.sides.len())).copied();
-        let scheme = self.schemes[pick(Purpose::Schemes, self.schemes.len())];
-        (Shown { count, side, least_crop: self.least_crop }, scheme)
-    }
-}
-
 /// Objects in validation, rays of each, sources, and samples.
 const VALIDATION: BatchSize = BatchSize { objects: 24, rays: 192 };
 const VALIDATION_SOURCES: usize = 3;
@@ -168,7 +104,7 @@ pub fn train_pixelnerf(
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
     settings.check()?;
-    let most_sources = settings.variety.sources.iter().copied().max().unwrap_or(1);
+    let most_sources = settings.variety.most_sources();
     let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
     let mut network = match from {
@@ -218,7 +154,7 @@ impl Learner for PixelNerfLearner {
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let PixelNerfSettings { objects, rays, coarse, fine, .. } = self.settings;
         let (shown, scheme) = self.settings.variety.drawn(draw);
-        let targets = if scheme == Scheme::MEAN { Targets::Many } else { Targets::One };
+        let targets = Targets::of(scheme);
         let size = BatchSize { objects, rays };
         let batch = Batch::draw(&self.scenes, draw, size, shown, targets, self.network.parameters.dtype())?;
         let colours = self.network.render(&batch, &batch.weights(scheme)?, draw, SampleCounts { coarse, fine })?;
@@ -226,8 +162,9 @@ impl Learner for PixelNerfLearner {
     }
 
     fn validate(&self) -> Result<Validated> {
-        let score =
-            score(&self.network, &self.validation, VALIDATION_SOURCES, Targets::Many, &|batch| batch.mean_weights())?;
+        let scheme = self.settings.variety.schemes[0];
+        let weigh = |batch: &Batch| batch.weights(scheme);
+        let score = score(&self.network, &self.validation, VALIDATION_SOURCES, Targets::of(scheme), &weigh)?;
         Ok(Validated { score, remark: String::new() })
     }
 

@@ -159,11 +159,6 @@ impl TrainingScene {
         let part = if size == side { part } else { resize(&part, side, side, FilterType::Triangle) };
         Ok((Camera { pinhole, ..camera }, part))
     }
-
-    /// A view's picture as a network's input.
-    pub(crate) fn shown(&self, view: usize) -> impl Iterator<Item = f32> + '_ {
-        inputs(&self.pictures[view])
-    }
 }
 
 /// A picture as a network's input: `[row][column][channel]`, in `[-1, 1]`.

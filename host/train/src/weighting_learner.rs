@@ -19,6 +19,7 @@ use std::path::{Path, PathBuf};
 use viewfuse_core::camera::Camera;
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::pose::Pose;
+use viewfuse_core::weighting::Scheme;
 use viewfuse_field::family::Family;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -126,7 +127,7 @@ impl Learner for WeightingLearner {
                 (colours - &batch.truth)?.sqr()?.mean_all()
             }
             Frozen::Genvs(network) => {
-                let views = ViewCounts { sources, targets: 1 };
+                let views = ViewCounts { sources: Shown::whole(sources), targets: 1 };
                 let views = Views::draw(&self.scenes, draw, objects, views, dtype)?;
                 let samples =
                     CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: GENVS_SAMPLES, jitter: 1.0 };
@@ -142,14 +143,14 @@ impl Learner for WeightingLearner {
                 let score = |weigh: &dyn Fn(&Batch) -> Result<Tensor>| {
                     pixelnerf_learner::score(network, &self.validation, VALIDATION_SOURCES, Targets::One, weigh)
                 };
-                [score(&|batch| self.of_batch(batch))?, score(&|batch| batch.mean_weights())?]
+                [score(&|batch| self.of_batch(batch))?, score(&|batch| batch.weights(Scheme::MEAN))?]
             }
             Frozen::Genvs(network) => {
-                let views = ViewCounts { sources: VALIDATION_SOURCES, targets: 1 };
+                let views = ViewCounts { sources: Shown::whole(VALIDATION_SOURCES), targets: 1 };
                 let score = |weigh: &dyn Fn(&Views) -> Result<Tensor>| -> Result<f64> {
                     Ok(genvs_learner::scores(network, &self.validation, views, GENVS_SAMPLES, weigh)?[0])
                 };
-                [score(&|views| self.of_views(views))?, score(&|views| views.mean_weights())?]
+                [score(&|views| self.of_views(views))?, score(&|views| views.weights(Scheme::MEAN))?]
             }
         };
         Ok(Validated { score: own, remark: format!("{:+.3} dB against equal weights", own - mean) })

@@ -107,33 +107,40 @@ struct PixelNerfArguments {
     /// Samples that the second pass adds
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = added_samples)]
     fine: usize,
-    /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6]
-    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=256))]
-    sources: Vec<u16>,
     /// Sides of the sources' pictures, multiples of 16 up to --side; each step draws one of the list [default: --side]
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = side)]
     sides: Vec<u32>,
+    #[command(flatten)]
+    variety: VarietyOptions,
+}
+
+/// What differs from step to step.
+#[derive(Args)]
+struct VarietyOptions {
+    /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6 for a PixelNeRF, 1,2,3,3 for a GeNVS]
+    #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=256))]
+    sources: Vec<u16>,
     /// Let each source show only a square of its photograph, somewhere in it, of at least this share of its side
     #[arg(long, value_name = "SHARE", default_value_t = 1.0, value_parser = crop)]
     least_crop: f32,
-    /// The views' weights: a formula, mean, error:alpha=1, ...; of several, each step draws one [default: mean]
+    /// The views' weights: a formula, mean, error:alpha=1, ...; of several, each step draws one, and validation has the
+    /// first [default: mean]
     #[arg(long, value_name = "SCHEME", value_parser = formula)]
     weights: Vec<Scheme>,
 }
 
-impl PixelNerfArguments {
-    fn variety(&self) -> Variety {
-        let PixelNerfArguments { sources, sides, least_crop, weights, .. } = self;
-        let default = Variety::default();
+impl VarietyOptions {
+    fn variety(&self, default: Variety) -> Variety {
+        let VarietyOptions { sources, least_crop, weights } = self;
         Variety {
             sources: if sources.is_empty() {
                 default.sources
             } else {
                 sources.iter().map(|n| usize::from(*n)).collect()
             },
-            sides: sides.clone(),
             least_crop: *least_crop,
             schemes: if weights.is_empty() { default.schemes } else { weights.clone() },
+            ..default
         }
     }
 }
@@ -167,7 +174,7 @@ struct GenvsArguments {
     /// Objects of a step
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
     objects: usize,
-    /// Targets of each object
+    /// Targets of each object; one in steps with weights other than the mean
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = count)]
     targets: usize,
     /// Samples of a ray: as many as in renders
@@ -182,6 +189,8 @@ struct GenvsArguments {
     /// With --from: begin with a new denoiser
     #[arg(long, requires = "from")]
     new_denoiser: bool,
+    #[command(flatten)]
+    variety: VarietyOptions,
 }
 
 /// See [`Estimate`].
@@ -288,7 +297,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
 fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     let &PixelNerfArguments { ref run, ref from, width, levels, side, objects, rays, coarse, fine, .. } = arguments;
-    let variety = arguments.variety();
+    let variety = Variety { sides: arguments.sides.clone(), ..arguments.variety.variety(Variety::pixelnerf()) };
     let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, variety };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
@@ -307,7 +316,9 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
         EstimateName::Colours => Estimate::FromColours,
         EstimateName::Published => Estimate::Published,
     };
-    let settings = GenvsSettings { width, side, objects, targets, samples, share_of_largest, estimate, new_denoiser };
+    let variety = arguments.variety.variety(Variety::genvs());
+    let settings =
+        GenvsSettings { width, side, objects, targets, samples, share_of_largest, estimate, new_denoiser, variety };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;

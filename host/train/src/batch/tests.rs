@@ -74,7 +74,7 @@ fn whole_sources_are_the_photographs_and_others_have_their_size() {
 fn weights_are_those_of_the_scheme_for_the_target() {
     let batch = batch(3, Shown { least_crop: 0.5, ..Shown::whole(3) });
     let rows = |scheme| batch.weights(scheme).and_then(|weights| weights.to_vec2::<f32>()).expect("weights");
-    assert_eq!(rows(Scheme::MEAN), batch.mean_weights().and_then(|all| all.to_vec2::<f32>()).expect("weights"));
+    assert_eq!(rows(Scheme::MEAN), vec![vec![1.0 / 3.0; 3]; 2]);
     let scheme = Weighting::from(Scheme::ERROR);
     for ((own, sources), target) in rows(Scheme::ERROR).iter().zip(&batch.sources).zip(&batch.targets) {
         let poses: Vec<Pose> = sources.iter().map(|camera| camera.pose).collect();

@@ -1,15 +1,22 @@
 //! The batch of a step: a few objects, with some views of each as sources and some as targets.
 
+#[cfg(test)]
+mod tests;
+
+use super::super::batch::Shown;
 use super::super::draw::{Draw, Purpose};
-use super::super::scenes::TrainingScene;
-use candle_core::{DType, Device, Result, Tensor};
+use super::super::scenes::{TrainingScene, inputs};
+use super::super::weights;
+use candle_core::{DType, Device, Error, Result, Tensor};
 use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::weighting::Scheme;
 use viewfuse_field::learned::default_near_far;
 
 /// The numbers of views of each object in a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ViewCounts {
-    pub(crate) sources: usize,
+    /// Their pictures have the scenes' side.
+    pub(crate) sources: Shown,
     pub(crate) targets: usize,
 }
 
@@ -51,14 +58,19 @@ impl Views {
         let (mut pictures, mut truth) = (Vec::new(), Vec::new());
         let mut lists = (Vec::new(), Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, scene) in objects.iter().enumerate() {
-            let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), sources + targets);
-            let (own, others) = order.split_at(sources);
-            own.iter().for_each(|view| pictures.extend(scene.shown(*view)));
-            others.iter().for_each(|view| truth.extend(scene.shown(*view)));
-            let cameras: Vec<Camera> = own.iter().map(|&view| scene.cameras[view]).collect();
+            let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), sources.count + targets);
+            let (own, others) = order.split_at(sources.count);
+            let mut cameras = Vec::with_capacity(own.len());
+            for (place, &view) in own.iter().enumerate() {
+                let cut = sources.cut(draw, index * own.len() + place, scene.pictures[view].width());
+                let (camera, picture) = scene.source(view, cut).map_err(Error::wrap)?;
+                pictures.extend(inputs(&picture));
+                cameras.push(camera);
+            }
+            others.iter().for_each(|view| truth.extend(inputs(&scene.pictures[*view])));
             lists.0.push(default_near_far(&cameras));
+            lists.2.push(cameras.iter().map(|camera| camera.block(0)).collect());
             lists.1.push(cameras);
-            lists.2.push(own.iter().map(|&view| scene.blocks[view]).collect());
             lists.3.push(others.iter().map(|&view| scene.blocks[view]).collect());
             lists.4.push(others.iter().map(|&view| scene.cameras[view]).collect());
         }
@@ -70,7 +82,7 @@ impl Views {
         Ok(Views {
             sources: sources_of,
             cameras,
-            pictures: images(pictures, sources)?,
+            pictures: images(pictures, sources.count)?,
             target_cameras,
             targets: targets_of,
             truth: images(truth, targets)?,
@@ -78,9 +90,9 @@ impl Views {
         })
     }
 
-    /// Equal weights `[object][view]`.
-    pub(crate) fn mean_weights(&self) -> Result<Tensor> {
-        let (objects, views) = (self.cameras.len(), self.cameras[0].len());
-        Tensor::full(1.0 / views as f64, (objects, views), &Device::Cpu)?.to_dtype(self.truth.dtype())
+    /// Weights `[object][view]` by a scheme, for the first target of each object.
+    pub(crate) fn weights(&self, scheme: Scheme) -> Result<Tensor> {
+        let targets = self.target_cameras.iter().map(|targets| &targets[0]);
+        weights::of_scheme(scheme, &self.sources, targets, self.truth.dtype())
     }
 }
