@@ -15,8 +15,10 @@ use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::weighting::Weighting;
 use viewfuse_tests::places;
 
-/// The most pictures whose error exceeds its bound.
+/// The most pictures whose error exceeds its bound, as a share.
 const MOST_MISSED: f64 = 0.05;
+/// The most that one of them exceeds it, as a factor: 1.08 was measured, and 1.6 where a corner of a small picture was lost.
+const MOST_EXCESS: f64 = 1.25;
 
 fn scene(name: &str) -> Scene {
     Scene::open(places::data(name)).expect("a scene")
@@ -157,6 +159,7 @@ fn errors_stay_below_their_bounds() {
                 group.pictures += 1;
                 if error > f64::from(most) {
                     println!("{}, {decibels} dB: error {error:.5}, {kept:?}", case.name);
+                    assert!(error < MOST_EXCESS * f64::from(most), "{}, {decibels} dB: {error}", case.name);
                     group.missed += 1;
                 }
                 if error > 0.0 {
@@ -206,6 +209,23 @@ fn effort_count(case: &Case, renderer: &dyn Renderer) -> usize {
         open_album(&case.scene, case.job.sources.iter().copied(), renderer, &options, &Silent).expect("photographs");
     let stage = Stage::prepare(&case.scene, &album, &case.job.sources, renderer, &options, &Silent).expect("prepared");
     stage.efforts().len()
+}
+
+/// In a picture of few pixels a single one counts: rays between others see nothing of a corner that lies between them.
+#[test]
+fn no_corner_of_a_small_picture_is_lost() {
+    let device = AnyDevice::Cpu(Cpu);
+    let (scene, bound) = (scene("toy"), 1.0e-2);
+    let job = job(&scene, "0,8,16", "1..7,9..15,20..23");
+    let field = network("formula:16", 1);
+    let case = Case { name: "formula".to_owned(), field, scene, job, side: 24, bounds: &[] };
+    let renderer = case.field.on(&device);
+    let last = effort_count(&case, renderer.as_ref()) - 1;
+    let (exact, _) = frames(&case, renderer.as_ref(), Some(last), None);
+    let (pictures, _) = frames(&case, renderer.as_ref(), None, Some(Bound::Error(bound)));
+    let errors: Vec<f64> = pictures.iter().zip(&exact).map(|(a, b)| difference(a, b)).collect();
+    println!("{errors:.4?}");
+    assert!(errors.iter().all(|error| *error < MOST_EXCESS * f64::from(bound)), "{errors:?}");
 }
 
 #[test]
