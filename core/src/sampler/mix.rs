@@ -41,8 +41,8 @@ impl Mix {
     /// The difference between a corrector's and a predictor's combination of the same state: the corrector's newest
     /// result is one that the predictor does not have.
     pub fn correction_beyond(&self, predictor: &Mix) -> Mix {
-        let ([new, a, b, c], [p, q, r, _]) = (self.results, predictor.results);
-        Mix { state: self.state - predictor.state, results: [new, a - p, b - q, c - r] }
+        let [a, b, c, _] = predictor.results;
+        self.beyond(&Mix { results: [0.0, a, b, c], ..*predictor })
     }
 }
 

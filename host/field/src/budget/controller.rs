@@ -179,7 +179,8 @@ impl Controller {
         let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_work).sum();
         if effort == exact || work > MOST_COMPARED {
             let rendered = self.picture(search, exact, termination, progress)?;
-            return Ok(self.compared_to(rendered, [exact; 2], [Estimate::EXACT; 2]));
+            self.compared = Some((exact, Estimate::EXACT));
+            return Ok((rendered, exact, Estimate::EXACT));
         }
         let mut cheaper = self.picture(search, below, termination, progress)?;
         loop {
@@ -193,30 +194,20 @@ impl Controller {
             let of_cheaper = with_termination(found.cheaper);
             if self.expected.is_exact(effort) {
                 self.expected.learn(below, of_cheaper);
-                return Ok(self.compared_to(rendered, [effort; 2], [Estimate::EXACT; 2]));
+                self.compared = Some((effort, Estimate::EXACT));
+                return Ok((rendered, effort, Estimate::EXACT));
             }
             let estimate = with_termination(found.better);
             self.expected.learn(effort, estimate);
             if estimate.upper <= most {
                 // The next pictures take the cheaper effort if that is enough for them.
-                let next = if of_cheaper.upper <= most { (below, of_cheaper) } else { (effort, estimate) };
-                return Ok(self.compared_to(rendered, [effort, next.0], [estimate, next.1]));
+                self.compared = Some(if of_cheaper.upper <= most { (below, of_cheaper) } else { (effort, estimate) });
+                return Ok((rendered, effort, estimate));
             }
             search.tried.push(self.tried(effort, Some(estimate)));
             (cheaper, below) = (rendered, effort);
             effort = self.expected.after(effort, most);
         }
-    }
-
-    /// Keeps a choice for the run. The efforts and estimates are those of this picture, and of the next ones.
-    fn compared_to(
-        &mut self,
-        rendered: Rendered,
-        [effort, next]: [usize; 2],
-        [estimate, of_next]: [Estimate; 2],
-    ) -> (Rendered, usize, Estimate) {
-        self.compared = Some((next, of_next));
-        (rendered, effort, estimate)
     }
 
     fn within_time(
