@@ -226,6 +226,8 @@ fn numbers_without_sense_are_refused() {
     }
     let all = "train pixelnerf learn/toys -o out --objects 1024 --rays 1024 --coarse 1024 --width 1024";
     assert_refused(BINARY, folder.path(), all, &["objects", "at most 2^28"]);
+    let all = "train genvs learn/toys -o out --objects 1024 --sources 3";
+    assert_refused(BINARY, folder.path(), all, &["objects is 1024", "volume", "at most 2^30"]);
     // The least that can be computed.
     let least = "--side 16 --objects 1 --rays 1 --coarse 2 --fine 0 --width 1 --steps 1";
     done(folder.path(), &format!("train pixelnerf learn/toys -o least {least}"));

@@ -215,10 +215,10 @@ fn effort_count(case: &Case, renderer: &dyn Renderer) -> usize {
 #[test]
 fn no_corner_of_a_small_picture_is_lost() {
     let device = AnyDevice::Cpu(Cpu);
-    let (scene, bound) = (scene("toy"), 1.0e-2);
-    let job = job(&scene, "0,8,16", "1..7,9..15,20..23");
-    let field = network("formula:16", 1);
-    let case = Case { name: "formula".to_owned(), field, scene, job, side: 24, bounds: &[] };
+    let (scene, bound) = (scene("car"), 1.0e-2);
+    let job = job(&scene, "16,72,136", "8,24,32,40,48,56,64,80,88,96,104,112,120,128");
+    let field = network("pixelnerf_cars.safetensors", 1);
+    let case = Case { name: "pixelnerf, cars".to_owned(), field, scene, job, side: 24, bounds: &[] };
     let renderer = case.field.on(&device);
     let last = effort_count(&case, renderer.as_ref()) - 1;
     let (exact, _) = frames(&case, renderer.as_ref(), Some(last), None);

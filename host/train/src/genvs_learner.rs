@@ -57,6 +57,8 @@ const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
 /// Objects in validation, and views of each.
 const VALIDATION_OBJECTS: usize = 24;
 const VALIDATION_SOURCES: usize = 3;
+/// Most numbers of a step's volumes, of 4 bytes each; gradients and layers take several times as many.
+const LARGEST_VOLUMES: usize = 1 << 30;
 
 /// The default of [`GenvsSettings::share_of_largest`].
 pub const SHARE_OF_LARGEST: f32 = 0.25;
@@ -80,6 +82,17 @@ impl GenvsSettings {
         }
         self.variety.check(self.side)
     }
+
+    /// Refuses steps whose volumes no memory holds.
+    fn check_volumes(&self, architecture: &Architecture) -> std::result::Result<(), TrainError> {
+        let Architecture { image_side, ref encoder, .. } = *architecture;
+        let volume = image_side * image_side * encoder.volume_depth * encoder.feature_count;
+        if self.objects.saturating_mul(self.variety.most_sources()).saturating_mul(volume) > LARGEST_VOLUMES {
+            let allowed = "objects times sources times the numbers of a volume must be at most 2^30";
+            return Err(TrainError::Setting { name: "objects", value: self.objects as f64, allowed });
+        }
+        Ok(())
+    }
 }
 
 /// Trains a GeNVS in `folder`, or continues there: from scratch, or from a trained network.
@@ -95,8 +108,6 @@ pub fn train_genvs(
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
     settings.check()?;
-    let least_views = settings.variety.most_sources() + settings.targets.max(1);
-    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let mut architecture = Architecture::narrow(settings.side as usize, settings.width);
     let estimate = settings.estimate;
     architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = estimate);
@@ -107,6 +118,9 @@ pub fn train_genvs(
         }
         None => Genvs::new(architecture, DType::F32, schedule.seed)?,
     };
+    settings.check_volumes(&network.architecture)?;
+    let least_views = settings.variety.most_sources() + settings.targets.max(1);
+    let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let denoiser = network.architecture.denoiser.as_ref();
     let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
     let estimate = denoiser.map_or(estimate, |denoiser| denoiser.estimate);
