@@ -8,7 +8,7 @@
 //! the minimum of the squared error.
 
 use super::TrainError;
-use super::batch::Shown;
+use super::batch::{Shown, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views, colours, each};
 use super::parameters::{Contents, Parameters};
@@ -21,7 +21,6 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning, SIGMA_DATA};
-use viewfuse_core::weighting::Scheme;
 use viewfuse_field::genvs::{Architecture, Estimate};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -83,11 +82,12 @@ impl GenvsSettings {
         self.variety.check(self.side)
     }
 
-    /// Refuses steps whose volumes no memory holds.
+    /// Refuses steps whose volumes alone take more than 4 GiB.
     fn check_volumes(&self, architecture: &Architecture) -> std::result::Result<(), TrainError> {
         let Architecture { image_side, ref encoder, .. } = *architecture;
-        let volume = image_side * image_side * encoder.volume_depth * encoder.feature_count;
-        if self.objects.saturating_mul(self.variety.most_sources()).saturating_mul(volume) > LARGEST_VOLUMES {
+        let factors =
+            [self.variety.most_sources(), image_side, image_side, encoder.volume_depth, encoder.feature_count];
+        if factors.into_iter().fold(self.objects, usize::saturating_mul) > LARGEST_VOLUMES {
             let allowed = "objects times sources times the numbers of a volume must be at most 2^30";
             return Err(TrainError::Setting { name: "objects", value: self.objects as f64, allowed });
         }
@@ -120,6 +120,7 @@ pub fn train_genvs(
     };
     settings.check_volumes(&network.architecture)?;
     let least_views = settings.variety.most_sources() + settings.targets.max(1);
+    let least_views = least_views.max(VALIDATION_SOURCES + 1);
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let denoiser = network.architecture.denoiser.as_ref();
     let width = denoiser.map_or(settings.width, |denoiser| denoiser.base_channels);
@@ -216,7 +217,7 @@ impl Learner for GenvsLearner {
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let GenvsSettings { objects, targets, samples, share_of_largest, ref variety, .. } = self.settings;
         let (sources, scheme) = variety.drawn(draw);
-        let targets = if scheme == Scheme::MEAN { targets } else { 1 };
+        let targets = if Targets::of(scheme) == Targets::One { 1 } else { targets };
         let views = ViewCounts { sources, targets };
         let views = Views::draw(&self.scenes, draw, objects, views, self.network.parameters.dtype())?;
         let samples = CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: samples, jitter: 1.0 };
