@@ -178,7 +178,7 @@ fn wrong_input_is_told() {
     refused("train pixelnerf learn/toys -o out --sources 3,10", &["has 10 photographs; 11 are needed"]);
     refused("train genvs learn/toys -o out --sources 3,9 --targets 2", &["has 10 photographs; 11 are needed"]);
     // Validation has three sources, however few the steps have.
-    done(folder.path(), "scenes make toys few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 16");
+    done(folder.path(), "scenes make toys few --train 1 --val 1 --test 0 --views 3 --test-views 3 --size 64");
     refused("train genvs few/toys --side 16 -o out --sources 1 --targets 1", &["has 3 photographs; 4 are needed"]);
     assert!(!folder.path().join("out").exists());
 }
