@@ -8,9 +8,9 @@
 //! ```text
 //! scenes       pictures and cameras in memory            TrainingScene
 //! draw         random numbers of a step                  Draw
-//! variety      what differs from step to step            Variety
-//! batch        sources and target rays of a step         Batch
 //! weights      of a batch's views, by a scheme           of_scheme
+//! batch        sources and target rays of a step         Batch
+//! variety      what differs from step to step            Variety
 //! operations   gradients of our own kernels              Convolution, PointNetwork, Look
 //! parameters   trained parameters                        Parameters
 //! images, compositing     parts of the graphs
