@@ -10,8 +10,8 @@
 
 pub mod quantised;
 
+use crate::fetch::{Fetch, StartingAt};
 use crate::math::{abs, max, sin_cos, sqrt, two_product, two_sum};
-use crate::pages::{Fetch, StartingAt};
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;

@@ -6,8 +6,8 @@
 //! 1.3 % at 1e-6), and the weights telescope to `1 - T_end`. Exclusive: a sample does not shade itself (in published
 //! GeNVS it does).
 
+use crate::fetch::Fetch;
 use crate::math::{exp, max};
-use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
 /// The state of compositing along a ray: `C` accumulated channels and the depth.

@@ -4,8 +4,8 @@
 //! equal parts of the interval) and importance samples by inverting the distribution that a first pass found; and
 //! PixelNeRF's third: samples around the depth that the first pass found.
 
+use crate::fetch::Fetch;
 use crate::math::clamp;
-use crate::pages::Fetch;
 use crate::random::{normal, uniform_from, uniform_pair};
 use crate::rays::TargetRay;
 use bytemuck::{Pod, Zeroable};

@@ -2,7 +2,7 @@
 //!
 //! Sums run in view order. Source: PixelNeRF's and GeNVS's combine step, with the mean replaced by [`Weights`].
 
-use crate::pages::Fetch;
+use crate::fetch::Fetch;
 use crate::weights::Weights;
 use bytemuck::{Pod, Zeroable};
 

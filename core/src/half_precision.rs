@@ -3,13 +3,13 @@
 //!
 //! Conversions use integer arithmetic only: devices without an f16 type, or with another rounding, get the same bits.
 
-use crate::pages::Fetch;
+use crate::fetch::Fetch;
 
 /// The largest number in half precision.
-pub const LARGEST: f32 = 65504.0;
+pub const MAX_F16: f32 = 65504.0;
 
 /// The f16 bits nearest to a number, of two equally near ones the even ones: off by at most 2^-11 of the number, below
-/// 2^-14 by 2^-25. Larger numbers and infinity become [`LARGEST`]; NaN stays NaN.
+/// 2^-14 by 2^-25. Larger numbers and infinity become [`MAX_F16`]; NaN stays NaN.
 #[inline]
 pub fn f16_bits(number: f32) -> u32 {
     let bits = number.to_bits();
@@ -17,7 +17,7 @@ pub fn f16_bits(number: f32) -> u32 {
     if magnitude > 0x7f80_0000 {
         return sign | 0x7e00;
     }
-    if magnitude >= LARGEST.to_bits() {
+    if magnitude >= MAX_F16.to_bits() {
         return sign | 0x7bff;
     }
     let exponent = magnitude >> 23;

@@ -26,11 +26,11 @@ use core::fmt;
 use core::ops::{Add, Div, Mul, Sub};
 
 /// Steps of Newton's method at most. Lenses of cameras take 3 to 6 in either precision.
-const MOST_STEPS: u32 = 24;
+const MAX_STEPS: u32 = 24;
 /// Halvings of a step that does not reduce the residual, at most.
-const MOST_HALVINGS: u32 = 12;
+const MAX_HALVINGS: u32 = 12;
 /// Greatest magnitude of a coefficient: powers of eight of them stay finite in `f32`.
-pub const LARGEST_COEFFICIENT: f64 = 1.0e4;
+pub const MAX_COEFFICIENT: f64 = 1.0e4;
 /// Largest angle from the principal axis that an ideal image holds, in radians: 89.9 degrees.
 const WIDEST: f32 = 1.569_051;
 
@@ -101,7 +101,7 @@ pub enum Projection {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LensError {
-    /// The coefficient with this index is not finite, or larger than [`LARGEST_COEFFICIENT`].
+    /// The coefficient with this index is not finite, or larger than [`MAX_COEFFICIENT`].
     Coefficient(usize),
 }
 
@@ -109,7 +109,7 @@ impl fmt::Display for LensError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let LensError::Coefficient(index) = self;
         let name = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"].get(*index).copied().unwrap_or("?");
-        write!(f, "the lens's coefficient {name} is not a number of at most {LARGEST_COEFFICIENT:e}")
+        write!(f, "the lens's coefficient {name} is not a number of at most {MAX_COEFFICIENT:e}")
     }
 }
 
@@ -142,7 +142,7 @@ impl Lens {
         let mut index = 0;
         while index < 8 {
             let value = coefficients[index];
-            if !(-LARGEST_COEFFICIENT..=LARGEST_COEFFICIENT).contains(&value) {
+            if !(-MAX_COEFFICIENT..=MAX_COEFFICIENT).contains(&value) {
                 return Err(LensError::Coefficient(index));
             }
             index += 1;
@@ -339,14 +339,14 @@ fn unbent<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
     let mut angle = if radius < widest { radius } else { widest };
     let mut miss = bent(coefficients, angle) - radius;
     let mut step = 0;
-    while step < MOST_STEPS {
+    while step < MAX_STEPS {
         let slope = bent_slope(coefficients, angle);
         // Beyond the fold: back towards the centre, where the slope is 1.
         let move_by = if slope > T::of(1.0e-3) { miss / slope } else { angle * T::of(0.5) };
         let mut share = T::of(1.0);
         let mut halving = 0;
         let mut moved = false;
-        while halving < MOST_HALVINGS && !moved {
+        while halving < MAX_HALVINGS && !moved {
             let next = angle - share * move_by;
             let next = if next > widest { widest } else { next };
             let next = if next > zero { next } else { zero };
@@ -359,7 +359,7 @@ fn unbent<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
             share = share * T::of(0.5);
             halving += 1;
         }
-        step = if moved { step + 1 } else { MOST_STEPS };
+        step = if moved { step + 1 } else { MAX_STEPS };
     }
     let factor = angle.tangent() / radius;
     [point[0] * factor, point[1] * factor]
@@ -374,7 +374,7 @@ fn straightened<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
     let mut guess = point;
     let mut miss = missed(false, coefficients, guess, point);
     let mut step = 0;
-    while step < MOST_STEPS {
+    while step < MAX_STEPS {
         let [x, y] = guess;
         let (factor, slope) = factor_and_slope(coefficients, x * x + y * y);
         // The Jacobian is symmetric.
@@ -393,7 +393,7 @@ fn straightened<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
         let mut share = T::of(1.0);
         let mut halving = 0;
         let mut moved = false;
-        while halving < MOST_HALVINGS && !moved {
+        while halving < MAX_HALVINGS && !moved {
             let next = [x - share * dx, y - share * dy];
             let next_miss = missed(false, coefficients, next, point);
             if next_miss < miss {
@@ -404,7 +404,7 @@ fn straightened<T: Real>(coefficients: &[T; 8], point: [T; 2]) -> [T; 2] {
             share = share * T::of(0.5);
             halving += 1;
         }
-        step = if moved { step + 1 } else { MOST_STEPS };
+        step = if moved { step + 1 } else { MAX_STEPS };
     }
     guess
 }

@@ -1,14 +1,12 @@
 //! The mathematics of viewfuse, at fixed sizes.
 //!
 //! Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32` and 32-bit integers (only the
-//! metrics, which never run on a device, in `f64`; lenses in either), so that one body serves as the definition on a workstation, as the
-//! source of a GPU kernel and as firmware. The modules are listed in the order of the data:
+//! metrics, which never run on a device, in `f64`; lenses in either), so that one body serves as the definition on a workstation, as a
+//! part of a GPU kernel and as firmware. The modules are listed in the order of the data:
 //!
 //! ```text
 //! math              one result on every target                     sqrt, exp, sin_cos, angles, norms
-//! pages             buffers in one piece or in pages               Fetch, Pages
-//! compact           which elements a mask marks, as a list         marked_in_run, run_offsets, list_run
-//! finite            where the first NaN or infinity is             first_non_finite
+//! fetch             elements by index, wherever they lie           Fetch, StartingAt
 //! half_precision    two numbers in a word (f16)                    f16_bits, f16_value, packed_f16
 //! pose, camera      camera poses and intrinsics                    Pose, Pinhole, Camera, Ray, Projection
 //! lens              lens distortion                                Lens, LensBlock: distort, undistort
@@ -21,17 +19,9 @@
 //! lookup            interpolation in grids                         bilinear, trilinear
 //! fuse              weighted sums of the views' latents            fuse_views, fuse_visible, fuse_readings
 //! composite         compositing of the samples along a ray         Compositor<C>
-//! sample_mask       which samples can be left out                  is_sampled
-//! network           layers                                         linear, convolve, group_norm, attend, resample
-//! pixelnerf         point embedding, latents, radiance             embedded_value, gathered_value, radiance
-//! genvs             volumes of features become a feature image     VolumePlace, weigh_features, denoiser_input
 //! schedule          noise levels of the diffusion denoiser         NoiseSchedule, Preconditioning, HeunStep
 //! sampler           samplers with few calls of the denoiser        Sampler, Mix, History, Churn, verdict
-//! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
-//! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend
-//! limits            what a device can do at most                   chained, copied
 //! metrics           picture quality                                psnr, ssim
-//! kernels           the list of kernels, one row each              Kernel, for_each_kernel
 //! ```
 //!
 //! A module uses only modules listed above it. Types that are checked when they are built ([`pose::Pose`],
@@ -41,31 +31,21 @@
 
 pub mod attention;
 pub mod camera;
-pub mod compact;
 pub mod composite;
 pub mod depths;
-pub mod finite;
+pub mod fetch;
 pub mod fuse;
-pub mod genvs;
 pub mod half_precision;
-pub mod kernels;
 pub mod lens;
-pub mod limits;
 pub mod lookup;
 pub mod math;
 pub mod metrics;
-pub mod network;
-pub mod pages;
-pub mod pixelnerf;
-pub mod plane_sweep;
 pub mod pose;
 pub mod random;
 pub mod rays;
-pub mod sample_mask;
 pub mod sampler;
 pub mod schedule;
 pub mod sources;
-pub mod visual_hull;
 pub mod weighting;
 pub mod weights;
 

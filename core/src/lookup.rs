@@ -4,8 +4,8 @@
 //! with node centres at halves (the image convention of [`crate::camera`]). Outside the outermost centres the border
 //! node's value is used; a NaN coordinate counts as 0. Grids shorter than the stated size are not allowed.
 
+use crate::fetch::Fetch;
 use crate::math::clamp;
-use crate::pages::Fetch;
 
 /// One axis of a look-up among `count` nodes: the two nodes around a coordinate and the share of the second.
 #[inline(always)]

@@ -16,7 +16,7 @@ use glam::Vec3;
 pub const RIGID_TOLERANCE: f32 = 1.0e-3;
 
 /// Largest allowed coordinate of a camera centre: distances and their squares' scaled forms then stay finite.
-pub const LARGEST_COORDINATE: f32 = 1.0e30;
+pub const MAX_COORDINATE: f32 = 1.0e30;
 
 /// Why a 4x4 matrix is not a camera pose. Rows and columns count from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,7 +29,7 @@ pub enum PoseError {
         /// Column of the entry.
         column: u32,
     },
-    /// A coordinate of the centre is larger than [`LARGEST_COORDINATE`].
+    /// A coordinate of the centre is larger than [`MAX_COORDINATE`].
     TooFar,
     /// The last row is not `0 0 0 1`.
     LastRow,
@@ -50,7 +50,7 @@ impl fmt::Display for PoseError {
                 write!(f, "the entry in row {}, column {} is not finite as a 32-bit number", row + 1, column + 1)
             }
             PoseError::TooFar => {
-                write!(f, "the camera's centre is further than {LARGEST_COORDINATE:e} from the origin")
+                write!(f, "the camera's centre is further than {MAX_COORDINATE:e} from the origin")
             }
             PoseError::LastRow => f.write_str("the last row is not 0 0 0 1"),
             PoseError::NotRigid { deviation } => {
@@ -167,7 +167,7 @@ impl Pose {
             centre_world: Vec3::new(m[0][3], m[1][3], m[2][3]),
         };
         let centre = pose.centre_world;
-        if max(max(abs(centre.x), abs(centre.y)), abs(centre.z)) > LARGEST_COORDINATE {
+        if max(max(abs(centre.x), abs(centre.y)), abs(centre.z)) > MAX_COORDINATE {
             return Err(PoseError::TooFar);
         }
         let deviation = pose.deviation_from_rigid();

@@ -1,8 +1,8 @@
 //! Rays of a target and the points on them.
 
 use crate::camera::CameraBlock;
+use crate::fetch::Fetch;
 use crate::math::{max, norm3};
-use crate::pages::Fetch;
 use bytemuck::{Pod, Zeroable};
 
 /// A ray of a target with its near and far bounds, as plain data. World coordinates; `near` and `far` are distances from

@@ -42,7 +42,7 @@ mod heun;
 mod interpolation;
 mod mix;
 
-pub use mix::{MOST_RESULTS, Mix, NoiseBlock, mixed_element, noisy_element};
+pub use mix::{MAX_RESULTS, Mix, NoiseBlock, mixed_element, noisy_element};
 
 use core::fmt;
 use core::str::FromStr;
@@ -126,13 +126,13 @@ macro_rules! samplers {
                 }
             }
 
-            fn step_by(self, levels: &[f32; MOST_RESULTS], count: u32, next: f32) -> Mix {
+            fn step_by(self, levels: &[f32; MAX_RESULTS], count: u32, next: f32) -> Mix {
                 match self {
                     $(Sampler::$sampler => $step(levels, count, next),)+
                 }
             }
 
-            fn correction_by(self, levels: &[f32; MOST_RESULTS], count: u32, reached: f32) -> Mix {
+            fn correction_by(self, levels: &[f32; MAX_RESULTS], count: u32, reached: f32) -> Mix {
                 match self {
                     $(Sampler::$sampler => $correction(levels, count, reached),)+
                 }
@@ -221,7 +221,7 @@ fn denoised(_: f32) -> Option<Mix> {
 }
 
 /// No correction.
-fn none(_: &[f32; MOST_RESULTS], _: u32, _: f32) -> Mix {
+fn none(_: &[f32; MAX_RESULTS], _: u32, _: f32) -> Mix {
     Mix::STAY
 }
 
@@ -322,13 +322,13 @@ impl FromStr for Sampler {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct History {
-    levels: [f32; MOST_RESULTS],
+    levels: [f32; MAX_RESULTS],
     count: u32,
 }
 
 impl History {
     /// No results.
-    pub const NONE: History = History { levels: [0.0; MOST_RESULTS], count: 0 };
+    pub const NONE: History = History { levels: [0.0; MAX_RESULTS], count: 0 };
 
     /// Adds a result at level `sigma`. If that is not below the newest level, all results before it are dropped:
     /// polynomials need distinct levels.
@@ -338,7 +338,7 @@ impl History {
         }
         let [a, b, c, _] = self.levels;
         self.levels = [sigma, a, b, c];
-        self.count = (self.count + 1).min(MOST_RESULTS as u32);
+        self.count = (self.count + 1).min(MAX_RESULTS as u32);
     }
 
     /// The number of results.

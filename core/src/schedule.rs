@@ -25,13 +25,13 @@ pub const SIGMA_DATA: f32 = 0.5;
 /// The smallest noise level that a schedule takes.
 pub const SMALLEST_LEVEL: f32 = 1.0e-30;
 /// The largest noise level that a schedule takes.
-pub const LARGEST_LEVEL: f32 = 1.0e30;
+pub const MAX_LEVEL: f32 = 1.0e30;
 
 /// Why two noise levels do not make a schedule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ScheduleError {
-    /// A level lies outside [`SMALLEST_LEVEL`] to [`LARGEST_LEVEL`] or is NaN.
+    /// A level lies outside [`SMALLEST_LEVEL`] to [`MAX_LEVEL`] or is NaN.
     Level,
     /// The smallest level is above the largest.
     Order,
@@ -41,7 +41,7 @@ impl fmt::Display for ScheduleError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             ScheduleError::Level => {
-                write!(f, "noise levels must lie between {SMALLEST_LEVEL:e} and {LARGEST_LEVEL:e}")
+                write!(f, "noise levels must lie between {SMALLEST_LEVEL:e} and {MAX_LEVEL:e}")
             }
             ScheduleError::Order => f.write_str("the smallest noise level must not be above the largest"),
         }
@@ -67,7 +67,7 @@ impl NoiseSchedule {
     /// # Errors
     /// [`ScheduleError`] if a level is out of range or they are in the wrong order.
     pub fn new(sigma_min: f32, sigma_max: f32) -> Result<NoiseSchedule, ScheduleError> {
-        let range = SMALLEST_LEVEL..=LARGEST_LEVEL;
+        let range = SMALLEST_LEVEL..=MAX_LEVEL;
         if !(range.contains(&sigma_min) && range.contains(&sigma_max)) {
             return Err(ScheduleError::Level);
         }

@@ -170,7 +170,7 @@ pub enum AngleKind {
 }
 
 /// The most sources of the kernels that weigh on a device: rows of weights there have this length.
-pub const MOST_WEIGHED: usize = 32;
+pub const MAX_WEIGHED: usize = 32;
 
 /// A dispatch of [`weigh`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

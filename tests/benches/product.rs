@@ -12,7 +12,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Layer, LayerShape};
-use viewfuse_core::network::linear::LinearBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
 
 const ROUNDS: usize = 40;
 /// Sums that are computed side by side: enough that none waits for its own last step (latency 4, two a cycle).

@@ -28,9 +28,9 @@ use viewfuse_core::Vec3;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 use viewfuse_core::sources::Sources;
-use viewfuse_core::visual_hull::shade::sample;
 use viewfuse_core::weighting::{AngleKind, Scheme, weigh};
 use viewfuse_core::weights::Weights;
+use viewfuse_kernels::visual_hull::shade::sample;
 use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_vulkan::GpuOptions;
 

@@ -15,7 +15,7 @@ const ROUNDS: u64 = 20_000;
 /// No file here takes longer, however busy the machine is; alone it takes 10 ms at most.
 const LONGEST: Duration = Duration::from_secs(60);
 /// Tensors of files that ask for more are not read here.
-const LARGEST_READ: u64 = 64 << 20;
+const MAX_READ: u64 = 64 << 20;
 /// What opening may take: so many bytes for each of the file, and something for every file.
 const PER_BYTE: usize = 160;
 const ALWAYS: usize = 256 << 10;
@@ -67,7 +67,7 @@ fn attempt(path: &Path, bytes: &[u8], tally: &mut Tally) {
             tally.opened += 1;
             for name in checkpoint.shapes().keys() {
                 let estimate = checkpoint.byte_estimate([name.as_str()]);
-                if estimate <= LARGEST_READ {
+                if estimate <= MAX_READ {
                     let before = MEMORY.current_usage();
                     MEMORY.reset_peak_usage();
                     let outcome = checkpoint.tensor(name);

@@ -4,7 +4,7 @@ use crate::candidate::{Candidate, Test, assert_works};
 use bytemuck::bytes_of;
 use libtest_mimic::Failed;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::network::linear::LinearBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::Kernel;
 use viewfuse_vulkan::{Adapter, Gpu, GpuOptions, Limits, Missing, VulkanError};
 

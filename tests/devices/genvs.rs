@@ -27,7 +27,7 @@ pub(crate) const TESTS: &[Test] = &[
 
 /// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's, through three
 /// calls of the denoiser.
-const LARGEST_DIFFERENCE: f32 = 1.0e-3;
+const MAX_DIFFERENCE: f32 = 1.0e-3;
 
 /// What only the denoiser needs.
 const DENOISERS: [Kernel; 4] = [Kernel::DenoiserInput, Kernel::GroupNorm, Kernel::MixPictures, Kernel::AddNoise];
@@ -57,7 +57,7 @@ fn picture<D: Device + Sync>(
     let plan = Plan { steps, ..Plan::published(0) };
     let options = GenvsOptions { plan, omissions, ..GenvsOptions::default() };
     let field = Genvs::new(test_networks::deterministic(&architecture), options)?;
-    let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+    let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
     (scores[0], scores[2]) = (0.7, 0.3);
     let weights = Weights::from_scores(&scores, 3);
     let sources = photographs(3, 30);
@@ -77,7 +77,7 @@ fn compare(ours: &[[f32; 4]], reference: &[[f32; 4]]) -> Result<(), Failed> {
     let differences = ours.iter().flatten().zip(reference.iter().flatten()).map(|(a, e)| (a - e).abs());
     let worst = differences.fold(0.0, |worst: f32, difference| if difference <= worst { worst } else { difference });
     println!("a channel differs by {worst:.1e}");
-    if worst <= LARGEST_DIFFERENCE { Ok(()) } else { Err(format!("a channel differs by {worst}").into()) }
+    if worst <= MAX_DIFFERENCE { Ok(()) } else { Err(format!("a channel differs by {worst}").into()) }
 }
 
 fn genvss_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed> {

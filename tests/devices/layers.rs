@@ -7,11 +7,11 @@ use viewfuse::check::world::Numbers;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape};
-use viewfuse_core::network::attend::MatrixBlock;
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::linear::LinearBlock;
-use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::network::attend::MatrixBlock;
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
+use viewfuse_kernels::network::transpose::TransposedBlock;
 use viewfuse_vulkan::{GpuOptions, Limits};
 
 pub(crate) const TESTS: &[Test] = &[

@@ -26,7 +26,7 @@ const SIDE: u32 = 20;
 const COARSE_COUNT: u32 = 32;
 /// Largest difference of a channel, whose range is 1. Sums of products run in another order than the CPU's; a fine sample
 /// that falls into the next part of a ray for it moves by a 64th of the ray, which changes a pixel by little.
-const LARGEST_DIFFERENCE: f32 = 4.0e-3;
+const MAX_DIFFERENCE: f32 = 4.0e-3;
 
 fn pixelnerf_has_the_reference_values(candidate: &Candidate) -> Result<(), Failed> {
     let device = candidate.vulkan(&GpuOptions::default())?;
@@ -73,7 +73,7 @@ fn pixelnerfs_pictures_are_the_cpus(candidate: &Candidate) -> Result<(), Failed>
             let differences = ours.iter().flatten().zip(reference.iter().flatten()).map(|(a, e)| (a - e).abs());
             let worst =
                 differences.fold(0.0, |worst: f32, difference| if difference <= worst { worst } else { difference });
-            if !(worst <= LARGEST_DIFFERENCE) {
+            if !(worst <= MAX_DIFFERENCE) {
                 return Err(format!("{omissions:?}: a channel differs by {worst}").into());
             }
         }

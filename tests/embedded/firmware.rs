@@ -28,7 +28,7 @@ const REQUIRED: &str = "VIEWFUSE_REQUIRE_FIRMWARE";
 const PROFILES: [&str; 2] = ["release", "fast"];
 const PROGRAMS: [&str; 4] = ["formulas", "attention", "samplers", "quantised"];
 /// Of so many different numbers a list consists at least.
-const LEAST_DIFFERENT: usize = 200;
+const MIN_DIFFERENT: usize = 200;
 
 fn host_list(program: &str, inputs: Inputs) -> Vec<Line> {
     match program {
@@ -103,7 +103,7 @@ pub(crate) fn trials() -> Vec<Trial> {
 fn the_lists_are_worth_comparing() -> Result<(), Failed> {
     for program in PROGRAMS {
         let list = host_list(program, Inputs::STANDARD);
-        compare(&list, &list, LEAST_DIFFERENT).map_err(|difference| format!("{program}: {difference:?}"))?;
+        compare(&list, &list, MIN_DIFFERENT).map_err(|difference| format!("{program}: {difference:?}"))?;
     }
     Ok(())
 }
@@ -115,7 +115,7 @@ fn every_kind_of_number_depends_on_the_inputs() -> Result<(), Failed> {
     const INDEPENDENT: [&str; 2] = ["mean", "gaussian:beta=0"];
     for program in PROGRAMS {
         let (list, other) = (host_list(program, Inputs::STANDARD), host_list(program, changed));
-        assert!(compare(&other, &list, LEAST_DIFFERENT).is_err());
+        assert!(compare(&other, &list, MIN_DIFFERENT).is_err());
         assert_eq!(list.len(), other.len());
         let mut names: Vec<&str> = list.iter().map(|(name, _)| name.as_str()).collect();
         names.sort_unstable();
@@ -207,9 +207,9 @@ fn bits_equal_the_hosts(firmware: &Firmware, profile: &'static str, program: &st
     let path = firmware.folder(profile)?.join(program);
     let printed = parsed(&firmware.emulator()?.run(&path)?)?;
     let expected = host_list(program, Inputs::STANDARD);
-    compare(&printed, &expected, LEAST_DIFFERENT).map_err(|difference| format!("{difference:?}"))?;
+    compare(&printed, &expected, MIN_DIFFERENT).map_err(|difference| format!("{difference:?}"))?;
     let changed = Inputs { phase: 1.01 * Inputs::STANDARD.phase, ..Inputs::STANDARD };
-    assert!(compare(&printed, &host_list(program, changed), LEAST_DIFFERENT).is_err());
+    assert!(compare(&printed, &host_list(program, changed), MIN_DIFFERENT).is_err());
     Ok(())
 }
 

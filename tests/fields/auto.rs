@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::auto::{self, Chosen, MOST_LEFT_OUT, choose, schemes};
+use viewfuse::field::auto::{self, Chosen, MAX_LEFT_OUT, choose, schemes};
 use viewfuse::field::pixelnerf::{Architecture, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse::field::render::{Frame, RenderError, RenderOptions, Stage, render};
 use viewfuse::field::training_free::TrainingFree;
@@ -87,7 +87,7 @@ fn the_choice_is_the_best_that_was_tried_or_the_default() -> Result<(), Box<dyn 
     let scene = room(folder.path(), 6);
     let (frames, chosen) = automatic(&scene)?;
     let Chosen { candidates, left_out, weighting, settings, .. } = &chosen;
-    assert_eq!(left_out.len(), 5.min(MOST_LEFT_OUT));
+    assert_eq!(left_out.len(), 5.min(MAX_LEFT_OUT));
     assert!(candidates.len() > schemes().len(), "the field's scalars are tried as well");
     assert!(candidates.iter().all(|candidate| candidate.scores.iter().all(|score| *score > 5.0)));
     let score = |candidate: &auto::Candidate| candidate.psnr;

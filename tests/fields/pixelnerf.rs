@@ -117,7 +117,7 @@ fn the_order_of_the_sources_is_only_rounding() {
     let sources = sources(3);
     let reversed = SourceImages { images: sources.images.iter().rev().cloned().collect(), ..sources.clone() };
     let weights = |scores: [f32; 3]| {
-        let mut all = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+        let mut all = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
         all[..3].copy_from_slice(&scores);
         Weights::from_scores(&all, 3)
     };

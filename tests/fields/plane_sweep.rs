@@ -13,9 +13,9 @@ use viewfuse::weighting::sources::SourceWeights;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::metrics::psnr;
-use viewfuse_core::plane_sweep::blend::blend;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
+use viewfuse_kernels::plane_sweep::blend::blend;
 use viewfuse_tests::places::repository;
 
 /// Distance of the painted wall.
@@ -67,7 +67,7 @@ fn wall(gains: [f32; 3]) -> SourceImages {
 /// Equal weights of all others for each source.
 fn relevance(count: usize) -> Vec<SourceWeights> {
     let of = |own: usize| {
-        let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+        let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
         (0..count).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
         Weights::from_scores(&scores, count as u32)
     };
@@ -149,7 +149,7 @@ fn sources_without_a_weight_change_no_bit() {
         let renderer = On { device: &Cpu, field: &field };
         let mut session = Session::open(&renderer, &sources, &Silent).expect("a session");
         let among_three = |own: usize| {
-            let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+            let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
             (0..3).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
             Weights::from_scores(&scores, count)
         };

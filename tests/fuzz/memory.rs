@@ -4,11 +4,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Nothing takes more than this: a larger process is refused memory, and ends. The machine stays usable.
-const MOST: usize = 3 << 30;
+const MAX_BYTES: usize = 3 << 30;
 
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
-static LARGEST: AtomicUsize = AtomicUsize::new(0);
+static PEAK_ALLOCATION: AtomicUsize = AtomicUsize::new(0);
 
 /// The system's allocator, counted.
 pub(crate) struct Counting;
@@ -17,11 +17,11 @@ pub(crate) struct Counting;
 fn take(size: usize) -> bool {
     let now = NOW.fetch_add(size, Ordering::Relaxed).saturating_add(size);
     PEAK.fetch_max(now, Ordering::Relaxed);
-    LARGEST.fetch_max(size, Ordering::Relaxed);
-    if now > MOST {
+    PEAK_ALLOCATION.fetch_max(size, Ordering::Relaxed);
+    if now > MAX_BYTES {
         NOW.fetch_sub(size, Ordering::Relaxed);
     }
-    now <= MOST
+    now <= MAX_BYTES
 }
 
 fn give_back(size: usize) {
@@ -87,11 +87,11 @@ unsafe impl GlobalAlloc for Counting {
 pub(crate) fn start() -> usize {
     let now = NOW.load(Ordering::Relaxed);
     PEAK.store(now, Ordering::Relaxed);
-    LARGEST.store(0, Ordering::Relaxed);
+    PEAK_ALLOCATION.store(0, Ordering::Relaxed);
     now
 }
 
 /// Most bytes taken at once since [`start`], and the largest piece.
 pub(crate) fn since_start() -> [usize; 2] {
-    [PEAK.load(Ordering::Relaxed), LARGEST.load(Ordering::Relaxed)]
+    [PEAK.load(Ordering::Relaxed), PEAK_ALLOCATION.load(Ordering::Relaxed)]
 }

@@ -17,11 +17,11 @@ use viewfuse_tests::command::files_below;
 use viewfuse_tests::places::data;
 
 /// Most bytes that reading a small file may take.
-const MOST_MEMORY: usize = 256 << 20;
+const MAX_MEMORY: usize = 256 << 20;
 /// Inputs that are kept because they led to something new, at most.
-const MOST_KEPT: usize = 1024;
+const MAX_KEPT: usize = 1024;
 /// A target that fell so many times is left.
-const MOST_FALLS: usize = 10;
+const MAX_FALLS: usize = 10;
 
 /// What a worker does.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -160,7 +160,7 @@ impl Worker<'_> {
             }
             if let Some(verdict) = self.attempt(target, &input)
                 && kinds.insert(kind(&verdict))
-                && kept.len() < MOST_KEPT
+                && kept.len() < MAX_KEPT
                 && input.len() < LONGEST / 4
             {
                 kept.push(input);
@@ -174,7 +174,7 @@ impl Worker<'_> {
         let Found { executions, fell, .. } = &self.found;
         *executions >= self.order.executions
             || self.start.elapsed().as_secs_f64() >= self.order.seconds
-            || fell.len() >= MOST_FALLS
+            || fell.len() >= MAX_FALLS
     }
 
     /// Tries an input; `None` if it fell.
@@ -202,7 +202,7 @@ impl Worker<'_> {
         let reason = match outcome {
             Err(_) => PANIC.lock().map_or_else(|_| "a panic".to_owned(), |said| said.clone()),
             Ok(Err(fault)) => fault,
-            Ok(Ok(_)) if taken > MOST_MEMORY => format!("it took {} MiB", taken >> 20),
+            Ok(Ok(_)) if taken > MAX_MEMORY => format!("it took {} MiB", taken >> 20),
             Ok(Ok(verdict)) => {
                 found.read += u64::from(verdict == Verdict::Read);
                 return Some(verdict);

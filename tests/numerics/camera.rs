@@ -4,7 +4,7 @@
 use glam::Vec3;
 use viewfuse::check::poses::Random;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
-use viewfuse_core::pose::{LARGEST_COORDINATE, Pose, PoseError};
+use viewfuse_core::pose::{MAX_COORDINATE, Pose, PoseError};
 use viewfuse_core::sources::{Sources, SourcesError};
 
 const UNIT: [[f32; 4]; 4] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
@@ -97,8 +97,8 @@ fn what_is_not_a_pose_is_refused() {
         m[row][column] = value;
         Pose::from_opencv(&m)
     };
-    assert_eq!(changed(0, 3, 1.1 * LARGEST_COORDINATE), Err(PoseError::TooFar));
-    assert!(changed(0, 3, LARGEST_COORDINATE).is_ok());
+    assert_eq!(changed(0, 3, 1.1 * MAX_COORDINATE), Err(PoseError::TooFar));
+    assert!(changed(0, 3, MAX_COORDINATE).is_ok());
     assert_eq!(changed(3, 3, 2.0), Err(PoseError::LastRow));
     assert_eq!(changed(3, 0, 0.1), Err(PoseError::LastRow));
     assert_eq!(changed(2, 2, -1.0), Err(PoseError::Mirrored));

@@ -5,8 +5,8 @@ use viewfuse::check::compare::relative_units;
 use viewfuse::check::poses::Random;
 use viewfuse::device::Device;
 use viewfuse::device::cpu::Cpu;
-use viewfuse_core::network::attend::{softmax_scale, softmax_value};
-use viewfuse_core::network::group_norm::{
+use viewfuse_kernels::network::attend::{softmax_scale, softmax_value};
+use viewfuse_kernels::network::group_norm::{
     GroupNormBlock, MeanBlock, channel_mean, group_norm_element, group_norm_partials, group_norm_statistics, silu,
 };
 

@@ -10,10 +10,10 @@ use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::{Orbit, render, toy};
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::half_precision::{LARGEST, f16_bits, f16_value, fetch_f16, packed_f16, word_count};
-use viewfuse_core::pixelnerf::{GatherBlock, GridPlace, gathered_value, gathered_value_f16};
+use viewfuse_core::half_precision::{MAX_F16, f16_bits, f16_value, fetch_f16, packed_f16, word_count};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_core::weights::Weights;
+use viewfuse_kernels::pixelnerf::{GatherBlock, GridPlace, gathered_value, gathered_value_f16};
 use viewfuse_tests::fields::{self, line};
 
 #[test]
@@ -62,11 +62,11 @@ fn numbers_at_random() {
             continue;
         }
         assert_eq!(f16_bits(number), expected(number), "{number:e}");
-        let error = (f64::from(f16_value(f16_bits(number))) - f64::from(number.clamp(-LARGEST, LARGEST))).abs();
+        let error = (f64::from(f16_value(f16_bits(number))) - f64::from(number.clamp(-MAX_F16, MAX_F16))).abs();
         let bound = f64::from(number).abs() * 0.5_f64.powi(11);
         assert!(error <= bound.max(0.5_f64.powi(25)), "{number:e} is off by {error:e}");
     }
-    for (number, whole) in [(65519.9, LARGEST), (65520.0, LARGEST), (f32::MAX, LARGEST), (f32::INFINITY, LARGEST)] {
+    for (number, whole) in [(65519.9, MAX_F16), (65520.0, MAX_F16), (f32::MAX, MAX_F16), (f32::INFINITY, MAX_F16)] {
         assert_eq!([f16_value(f16_bits(number)), f16_value(f16_bits(-number))], [whole, -whole]);
     }
 }

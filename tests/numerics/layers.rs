@@ -4,10 +4,10 @@
 use viewfuse::check::poses::Random;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Layer, LayerShape, Memory};
-use viewfuse_core::network::attend::{MatrixBlock, matrix_element};
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
-use viewfuse_core::network::transpose::{TransposedBlock, transposed_element};
+use viewfuse_kernels::network::attend::{MatrixBlock, matrix_element};
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::depthwise::{DepthwiseBlock, depthwise_element};
+use viewfuse_kernels::network::transpose::{TransposedBlock, transposed_element};
 
 fn numbers(random: &mut Random, count: usize) -> Vec<f32> {
     (0..count).map(|_| random.normal() as f32).collect()

@@ -1,7 +1,7 @@
 //! Lenses: the formulas by another hand (figures of OpenCV 5.0.0's `projectPoints` and `fisheye::projectPoints`), and that
 //! what is distorted is undistorted, over whole pictures.
 
-use viewfuse_core::lens::{LARGEST_COEFFICIENT, Lens, LensBlock, LensError, Projection};
+use viewfuse_core::lens::{Lens, LensBlock, LensError, MAX_COEFFICIENT, Projection};
 
 /// Points before the camera, at depth 1.
 const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.3, -0.2], [-0.55, 0.4], [0.1, 0.7], [-0.8, -0.6]];
@@ -181,7 +181,7 @@ fn what_no_ideal_point_maps_to_is_told() {
 
 #[test]
 fn coefficients_are_checked() {
-    for (index, value) in [(0, f64::NAN), (3, f64::INFINITY), (7, 2.0 * LARGEST_COEFFICIENT)] {
+    for (index, value) in [(0, f64::NAN), (3, f64::INFINITY), (7, 2.0 * MAX_COEFFICIENT)] {
         let mut coefficients = [0.0; 8];
         coefficients[index] = value;
         let error = Lens::new(Projection::Perspective, coefficients).expect_err("no lens");

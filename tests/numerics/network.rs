@@ -2,9 +2,9 @@
 
 use viewfuse::check::compare::Comparator;
 use viewfuse::check::poses::Random;
-use viewfuse_core::network::convolve::{ConvolveBlock, convolve_element};
-use viewfuse_core::network::linear::{LinearBlock, linear_element, rectified};
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, aligned, pooled_element, upsampled_element};
+use viewfuse_kernels::network::convolve::{ConvolveBlock, convolve_element};
+use viewfuse_kernels::network::linear::{LinearBlock, linear_element, rectified};
+use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock, aligned, pooled_element, upsampled_element};
 
 fn numbers(random: &mut Random, count: usize) -> Vec<f32> {
     (0..count).map(|_| random.normal() as f32).collect()

@@ -6,11 +6,11 @@ use viewfuse::check::sights;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::lookup::bilinear;
-use viewfuse_core::pixelnerf::{
-    EmbedBlock, GatherBlock, GridPlace, embedded_value, gathered_value, radiance, visible_weight,
-};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::pixelnerf::{
+    EmbedBlock, GatherBlock, GridPlace, embedded_value, gathered_value, radiance, visible_weight,
+};
 
 fn camera(pose: Pose, width: u32, height: u32) -> CameraBlock {
     let middle = [width as f32 / 2.0, height as f32 / 2.0];

@@ -10,7 +10,7 @@ use viewfuse_core::depths::{
 use viewfuse_core::math;
 use viewfuse_core::random::{normal, uniform_from, uniform_pair};
 use viewfuse_core::rays::{CastBlock, TargetRay, cast_ray, place_point};
-use viewfuse_core::sample_mask::{SampleMaskBlock, is_sampled, weigh_sample};
+use viewfuse_kernels::sample_mask::{SampleMaskBlock, is_sampled, weigh_sample};
 
 /// As [`normal`], in `f64`.
 fn normal_oracle(seed: [u32; 2], pixel: u32, sample: u32) -> f64 {

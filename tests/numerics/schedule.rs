@@ -5,7 +5,7 @@ use serde_json::Value;
 use viewfuse::check::compare::{Comparator, relative_units, unit_in_last_place};
 use viewfuse::check::poses::Random;
 use viewfuse_core::schedule::{
-    HeunStep, LARGEST_LEVEL, NoiseSchedule, Preconditioning, SIGMA_DATA, SMALLEST_LEVEL, ScheduleError,
+    HeunStep, MAX_LEVEL, NoiseSchedule, Preconditioning, SIGMA_DATA, SMALLEST_LEVEL, ScheduleError,
 };
 
 #[test]
@@ -74,7 +74,7 @@ fn impossible_ends_are_refused() {
         assert_eq!(NoiseSchedule::new(0.002, bad), Err(ScheduleError::Level), "{bad}");
     }
     assert_eq!(NoiseSchedule::new(80.0, 0.002), Err(ScheduleError::Order));
-    assert!(NoiseSchedule::new(SMALLEST_LEVEL, LARGEST_LEVEL).is_ok());
+    assert!(NoiseSchedule::new(SMALLEST_LEVEL, MAX_LEVEL).is_ok());
     assert!(ScheduleError::Level.to_string().contains("1e-30") && ScheduleError::Order.to_string().contains("above"));
 }
 

@@ -8,9 +8,9 @@ use viewfuse::check::agreement::{Disagreement, Limits, measure};
 use viewfuse::check::bounded::Bounded;
 use viewfuse::check::world::{Numbers, World};
 use viewfuse::check::{camera_oracle, hull_oracle as oracle};
-use viewfuse_core::visual_hull::NO_SURFACE;
-use viewfuse_core::visual_hull::hull::{hull_alpha, hull_entry};
-use viewfuse_core::visual_hull::shade::{EMPTY, JUMP, depth_at, sample};
+use viewfuse_kernels::visual_hull::NO_SURFACE;
+use viewfuse_kernels::visual_hull::hull::{hull_alpha, hull_entry};
+use viewfuse_kernels::visual_hull::shade::{EMPTY, JUMP, depth_at, sample};
 
 const SEEDS: std::ops::Range<u64> = 1..5;
 

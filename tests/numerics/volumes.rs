@@ -5,12 +5,12 @@ use viewfuse::check::poses::Random;
 use viewfuse::check::sights;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
-use viewfuse_core::genvs::{
+use viewfuse_core::pose::Pose;
+use viewfuse_core::rays::{CastBlock, RayPoint, cast_ray};
+use viewfuse_kernels::genvs::{
     DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace, denoiser_input, summed_feature, volume_value,
     weigh_features,
 };
-use viewfuse_core::pose::Pose;
-use viewfuse_core::rays::{CastBlock, RayPoint, cast_ray};
 
 /// At the origin, looks along z; an image of 8x8 pixels and a focal length of 8.
 fn camera() -> CameraBlock {

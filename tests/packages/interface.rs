@@ -75,7 +75,7 @@ fn what_is_public_is_listed() {
         struct Own;
         impl Clone for Own { fn clone(&self) -> Own { Own } }
         pub enum B { One, Two(u32), Three { side: f32 } }
-        pub trait C<T>: Copy where T: Copy { const MOST: usize = 3; type Item; fn must(&self); fn may(&self) {} }
+        pub trait C<T>: Copy where T: Copy { const MAX: usize = 3; type Item; fn must(&self); fn may(&self) {} }
         #[cfg(feature = \"more\")]
         pub mod more { pub const SIDE: [usize; 2] = [1, 2]; pub use super::A; fn own() {} }
         #[cfg(test)]
@@ -98,7 +98,7 @@ pub enum B: Two(u32)
 pub mod more #[cfg(feature = \"more\")]
 pub struct A { private fields } #[derive(Clone, Debug)]
 pub struct A: pub number: u32
-pub trait C: const MOST: usize = default
+pub trait C: const MAX: usize = default
 pub trait C: fn may(&self) { default }
 pub trait C: fn must(&self)
 pub trait C: type Item

@@ -15,7 +15,7 @@ use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
 use viewfuse::scene::{Place, READERS, Scene, SceneError};
 use viewfuse::weighting::Weighting;
-use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
 use viewfuse_tests::places::data;
 
@@ -115,7 +115,7 @@ fn a_plane_seen_from_a_source_is_its_photograph() {
     let renderer = On { device: &Cpu, field: &PLANE };
     let mut session = Session::open(&renderer, &images, &Silent).expect("a session");
     for (view, image) in images.images.iter().enumerate() {
-        let mut scores = [0.0; MOST_SOURCES];
+        let mut scores = [0.0; MAX_SOURCES];
         scores[view] = 1.0;
         let weights = SourceWeights::from_scores(&scores, 4);
         let picture = session.render(&image.camera, &weights, 0.0, &Silent).expect("a picture");

@@ -9,7 +9,7 @@ use std::process::Command;
 use viewfuse_tests::places::repository;
 
 /// Most versions of crates beside a newer one.
-const MOST_DUPLICATES: usize = 24;
+const MAX_DUPLICATES: usize = 24;
 
 /// Every crate of the lock file, those of optional features too, as cargo describes it.
 fn crates() -> Vec<Value> {
@@ -129,7 +129,7 @@ fn few_crates_come_in_several_versions() {
     let gone: Vec<&String> = listed.difference(&found).collect();
     assert!(new.is_empty(), "older versions that are not in `skip` of .cargo/deny.toml: {new:?}");
     assert!(gone.is_empty(), "in `skip` of .cargo/deny.toml and not there any more: {gone:?}");
-    assert!(found.len() <= MOST_DUPLICATES, "{} older versions", found.len());
+    assert!(found.len() <= MAX_DUPLICATES, "{} older versions", found.len());
 }
 
 #[test]

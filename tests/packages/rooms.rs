@@ -7,7 +7,7 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
 /// So many test binaries there are at most.
-const MOST_ROOMS: usize = 11;
+const MAX_ROOMS: usize = 11;
 
 /// The root file of each test binary, and whether it has the standard library's harness.
 fn rooms() -> Vec<(PathBuf, bool)> {
@@ -43,7 +43,7 @@ fn is_declared(path: &Path, room: &Path) -> bool {
 #[test]
 fn there_are_few_rooms_and_nothing_is_hidden_in_them() {
     let rooms = rooms();
-    assert!((5..=MOST_ROOMS).contains(&rooms.len()), "{rooms:#?}");
+    assert!((5..=MAX_ROOMS).contains(&rooms.len()), "{rooms:#?}");
     let mut files_in_rooms = BTreeSet::new();
     for (file, has_harness) in &rooms {
         let folder = file.parent().expect("a folder");

@@ -1,8 +1,8 @@
 //! The mark `twin` of a kernel's row: a kernel with the mark has a form of its own on the CPU, which does not call the
 //! body; the form of a kernel without the mark calls it.
 
-use viewfuse_core::for_each_kernel;
-use viewfuse_core::kernels::Kernel;
+use viewfuse_kernels::for_each_kernel;
+use viewfuse_kernels::rows::Kernel;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 

@@ -3,8 +3,8 @@
 use viewfuse::device::DeviceError;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Element, KernelTime, LayerShape, Memory};
-use viewfuse_core::for_each_kernel;
-use viewfuse_core::kernels::*;
+use viewfuse_kernels::for_each_kernel;
+use viewfuse_kernels::rows::*;
 
 /// The CPU, with one kernel's results too large by 1e-3.
 pub(crate) struct Faulty {

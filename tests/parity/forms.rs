@@ -9,7 +9,7 @@ use viewfuse::check::case::{Case, Visitor};
 use viewfuse::check::cases::visit;
 use viewfuse::device::vulkan::Vulkan;
 use viewfuse::device::{Device, Layer, LayerShape, Memory};
-use viewfuse_core::network::linear::LinearBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_tests::trials::{is_required, needing};
 use viewfuse_vulkan::kernel::{Form, Kernel};
 use viewfuse_vulkan::{Adapter, GpuOptions, Instance, Missing};

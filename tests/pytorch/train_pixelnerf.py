@@ -24,7 +24,7 @@ from pixelnerf import FREQUENCY, PixelNerf, cast_rays, parameters, read_scene
 
 # Numbers of sources, one of which is drawn at each step, as in host/train/src/pixelnerf_learner.rs.
 SOURCE_COUNTS = (1, 2, 3, 3, 3, 3, 4, 6)
-RATE, MOST_GRADIENT = 1e-3, 1.0
+RATE, MAX_GRADIENT = 1e-3, 1.0
 
 
 class Batched(PixelNerf):
@@ -168,7 +168,7 @@ def main():
         loss = forward(network, batch, options)
         adam.zero_grad(set_to_none=True)
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(learned, MOST_GRADIENT)
+        torch.nn.utils.clip_grad_norm_(learned, MAX_GRADIENT)
         adam.step()
         losses.append(loss.item())
     result = {

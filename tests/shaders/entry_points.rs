@@ -15,18 +15,18 @@ use viewfuse::check::world::{Numbers, World};
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding};
 use viewfuse_core::composite::{CompositeBlock, composite_samples};
 use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, fine_depth, merged_depth, random_draw};
+use viewfuse_core::fetch::StartingAt;
 use viewfuse_core::fuse::{FuseBlock, fuse_element};
 use viewfuse_core::half_precision::packed_f16;
-use viewfuse_core::pages::StartingAt;
-use viewfuse_core::pixelnerf::{
-    EmbedBlock, GatherBlock, embedded_value, gathered_value, gathered_value_f16, radiance, visible_weight,
-};
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
-use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
 use viewfuse_core::sampler::{Mix, NoiseBlock, noisy_element};
 use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock, weigh};
+use viewfuse_core::weighting::{MAX_WEIGHED, Scheme, WeighBlock, weigh};
+use viewfuse_kernels::pixelnerf::{
+    EmbedBlock, GatherBlock, embedded_value, gathered_value, gathered_value_f16, radiance, visible_weight,
+};
+use viewfuse_kernels::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
 use viewfuse_shaders::{Piece, Push, compositing, points, rays, sampler, weighting};
 
 /// What an element holds before anything is written.
@@ -64,11 +64,11 @@ fn numbers(seed: u64, count: usize) -> Vec<f32> {
 fn weigh_is_core_s() {
     let (sources, targets) = (poses(7), poses(70));
     let block = WeighBlock { scheme: Scheme::ERROR.block(), source_count: 7 };
-    let mut weights = vec![[UNTOUCHED; MOST_WEIGHED]; 70];
+    let mut weights = vec![[UNTOUCHED; MAX_WEIGHED]; 70];
     dispatch(block, 70, |id, push| {
         weighting::weigh(id, push, &blocks(&sources), &blocks(&targets), &mut weights);
     });
-    let sources = Sources::<MOST_WEIGHED>::new(&sources).expect("sources");
+    let sources = Sources::<MAX_WEIGHED>::new(&sources).expect("sources");
     let expected: Vec<_> = targets.iter().map(|target| *weigh(Scheme::ERROR, &sources, target).values()).collect();
     assert_eq!(weights, expected);
 }
@@ -83,11 +83,11 @@ fn attention_is_core_s() {
     assert_eq!(embedded, expected);
 
     let (queries, keys) = (numbers(4, 70 * EMBEDDING), numbers(5, 6 * EMBEDDING));
-    let mut weights = vec![[UNTOUCHED; MOST_WEIGHED]; 70];
+    let mut weights = vec![[UNTOUCHED; MAX_WEIGHED]; 70];
     dispatch(6, 70, |id, push| weighting::attend(id, push, &queries, &keys, &mut weights));
     let expected: Vec<_> = queries
         .chunks(EMBEDDING)
-        .map(|query| *viewfuse_core::attention::attend::<MOST_WEIGHED>(query, &keys[..], 6).values())
+        .map(|query| *viewfuse_core::attention::attend::<MAX_WEIGHED>(query, &keys[..], 6).values())
         .collect();
     assert_eq!(weights, expected);
 }

@@ -7,7 +7,7 @@ use ash::vk;
 use std::marker::PhantomData;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use viewfuse_core::pages::MOST_PAGES;
+use viewfuse_kernels::pages::MAX_PAGES;
 
 /// An array of `T` in a device's memory. An array that is too large for one allocation is stored in several chunks of a
 /// page each.
@@ -89,7 +89,7 @@ pub(crate) fn ranges(array: &Array, layout: Layout, page_shift: u32) -> Vec<Rang
         (Layout::Whole | Layout::One, _) | (_, 0) => array.len,
         (Layout::Pages, shift) => 1 << shift,
     };
-    let binding_count = if layout == Layout::Pages { MOST_PAGES } else { 1 };
+    let binding_count = if layout == Layout::Pages { MAX_PAGES } else { 1 };
     (0..binding_count)
         .map(|page| {
             let first = if page * page_len < array.len { page * page_len } else { 0 };

@@ -11,7 +11,7 @@ use ash::vk;
 use std::ops::Range;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use viewfuse_core::pages::MOST_PAGES;
+use viewfuse_kernels::pages::MAX_PAGES;
 
 /// The time that a dispatch of an unknown kernel is expected to take.
 const UNKNOWN: Duration = Duration::from_millis(20);
@@ -234,8 +234,8 @@ impl Gpu {
                 Layout::Pages if page_bytes > most_page_bytes => {
                     return limit(page_limit, page_bytes, most_page_bytes);
                 }
-                Layout::Pages if len > MOST_PAGES << self.page_shift => {
-                    let page_len = len.div_ceil(MOST_PAGES).next_power_of_two() as u64;
+                Layout::Pages if len > MAX_PAGES << self.page_shift => {
+                    let page_len = len.div_ceil(MAX_PAGES).next_power_of_two() as u64;
                     return limit(page_limit, page_len * WIDEST_PAGED, most_page_bytes);
                 }
                 _ => {}

@@ -6,20 +6,20 @@
 use crate::kernel::{Form, Kernel, TILE, WORKGROUP};
 use bytemuck::AnyBitPattern;
 use std::collections::BTreeMap;
-use viewfuse_core::network::attend::MatrixBlock;
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::linear::LinearBlock;
-use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_kernels::network::attend::MatrixBlock;
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
+use viewfuse_kernels::network::transpose::TransposedBlock;
 
 /// Dispatches of a measurement, the first of which does not count.
 pub(crate) const ROUNDS: u32 = 4;
 /// Multiply-adds of a product that is worth a measurement.
-const LEAST_WORK: u64 = 1 << 22;
+const MIN_WORK: u64 = 1 << 22;
 /// Tiles that are measured: as many as keep a GPU busy, and few where a processor does their work.
 const MEASURED_TILES: u32 = 4096;
 const MEASURED_TILES_OF_SOFTWARE: u32 = 16;
 /// Logarithm of the rows from which on all products are of one class.
-const MOST_ROWS: u32 = 14;
+const MAX_ROWS: u32 = 14;
 
 /// The sizes of a product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +71,7 @@ impl Class {
     pub(crate) fn new(kernel: Kernel, shape: Shape) -> Class {
         let logarithm = |count: u32| u32::BITS - count.saturating_sub(1).leading_zeros();
         let Shape { row_count, inner_count, column_count } = shape;
-        let sizes = [logarithm(row_count).min(MOST_ROWS), logarithm(inner_count), logarithm(column_count)];
+        let sizes = [logarithm(row_count).min(MAX_ROWS), logarithm(inner_count), logarithm(column_count)];
         Class { shape, key: (kernel.name().to_owned(), sizes) }
     }
 
@@ -80,7 +80,7 @@ impl Class {
     pub(crate) fn candidates(&self, is_software: bool, has_subgroups: bool) -> Vec<Form> {
         let Shape { row_count, inner_count, column_count } = self.shape;
         let work = u64::from(row_count) * u64::from(inner_count) * u64::from(column_count);
-        if work < LEAST_WORK {
+        if work < MIN_WORK {
             return vec![Form::Single];
         }
         let comes_into_question = |form: &Form| {

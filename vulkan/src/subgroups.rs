@@ -7,7 +7,7 @@ use crate::kernel::WORKGROUP;
 use ash::vk;
 
 /// Invocations of the smallest subgroup: those that need the same eight rows of a tile.
-const LEAST_SIZE: u32 = 8;
+const MIN_SIZE: u32 = 8;
 
 /// The size of the subgroups that kernels demand on a device with the extension; `None` if there is none that fits.
 ///
@@ -35,7 +35,7 @@ pub(crate) fn fitting_size(instance: &Instance, raw: vk::PhysicalDevice) -> Opti
 
 /// The size nearest to the usual one that a device offers and that fits.
 fn size_within(usual: u32, least: u32, most: u32) -> Option<u32> {
-    let (least, most) = (least.max(LEAST_SIZE), most.min(WORKGROUP));
+    let (least, most) = (least.max(MIN_SIZE), most.min(WORKGROUP));
     // Bounds of a device and ours are powers of two.
     (least <= most).then(|| usual.clamp(least, most)).filter(|size| size.is_power_of_two())
 }

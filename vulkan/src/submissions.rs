@@ -2,7 +2,7 @@
 //!
 //! Commands are recorded one behind the other into the open submission, which is submitted when somebody waits for it, or
 //! when it is full: of dispatches, of time that they are expected to take, or of memory that they hold. Up to
-//! [`MOST_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next ones. A
+//! [`MAX_IN_FLIGHT`] submissions are in flight at once, so that the device works while the host prepares the next ones. A
 //! submission keeps its resources alive until its fence is signalled.
 
 use crate::buffer::Array;
@@ -15,14 +15,14 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The most submissions in flight.
-const MOST_IN_FLIGHT: usize = 4;
+const MAX_IN_FLIGHT: usize = 4;
 /// The most dispatches of a submission.
-const MOST_DISPATCHES: usize = 128;
+const MAX_DISPATCHES: usize = 128;
 /// The longest time that a submission is expected to take: far below the time limit, and short enough that a display
 /// that shares the device is not stopped.
-const MOST_TIME: Duration = Duration::from_millis(200);
+const MAX_TIME: Duration = Duration::from_millis(200);
 /// The most bytes of arrays that a submission holds, counted at each use.
-const MOST_HELD: u64 = 256 << 20;
+const MAX_HELD: u64 = 256 << 20;
 
 /// A dispatch that is done, for statistics.
 #[derive(Clone, Copy, Debug)]
@@ -59,7 +59,7 @@ impl Submission {
     }
 
     fn is_full(&self) -> bool {
-        self.dispatched.len() >= MOST_DISPATCHES || self.expected >= MOST_TIME || self.held_bytes >= MOST_HELD
+        self.dispatched.len() >= MAX_DISPATCHES || self.expected >= MAX_TIME || self.held_bytes >= MAX_HELD
     }
 
     /// What it does, for an error.
@@ -136,7 +136,7 @@ impl Submissions {
         if let Some(open) = self.open.take() {
             return Ok(open);
         }
-        if self.running.len() >= MOST_IN_FLIGHT {
+        if self.running.len() >= MAX_IN_FLIGHT {
             self.wait_for_oldest(done)?;
         }
         let submission = match self.free.pop() {
@@ -149,7 +149,7 @@ impl Submissions {
         match begun {
             Ok(()) => {
                 if self.tick.is_some() {
-                    let count = 2 * MOST_DISPATCHES as u32;
+                    let count = 2 * MAX_DISPATCHES as u32;
                     let Handle { device, .. } = &*self.handle;
                     // SAFETY: the commands are being recorded; the pool has so many queries.
                     unsafe { device.cmd_reset_query_pool(submission.commands, submission.queries, 0, count) };
@@ -319,11 +319,11 @@ impl Submissions {
         let bindings = Kernel::ALL.into_iter().map(|kernel| kernel.binding_count()).max().unwrap_or(1);
         let sizes = [vk::DescriptorPoolSize::default()
             .ty(vk::DescriptorType::STORAGE_BUFFER)
-            .descriptor_count((bindings * MOST_DISPATCHES) as u32)];
-        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(MOST_DISPATCHES as u32).pool_sizes(&sizes);
+            .descriptor_count((bindings * MAX_DISPATCHES) as u32)];
+        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(MAX_DISPATCHES as u32).pool_sizes(&sizes);
         let queries = vk::QueryPoolCreateInfo::default()
             .query_type(vk::QueryType::TIMESTAMP)
-            .query_count(2 * MOST_DISPATCHES as u32);
+            .query_count(2 * MAX_DISPATCHES as u32);
         let commands = vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
         let mut submission = Submission {
             commands: vk::CommandBuffer::null(),

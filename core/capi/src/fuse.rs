@@ -2,8 +2,8 @@
 
 use crate::lent::{Input, Output};
 use crate::status::Status;
+use viewfuse_core::fetch::{Fetch, StartingAt};
 use viewfuse_core::fuse::{FuseBlock, fuse_element};
-use viewfuse_core::pages::{Fetch, StartingAt};
 
 /// The weighted sum of the views' latents, in view order.
 ///

@@ -1,7 +1,7 @@
 //! Memory that the caller lends for the length of a call.
 
 use crate::status::Status;
-use viewfuse_core::pages::Fetch;
+use viewfuse_core::fetch::Fetch;
 
 /// Floats to read. No reference is made to them: they may overlap with what is written.
 pub(crate) struct Input {

@@ -3,7 +3,7 @@
 use crate::lent::{Input, read, write};
 use crate::status::Status;
 use viewfuse_core::composite::{Compositor, RayBlock};
-use viewfuse_core::pages::Fetch;
+use viewfuse_core::fetch::Fetch;
 
 /// The state of compositing along a ray. Initialised by viewfuse_ray_start.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use crate::lent::{Input, Output, checked, read};
 use crate::status::Status;
 use viewfuse_core::attention::{FourierEmbedding, cross_attention};
-use viewfuse_core::pages::{Fetch, StartingAt};
+use viewfuse_core::fetch::{Fetch, StartingAt};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_core::weighting::{self, AngleKind};

@@ -36,9 +36,9 @@ pub const HIDDEN_STEPS: usize = 4;
 /// As [`HIDDEN_STEPS`].
 pub const HIDDEN_PAIRS: usize = HIDDEN / 2 / HIDDEN_STEPS;
 /// The largest whole number that a layer's input becomes.
-pub const MOST_LEVEL: f32 = 32_767.0;
+pub const MAX_LEVEL: f32 = 32_767.0;
 /// Inputs that are all smaller count as 0: the quotient would not be finite.
-pub const LEAST_INPUT: f32 = 1.0e-30;
+pub const MIN_INPUT: f32 = 1.0e-30;
 
 /// The features of [`super::pose_features`]. Where the angles are small enough, the sines and cosines of a double angle
 /// follow from those before; [`feature_error`] bounds by how much they differ.
@@ -114,14 +114,14 @@ fn halves(pair: u32) -> (i32, i32) {
 impl<const P: usize, const N: usize> Levels<P, N> {
     const ZERO: Levels<P, N> = Levels { pairs: [[0; P]; N], scale: 0.0 };
 
-    /// Becomes the nearest levels of `2 P N` numbers, the `largest` of which becomes [`MOST_LEVEL`].
+    /// Becomes the nearest levels of `2 P N` numbers, the `largest` of which becomes [`MAX_LEVEL`].
     #[inline(never)]
     fn fill(&mut self, numbers: &[f32], largest: f32) {
         // 1.5 * 2^23: adding it rounds to a whole number, which the last bits are.
         const WHOLE: f32 = 12_582_912.0;
-        let is_small = !(largest > LEAST_INPUT);
-        let factor = if is_small { 0.0 } else { MOST_LEVEL / largest };
-        self.scale = if is_small { 0.0 } else { largest * (1.0 / MOST_LEVEL) };
+        let is_small = !(largest > MIN_INPUT);
+        let factor = if is_small { 0.0 } else { MAX_LEVEL / largest };
+        self.scale = if is_small { 0.0 } else { largest * (1.0 / MAX_LEVEL) };
         let level = |number: f32| (number * factor + WHOLE).to_bits().wrapping_sub(WHOLE.to_bits());
         for (pair, two) in self.pairs.as_flattened_mut().iter_mut().zip(numbers.chunks_exact(2)) {
             *pair = (level(two[0]) & 0xffff) | (level(two[1]) << 16);

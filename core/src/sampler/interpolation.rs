@@ -1,10 +1,10 @@
 //! Integrals of the polynomial through known results, by which multistep methods step.
 
-use super::MOST_RESULTS;
+use super::MAX_RESULTS;
 use crate::math::ln_ratio;
 
 /// Numbers of a step in the logarithm of the level, or of one in the level itself.
-pub(super) type Row = [f32; MOST_RESULTS];
+pub(super) type Row = [f32; MAX_RESULTS];
 
 /// `integral over t in [0, 1] of h exp(-h (1 - t)) t^k`, for `k` of 0 to 3: the contribution to the state of a result
 /// that grows like `t^k` along a step of length `h` in the logarithm of the level. `first` is the one for `k = 0`,
@@ -13,7 +13,7 @@ pub(super) fn exponential_moments(h: f32, first: f32) -> Row {
     let mut moments = [first, 0.0, 0.0, 0.0];
     if h > 2.0 {
         let mut k = 1;
-        while k < MOST_RESULTS {
+        while k < MAX_RESULTS {
             moments[k] = 1.0 - k as f32 / h * moments[k - 1];
             k += 1;
         }
@@ -27,7 +27,7 @@ pub(super) fn exponential_moments(h: f32, first: f32) -> Row {
     while k > 1 {
         moment = h / k as f32 * (1.0 - moment);
         k -= 1;
-        if k < MOST_RESULTS {
+        if k < MAX_RESULTS {
             moments[k] = moment;
         }
     }
@@ -42,7 +42,7 @@ pub(super) const EVEN_MOMENTS: Row = [1.0, 1.0 / 2.0, 1.0 / 3.0, 1.0 / 4.0];
 /// is taken as it is.
 pub(super) fn weights(places: &Row, count: u32, moments: &Row) -> Row {
     let count = count as usize;
-    let mut weights = [0.0; MOST_RESULTS];
+    let mut weights = [0.0; MAX_RESULTS];
     let mut rest = moments[0];
     let mut own = 1;
     while own < count {
@@ -70,7 +70,7 @@ pub(super) fn weights(places: &Row, count: u32, moments: &Row) -> Row {
 /// Where the results at `levels` lie along a step of length `h` in the logarithm of the level that begins at `start`: 0 at
 /// its beginning, negative before.
 pub(super) fn places(levels: &Row, count: u32, start: f32, h: f32) -> Row {
-    let mut places = [0.0; MOST_RESULTS];
+    let mut places = [0.0; MAX_RESULTS];
     let mut index = 0;
     while index < count as usize {
         places[index] = -ln_ratio(levels[index], start) / h;

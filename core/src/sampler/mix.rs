@@ -1,11 +1,11 @@
 //! Operations of samplers on pictures: linear combinations, and noise.
 
-use crate::pages::Fetch;
+use crate::fetch::Fetch;
 use crate::random::normal;
 use bytemuck::{Pod, Zeroable};
 
 /// How many results a step combines at most.
-pub const MOST_RESULTS: usize = 4;
+pub const MAX_RESULTS: usize = 4;
 
 /// Coefficients of a linear combination of pictures: of the state, and of results, the newest first. A picture with
 /// coefficient 0 is not read. Also the block of the kernel `mix_pictures`.
@@ -16,18 +16,18 @@ pub struct Mix {
     /// Of the state.
     pub state: f32,
     /// Of the results.
-    pub results: [f32; MOST_RESULTS],
+    pub results: [f32; MAX_RESULTS],
 }
 
 impl Mix {
     /// The state as it is.
-    pub const STAY: Mix = Mix { state: 1.0, results: [0.0; MOST_RESULTS] };
+    pub const STAY: Mix = Mix { state: 1.0, results: [0.0; MAX_RESULTS] };
     /// The newest result as it is.
     pub const NEWEST: Mix = Mix { state: 0.0, results: [1.0, 0.0, 0.0, 0.0] };
 
     /// The combination of numbers; a number with coefficient 0 is ignored, also NaN.
     #[inline]
-    pub fn of(&self, state: f32, results: &[f32; MOST_RESULTS]) -> f32 {
+    pub fn of(&self, state: f32, results: &[f32; MAX_RESULTS]) -> f32 {
         let [a, b, c, d] = results;
         mixed_element(self, &[state], &[*a], &[*b], &[*c], &[*d], 0)
     }

@@ -133,7 +133,7 @@ pub(super) fn gaussian<const S: usize>(sources: &Sources<S>, target: &Pose, _: u
         // alone would cost 5e-6. So it is kept with its rounding error, and the exponential corrected by that.
         let (excess, rest) = two_sum(squared.0, -nearest_squared.0);
         let rest = rest + (squared.1 - nearest_squared.1);
-        scores[view] = if largest > LARGEST_EXACT_DISTANCE || beta > LARGEST_EXACT_BETA {
+        scores[view] = if largest > MAX_EXACT_DISTANCE || beta > MAX_EXACT_BETA {
             // So far away the squares overflow; d^2 - n^2 = (d - n)(d + n).
             let (far, near) = (distances[view], least);
             if far > near && beta > 0.0 { exp(-(beta * (far - near)) * (far + near)) } else { 1.0 }
@@ -147,9 +147,9 @@ pub(super) fn gaussian<const S: usize>(sources: &Sources<S>, target: &Pose, _: u
 }
 
 /// Distance up to which the Gaussian's exponent is kept with its rounding error.
-const LARGEST_EXACT_DISTANCE: f32 = 1.0e6;
+const MAX_EXACT_DISTANCE: f32 = 1.0e6;
 /// The same for `beta`.
-const LARGEST_EXACT_BETA: f32 = 1.0e6;
+const MAX_EXACT_BETA: f32 = 1.0e6;
 
 /// Squared distance of two cameras' centres, as the rounded value and the rest.
 fn squared_distance(a: &Pose, b: &Pose) -> (f32, f32) {

@@ -8,7 +8,7 @@ use super::compare::unit_in_last_place;
 use std::fmt;
 
 /// The largest share of undecided elements: those that depend on rounding.
-pub const MOST_UNDECIDED: f64 = 0.02;
+pub const MAX_UNDECIDED: f64 = 0.02;
 
 /// Why numbers do not agree with the expected ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,7 +17,7 @@ pub enum Disagreement {
     Length,
     /// They are all the same, so nothing was tested.
     Constant,
-    /// More than [`MOST_UNDECIDED`] of the elements are undecided.
+    /// More than [`MAX_UNDECIDED`] of the elements are undecided.
     Undecided {
         /// Their share.
         share: f64,
@@ -137,7 +137,7 @@ pub fn measure(actual: &[f32], expected: &[Option<Bounded>], limits: Limits) -> 
     }
     agreement.undecided = 1.0 - agreement.compared as f64 / actual.len() as f64;
     agreement.disagreement = agreement.disagreement.or_else(|| {
-        if agreement.undecided > MOST_UNDECIDED {
+        if agreement.undecided > MAX_UNDECIDED {
             Some(Disagreement::Undecided { share: agreement.undecided })
         } else if actual.iter().all(|value| *value == actual[0]) {
             Some(Disagreement::Constant)

@@ -37,7 +37,7 @@ pub mod window;
 pub mod window_cost;
 
 use super::case::{Case, Visitor};
-use viewfuse_core::for_each_kernel;
+use viewfuse_kernels::for_each_kernel;
 use viewfuse_vulkan::kernel::Kernel;
 
 use attend::*;

@@ -1,7 +1,7 @@
 //! Channel means and group norm of images in `f64`, with bounds on the error of `f32`.
 
 use super::bounded::{Bounded, DIVISION, ROUNDING, roundings};
-use viewfuse_core::network::group_norm::{GroupNormBlock, MeanBlock, PART};
+use viewfuse_kernels::network::group_norm::{GroupNormBlock, MeanBlock, PART};
 
 /// Mean of a channel, summed in any order.
 pub fn channel_mean(inputs: &[f32], block: &MeanBlock, channel: usize) -> Bounded {

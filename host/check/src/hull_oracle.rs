@@ -1,4 +1,4 @@
-//! The kernels of [`viewfuse_core::visual_hull`] evaluated in `f64` from their documentation, with bounds on the error
+//! The kernels of [`viewfuse_kernels::visual_hull`] evaluated in `f64` from their documentation, with bounds on the error
 //! of `f32`.
 //!
 //! `None` means undecided: a value lies so near to a threshold that `f32` may fall on either side of it.
@@ -12,8 +12,8 @@ pub use sweep::{match_cost, mean_column, pick_depth, sum_row};
 use crate::bounded::{Bounded, ROUNDING};
 use crate::camera_oracle::{Seen, Vector, along, bilinear, centre, project, tents, towards};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::visual_hull::hull::{ENTRY_ALPHA, ENTRY_STEP, LEAST_ALPHA};
-use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_kernels::visual_hull::hull::{ENTRY_ALPHA, ENTRY_STEP, MIN_ALPHA};
+use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
 
 /// The depth of a pixel without a surface; the same number in both precisions.
 pub const NOWHERE: Bounded = Bounded { value: NO_SURFACE as f64, error: 0.0 };
@@ -96,7 +96,7 @@ pub fn hull_alpha(scene: &Scene, point_world: Vector, least: f32) -> Option<Boun
 /// Depth of the first of the points, a step apart, at which the ray of a pixel is inside the hull.
 pub fn hull_entry(scene: &Scene, view: u32, pixel: u32) -> Option<Bounded> {
     let camera = &scene.views[view as usize];
-    if scene.texels[(camera.first_texel + pixel) as usize][3] < LEAST_ALPHA {
+    if scene.texels[(camera.first_texel + pixel) as usize][3] < MIN_ALPHA {
         return Some(NOWHERE);
     }
     let at = [(pixel % camera.width) as f32 + 0.5, (pixel / camera.width) as f32 + 0.5];

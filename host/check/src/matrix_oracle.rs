@@ -1,7 +1,7 @@
 //! Matrix products of two computed matrices, and softmax, in `f64` with bounds on the error of `f32`.
 
 use super::bounded::Bounded;
-use viewfuse_core::network::attend::MatrixBlock;
+use viewfuse_kernels::network::attend::MatrixBlock;
 
 /// Number `[row, column]` of a product, summed in any order and scaled.
 pub fn product(left: &[f32], right: &[f32], block: &MatrixBlock, row: usize, column: usize) -> Bounded {

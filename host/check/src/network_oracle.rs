@@ -3,11 +3,11 @@
 use super::bounded::{Bounded, DIVISION, ROUNDING};
 use super::camera_oracle::{bilinear, tents};
 use super::winograd_oracle::{SIDE, Tile};
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::depthwise::DepthwiseBlock;
-use viewfuse_core::network::linear::LinearBlock;
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
-use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::depthwise::DepthwiseBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
+use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock};
+use viewfuse_kernels::network::transpose::TransposedBlock;
 
 /// The inputs of a layer.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! A whole picture on a device compared with the CPU's.
 //!
 //! The scene is a given one, or the synthetic lorry, rendered into a temporary folder: an installed program has no
-//! sample scene. The last view is rendered from up to [`MOST_SOURCES`] others.
+//! sample scene. The last view is rendered from up to [`MAX_SOURCES`] others.
 
 use super::measure::Role;
 use super::report::{CheckError, PictureReport, PictureVersusCpu};
@@ -24,13 +24,13 @@ use viewfuse_synthetic::{toy, write_scene};
 use viewfuse_weighting::Weighting;
 
 /// The most sources of the picture.
-pub const MOST_SOURCES: usize = 12;
+pub const MAX_SOURCES: usize = 12;
 /// Longest side of the picture.
 pub const LONGEST_SIDE: u32 = 160;
 /// Width and height of the synthetic scene's photographs.
 const SYNTHETIC_SIDE: u32 = 64;
 /// Largest difference of a channel that passes, in steps of 1/255: rounding to 8 bits may fall to either side.
-pub const LARGEST_DIFFERENCE: u8 = 1;
+pub const MAX_DIFFERENCE: u8 = 1;
 
 type AnyError = Box<dyn std::error::Error + Send + Sync>;
 
@@ -67,7 +67,7 @@ impl Picture {
         };
         let selection = Selection {
             targets: scene.views.last().map(|view| view.name.clone()),
-            view_count: Some(MOST_SOURCES),
+            view_count: Some(MAX_SOURCES),
             ..Selection::default()
         };
         let job = selection.resolve(&scene, AnyField::default().about().least_sources)?;
@@ -163,7 +163,7 @@ pub fn compare(picture: &RgbImage, reference: &RgbImage) -> (Option<PictureVersu
     let versus = PictureVersusCpu { worst, differing, psnr: decibels.is_finite().then_some(decibels) };
     let breach = if picture.iter().all(|value| *value == picture.as_raw()[0]) {
         Some("every pixel is the same".to_owned())
-    } else if worst > LARGEST_DIFFERENCE {
+    } else if worst > MAX_DIFFERENCE {
         Some(format!("a pixel differs by {worst}/255"))
     } else {
         None

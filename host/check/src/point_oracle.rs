@@ -3,11 +3,11 @@
 use super::bounded::Bounded;
 use super::camera_oracle::{Vector, axes, bilinear, centre, dot, point, project, tents};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock};
 
 /// Nearer points are not in front of a view.
-const LEAST_DEPTH: f32 = 1.0e-20;
+const MIN_DEPTH: f32 = 1.0e-20;
 
 /// The largest magnitude whose exponential is not saturated.
 const SATURATED: f32 = 88.7;
@@ -37,7 +37,7 @@ pub fn embed(view: &CameraBlock, at: &RayPoint, block: &EmbedBlock) -> Vec<Bound
 pub(super) fn is_in_front(view: &CameraBlock, at: Vector) -> Option<bool> {
     let origin = centre(view);
     let [_, _, forward] = axes(view);
-    Bounded::from(LEAST_DEPTH).below(dot(forward, [0, 1, 2].map(|axis| at[axis] - origin[axis])))
+    Bounded::from(MIN_DEPTH).below(dot(forward, [0, 1, 2].map(|axis| at[axis] - origin[axis])))
 }
 
 /// The weights of all views at a point.

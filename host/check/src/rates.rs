@@ -24,7 +24,7 @@ pub const DEFAULT_ROUNDS: u32 = 5;
 /// The time for which a kernel is repeated in a round.
 const MEASURED: Duration = Duration::from_millis(20);
 /// Most repetitions in a round.
-const MOST_REPEATS: f64 = 500.0;
+const MAX_REPEATS: f64 = 500.0;
 
 /// Which limit a kernel is compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -165,7 +165,7 @@ fn rate<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f64,
 fn repeats<D: Device>(device: &D, work: &mut Work<'_>) -> Result<u32, CheckError> {
     seconds(device, work, 1)?;
     let once = seconds(device, work, 1)?;
-    Ok((MEASURED.as_secs_f64() / once.max(1.0e-9)).clamp(1.0, MOST_REPEATS) as u32)
+    Ok((MEASURED.as_secs_f64() / once.max(1.0e-9)).clamp(1.0, MAX_REPEATS) as u32)
 }
 
 /// The time of a dispatch, of several behind each other.

@@ -10,7 +10,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock, PROBABILITY_FLOOR};
 use viewfuse_core::random::uniform_pair;
 use viewfuse_core::rays::{CastBlock, TargetRay};
-use viewfuse_core::sample_mask::SampleMaskBlock;
+use viewfuse_kernels::sample_mask::SampleMaskBlock;
 
 /// Products below it may be flushed to 0.
 const NEGLIGIBLE: f64 = f32::MIN_POSITIVE as f64;

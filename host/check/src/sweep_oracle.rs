@@ -1,4 +1,4 @@
-//! The kernels of [`viewfuse_core::plane_sweep`] evaluated in `f64` from their documentation, with bounds on the error of
+//! The kernels of [`viewfuse_kernels::plane_sweep`] evaluated in `f64` from their documentation, with bounds on the error of
 //! `f32`.
 //!
 //! `None` means undecided: a value lies so near to a threshold that `f32` may fall on either side of it.
@@ -18,8 +18,8 @@ pub use picked::pick_disparity;
 use crate::bounded::{Bounded, ROUNDING};
 use crate::camera_oracle::{Tents, Vector, along, axes, centre, dot, inside, tents, towards};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::plane_sweep::frustum::LEAST_DEPTH;
-use viewfuse_core::plane_sweep::{PLANES, Planes};
+use viewfuse_kernels::plane_sweep::frustum::MIN_DEPTH;
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 /// A number for each of some neighbouring planes.
 pub type BoundedPlanes = [Bounded; PLANES];
@@ -51,7 +51,7 @@ fn sight(camera: &CameraBlock, view: &CameraBlock, at: [f32; 2], disparity: Boun
     let far = in_view(towards(camera, at));
     let slope = in_view([0, 1, 2].map(|axis| origin[axis] - other[axis]));
     let place = along(far, slope, disparity);
-    let least = Bounded::from(LEAST_DEPTH);
+    let least = Bounded::from(MIN_DEPTH);
     let depth_ratio = place[2].greater(least);
     let [focal_x, focal_y, principal_x, principal_y] = view.intrinsics.map(Bounded::from);
     let inverse = Bounded::ONE / depth_ratio;

@@ -1,13 +1,13 @@
 //! Small random frusta with views around them, for the kernels of the plane sweep.
 
 use super::world::{Numbers, World};
-use viewfuse_core::plane_sweep::blend::BlendBlock;
-use viewfuse_core::plane_sweep::evidence::{UNSEEN, ViewPair};
-use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
-use viewfuse_core::plane_sweep::path::CostBlock;
-use viewfuse_core::plane_sweep::{PLANES, Planes};
-use viewfuse_core::visual_hull::NO_SURFACE;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::plane_sweep::blend::BlendBlock;
+use viewfuse_kernels::plane_sweep::evidence::{UNSEEN, ViewPair};
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_kernels::plane_sweep::path::CostBlock;
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
+use viewfuse_kernels::visual_hull::NO_SURFACE;
 
 /// The common inputs.
 #[derive(Clone, Debug)]

@@ -4,8 +4,8 @@ use super::bounded::{Bounded, ROUNDING, roundings};
 use super::camera_oracle::{point, project};
 use super::point_oracle::is_in_front;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
 
 /// Nodes of one axis around a coordinate, with their shares; those outside (`None`) hold zeros.
 struct Nodes {

@@ -6,10 +6,10 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
-use viewfuse_core::visual_hull::sweep::{OUTSIDE, SweepBlock};
-use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, HullScene};
+use viewfuse_kernels::visual_hull::sweep::{OUTSIDE, SweepBlock};
+use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
 
 /// The kernels' inputs.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use super::kernels::{Device, LayerShape};
 use super::memory::Memory;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::rays::TargetRay;
-use viewfuse_core::visual_hull::ObjectBlock;
+use viewfuse_kernels::visual_hull::ObjectBlock;
 
 /// The parameters of a layer in a device's memory. They never change, and all blocks that they are used with have the
 /// same inner index and columns.
@@ -45,7 +45,7 @@ pub struct Pixels<D: Memory + ?Sized> {
     pub depths: D::Buffer<f32>,
 }
 
-/// Views and object of the training-free field in a device's memory; see [`viewfuse_core::visual_hull`].
+/// Views and object of the training-free field in a device's memory; see [`viewfuse_kernels::visual_hull`].
 pub struct HullScene<D: Memory + ?Sized> {
     /// The object's box and the number of views.
     pub object: ObjectBlock,

@@ -2,8 +2,8 @@
 
 use super::error::DeviceError;
 use super::memory::Memory;
-use viewfuse_core::for_each_kernel;
-use viewfuse_core::kernels::*;
+use viewfuse_kernels::for_each_kernel;
+use viewfuse_kernels::rows::*;
 
 /// The sizes of a layer's weights, and what they are for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,7 +34,7 @@ macro_rules! device {
             $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
         }
     )+) => {
-        /// Something that runs every kernel: a method for each row of [`viewfuse_core::kernels`], so that a kernel that
+        /// Something that runs every kernel: a method for each row of [`viewfuse_kernels::rows`], so that a kernel that
         /// exists on one device only does not compile. A method takes the kernel's parameters, the numbers that say how
         /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters say.
         pub trait Device: Memory {

@@ -6,9 +6,9 @@ use super::memory::{Element, KernelTime, Memory, Transfers};
 use bytemuck::bytes_of;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use viewfuse_core::for_each_kernel;
-use viewfuse_core::kernels::*;
 use viewfuse_job::files::{read_at_most, write_whole};
+use viewfuse_kernels::for_each_kernel;
+use viewfuse_kernels::rows::*;
 use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
 /// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when there is
@@ -23,7 +23,7 @@ pub struct Vulkan {
 /// Elements of a kernel that keep a GPU busy.
 const BUSY_ELEMENTS: usize = 1 << 16;
 /// Most bytes of what a device remembers: more is not its own.
-const MOST_REMEMBERED: u64 = 256 << 20;
+const MAX_REMEMBERED: u64 = 256 << 20;
 
 impl Vulkan {
     /// Opens a device.
@@ -48,7 +48,7 @@ impl Vulkan {
     ) -> Result<Vulkan, VulkanError> {
         let mut vulkan = Vulkan::open(instance, adapter, options)?;
         let file = folder.join(format!("{}.kernels", adapter.memory_name()));
-        if let Ok(bytes) = read_at_most(&file, MOST_REMEMBERED) {
+        if let Ok(bytes) = read_at_most(&file, MAX_REMEMBERED) {
             vulkan.gpu.recall(&bytes);
         }
         vulkan.memory = Some(file);

@@ -12,12 +12,12 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use viewfuse_core::lookup::bilinear_from;
-use viewfuse_core::plane_sweep::PLANES;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::On;
 use viewfuse_field::render::{RenderOptions, Stage};
 use viewfuse_field::training_free::{Sweep, TrainingFree};
 use viewfuse_job::progress::Silent;
+use viewfuse_kernels::plane_sweep::PLANES;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{Target, target_of};
 use viewfuse_scene::photographs::{Album, BackgroundChoice, scaled_size};
@@ -27,7 +27,7 @@ const ROUNDS: usize = 5;
 /// Other sources that a source is compared with, and itself.
 const VIEWS_OF_A_SOURCE: usize = 5;
 /// Most views that a target's frustum is compared with.
-const MOST_MATCHED: usize = 8;
+const MAX_MATCHED: usize = 8;
 
 /// Planes, longest side, sources.
 #[derive(Clone, Copy)]
@@ -53,7 +53,7 @@ fn main() -> anyhow::Result<()> {
     for (name, work) in rows {
         let (time, pixels) = measured(&scene, work)?;
         let Work(planes, side, sources) = work;
-        let views = sources * sources.min(VIEWS_OF_A_SOURCE) + sources.min(MOST_MATCHED);
+        let views = sources * sources.min(VIEWS_OF_A_SOURCE) + sources.min(MAX_MATCHED);
         let lookups = planes as usize * pixels as usize * views;
         let limit = limit(lookups, side);
         let base = *first.get_or_insert(time);

@@ -4,20 +4,20 @@ use image::RgbImage;
 use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
-use viewfuse_core::visual_hull::ObjectBlock;
 use viewfuse_field::training_free::{find_object, gap_warning};
 use viewfuse_job::progress::Interrupted;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::visual_hull::ObjectBlock;
 use viewfuse_output::canvas::{BLUE, Canvas, GREY, INK, LINE_HEIGHT, RED};
 use viewfuse_scene::photographs::{Album, BackgroundChoice};
 use viewfuse_scene::rig::Rig;
 use viewfuse_scene::{Scene, View};
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_weighting::sources::MAX_SOURCES;
 
 /// Longest side at which photographs are read, in pixels: enough to find the object.
 const LOOK_SIDE: u32 = 128;
 /// A rig whose axes miss their common point by more than this share of the distance has no common subject.
-const MOST_AXIS_MISS: f32 = 0.25;
+const MAX_AXIS_MISS: f32 = 0.25;
 /// Range of distances for which the parameters of published schemes (Gaussian, attention) are meaningful.
 const USUAL_DISTANCES: (f32, f32) = (0.1, 100.0);
 
@@ -135,7 +135,7 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
              (OpenGL poses read as OpenCV, or the other way round)"
         ));
     }
-    if rig.axis_miss > MOST_AXIS_MISS * rig.distance {
+    if rig.axis_miss > MAX_AXIS_MISS * rig.distance {
         warnings.push(format!(
             "the cameras do not look at a common point: their axes miss the nearest one by {:.3} at a distance of {:.3}",
             rig.axis_miss, rig.distance
@@ -176,7 +176,7 @@ fn object_of(
     warnings: &mut Vec<String>,
 ) -> Result<Option<ObjectBlock>, String> {
     let views: Vec<usize> =
-        (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).take(MOST_SOURCES).collect();
+        (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some()).take(MAX_SOURCES).collect();
     if views.len() < 2 {
         return Err("fewer than two photographs: the object cannot be found".to_owned());
     }

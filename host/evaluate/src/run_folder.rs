@@ -24,7 +24,7 @@ use viewfuse_job::files::{WriteError, read_at_most, write_whole};
 pub const SETTINGS: &str = "run.json";
 
 /// Most jobs of an evaluation.
-pub const MOST_JOBS: usize = 10_000_000;
+pub const MAX_JOBS: usize = 10_000_000;
 
 /// Most bytes of the file of settings.
 const LONGEST_SETTINGS: u64 = 1 << 30;
@@ -67,7 +67,7 @@ pub enum FolderError {
         differences: Vec<String>,
     },
     /// The settings have more jobs than an evaluation can have.
-    #[error("{}: job_count is {count}; at most {MOST_JOBS} jobs are possible", path.display())]
+    #[error("{}: job_count is {count}; at most {MAX_JOBS} jobs are possible", path.display())]
     JobCount {
         /// The file of settings.
         path: PathBuf,
@@ -136,7 +136,7 @@ impl RunFolder {
             line: None,
             cause,
         })?;
-        if settings.job_count > MOST_JOBS {
+        if settings.job_count > MAX_JOBS {
             return Err(FolderError::JobCount { path: file, count: settings.job_count });
         }
         Ok(RunFolder { path: path.to_path_buf(), settings })

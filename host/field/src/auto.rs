@@ -19,7 +19,7 @@ mod leave_out;
 
 pub use expectation::{Basis, Expected, TERMS};
 pub use geometry::Standing;
-pub use leave_out::{MOST_LEFT_OUT, MOST_NEIGHBOURS, SIDE};
+pub use leave_out::{MAX_LEFT_OUT, MAX_NEIGHBOURS, SIDE};
 
 use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
 use crate::{Renderer, Setting};
@@ -45,7 +45,7 @@ pub fn schemes() -> Vec<Scheme> {
 
 /// Least significant gain, decibels. Of 0, 0.03 and 0.1, with and without a margin for the spread between sources, this
 /// came nearest to the best choice in hindsight over 15 scenes and selections; see also [`is_better`].
-const LEAST_GAIN: f64 = 0.1;
+const MIN_GAIN: f64 = 0.1;
 
 /// A scheme and settings that were tried.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -214,8 +214,8 @@ fn is_better(candidate: &[Outcome], best: &[Outcome], replaced: &[Outcome]) -> b
     let middle = gains.len() / 2;
     let median = if gains.len() % 2 == 1 { gains[middle] } else { 0.5 * (gains[middle - 1] + gains[middle]) };
     mean_score(candidate) > mean_score(best)
-        && mean_score(candidate) - mean_score(replaced) > LEAST_GAIN
-        && median > 0.5 * LEAST_GAIN
+        && mean_score(candidate) - mean_score(replaced) > MIN_GAIN
+        && median > 0.5 * MIN_GAIN
 }
 
 /// Mean score, decibels.

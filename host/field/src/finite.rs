@@ -2,8 +2,8 @@
 
 use super::error::FieldError;
 pub use super::error::NotFinite;
-use viewfuse_core::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_device::Device;
+use viewfuse_kernels::finite::{ALL_FINITE, FINITE_RUN};
 
 /// Checks all values of a stage's result.
 ///

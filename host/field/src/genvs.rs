@@ -1,5 +1,5 @@
 //! GeNVS with weighted views, on any device: volumes of features, a feature image, a diffusion denoiser; the mathematics is
-//! in [`viewfuse_core::genvs`], [`viewfuse_core::network`], [`viewfuse_core::schedule`] and [`viewfuse_core::sampler`].
+//! in [`viewfuse_kernels::genvs`], [`viewfuse_kernels::network`], [`viewfuse_core::schedule`] and [`viewfuse_core::sampler`].
 //!
 //! Source: Chan et al., "Generative novel view synthesis with 3D-aware diffusion models" (2023), and the code of "Pay
 //! Attention to Where You Looked". The views are combined with weights; the published network takes their mean.

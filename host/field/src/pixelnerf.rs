@@ -1,5 +1,5 @@
-//! PixelNeRF with weighted views, on any device; the mathematics is in [`viewfuse_core::pixelnerf`] and
-//! [`viewfuse_core::network`].
+//! PixelNeRF with weighted views, on any device; the mathematics is in [`viewfuse_kernels::pixelnerf`] and
+//! [`viewfuse_kernels::network`].
 //!
 //! Source: Yu, Ye, Tancik, Kanazawa: "pixelNeRF", CVPR 2021, and its official code. The views are combined with weights;
 //! the published network takes their mean.
@@ -24,7 +24,7 @@ pub mod test_networks;
 
 pub use architecture::{Architecture, Level, Pass};
 pub use open::{COMPUTABLE, open};
-pub use options::{LEAST_OPACITY, LEAST_SHARE, Omissions, PixelNerfOptions, Sampling};
+pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
 use super::learned::{default_near_far, over_white};
 use super::{
@@ -374,6 +374,6 @@ fn along_axis(rendered: &mut Rendered, cast: &CastBlock) {
     for (pixel, (depth, colour)) in (0..).zip(rendered.depths.iter_mut().zip(&rendered.colours)) {
         let ray = viewfuse_core::rays::cast_ray(cast, pixel);
         let direction = viewfuse_core::Vec3::from_array(ray.direction);
-        *depth = if colour[3] >= LEAST_OPACITY { *depth * direction.dot(forward) } else { 0.0 };
+        *depth = if colour[3] >= MIN_OPACITY { *depth * direction.dot(forward) } else { 0.0 };
     }
 }

@@ -21,9 +21,9 @@ const PIXEL_TOLERANCE: f32 = 1.0;
 /// Greatest relative difference of the depths of neighbours on one surface.
 const SURFACE_TOLERANCE: f32 = 0.05;
 /// Confidence from which on a depth counts, where the field tells.
-const LEAST_CONFIDENCE: f32 = 0.5;
+const MIN_CONFIDENCE: f32 = 0.5;
 /// Opacity of a photograph from which on a pixel belongs to the object.
-const LEAST_OPACITY: f32 = 0.5;
+const MIN_OPACITY: f32 = 0.5;
 
 /// A point on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,7 +176,7 @@ impl Fusion<'_> {
     fn point(&self, view: usize, pixel: usize) -> Option<Vec3> {
         let DepthMap { camera, depths, .. } = &self.maps[view];
         let depth = depths[pixel];
-        if !(depth > 0.0 && self.confidence(view, pixel) >= LEAST_CONFIDENCE) {
+        if !(depth > 0.0 && self.confidence(view, pixel) >= MIN_CONFIDENCE) {
             return None;
         }
         let width = camera.width as usize;
@@ -225,13 +225,13 @@ impl Fusion<'_> {
     }
 
     fn is_object(&self, view: usize, x: f32, y: f32) -> bool {
-        self.texel(view, x, y)[3] >= LEAST_OPACITY
+        self.texel(view, x, y)[3] >= MIN_OPACITY
     }
 
     /// Red, green and blue of a pixel, without the background.
     fn colour(&self, view: usize, pixel: usize) -> [f32; 3] {
         let width = self.maps[view].camera.width as usize;
         let [r, g, b, alpha] = self.texel(view, (pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);
-        [r, g, b].map(|value| value / alpha.max(LEAST_OPACITY))
+        [r, g, b].map(|value| value / alpha.max(MIN_OPACITY))
     }
 }

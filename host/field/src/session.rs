@@ -8,7 +8,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
 /// Source views on a renderer's device, with the set of encoded views (for the current weighting, if encodings depend on
 /// it).
@@ -229,7 +229,7 @@ impl<'a> Session<'a> {
 fn even(count: usize) -> Vec<SourceWeights> {
     let weights = |own: usize| {
         let score = |view: usize| f32::from(view < count && view != own);
-        Weights::from_scores(&std::array::from_fn::<f32, MOST_SOURCES, _>(score), count as u32)
+        Weights::from_scores(&std::array::from_fn::<f32, MAX_SOURCES, _>(score), count as u32)
     };
     (0..count).map(weights).collect()
 }

@@ -42,14 +42,14 @@ impl Default for TrainingFree {
 
 /// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
 /// photographs.
-const MOST_GAP_DEGREES: f32 = 15.0;
+const MAX_GAP_DEGREES: f32 = 15.0;
 
 /// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
 pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
-    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MOST_GAP_DEGREES)?;
+    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MAX_GAP_DEGREES)?;
     Some(format!(
         "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
-         reliably up to about {MOST_GAP_DEGREES:.0} degrees; take photographs between them"
+         reliably up to about {MAX_GAP_DEGREES:.0} degrees; take photographs between them"
     ))
 }
 

@@ -10,7 +10,7 @@
 //!
 //! Memory: opening takes at most [`OPENING_BYTES`], and at most a fixed multiple of the file's description of its
 //! tensors. Reading takes [`Checkpoint::byte_estimate`], which is known before and limited by
-//! [`LARGEST_TENSOR_BYTES`] and [`LARGEST_TOTAL_BYTES`].
+//! [`MAX_TENSOR_BYTES`] and [`MAX_TOTAL_BYTES`].
 
 mod archive;
 mod check;
@@ -31,8 +31,8 @@ mod write;
 pub use element::Element;
 pub use error::CheckpointError;
 pub use kind::Kind;
-pub use place::{LARGEST_TENSOR_BYTES, LARGEST_TOTAL_BYTES};
-pub use sizes::{LARGEST_SIZE, Sizes};
+pub use place::{MAX_TENSOR_BYTES, MAX_TOTAL_BYTES};
+pub use sizes::{MAX_SIZE, Sizes};
 pub use state_dict::PLACES;
 pub use write::{Precision, Written};
 
@@ -115,11 +115,11 @@ impl Checkpoint {
                 }
             };
             let total = places.values().map(|place| 4 * u128::from(place.count())).sum();
-            if total > LARGEST_TOTAL_BYTES.into() {
+            if total > MAX_TOTAL_BYTES.into() {
                 return Err(Problem::TooLarge {
                     what: format!("all its {} tensors", places.len()),
                     bytes: total,
-                    limit: LARGEST_TOTAL_BYTES,
+                    limit: MAX_TOTAL_BYTES,
                 });
             }
             let shapes = places.iter().map(|(name, place)| (name.clone(), place.shape.clone())).collect();

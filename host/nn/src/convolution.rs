@@ -4,10 +4,10 @@ use super::image::{Image, Size};
 use super::scratch::Scratch;
 use super::window::Windows;
 use std::ops::Range;
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::depthwise::DepthwiseBlock;
-use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_device::{Device, DeviceError, Layer};
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::depthwise::DepthwiseBlock;
+use viewfuse_kernels::network::transpose::TransposedBlock;
 
 /// A convolution with bias on a device.
 pub struct Convolution<D: Device> {

@@ -1,7 +1,7 @@
 //! Linear layers.
 
-use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_device::{Device, DeviceError, Layer};
+use viewfuse_kernels::network::linear::LinearBlock;
 
 /// A linear layer on a device: `outputs[row][output] = bias[output] + sum over inputs of inputs[row][input] *
 /// weights[input][output]`.

@@ -2,8 +2,8 @@
 
 use super::image::Image;
 use super::scratch::Scratch;
-use viewfuse_core::network::group_norm::GroupNormBlock;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::network::group_norm::GroupNormBlock;
 
 /// A group norm on a device.
 pub struct GroupNorm<D: Device> {

@@ -4,10 +4,10 @@
 use super::image::{HostImage, Image, Size};
 use super::scratch::Scratch;
 use super::window::Windows;
-use viewfuse_core::network::group_norm::MeanBlock;
-use viewfuse_core::network::resample::PoolBlock;
 use viewfuse_device::parallel::for_each_row;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::network::group_norm::MeanBlock;
+use viewfuse_kernels::network::resample::PoolBlock;
 
 /// Max pool over square windows, channel by channel; places outside of the image do not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,8 +2,8 @@
 
 use super::image::Image;
 use super::scratch::Scratch;
-use viewfuse_core::network::resample::UpsampleBlock;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::network::resample::UpsampleBlock;
 
 /// Upsamples an image that fills its buffer to the size of another, bilinear with aligned corners, into the channels of that
 /// one's buffer from `first_channel` on. To an image of its own size, the values are copied.

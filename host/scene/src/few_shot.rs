@@ -11,7 +11,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_weighting::sources::MAX_SOURCES;
 
 /// Why a selection of views is invalid.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +67,7 @@ pub enum SelectionError {
         least: usize,
     },
     /// There are more sources than the program supports.
-    #[error("{scene}: {count} source views; at most {MOST_SOURCES} fit")]
+    #[error("{scene}: {count} source views; at most {MAX_SOURCES} fit")]
     TooManySources {
         /// The scene's path.
         scene: String,
@@ -244,7 +244,7 @@ impl Selection {
                 least: least_sources,
             });
         }
-        if sources.len() > MOST_SOURCES {
+        if sources.len() > MAX_SOURCES {
             return Err(SelectionError::TooManySources { scene: scene_name(), count: sources.len() });
         }
         Ok(sources)

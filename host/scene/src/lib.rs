@@ -25,7 +25,7 @@ mod scene;
 pub mod write;
 
 pub use scene::{
-    FileFault, IntrinsicsFault, LARGEST_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
+    FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
     ScenePoint, Split, View, looked_for, read_picture, reader,
 };
 

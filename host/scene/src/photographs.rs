@@ -102,19 +102,19 @@ impl SourceImages {
 }
 
 /// Most bytes of decoded photographs that are kept. If a run needs more, each is decoded again at every use.
-const MOST_KEPT_BYTES: u64 = 512 << 20;
+const MAX_KEPT_BYTES: u64 = 512 << 20;
 
 /// Most bytes of photographs decoded at the same time, unless a single one needs more.
-const MOST_DECODING_BYTES: u64 = 512 << 20;
+const MAX_DECODING_BYTES: u64 = 512 << 20;
 
 /// Bytes for decoding a pixel: as decoded, as RGBA, undistorted.
 const DECODING_BYTES: u64 = 16;
 
 /// Photographs of less than twice this side are kept at their own size, for any working size.
-const LEAST_KEPT_SIDE: u32 = 640;
+const MIN_KEPT_SIDE: u32 = 640;
 
 /// Points with a larger reprojection error, in pixels, are ignored.
-const MOST_POINT_ERROR: f32 = 2.0;
+const MAX_POINT_ERROR: f32 = 2.0;
 
 /// Photographs of a scene, decoded once if memory allows.
 pub struct Album<'a> {
@@ -152,7 +152,7 @@ impl<'a> Album<'a> {
         longest_side: u32,
         progress: &dyn Progress,
     ) -> Result<Album<'a>, PhotographsError> {
-        let side = Some(longest_side.saturating_mul(2).max(LEAST_KEPT_SIDE));
+        let side = Some(longest_side.saturating_mul(2).max(MIN_KEPT_SIDE));
         Album { scene, kept: vec![None; scene.views.len()], side }.filled(views, progress)
     }
 
@@ -165,7 +165,7 @@ impl<'a> Album<'a> {
         wanted.sort_unstable();
         wanted.dedup();
         let pixels = |(width, height): (u32, u32)| u64::from(width) * u64::from(height);
-        if wanted.iter().map(|&view| 4 * pixels(self.kept_size(view))).sum::<u64>() > MOST_KEPT_BYTES {
+        if wanted.iter().map(|&view| 4 * pixels(self.kept_size(view))).sum::<u64>() > MAX_KEPT_BYTES {
             return Ok(self);
         }
         progress.expect(wanted.len());
@@ -176,7 +176,7 @@ impl<'a> Album<'a> {
             let fits = |&&view: &&usize| {
                 let pinhole = &self.scene.views[view].camera.pinhole;
                 bytes += DECODING_BYTES * pixels((pinhole.width(), pinhole.height()));
-                bytes <= MOST_DECODING_BYTES
+                bytes <= MAX_DECODING_BYTES
             };
             let count = rest.iter().take_while(fits).count().max(1);
             let (now, later) = rest.split_at(count);
@@ -250,7 +250,7 @@ impl<'a> Album<'a> {
                 "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): nothing is cut out, \
                  whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG with \
                  alpha)",
-                matte::MOST_NOISE_LEVEL
+                matte::MAX_NOISE_LEVEL
             ));
         }
         let (points, near_far) = self.space(views);
@@ -294,7 +294,7 @@ impl<'a> Album<'a> {
     fn space(&self, views: &[usize]) -> (Vec<Vec3>, Option<[f32; 2]>) {
         let saw = |point: &&crate::ScenePoint| {
             let is_source = |view: &&u32| views.contains(&(**view as usize));
-            let is_exact = point.error.is_none_or(|error| error <= MOST_POINT_ERROR);
+            let is_exact = point.error.is_none_or(|error| error <= MAX_POINT_ERROR);
             is_exact && point.views.iter().filter(is_source).take(2).count() == 2
         };
         let points = self.scene.points.iter().filter(saw).map(|point| point.position_world).collect();

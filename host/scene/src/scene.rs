@@ -57,7 +57,7 @@ pub fn looked_for(readers: &[&dyn Reader]) -> String {
 }
 
 /// Most pixels that an image may have on a side: a larger header is refused before anything is allocated.
-pub const LARGEST_SIDE: u32 = 16_384;
+pub const MAX_SIDE: u32 = 16_384;
 
 /// One camera of a scene, with its photograph if there is one.
 ///

@@ -33,7 +33,7 @@ pub const RAYS_PER_SIDE: u32 = 3;
 const LONGEST_SETTINGS: u64 = 1 << 20;
 
 /// Most objects in a folder: their names have six digits, and the folders' stretches of indices do not overlap.
-pub const LARGEST_OBJECT_COUNT: u32 = 1_000_000;
+pub const MAX_OBJECT_COUNT: u32 = 1_000_000;
 
 /// What decides every picture of a collection, whatever the number of objects.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -138,7 +138,7 @@ pub enum MakeError {
     #[error("a camera is unusable")]
     Camera(#[from] PoseError),
     /// More objects than names.
-    #[error("a folder holds at most {LARGEST_OBJECT_COUNT} objects, not {0}")]
+    #[error("a folder holds at most {MAX_OBJECT_COUNT} objects, not {0}")]
     Count(u32),
     /// The work was stopped.
     #[error("{0}")]
@@ -172,7 +172,7 @@ pub fn make(
     progress: &dyn Progress,
 ) -> Result<Made, MakeError> {
     let sets = [("train", counts.train, false), ("val", counts.validation, true), ("test", counts.test, true)];
-    if let Some((_, count, _)) = sets.iter().find(|(_, count, _)| *count > LARGEST_OBJECT_COUNT) {
+    if let Some((_, count, _)) = sets.iter().find(|(_, count, _)| *count > MAX_OBJECT_COUNT) {
         return Err(MakeError::Count(*count));
     }
     let sphere = sphere(settings.size).map_err(|source| MakeError::Size { size: settings.size, source })?;
@@ -188,7 +188,7 @@ pub fn make(
             if folder.is_dir() {
                 made.kept_count += 1;
             } else {
-                jobs.push(Job { folder, index: set as u32 * LARGEST_OBJECT_COUNT + object, on_spiral });
+                jobs.push(Job { folder, index: set as u32 * MAX_OBJECT_COUNT + object, on_spiral });
             }
         }
     }

@@ -21,7 +21,7 @@ use viewfuse_job::files::WholeFolder;
 use viewfuse_job::progress::{Interrupted, Progress};
 
 /// Most views in a folder: their names have six digits.
-pub const LARGEST_VIEW_COUNT: usize = 1_000_000;
+pub const MAX_VIEW_COUNT: usize = 1_000_000;
 
 /// Why a scene folder was not written. Nothing stands at its path then that was not there before.
 #[derive(Debug, thiserror::Error)]
@@ -38,8 +38,8 @@ pub enum WriteError {
         /// The folder asked for.
         path: PathBuf,
     },
-    /// There are no cameras, or more than [`LARGEST_VIEW_COUNT`].
-    #[error("{path}: a scene has 1 to {LARGEST_VIEW_COUNT} views, not {count}", path = .path.display())]
+    /// There are no cameras, or more than [`MAX_VIEW_COUNT`].
+    #[error("{path}: a scene has 1 to {MAX_VIEW_COUNT} views, not {count}", path = .path.display())]
     ViewCount {
         /// The folder asked for.
         path: PathBuf,
@@ -152,7 +152,7 @@ pub(crate) fn create_whole(
 
 pub(crate) fn shared_pinhole(folder: &Path, cameras: &[Camera]) -> Result<Pinhole, WriteError> {
     let count = cameras.len();
-    let Some(first) = cameras.first().filter(|_| count <= LARGEST_VIEW_COUNT) else {
+    let Some(first) = cameras.first().filter(|_| count <= MAX_VIEW_COUNT) else {
         return Err(WriteError::ViewCount { path: folder.to_owned(), count });
     };
     let [focal_x, focal_y] = first.pinhole.focal();

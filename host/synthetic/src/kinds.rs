@@ -4,7 +4,7 @@
 //! colours, patterns, lamps. The same seed and index give the same object bit for bit, whatever was drawn before.
 //! Objects stand upright along world z, cars and chairs face along world x, and all are normalised as ShapeNet's are: the
 //! diagonal of the box around them is about 1 (0.8 to 1), its middle about the origin. Nothing reaches farther
-//! than [`LARGEST_RADIUS`], so that no camera of [`crate::cameras`] cuts anything off.
+//! than [`MAX_RADIUS`], so that no camera of [`crate::cameras`] cuts anything off.
 
 pub(crate) mod build;
 mod cars;
@@ -22,7 +22,7 @@ use std::str::FromStr;
 use viewfuse_core::Vec3;
 
 /// Farthest that an object reaches from the origin, in world units.
-pub const LARGEST_RADIUS: f32 = 0.55;
+pub const MAX_RADIUS: f32 = 0.55;
 
 /// What an object is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use viewfuse_core::math::{max, min};
 
 /// Farthest that a part may reach from the world's origin: coordinates there are exact to about the distance at which a
 /// ray counts as arrived.
-pub const LARGEST_DISTANCE: f32 = 100.0;
+pub const MAX_DISTANCE: f32 = 100.0;
 
 /// Why parts are not an object. Parts count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -30,8 +30,8 @@ pub enum ObjectError {
     /// A lamp's direction or strength is not usable.
     #[error("the light has an unusable direction or strength")]
     Light,
-    /// A part's place is not finite or farther away than [`LARGEST_DISTANCE`].
-    #[error("part {part} is not within {LARGEST_DISTANCE} of the origin")]
+    /// A part's place is not finite or farther away than [`MAX_DISTANCE`].
+    #[error("part {part} is not within {MAX_DISTANCE} of the origin")]
     Place {
         /// Which part.
         part: usize,
@@ -83,7 +83,7 @@ impl Object {
                 return Err(ObjectError::Finish { part: index });
             }
             let reach = part.placement.origin_world().length() + part.shape.bounding_radius();
-            if !(reach <= LARGEST_DISTANCE) {
+            if !(reach <= MAX_DISTANCE) {
                 return Err(ObjectError::Place { part: index });
             }
             bounding_radius = max(bounding_radius, min(reach, farthest_corner(part)));

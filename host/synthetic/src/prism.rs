@@ -14,7 +14,7 @@ use viewfuse_core::Vec3;
 use viewfuse_core::math::{abs, clamp, max, min, sqrt};
 
 /// Most corners of an outline.
-pub const LARGEST_CORNER_COUNT: usize = 32;
+pub const MAX_CORNER_COUNT: usize = 32;
 
 /// Shortest edge of an outline, in world units: shorter ones have no direction in `f32`.
 pub const SHORTEST_EDGE: f32 = 1.0e-4;
@@ -73,7 +73,7 @@ impl Edges {
 /// An outline with a width.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prism {
-    edges: [Edges; LARGEST_CORNER_COUNT / EDGES_TOGETHER],
+    edges: [Edges; MAX_CORNER_COUNT / EDGES_TOGETHER],
     shortest_edge: f32,
     /// As asked for; [`Prism::is_sound`] refuses one that is too large.
     corner_count: usize,
@@ -88,10 +88,10 @@ impl Prism {
     /// The prism over the outline with these corners (x and z, in either sense, each once), which rounding then widens
     /// on all sides. The outline must not cross itself.
     pub fn new(corners: &[[f32; 2]], width: Width) -> Prism {
-        let mut edges = [Edges::NOTHING; LARGEST_CORNER_COUNT / EDGES_TOGETHER];
+        let mut edges = [Edges::NOTHING; MAX_CORNER_COUNT / EDGES_TOGETHER];
         let mut shortest_edge = f32::MAX;
         let mut reach = [0.0_f32; 2];
-        for (index, &[x, z]) in corners.iter().enumerate().take(LARGEST_CORNER_COUNT) {
+        for (index, &[x, z]) in corners.iter().enumerate().take(MAX_CORNER_COUNT) {
             let (edges, lane) = (&mut edges[index / EDGES_TOGETHER], index % EDGES_TOGETHER);
             let end = corners[(index + 1) % corners.len()];
             let along = [end[0] - x, end[1] - z];
@@ -146,7 +146,7 @@ impl Prism {
     fn outline_distance(&self, x: f32, z: f32) -> f32 {
         let mut nearest = [f32::MAX; EDGES_TOGETHER];
         let mut crossings = [0_u32; EDGES_TOGETHER];
-        let count = self.corner_count.min(LARGEST_CORNER_COUNT).div_ceil(EDGES_TOGETHER);
+        let count = self.corner_count.min(MAX_CORNER_COUNT).div_ceil(EDGES_TOGETHER);
         for edges in &self.edges[..count] {
             for lane in 0..EDGES_TOGETHER {
                 let (along_x, along_z) = (edges.along_x[lane], edges.along_z[lane]);
@@ -164,13 +164,13 @@ impl Prism {
         if crossings.into_iter().fold(0, |sum, crossing| sum ^ crossing) == 1 { -distance } else { distance }
     }
 
-    /// Whether there are 3 to [`LARGEST_CORNER_COUNT`] corners, no edge is shorter than [`SHORTEST_EDGE`], every number
+    /// Whether there are 3 to [`MAX_CORNER_COUNT`] corners, no edge is shorter than [`SHORTEST_EDGE`], every number
     /// is finite, and the width stays positive and larger than the rounding.
     pub fn is_sound(&self) -> bool {
         let Width { half_width, waist, lean, shoulder, nose, rounding } = self.width;
         let slopes = lean >= 0.0 && nose >= 0.0 && (0.0..self.half_box.x).contains(&shoulder);
         let narrowest = half_width - lean * max(self.half_box.z - waist, 0.0) - nose;
-        (3..=LARGEST_CORNER_COUNT).contains(&self.corner_count)
+        (3..=MAX_CORNER_COUNT).contains(&self.corner_count)
             && self.shortest_edge >= SHORTEST_EDGE
             && self.half_box.is_finite()
             && waist.is_finite()

@@ -45,7 +45,7 @@ pub struct Walk {
 const ARC_STEP: f32 = 0.11;
 
 /// Largest angle of an arc, in radians.
-const LARGEST_ARC: f32 = 2.1;
+const MAX_ARC: f32 = 2.1;
 
 /// Random numbers of a rig: those of a view do not depend on how many views there are.
 struct Hand {
@@ -85,7 +85,7 @@ impl Rig {
         // Azimuths are those of the camera as seen from the subject; -y is in front.
         let (azimuth, distance, up, unsteady) = match self {
             Rig::Arc => {
-                let span = min(ARC_STEP * steps, LARGEST_ARC);
+                let span = min(ARC_STEP * steps, MAX_ARC);
                 let azimuth = span * (along - 0.5) + 0.008 * hand.shake();
                 (azimuth, d * (1.0 + 0.04 * hand.shake()), height(0.5 + 0.5 * hand.shake()), 0.03)
             }

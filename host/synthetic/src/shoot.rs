@@ -54,7 +54,7 @@ pub enum ShootError {
 const FOCAL: f32 = 0.92;
 
 /// Distance of a corner and where the lens bends the corner's ray to, normalised, above which the lens folds over.
-const LARGEST_RESIDUAL: f64 = 1.0e-6;
+const MAX_RESIDUAL: f64 = 1.0e-6;
 
 /// Seed of the sample: a room with many colours and textures.
 const SAMPLE_SEED: u64 = 17;
@@ -163,7 +163,7 @@ impl Shoot {
                 let corner = [f64::from(x / focal_x), f64::from(y / focal_y)];
                 let straight = lens.undistort(corner);
                 let radius = straight.point[0].hypot(straight.point[1]);
-                !(straight.residual <= LARGEST_RESIDUAL) || lens.reach(2.0 * radius + 1.0e-9) < radius
+                !(straight.residual <= MAX_RESIDUAL) || lens.reach(2.0 * radius + 1.0e-9) < radius
             };
             corners.into_iter().any(misses)
         };

@@ -13,7 +13,7 @@ use viewfuse_core::random::threefry_2x32;
 pub const SMALLEST_CELL: f32 = 1.0e-5;
 
 /// Most slices of each colour: far more than a picture can show.
-pub const LARGEST_PAIR_COUNT: u32 = 1 << 12;
+pub const MAX_PAIR_COUNT: u32 = 1 << 12;
 
 /// How many boxes [`Texture::Patches`] has.
 pub const PATCH_COUNT: usize = 10;
@@ -121,7 +121,7 @@ impl Finish {
             Texture::Plain { colour } => colour.is_finite(),
             Texture::Checker { colours, size: edge } => both(colours) && size(edge),
             Texture::Stripes { colours, across, width } => both(colours) && across.is_finite() && size(width),
-            Texture::Slices { colours, pair_count } => both(colours) && pair_count <= LARGEST_PAIR_COUNT,
+            Texture::Slices { colours, pair_count } => both(colours) && pair_count <= MAX_PAIR_COUNT,
             Texture::Spots { colours, cell, radius, .. } => {
                 both(colours) && size(cell) && radius > 0.0 && radius <= 0.5
             }

@@ -15,7 +15,7 @@ use viewfuse_core::math::{abs, max, min, sqrt};
 pub const ARRIVAL_DISTANCE: f32 = 1.0e-5;
 
 /// Most steps along a ray through one part. Only rays that graze a surface come near it, and they are then let pass.
-const LARGEST_STEP_COUNT: u32 = 256;
+const MAX_STEP_COUNT: u32 = 256;
 
 /// Half of the distance between the points that a normal is computed from, in world units: smaller than any edge's
 /// radius, and large enough for a rounding error below 0.001 in the normal.
@@ -94,7 +94,7 @@ fn march(part: &Part, bounding_radius: f32, ray: &Ray, limit: f32) -> Option<f32
     }
     let mut t = if bounding_radius > LARGE { max(enter, box_enter) } else { enter };
     let leave = min(leave, box_leave);
-    for _ in 0..LARGEST_STEP_COUNT {
+    for _ in 0..MAX_STEP_COUNT {
         if t >= leave {
             return None;
         }

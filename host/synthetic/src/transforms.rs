@@ -7,7 +7,7 @@
 //!
 //! Numbers are written with the fewest digits that read back as the same `f32`. The folder appears whole or not at all.
 
-use crate::folder::{LARGEST_VIEW_COUNT, WriteError, create_whole, io_error, write_text};
+use crate::folder::{MAX_VIEW_COUNT, WriteError, create_whole, io_error, write_text};
 use crate::shoot::Shoot;
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
@@ -56,7 +56,7 @@ pub fn write_shoot(
     progress: &dyn Progress,
 ) -> Result<(), WriteError> {
     let count = shoot.cameras().len();
-    if count > LARGEST_VIEW_COUNT {
+    if count > MAX_VIEW_COUNT {
         return Err(WriteError::ViewCount { path: folder.to_owned(), count });
     }
     let text = transforms(shoot.cameras(), shoot.lens())

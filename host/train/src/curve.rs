@@ -8,7 +8,7 @@ const SIZE: (u32, u32) = (900, 480);
 const LOSS: RGBColor = RGBColor(0, 114, 178);
 const SCORE: RGBColor = RGBColor(213, 94, 0);
 /// Scores beyond this are drawn as this.
-const LARGEST_SCORE: f64 = 1.0e6;
+const MAX_SCORE: f64 = 1.0e6;
 const FONT: &str = "sans-serif";
 
 /// Draws the curves; a run without points has empty axes.
@@ -29,7 +29,7 @@ fn draw(picture: &mut String, so_far: &Progressed, score_name: &str) -> Result<(
     let losses: Vec<(u32, f64)> = so_far.losses.iter().map(logarithm).collect();
     // An axis has no steps between numbers that are so large.
     let scores: Vec<(u32, f64)> =
-        so_far.scores.iter().map(|(step, score)| (*step, score.clamp(-LARGEST_SCORE, LARGEST_SCORE))).collect();
+        so_far.scores.iter().map(|(step, score)| (*step, score.clamp(-MAX_SCORE, MAX_SCORE))).collect();
     let mut chart = ChartBuilder::on(&root)
         .margin(12)
         .x_label_area_size(40)

@@ -57,10 +57,10 @@ const FEATURES_WEIGHT: f64 = 1.0 / (SIGMA_DATA * SIGMA_DATA) as f64;
 const VALIDATION_OBJECTS: usize = 24;
 const VALIDATION_SOURCES: usize = 3;
 /// Most numbers of a step's volumes, of 4 bytes each; gradients and layers take several times as many.
-const LARGEST_VOLUMES: usize = 1 << 30;
+const MAX_VOLUMES: usize = 1 << 30;
 
 /// The default of [`GenvsSettings::share_of_largest`].
-pub const SHARE_OF_LARGEST: f32 = 0.25;
+pub const MAX_LEVEL_SHARE: f32 = 0.25;
 
 struct GenvsLearner {
     network: Genvs,
@@ -87,7 +87,7 @@ impl GenvsSettings {
         let Architecture { image_side, ref encoder, .. } = *architecture;
         let factors =
             [self.variety.most_sources(), image_side, image_side, encoder.volume_depth, encoder.feature_count];
-        if factors.into_iter().fold(self.objects, usize::saturating_mul) > LARGEST_VOLUMES {
+        if factors.into_iter().fold(self.objects, usize::saturating_mul) > MAX_VOLUMES {
             let allowed = "objects times sources times the numbers of a volume must be at most 2^30";
             return Err(TrainError::Setting { name: "objects", value: self.objects as f64, allowed });
         }

@@ -47,7 +47,7 @@ mod weighting_learner;
 mod weights;
 
 pub use attention::Embedding;
-pub use genvs_learner::{GenvsSettings, SHARE_OF_LARGEST, train_genvs};
+pub use genvs_learner::{GenvsSettings, MAX_LEVEL_SHARE, train_genvs};
 pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
 pub use state::check_state;

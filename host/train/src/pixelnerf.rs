@@ -14,9 +14,9 @@ use super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, Window};
 use super::parameters::{Contents, Parameters, fan_in, random};
 use candle_core::{D, DType, Device, Result, Tensor};
 use std::sync::Arc;
-use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_field::pixelnerf::architecture::Architecture;
+use viewfuse_kernels::pixelnerf::EmbedBlock;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_nn::resnet::has_shortcut;
 

@@ -39,11 +39,11 @@ pub struct PixelNerfSettings {
 
 /// Levels of a new network's trunk, and the most: those of the published trunk.
 const LEVELS: usize = 3;
-const MOST_LEVELS: usize = 4;
+const MAX_LEVELS: usize = 4;
 /// Largest width, side and count of the settings.
-const LARGEST: usize = 1024;
+const MAX_SETTING: usize = 1024;
 /// Most samples of a step times the width: so many numbers a layer has, of 4 bytes.
-const LARGEST_LAYER: usize = 1 << 28;
+const MAX_LAYER: usize = 1 << 28;
 
 impl PixelNerfSettings {
     /// Refuses numbers with which nothing is computed, or that no memory holds.
@@ -59,11 +59,11 @@ impl PixelNerfSettings {
             ("fine", fine, 0, "it must be from 0 to 1024"),
         ];
         if let Some(&(name, value, _, allowed)) =
-            numbers.iter().find(|(_, value, least, _)| !(*least..=LARGEST).contains(value))
+            numbers.iter().find(|(_, value, least, _)| !(*least..=MAX_SETTING).contains(value))
         {
             return Err(TrainError::Setting { name, value: value as f64, allowed });
         }
-        if !(1..=MOST_LEVELS).contains(&levels) {
+        if !(1..=MAX_LEVELS).contains(&levels) {
             return Err(TrainError::Setting {
                 name: "levels",
                 value: levels as f64,
@@ -71,7 +71,7 @@ impl PixelNerfSettings {
             });
         }
         let layer = objects * rays * (coarse + fine) * width;
-        if layer > LARGEST_LAYER {
+        if layer > MAX_LAYER {
             let allowed = "objects times rays times samples times width must be at most 2^28";
             return Err(TrainError::Setting { name: "objects", value: objects as f64, allowed });
         }

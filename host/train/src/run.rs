@@ -52,7 +52,7 @@ const LAST_RATE: f64 = 0.03;
 /// Steps from one point of the loss curve to the next.
 const LOSS_EVERY: u32 = 50;
 /// Largest norm of a gradient.
-const MOST_GRADIENT: f64 = 1.0;
+const MAX_GRADIENT: f64 = 1.0;
 /// Decay of the parameters' average at each step.
 const AVERAGING: f64 = 0.999;
 
@@ -167,7 +167,7 @@ pub(crate) fn run(
             return Err(TrainError::NotFinite { step, what: "loss".to_owned() });
         }
         let rate = schedule.rate_at(step);
-        learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MOST_GRADIENT)?;
+        learned.adam.step(learner.parameters(), &loss.backward()?, step, rate, MAX_GRADIENT)?;
         learned.average.step(learner.parameters(), step)?;
         so_far.steps += 1;
         so_far.pending = (so_far.pending.0 + value, so_far.pending.1 + 1);

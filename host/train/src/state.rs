@@ -32,8 +32,8 @@ pub(crate) struct Progressed {
 /// Most bytes of a state.
 const LONGEST_STATE: u64 = 16 << 30;
 /// Largest loss and score, up to the sign, and longest time in seconds, of a run.
-const LARGEST: f64 = 1.0e30;
-const LARGEST_SCORE: f64 = 1.0e9;
+const MAX_NUMBER: f64 = 1.0e30;
+const MAX_SCORE: f64 = 1.0e9;
 
 impl Progressed {
     /// What is wrong with its numbers, which a damaged file may hold.
@@ -42,8 +42,8 @@ impl Progressed {
         let sound = |points: &[(u32, f64)], largest: f64| {
             points.iter().all(|(step, value)| step <= steps && value.abs() <= largest)
         };
-        let is_time = (0.0..=LARGEST).contains(seconds);
-        match is_time && sound(losses, LARGEST) && pending.0.abs() <= LARGEST && sound(scores, LARGEST_SCORE) {
+        let is_time = (0.0..=MAX_NUMBER).contains(seconds);
+        match is_time && sound(losses, MAX_NUMBER) && pending.0.abs() <= MAX_NUMBER && sound(scores, MAX_SCORE) {
             true => Ok(()),
             false => Err("its steps, times, losses or scores are out of range".to_owned()),
         }

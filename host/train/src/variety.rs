@@ -5,7 +5,7 @@ use super::batch::Shown;
 use super::draw::{Draw, Purpose};
 use serde::{Serialize, Serializer};
 use viewfuse_core::weighting::Scheme;
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_weighting::sources::MAX_SOURCES;
 
 /// What differs from step to step, so that a network works with more than one kind of sources: of each list one is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -51,7 +51,7 @@ impl Variety {
     /// Refuses empty lists and numbers out of range, for pictures of this side.
     pub(crate) fn check(&self, side: u32) -> Result<(), TrainError> {
         let refuse = |name, value, allowed| Err(TrainError::Setting { name, value, allowed });
-        if let Some(count) = self.sources.iter().find(|count| !(1..=MOST_SOURCES).contains(*count)) {
+        if let Some(count) = self.sources.iter().find(|count| !(1..=MAX_SOURCES).contains(*count)) {
             return refuse("sources", *count as f64, "it must be from 1 to 256");
         }
         if self.sources.is_empty() || self.schemes.is_empty() {

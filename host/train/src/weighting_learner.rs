@@ -6,7 +6,7 @@ use super::attention::{Attention, Embedding};
 use super::batch::{Batch, BatchSize, Shown, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views};
-use super::genvs_learner::{self, SHARE_OF_LARGEST};
+use super::genvs_learner::{self, MAX_LEVEL_SHARE};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::pixelnerf_learner;
@@ -132,7 +132,7 @@ impl Learner for WeightingLearner {
                 let samples =
                     CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: GENVS_SAMPLES, jitter: 1.0 };
                 let weights = self.of_views(&views)?;
-                genvs_learner::loss(network, &views, &weights, &samples, SHARE_OF_LARGEST, draw)
+                genvs_learner::loss(network, &views, &weights, &samples, MAX_LEVEL_SHARE, draw)
             }
         }
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Most warnings that are kept.
-const MOST_WARNINGS: usize = 20;
+const MAX_WARNINGS: usize = 20;
 
 /// What is being done.
 #[derive(Debug, Default)]
@@ -42,7 +42,7 @@ impl Status {
     /// Each warning is kept once.
     pub(crate) fn warn(&self, warning: &str) {
         let mut shown = self.shown();
-        if shown.warnings.len() < MOST_WARNINGS && !shown.warnings.iter().any(|known| known == warning) {
+        if shown.warnings.len() < MAX_WARNINGS && !shown.warnings.iter().any(|known| known == warning) {
             shown.warnings.push(warning.to_owned());
         }
     }

@@ -11,7 +11,7 @@ use viewfuse_scene::{Scene, View};
 use viewfuse_weighting::scheme_names;
 
 /// A greater limit of a parameter than this is none.
-const LARGEST_LIMIT: f32 = 1.0e9;
+const MAX_LIMIT: f32 = 1.0e9;
 
 /// The scene as the page gets it. World coordinates; poses are world from camera, row-major, in OpenCV axes.
 #[derive(Debug, Serialize)]
@@ -164,7 +164,7 @@ fn scheme_rows() -> Vec<SchemeRow> {
         parameter: row.parameter.map(|own| ParameterRow {
             key: own.key,
             least: own.least,
-            most: (own.most < LARGEST_LIMIT).then_some(own.most),
+            most: (own.most < MAX_LIMIT).then_some(own.most),
             default: own.default,
         }),
         choice: row.choice.map(|choice| ChoiceRow { key: choice.key, options: choice.options }),

@@ -1,7 +1,7 @@
 //! Pictures that need no field: copies and warps of the nearest sources.
 
 use image::{Rgb, RgbImage};
-use viewfuse::evaluate::baseline::plane::{FEWEST_POINTS, depth_of_bounds, depth_of_focus, plane_depth};
+use viewfuse::evaluate::baseline::plane::{MIN_POINTS, depth_of_bounds, depth_of_focus, plane_depth};
 use viewfuse::evaluate::baseline::{BLENDED, Baseline, Shot};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
@@ -159,7 +159,7 @@ fn points_come_before_bounds_and_bounds_before_the_focus() {
     let view = target();
     // Half of the points at 2, half at 6: the mean disparity is that of 3. Those outside the picture do not count.
     let seen = |z: f32| Vec3::new(0.0, 0.1, z);
-    let points: Vec<Vec3> = [2.0, 6.0].repeat(FEWEST_POINTS / 2).into_iter().map(seen).collect();
+    let points: Vec<Vec3> = [2.0, 6.0].repeat(MIN_POINTS / 2).into_iter().map(seen).collect();
     let outside = [Vec3::new(0.0, 0.0, -5.0), Vec3::new(90.0, 0.0, 1.0)];
     let all = || points.iter().copied().chain(outside);
     let near = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1.0e-5, "{value}, not {expected}");

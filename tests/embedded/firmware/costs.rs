@@ -12,13 +12,13 @@ use viewfuse_tests::emulator::trace::Call;
 use viewfuse_tests::places::repository;
 
 /// What the default scheme may take for 8 sources on the first board.
-const MOST_INSTRUCTIONS: u64 = 6000;
-const MOST_STACK: u32 = 2048;
+const MAX_INSTRUCTIONS: u64 = 6000;
+const MAX_STACK: u32 = 2048;
 /// What attention with 8 bits may take there, and have of parameters.
-const MOST_ATTENDING: u64 = 300_000;
-const MOST_PARAMETERS: usize = 20_000;
+const MAX_ATTENDING: u64 = 300_000;
+const MAX_PARAMETERS: usize = 20_000;
 /// What the firmware without attention may have there of code and constants.
-const MOST_BYTES: u64 = 32 * 1024;
+const MAX_BYTES: u64 = 32 * 1024;
 
 /// A row of a table: what it is about, and its numbers; what is not measured has none.
 type Row = (String, Vec<Option<u64>>);
@@ -93,7 +93,7 @@ pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed
         println!("{}, all without attention: {} bytes: {:?}", board.board.processor, image.bytes(), image.sections);
         whole.extend([None, None, Some(image.bytes())]);
     }
-    assert!(whole[2] <= Some(MOST_BYTES), "{whole:?}");
+    assert!(whole[2] <= Some(MAX_BYTES), "{whole:?}");
     three.push(("all but attention, with the program that prints it".to_owned(), whole));
     let is_small = boards.iter().all(|board| board.emulator().is_ok_and(|emulator| emulator.compiles_the_library()));
 
@@ -107,13 +107,13 @@ pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed
 fn within_limits(calls: &[Call]) -> Result<(), Failed> {
     let default = &calls[0];
     assert_eq!(default.name, "weigh");
-    assert!(default.instructions <= MOST_INSTRUCTIONS && default.stack <= MOST_STACK, "{default:?}");
+    assert!(default.instructions <= MAX_INSTRUCTIONS && default.stack <= MAX_STACK, "{default:?}");
     assert!(default.instructions > 100, "nothing was computed: {default:?}");
     let (attend, further) = (named(calls, "attend")?, named(calls, "further")?);
-    assert!(attend.instructions <= MOST_ATTENDING, "{attend:?}");
+    assert!(attend.instructions <= MAX_ATTENDING, "{attend:?}");
     assert!(10 * further.instructions <= attend.instructions, "{further:?} of {attend:?}");
     assert!(further.instructions > 1000, "nothing was computed: {further:?}");
-    assert!(size_of::<QuantisedAttention>() <= MOST_PARAMETERS);
+    assert!(size_of::<QuantisedAttention>() <= MAX_PARAMETERS);
     Ok(())
 }
 

@@ -28,7 +28,7 @@ fn one_source_looks_as_far_as_several() {
 #[test]
 fn a_target_that_is_a_source() {
     let sources = sources(3);
-    let mut scores = [0.0; viewfuse::weighting::sources::MOST_SOURCES];
+    let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
     scores[1] = 1.0;
     let camera = Camera { pinhole: orbit(12).pinhole, ..sources.images[1].camera };
     assert_sound(&picture_with(&mist(exact()), &sources, &Weights::from_scores(&scores, 3), &camera, 0.0));

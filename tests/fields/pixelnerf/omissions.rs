@@ -3,7 +3,7 @@
 use super::{body, exact, largest_difference, leaving_out, mist, picture, picture_with, recorded, sources, target};
 use viewfuse::field::pixelnerf::{Omissions, PixelNerfOptions};
 use viewfuse::field::{LeftOut, Rendered};
-use viewfuse::weighting::sources::MOST_SOURCES;
+use viewfuse::weighting::sources::MAX_SOURCES;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::fields::line;
@@ -37,7 +37,7 @@ fn nothing_is_left_out_where_nothing_may() {
 #[test]
 fn views_that_no_target_uses_are_not_encoded() {
     let (sources, target) = (sources(4), target(16));
-    let mut scores = [0.0; MOST_SOURCES];
+    let mut scores = [0.0; MAX_SOURCES];
     (scores[1], scores[3]) = (0.25, 0.75);
     let weights = Weights::from_scores(&scores, 4);
     let reference = picture_with(&body(exact()), &sources, &weights, &target, 0.0);

@@ -3,7 +3,7 @@
 use super::{Omissions, assert_sound, exact, leaving_out, mist, orbit, picture_with, recorded, sources, target};
 use viewfuse::field::pixelnerf::{PixelNerfOptions, Sampling};
 use viewfuse::scene::photographs::SourceImages;
-use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::depths::stratified_depth;
@@ -16,7 +16,7 @@ const SIDE: u32 = 12;
 const WEIGHTS: [f32; 3] = [0.5, 0.3, 0.2];
 
 fn weights(scores: [f32; 3]) -> SourceWeights {
-    let mut all = [0.0; MOST_SOURCES];
+    let mut all = [0.0; MAX_SOURCES];
     all[..3].copy_from_slice(&scores);
     Weights::from_scores(&all, 3)
 }
@@ -66,7 +66,7 @@ fn nothing_of_a_view_behind_which_all_points_lie_reaches_the_picture() {
         // Without the omission its latents are multiplied by 0.
         assert_ne!(picture, render(&spoiled, false), "{omissions:?}");
         // The weights of the others are renormalised: the picture is theirs alone, up to the rounding of that.
-        let mut scores = [0.0; MOST_SOURCES];
+        let mut scores = [0.0; MAX_SOURCES];
         (scores[0], scores[1]) = (WEIGHTS[0], WEIGHTS[2]);
         let field = mist(with_near(0.1, omissions));
         let alone = picture_with(&field, &others, &Weights::from_scores(&scores, 2), &target, 0.0);

@@ -9,7 +9,7 @@ use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::toy::{lorry, training_cameras};
 use viewfuse::synthetic::{Finish, Object, Orbit, Part, Placement, Shape, Texture, render};
 use viewfuse::weighting::Weighting;
-use viewfuse::weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::Sources;
@@ -41,7 +41,7 @@ impl Run {
         let mut session = Session::open(&renderer, sources, &quiet)?;
         session.weigh(&relevance(sources, &weighting), &quiet)?;
         let all: Vec<_> = sources.images.iter().map(|image| image.camera.pose).collect();
-        let all = Sources::<MOST_SOURCES>::new(&all).expect("sources");
+        let all = Sources::<MAX_SOURCES>::new(&all).expect("sources");
         let weights = weighting.weigh(&all, &target.pose);
         session.render(target, &weights, self.early_termination, &quiet)
     }
@@ -54,10 +54,10 @@ fn relevance(sources: &SourceImages, weighting: &Weighting) -> Vec<SourceWeights
         .map(|own| {
             let mut others = poses.clone();
             others.remove(own);
-            let others = Sources::<MOST_SOURCES>::new(&others).expect("two sources or more");
+            let others = Sources::<MAX_SOURCES>::new(&others).expect("two sources or more");
             let mut scores = weighting.weigh(&others, &poses[own]).values().to_vec();
             scores.insert(own, 0.0);
-            let scores: [f32; MOST_SOURCES] = std::array::from_fn(|view| scores[view]);
+            let scores: [f32; MAX_SOURCES] = std::array::from_fn(|view| scores[view]);
             Weights::from_scores(&scores, poses.len() as u32)
         })
         .collect()

@@ -7,7 +7,7 @@ use viewfuse_tests::checkpoints::{Claim, Pickle, archive, legacy, safetensors, s
 use viewfuse_tests::places::data;
 
 /// Tensors of files that ask for more are not read here.
-const LARGEST_READ: u64 = 64 << 20;
+const MAX_READ: u64 = 64 << 20;
 
 pub(crate) struct Checkpoints {
     file: OneFile,
@@ -99,7 +99,7 @@ impl Target for Checkpoints {
         let opened = Checkpoint::open(path);
         if let Ok(checkpoint) = &opened {
             for name in checkpoint.shapes().keys() {
-                if checkpoint.byte_estimate([name.as_str()]) <= LARGEST_READ {
+                if checkpoint.byte_estimate([name.as_str()]) <= MAX_READ {
                     verdict(checkpoint.tensor(name), path)?;
                 }
             }

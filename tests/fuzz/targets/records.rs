@@ -45,7 +45,7 @@ impl Files {
     }
 
     fn verdict(&self, made: Result<String, ReportError>) -> Result<Verdict, String> {
-        if made.as_ref().is_ok_and(|page| page.len() > MOST_PAGE) {
+        if made.as_ref().is_ok_and(|page| page.len() > MAX_PAGE) {
             return Err("a page of more than 64 MiB".to_owned());
         }
         verdict(made, self.folder.path())
@@ -53,7 +53,7 @@ impl Files {
 }
 
 /// Most bytes of a page of small files.
-const MOST_PAGE: usize = 64 << 20;
+const MAX_PAGE: usize = 64 << 20;
 
 const WORDS: &[&str] = &[
     "\"inf\"",

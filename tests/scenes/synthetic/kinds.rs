@@ -2,7 +2,7 @@
 
 use image::RgbaImage;
 use viewfuse::synthetic::cameras::{random_views, sphere};
-use viewfuse::synthetic::kinds::{Kind, LARGEST_RADIUS};
+use viewfuse::synthetic::kinds::{Kind, MAX_RADIUS};
 use viewfuse::synthetic::{Light, Object, ObjectError, Orbit, render_with};
 use viewfuse_core::Vec3;
 
@@ -16,12 +16,12 @@ fn object(kind: Kind, seed: u64, index: u32) -> Object {
 fn every_object_is_sound_and_fits_into_its_pictures() {
     // A ball that touches the picture's edge: its sine is that of half the field of view.
     let widest = 1.3 * (64.0_f32 / 131.25).atan().sin();
-    assert!(LARGEST_RADIUS < widest, "{LARGEST_RADIUS} is cut off at {widest}");
+    assert!(MAX_RADIUS < widest, "{MAX_RADIUS} is cut off at {widest}");
     for kind in Kind::ALL {
         for index in 0..500 {
             let object = object(kind, 1, index);
             let radius = object.bounding_radius();
-            assert!((0.2..=LARGEST_RADIUS).contains(&radius), "{kind} {index} reaches {radius}");
+            assert!((0.2..=MAX_RADIUS).contains(&radius), "{kind} {index} reaches {radius}");
             // The plainest is a stool: a seat on a box.
             assert!(object.parts().len() >= 2, "{kind} {index} has {} parts", object.parts().len());
         }

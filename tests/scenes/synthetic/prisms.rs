@@ -1,7 +1,7 @@
 //! Prisms: tracing against a walk in small steps through their definition in `f64`.
 
 use super::RED;
-use viewfuse::synthetic::prism::{LARGEST_CORNER_COUNT, Width};
+use viewfuse::synthetic::prism::{MAX_CORNER_COUNT, Width};
 use viewfuse::synthetic::{Finish, Object, ObjectError, Part, Placement, Prism, Shape, Texture, trace};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Ray;
@@ -103,7 +103,7 @@ fn distances_to_a_prism_are_never_too_long_and_its_box_holds_it() {
 fn unusable_prisms_are_refused() {
     let refused = Err(ObjectError::Shape { part: 0 });
     assert_eq!(object(&CORNERS[..2], WIDTH), refused, "no area");
-    let many = [[0.1, 0.2]; LARGEST_CORNER_COUNT + 1];
+    let many = [[0.1, 0.2]; MAX_CORNER_COUNT + 1];
     assert_eq!(object(&many, WIDTH), refused, "too many corners");
     assert_eq!(object(&[[0.0, 0.0], [0.1, 0.0], [0.1, 0.0], [0.0, 0.1]], Width::constant(0.1, 0.0)), refused, "twice");
     assert_eq!(object(&[[0.0, 0.0], [f32::NAN, 0.0], [0.0, 0.1]], Width::constant(0.1, 0.0)), refused, "not a number");

@@ -18,7 +18,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
 
 /// Most that the sample may take in the repository.
-const LARGEST_BYTE_COUNT: u64 = 600_000;
+const MAX_BYTE_COUNT: u64 = 600_000;
 
 fn folder() -> PathBuf {
     viewfuse_tests::places::data("room")
@@ -47,7 +47,7 @@ fn the_sample_room_is_what_the_code_makes() {
     let length = |path: PathBuf| fs::metadata(path).expect("a file").len();
     let photographs: u64 = (0..room.cameras().len()).map(|view| length(folder().join(file_name(view)))).sum();
     let total = photographs + length(folder().join("transforms.json"));
-    assert!(total <= LARGEST_BYTE_COUNT, "the sample takes {total} bytes");
+    assert!(total <= MAX_BYTE_COUNT, "the sample takes {total} bytes");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use super::vectors::{arrays, fours};
 use super::{UNTOUCHED, dispatch, numbers};
-use viewfuse_core::limits::{ChainBlock, chained};
+use viewfuse_kernels::limits::{ChainBlock, chained};
 use viewfuse_shaders::limits;
 
 #[test]

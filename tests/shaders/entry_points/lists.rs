@@ -1,8 +1,8 @@
 //! Lists of samples and numbers that are not finite.
 
 use super::dispatch;
-use viewfuse_core::compact::RUN;
-use viewfuse_core::finite::{ALL_FINITE, FINITE_RUN};
+use viewfuse_kernels::compact::RUN;
+use viewfuse_kernels::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_shaders::lists;
 
 /// From a mask to its list, by the three kernels one after the other, beside the list as an iterator makes it.

@@ -1,12 +1,12 @@
 //! Layers of networks.
 
 use super::{UNTOUCHED, dispatch, numbers};
-use viewfuse_core::network::attend::{softmax_scale, softmax_value};
-use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
-use viewfuse_core::network::group_norm::{
+use viewfuse_kernels::network::attend::{softmax_scale, softmax_value};
+use viewfuse_kernels::network::depthwise::{DepthwiseBlock, depthwise_element};
+use viewfuse_kernels::network::group_norm::{
     GroupNormBlock, MeanBlock, channel_mean, group_norm_element, group_norm_partials, group_norm_statistics,
 };
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_shaders::{group_norm, matrices, network};
 
 #[test]

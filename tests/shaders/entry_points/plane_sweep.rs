@@ -5,13 +5,13 @@ use super::visual_hull::{page_shift, pages, pages_mut};
 use super::{UNTOUCHED, dispatch};
 use viewfuse::check::swept::{Swept, band, costs};
 use viewfuse::check::world::Numbers;
-use viewfuse_core::plane_sweep::blend::blend;
-use viewfuse_core::plane_sweep::disparity::pick_disparity;
-use viewfuse_core::plane_sweep::evidence::evidence;
-use viewfuse_core::plane_sweep::frustum::FrustumBlock;
-use viewfuse_core::plane_sweep::path::{CostBlock, Line, joined_cost};
-use viewfuse_core::plane_sweep::window::{WindowBlock, row_sums, window_cost};
-use viewfuse_core::plane_sweep::{PLANES, Planes, census};
+use viewfuse_kernels::plane_sweep::blend::blend;
+use viewfuse_kernels::plane_sweep::disparity::pick_disparity;
+use viewfuse_kernels::plane_sweep::evidence::evidence;
+use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
+use viewfuse_kernels::plane_sweep::path::{CostBlock, Line, joined_cost};
+use viewfuse_kernels::plane_sweep::window::{WindowBlock, row_sums, window_cost};
+use viewfuse_kernels::plane_sweep::{PLANES, Planes, census};
 use viewfuse_shaders::plane_sweep;
 
 /// What elements hold before anything is written.

@@ -3,9 +3,9 @@
 use bytemuck::{Pod, cast_slice};
 use glam::{UVec4, Vec2, Vec4};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::frustum::SweptView;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_shaders::loads::{CameraWords, PlaneVectors, PointWords, ViewWords};
 
 /// Structs as `N` fours of words each.

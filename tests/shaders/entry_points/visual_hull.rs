@@ -3,9 +3,9 @@
 use super::vectors::{arrays, cameras, fours};
 use super::{UNTOUCHED, dispatch, numbers};
 use viewfuse::check::world::World;
-use viewfuse_core::visual_hull::hull::hull_entry;
-use viewfuse_core::visual_hull::ray_marching::{MarchBlock, march_ray};
-use viewfuse_core::visual_hull::sweep::{SweepBlock, match_cost, mean_column, pick_depth, sum_row};
+use viewfuse_kernels::visual_hull::hull::hull_entry;
+use viewfuse_kernels::visual_hull::ray_marching::{MarchBlock, march_ray};
+use viewfuse_kernels::visual_hull::sweep::{SweepBlock, match_cost, mean_column, pick_depth, sum_row};
 use viewfuse_shaders::{ray_marching, sweep};
 
 /// Binary logarithm of the pages' length by which a map of this length takes all four.

@@ -3,12 +3,12 @@
 use super::vectors::{cameras, points};
 use super::{UNTOUCHED, dispatch, numbers, points_of};
 use viewfuse::check::world::World;
-use viewfuse_core::genvs::{
+use viewfuse_core::half_precision::packed_f16;
+use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::genvs::{
     DenoiserInputBlock, FeatureBlock, VolumeBlock, denoiser_input, summed_feature, volume_value, volume_value_f16,
     weigh_features,
 };
-use viewfuse_core::half_precision::packed_f16;
-use viewfuse_core::rays::RayPoint;
 use viewfuse_shaders::volumes;
 
 #[test]

@@ -17,8 +17,10 @@ pub const SUBGROUPS: &str = "vulkan/src/subgroups.spv";
 /// Their stamp.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
 /// The modules' source files, and folders with all their Rust files.
-pub const SOURCES: [&str; 9] = [
+pub const SOURCES: [&str; 11] = [
     "core/Cargo.toml",
+    "core/kernels/Cargo.toml",
+    "core/kernels/src",
     "core/src",
     "vulkan/compiler/src/compile.rs",
     "vulkan/compiler/src/legalise.rs",

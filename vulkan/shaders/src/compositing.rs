@@ -4,8 +4,8 @@ use crate::Push;
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::composite::{CompositeBlock, composite_samples};
+use viewfuse_core::fetch::StartingAt;
 use viewfuse_core::fuse::{FuseBlock, fuse_element};
-use viewfuse_core::pages::StartingAt;
 
 /// The weighted sum over the views of channel number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "fuse_views"))]

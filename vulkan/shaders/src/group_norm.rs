@@ -3,7 +3,7 @@
 use crate::Push;
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::network::group_norm::{self, GroupNormBlock, MeanBlock};
+use viewfuse_kernels::network::group_norm::{self, GroupNormBlock, MeanBlock};
 
 /// The mean of channel number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "channel_means"))]

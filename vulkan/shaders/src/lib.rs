@@ -1,7 +1,7 @@
 //! Entry points of the kernels on Vulkan devices.
 //!
 //! An entry point has the name of its kernel and takes its arrays in the order of the kernel's row
-//! ([`viewfuse_core::kernels`]), its parameters and the [`Piece`] as push constants. It checks whether its element
+//! ([`viewfuse_kernels::rows`]), its parameters and the [`Piece`] as push constants. It checks whether its element
 //! exists, calls the kernel's body in `viewfuse-core` or the parts of that body, and stores the result. Arrays that may
 //! be longer than a device can bind at once come as four pages. Elements of several numbers are loaded as vectors
 //! (`loads`). Two things are computed here: the matrix products of tiled kernels are summed in workgroup memory or by
@@ -29,7 +29,7 @@ mod unchecked;
 pub mod volumes;
 pub mod weighting;
 
-pub use viewfuse_core::kernels::Piece;
+pub use viewfuse_kernels::rows::Piece;
 
 /// Push constants of a kernel with parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

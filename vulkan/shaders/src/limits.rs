@@ -4,7 +4,7 @@ use crate::loads::Fours;
 use crate::{Piece, Push};
 use spirv_std::glam::{UVec3, Vec4};
 use spirv_std::spirv;
-use viewfuse_core::limits::{ChainBlock, chained, copied};
+use viewfuse_kernels::limits::{ChainBlock, chained, copied};
 
 /// Four numbers, number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "copy_numbers"))]

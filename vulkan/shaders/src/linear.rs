@@ -5,8 +5,8 @@ use crate::tile::{Buffered, Double, Quadruple, Shape, Shared, ShortShared, Singl
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::network::linear::{LinearBlock, first_of_sum, input_value, rectified};
-use viewfuse_core::pages::Fetch;
+use viewfuse_core::fetch::Fetch;
+use viewfuse_kernels::network::linear::{LinearBlock, first_of_sum, input_value, rectified};
 
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]

@@ -3,8 +3,8 @@
 use crate::Push;
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::compact;
-use viewfuse_core::finite;
+use viewfuse_kernels::compact;
+use viewfuse_kernels::finite;
 
 /// Run number `first + id.x` of the elements.
 #[spirv(compute(threads(64), entry_point_name = "count_marked"))]

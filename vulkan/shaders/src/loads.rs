@@ -5,11 +5,11 @@
 
 use spirv_std::glam::{UVec4, Vec2, Vec4};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pages::Fetch;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::frustum::SweptView;
+use viewfuse_core::fetch::Fetch;
 use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::frustum::SweptView;
 
 /// A [`CameraBlock`].
 pub type CameraWords = [UVec4; 5];

@@ -5,7 +5,7 @@ use crate::tile::{Buffered, Double, Quadruple, Shape, Shared, ShortShared, Singl
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::network::attend::{MatrixBlock, softmax_scale, softmax_value};
+use viewfuse_kernels::network::attend::{MatrixBlock, softmax_scale, softmax_value};
 
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]

@@ -5,11 +5,11 @@ use crate::tile::{Buffered, Double, Quadruple, Shape, Shared, ShortShared, Singl
 use crate::unchecked::{Endless, store};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::network::convolve::{ConvolveBlock, convolved, patch_value};
-use viewfuse_core::network::depthwise::{DepthwiseBlock, depthwise_element};
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
-use viewfuse_core::network::transpose::TransposedBlock;
-use viewfuse_core::pages::Fetch;
+use viewfuse_core::fetch::Fetch;
+use viewfuse_kernels::network::convolve::{ConvolveBlock, convolved, patch_value};
+use viewfuse_kernels::network::depthwise::{DepthwiseBlock, depthwise_element};
+use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_kernels::network::transpose::TransposedBlock;
 
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]

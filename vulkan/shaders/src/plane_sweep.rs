@@ -4,15 +4,15 @@ use crate::Push;
 use crate::loads::{Fours, Groups, PlaneVectors, Twos, ViewWords, Views, plane_vectors};
 use spirv_std::glam::{UVec3, Vec2, Vec4};
 use spirv_std::spirv;
-use viewfuse_core::pages::{Pages, PagesMut};
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::blend::{self, BlendBlock};
-use viewfuse_core::plane_sweep::census;
-use viewfuse_core::plane_sweep::disparity;
-use viewfuse_core::plane_sweep::evidence::{self, ViewPair};
-use viewfuse_core::plane_sweep::frustum::FrustumBlock;
-use viewfuse_core::plane_sweep::path::{self, CostBlock, Line};
-use viewfuse_core::plane_sweep::window::{self, WindowBlock};
+use viewfuse_kernels::pages::{Pages, PagesMut};
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::blend::{self, BlendBlock};
+use viewfuse_kernels::plane_sweep::census;
+use viewfuse_kernels::plane_sweep::disparity;
+use viewfuse_kernels::plane_sweep::evidence::{self, ViewPair};
+use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
+use viewfuse_kernels::plane_sweep::path::{self, CostBlock, Line};
+use viewfuse_kernels::plane_sweep::window::{self, WindowBlock};
 
 /// What the views show on group and pixel number `first + id.x` of the band.
 #[spirv(compute(threads(64), entry_point_name = "compare_views"))]

@@ -4,9 +4,9 @@ use crate::loads::{CameraWords, Cameras, PointWords, Points};
 use crate::{Piece, Push};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
+use viewfuse_core::fetch::{Fetch, StartingAt};
 use viewfuse_core::half_precision::Halves;
-use viewfuse_core::pages::{Fetch, StartingAt};
-use viewfuse_core::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace};
+use viewfuse_kernels::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace};
 
 /// Feature number `first + id.x`, flat in `[view][point][feature]`.
 #[spirv(compute(threads(64), entry_point_name = "embed_points"))]

@@ -4,9 +4,9 @@ use crate::Push;
 use crate::loads::{CameraWords, Cameras, Fours};
 use spirv_std::glam::{UVec3, Vec4};
 use spirv_std::spirv;
-use viewfuse_core::pages::{Pages, PagesMut};
-use viewfuse_core::visual_hull::ObjectBlock;
-use viewfuse_core::visual_hull::ray_marching::MarchBlock;
+use viewfuse_kernels::pages::{Pages, PagesMut};
+use viewfuse_kernels::visual_hull::ObjectBlock;
+use viewfuse_kernels::visual_hull::ray_marching::MarchBlock;
 
 /// The ray of pixel number `first + id.x` of the target through the solid.
 #[spirv(compute(threads(64), entry_point_name = "march_rays"))]
@@ -48,7 +48,7 @@ pub fn march_rays(
     let mut colours = PagesMut { a: colours_a, b: colours_b, c: colours_c, d: colours_d, shift: page_shift };
     let mut pixel_depths =
         PagesMut { a: pixel_depths_a, b: pixel_depths_b, c: pixel_depths_c, d: pixel_depths_d, shift: page_shift };
-    let seen = viewfuse_core::visual_hull::ray_marching::march_ray(
+    let seen = viewfuse_kernels::visual_hull::ray_marching::march_ray(
         object,
         &Cameras(views),
         footprints,

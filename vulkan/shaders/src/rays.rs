@@ -4,9 +4,9 @@ use crate::Push;
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::depths::{self, CoarseBlock, FineBlock};
-use viewfuse_core::pages::StartingAt;
+use viewfuse_core::fetch::StartingAt;
 use viewfuse_core::rays::{self, CastBlock, PlaceBlock, RayPoint, TargetRay};
-use viewfuse_core::sample_mask::{self, RaysBlock, SampleMaskBlock};
+use viewfuse_kernels::sample_mask::{self, RaysBlock, SampleMaskBlock};
 
 /// Ray number `first + id.x`.
 #[spirv(compute(threads(64), entry_point_name = "cast_rays"))]

@@ -4,9 +4,10 @@ use crate::Push;
 use crate::loads::{CameraWords, Cameras, Fours};
 use spirv_std::glam::{UVec3, Vec4};
 use spirv_std::spirv;
-use viewfuse_core::pages::{Fetch, Pages, PagesMut, StartingAt};
-use viewfuse_core::visual_hull::sweep::{OUTSIDE, SweepBlock, SweptPixel};
-use viewfuse_core::visual_hull::{ObjectBlock, hull, sweep};
+use viewfuse_core::fetch::{Fetch, StartingAt};
+use viewfuse_kernels::pages::{Pages, PagesMut};
+use viewfuse_kernels::visual_hull::sweep::{OUTSIDE, SweepBlock, SweptPixel};
+use viewfuse_kernels::visual_hull::{ObjectBlock, hull, sweep};
 
 /// Where the ray of pixel number `first + id.x` of a view, the parameter, enters the hull.
 #[spirv(compute(threads(64), entry_point_name = "hull_entry"))]

@@ -15,8 +15,8 @@ pub(crate) use subgroup::Subgroup;
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
-use viewfuse_core::kernels::Form;
-use viewfuse_core::network::tile::{Sums, TILE};
+use viewfuse_kernels::network::tile::{Sums, TILE};
+use viewfuse_kernels::rows::Form;
 
 /// Inner indices of a step.
 const STEP: u32 = 16;

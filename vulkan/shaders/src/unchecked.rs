@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use spirv_std::arch::IndexUnchecked;
-use viewfuse_core::pages::Fetch;
+use viewfuse_core::fetch::Fetch;
 
 /// An array with at least one element; an index beyond its end reads the last one.
 #[derive(Clone, Copy)]

@@ -4,9 +4,9 @@ use crate::Push;
 use crate::loads::{CameraWords, Cameras, PointWords, Points};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
-use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock};
 use viewfuse_core::half_precision;
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock};
 
 /// Feature number `first + id.x` of a view's part of the latents, flat in `[point][feature]`.
 #[spirv(compute(threads(64), entry_point_name = "gather_volume"))]

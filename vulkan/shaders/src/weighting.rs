@@ -4,10 +4,10 @@ use crate::{Piece, Push};
 use spirv_std::glam::UVec3;
 use spirv_std::spirv;
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, PoseEmbedding};
-use viewfuse_core::pages::StartingAt;
+use viewfuse_core::fetch::StartingAt;
 use viewfuse_core::pose::{Pose, PoseBlock};
 use viewfuse_core::sources::Sources;
-use viewfuse_core::weighting::{MOST_WEIGHED, WeighBlock};
+use viewfuse_core::weighting::{MAX_WEIGHED, WeighBlock};
 
 /// Weights of the sources for target number `first + id.x`, by formula.
 #[spirv(compute(threads(64), entry_point_name = "weigh"))]
@@ -16,15 +16,15 @@ pub fn weigh(
     #[spirv(push_constant)] push: &Push<WeighBlock>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] sources: &[PoseBlock],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] targets: &[PoseBlock],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] weights: &mut [[f32; MOST_WEIGHED]],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] weights: &mut [[f32; MAX_WEIGHED]],
 ) {
     if id.x >= push.piece.count {
         return;
     }
     let target = (push.piece.first + id.x) as usize;
-    let mut poses = [Pose::IDENTITY; MOST_WEIGHED];
+    let mut poses = [Pose::IDENTITY; MAX_WEIGHED];
     let mut view = 0;
-    while view < MOST_WEIGHED && view < push.parameters.source_count as usize {
+    while view < MAX_WEIGHED && view < push.parameters.source_count as usize {
         poses[view] = sources[view].pose();
         view += 1;
     }
@@ -56,13 +56,13 @@ pub fn attend(
     #[spirv(push_constant)] push: &Push<u32>,
     #[spirv(storage_buffer, descriptor_set = 0, binding = 0)] queries: &[f32],
     #[spirv(storage_buffer, descriptor_set = 0, binding = 1)] keys: &[f32],
-    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] weights: &mut [[f32; MOST_WEIGHED]],
+    #[spirv(storage_buffer, descriptor_set = 0, binding = 2)] weights: &mut [[f32; MAX_WEIGHED]],
 ) {
     if id.x >= push.piece.count {
         return;
     }
     let target = (push.piece.first + id.x) as usize;
     let query = StartingAt { all: queries, first: target * EMBEDDING };
-    let attended = viewfuse_core::attention::attend::<MOST_WEIGHED>(&query, keys, push.parameters);
+    let attended = viewfuse_core::attention::attend::<MAX_WEIGHED>(&query, keys, push.parameters);
     weights[target] = *attended.values();
 }

@@ -6,7 +6,7 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{numbers, random};
 use viewfuse_core::attention::EMBEDDING;
-use viewfuse_core::weighting::MOST_WEIGHED;
+use viewfuse_core::weighting::MAX_WEIGHED;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
@@ -42,7 +42,7 @@ impl Case for Attend {
         let random = &mut random(2, seed, size);
         let first = seed as usize * 5 + size as usize;
         let job = |(index, scale): (usize, f64)| {
-            let source_count = (first + 11 * index) % MOST_WEIGHED + 1;
+            let source_count = (first + 11 * index) % MAX_WEIGHED + 1;
             Job {
                 source_count: source_count as u32,
                 queries: numbers(size as usize * EMBEDDING, || scale * random.normal()),
@@ -58,7 +58,7 @@ impl Case for Attend {
 
     fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
-            let weights = device.zeros(job.queries.len() / EMBEDDING * MOST_WEIGHED)?;
+            let weights = device.zeros(job.queries.len() / EMBEDDING * MAX_WEIGHED)?;
             Ok((device.upload(&job.queries)?, device.upload(&job.keys)?, weights))
         };
         jobs.iter().map(load).collect()
@@ -78,7 +78,7 @@ impl Case for Attend {
 
     fn expected(jobs: &Vec<Job>) -> Vec<Option<Bounded>> {
         let row = |job: &Job, query: &[f32]| {
-            let mut row = [Some(Bounded::ZERO); MOST_WEIGHED];
+            let mut row = [Some(Bounded::ZERO); MAX_WEIGHED];
             row.iter_mut().zip(attend(query, &job.keys)).for_each(|(place, weight)| *place = Some(weight));
             row
         };

@@ -6,11 +6,11 @@ use crate::case::{Case, Spoiler};
 use crate::sweep_oracle;
 use crate::swept::{Swept, band};
 use crate::world::Numbers;
-use viewfuse_core::plane_sweep::evidence::ViewPair;
-use viewfuse_core::plane_sweep::{PLANES, Planes};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::plane_sweep::evidence::ViewPair;
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A frustum and what its views show.

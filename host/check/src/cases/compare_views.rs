@@ -5,10 +5,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::sweep_oracle;
 use crate::swept::{LoadedSwept, Swept};
-use viewfuse_core::plane_sweep::Planes;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A frustum in a device's memory, and what views show there.

@@ -8,10 +8,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::network_oracle;
 use crate::poses::{Random, random};
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::transpose::TransposedBlock;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::transpose::TransposedBlock;
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
 /// A layer of convolutions.

@@ -6,11 +6,11 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{Random, numbers, random};
 use crate::volume_oracle;
-use viewfuse_core::genvs::{DenoiserInputBlock, FeatureBlock};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::genvs::{DenoiserInputBlock, FeatureBlock};
 use viewfuse_vulkan::kernel::Kernel;
 
 type Buffer<D, T> = <D as Memory>::Buffer<T>;

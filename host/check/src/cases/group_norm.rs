@@ -7,10 +7,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::group_norm_oracle;
 use crate::poses::{Random, numbers, random};
-use viewfuse_core::network::group_norm::{GroupNormBlock, MeanBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::network::group_norm::{GroupNormBlock, MeanBlock};
 use viewfuse_vulkan::kernel::Kernel;
 
 type Buffer<D, T> = <D as Memory>::Buffer<T>;

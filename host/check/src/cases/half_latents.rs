@@ -8,10 +8,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::random;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pixelnerf::GatherBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::pixelnerf::GatherBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Jobs in a device's memory, and the gathered values with a number behind them.

@@ -9,10 +9,10 @@ use crate::case::{Case, Spoiler};
 use crate::poses::{numbers, random};
 use half::f16;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::genvs::VolumeBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The nearest number in half precision, none larger than the largest.

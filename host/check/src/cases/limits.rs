@@ -5,9 +5,9 @@ use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{numbers, random};
-use viewfuse_core::limits::{CHAINS, ChainBlock, ROUND_STEPS};
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::limits::{CHAINS, ChainBlock, ROUND_STEPS};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// See the module.

@@ -6,10 +6,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::network_oracle::{self, LayerInputs};
 use crate::poses::{Random, numbers, random};
-use viewfuse_core::network::linear::LinearBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Layer, LayerShape, Memory};
+use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
 /// Numbers behind the last.

@@ -5,9 +5,9 @@ use crate::agreement::Limits;
 use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{Random, random};
-use viewfuse_core::compact::RUN;
-use viewfuse_core::finite::FINITE_RUN;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::compact::RUN;
+use viewfuse_kernels::finite::FINITE_RUN;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Whole numbers.

@@ -5,10 +5,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::hull_oracle;
 use crate::world::World;
-use viewfuse_core::visual_hull::sweep::SweepBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, HullScene};
+use viewfuse_kernels::visual_hull::sweep::SweepBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The world and the sweep.

@@ -6,10 +6,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::matrix_oracle;
 use crate::poses::{Random, numbers, random};
-use viewfuse_core::network::attend::MatrixBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::network::attend::MatrixBlock;
 use viewfuse_vulkan::kernel::{Kernel, tile_elements};
 
 /// Two matrices.

@@ -6,11 +6,11 @@ use crate::case::{Case, Spoiler};
 use crate::sweep_oracle;
 use crate::swept::{Swept, costs};
 use crate::world::Numbers;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::path::CostBlock;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::path::CostBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A volume of costs; four behind one another, of the directions, for [`JoinPaths`].

@@ -6,11 +6,11 @@ use crate::case::{Case, Spoiler};
 use crate::hull_oracle;
 use crate::world::{Numbers, World, costs};
 use std::ops::Range;
-use viewfuse_core::visual_hull::NO_SURFACE;
-use viewfuse_core::visual_hull::sweep::SweepBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, HullScene};
+use viewfuse_kernels::visual_hull::NO_SURFACE;
+use viewfuse_kernels::visual_hull::sweep::SweepBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// The world, and each view's sweep with its mean costs.

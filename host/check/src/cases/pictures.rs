@@ -6,7 +6,7 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::poses::{numbers, random};
 use crate::ray_oracle;
-use viewfuse_core::sampler::{MOST_RESULTS, Mix, NoiseBlock};
+use viewfuse_core::sampler::{MAX_RESULTS, Mix, NoiseBlock};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_vulkan::kernel::Kernel;
@@ -17,14 +17,14 @@ pub struct MixJob {
     mix: Mix,
     element_count: usize,
     state: Vec<f32>,
-    results: [Vec<f32>; MOST_RESULTS],
+    results: [Vec<f32>; MAX_RESULTS],
 }
 
 /// See the module.
 pub enum MixPictures {}
 
 /// State, results, and the combination.
-type LoadedMix<B> = (B, [B; MOST_RESULTS], B);
+type LoadedMix<B> = (B, [B; MAX_RESULTS], B);
 
 impl Case for MixPictures {
     const KERNEL: Kernel = Kernel::MixPictures;

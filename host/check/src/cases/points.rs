@@ -8,11 +8,11 @@ use crate::point_oracle;
 use crate::poses::{Random, numbers, random};
 use crate::sights::{camera, point};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pixelnerf::EmbedBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::pixelnerf::EmbedBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 type Buffer<D, T> = <D as Memory>::Buffer<T>;

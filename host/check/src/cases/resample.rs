@@ -6,10 +6,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::network_oracle;
 use crate::poses::{numbers, random};
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Memory};
+use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A dispatch.

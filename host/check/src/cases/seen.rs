@@ -9,10 +9,10 @@ use crate::poses::{Random, random};
 use crate::ray_oracle;
 use crate::sights::{load_rays, ray};
 use viewfuse_core::rays::TargetRay;
-use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, Rays};
+use viewfuse_kernels::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Rays of equally many samples.

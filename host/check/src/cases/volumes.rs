@@ -8,11 +8,11 @@ use crate::poses::{Random, numbers, random};
 use crate::sights::{camera, point};
 use crate::volume_oracle;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::genvs::VolumeBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Views with their volumes: a dispatch each.

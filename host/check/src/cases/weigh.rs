@@ -6,7 +6,7 @@ use crate::case::{Case, Spoiler};
 use crate::oracle::{Arithmetic, evaluate, schemes};
 use crate::poses::{Random, looking_at_origin, random, ring};
 use viewfuse_core::pose::{Pose, PoseBlock};
-use viewfuse_core::weighting::{MOST_WEIGHED, Scheme, WeighBlock};
+use viewfuse_core::weighting::{MAX_WEIGHED, Scheme, WeighBlock};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
@@ -74,7 +74,7 @@ impl Case for Weigh {
         let schemes = schemes();
         let first = seed as usize * schemes.len() + size as usize;
         let job = |(index, scheme): (usize, Scheme)| {
-            let source_count = (first + index) % MOST_WEIGHED + 1;
+            let source_count = (first + index) % MAX_WEIGHED + 1;
             let arrangement = (first + index + seed as usize) as u32;
             let (sources, targets) = cameras(random, arrangement, source_count, size as usize);
             Job {
@@ -93,7 +93,7 @@ impl Case for Weigh {
 
     fn load<D: Device>(device: &D, jobs: &Vec<Job>) -> Result<Self::Loaded<D>, DeviceError> {
         let load = |job: &Job| {
-            let weights = device.zeros(job.targets.len() * MOST_WEIGHED)?;
+            let weights = device.zeros(job.targets.len() * MAX_WEIGHED)?;
             Ok((device.upload(&job.sources)?, device.upload(&job.targets)?, weights))
         };
         jobs.iter().map(load).collect()
@@ -118,10 +118,10 @@ impl Case for Weigh {
 }
 
 /// A target's weights, zeros beyond the sources.
-fn row(job: &Job, target: &PoseBlock) -> [Option<Bounded>; MOST_WEIGHED] {
+fn row(job: &Job, target: &PoseBlock) -> [Option<Bounded>; MAX_WEIGHED] {
     let sources: Vec<Pose> = job.sources.iter().map(PoseBlock::pose).collect();
     let (weights, units) = evaluate(job.scheme, &sources, &target.pose(), Arithmetic::VULKAN);
-    let mut row = [Some(Bounded::ZERO); MOST_WEIGHED];
+    let mut row = [Some(Bounded::ZERO); MAX_WEIGHED];
     for ((bounded, value), units) in row.iter_mut().zip(weights).zip(units) {
         *bounded = Some(Bounded { value, error: value * units / 16_777_216.0 + NEGLIGIBLE });
     }

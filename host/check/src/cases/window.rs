@@ -5,10 +5,10 @@ use crate::bounded::Bounded;
 use crate::case::{Case, Spoiler};
 use crate::hull_oracle;
 use crate::world::{Numbers, World, costs};
-use viewfuse_core::visual_hull::sweep::{SweepBlock, sum_row};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::visual_hull::sweep::{SweepBlock, sum_row};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// A band's costs and their sums over rows.

@@ -3,9 +3,9 @@
 use super::{NOWHERE, Scene, Seen, Vector, along, centre, interval, look_up, project, radius, tents, towards};
 use crate::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::visual_hull::NO_SURFACE;
-use viewfuse_core::visual_hull::ray_marching::{MOST_STEPS, STEP};
-use viewfuse_core::visual_hull::shade::{
+use viewfuse_kernels::visual_hull::NO_SURFACE;
+use viewfuse_kernels::visual_hull::ray_marching::{MAX_STEPS, STEP};
+use viewfuse_kernels::visual_hull::shade::{
     DEEPEST, EMPTY_ALPHA, FULL_ALPHA, HIDDEN_SHARE, JUMP, SEEN_BEHIND, SURFACE_OFFSET, SURFACE_WIDTH, TRUNCATION,
 };
 
@@ -176,7 +176,7 @@ pub fn march_ray(
     let (mut first, mut behind_first) = (None, Bounded::ZERO);
     if enter.below(leave)? {
         let footprint = (enter + leave) / (Bounded::from(2.0) * Bounded::from(target.intrinsics[0]));
-        let wanted = ((leave - enter) / (Bounded::from(STEP) * footprint)).clamped(1.0, (MOST_STEPS - 1) as f32);
+        let wanted = ((leave - enter) / (Bounded::from(STEP) * footprint)).clamped(1.0, (MAX_STEPS - 1) as f32);
         let floor = (wanted.value - wanted.error).floor();
         if floor != (wanted.value + wanted.error).floor() {
             return None;

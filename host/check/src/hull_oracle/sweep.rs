@@ -2,12 +2,12 @@
 
 use super::{NOWHERE, Scene, along, centre, look_up, project, radius, towards};
 use crate::bounded::{Bounded, ROUNDING};
-use viewfuse_core::visual_hull::hull::SWEPT_ALPHA;
-use viewfuse_core::visual_hull::sweep::{
-    DEPTH_COST, MOST_DIFFERENCE, MOST_ROUGHNESS, NO_WITNESS, OUTSIDE, ROUGHNESS_COST, SEEN_BEHIND_ENTRY,
+use viewfuse_kernels::visual_hull::hull::SWEPT_ALPHA;
+use viewfuse_kernels::visual_hull::sweep::{
+    DEPTH_COST, MAX_DIFFERENCE, MAX_ROUGHNESS, NO_WITNESS, OUTSIDE, ROUGHNESS_COST, SEEN_BEHIND_ENTRY,
     SWEPT_BEHIND_ENTRY, SweepBlock, WINDOW_REACH,
 };
-use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
 
 /// The cost outside the hull.
 const OUT: Bounded = Bounded { value: OUTSIDE as f64, error: 0.0 };
@@ -24,7 +24,7 @@ fn cell(coordinate: Bounded, count: u32) -> Option<usize> {
 }
 
 /// Mean absolute difference between a pixel's colour and the other views' colours at its point on a plane; a share of
-/// [`NO_WITNESS`] always has the difference [`MOST_DIFFERENCE`].
+/// [`NO_WITNESS`] always has the difference [`MAX_DIFFERENCE`].
 pub fn match_cost(
     scene: &Scene,
     sweep: &SweepBlock,
@@ -74,7 +74,7 @@ pub fn match_cost(
         let share = weight * super::bell(behind);
         let differences = [0, 1, 2].map(|c| (colour[c] / colour[3] - own[c] / own[3]).magnitude());
         let difference = (differences[0] + differences[1] + differences[2]) / Bounded::from(3.0);
-        votes.push((share, difference.lesser(MOST_DIFFERENCE.into())));
+        votes.push((share, difference.lesser(MAX_DIFFERENCE.into())));
     }
     if undecided {
         return None;
@@ -82,7 +82,7 @@ pub fn match_cost(
     if containing < scene.object.least_containing {
         return Some(OUT);
     }
-    let no_witness = (Bounded::from(NO_WITNESS), Bounded::from(MOST_DIFFERENCE));
+    let no_witness = (Bounded::from(NO_WITNESS), Bounded::from(MAX_DIFFERENCE));
     let total = votes.iter().fold(no_witness.0, |sum, (share, _)| sum + *share);
     // The mean as a correction of the first vote: an error of a share counts as far as its vote differs.
     let excess =
@@ -156,7 +156,7 @@ pub fn pick_depth(
         let behind = (depth - Bounded::from(entry)).greater(Bounded::ZERO) / radius(object);
         let rough = |sum: Bounded, near: &Bounded| {
             let footprints = (depth - *near).magnitude() / Bounded::from(sweep.footprint);
-            sum + footprints.lesser(MOST_ROUGHNESS.into())
+            sum + footprints.lesser(MAX_ROUGHNESS.into())
         };
         let roughness = around.iter().fold(Bounded::ZERO, rough) / Bounded::from(around.len().max(1) as u32);
         Some(Bounded::from(mean) + Bounded::from(DEPTH_COST) * behind + Bounded::from(ROUGHNESS_COST) * roughness)

@@ -1,8 +1,8 @@
 //! The kernels of a device's limits.
 
 use super::Work;
-use viewfuse_core::limits::{CHAINS, ChainBlock, ROUND_STEPS};
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::limits::{CHAINS, ChainBlock, ROUND_STEPS};
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Fours of an array that is copied, 64 MiB: more than caches hold.

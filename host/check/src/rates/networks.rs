@@ -6,11 +6,11 @@ use crate::poses::{numbers, random};
 use crate::sights::{camera, point};
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::network::attend::MatrixBlock;
-use viewfuse_core::network::convolve::ConvolveBlock;
-use viewfuse_core::network::linear::LinearBlock;
-use viewfuse_core::pixelnerf::GatherBlock;
 use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
+use viewfuse_kernels::network::attend::MatrixBlock;
+use viewfuse_kernels::network::convolve::ConvolveBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
+use viewfuse_kernels::pixelnerf::GatherBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 const F32: f64 = size_of::<f32>() as f64;

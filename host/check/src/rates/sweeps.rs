@@ -3,10 +3,10 @@
 use super::Work;
 use crate::swept::{Swept, band, costs};
 use crate::world::Numbers;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::path::DIRECTIONS;
-use viewfuse_core::plane_sweep::window::WindowBlock;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::path::DIRECTIONS;
+use viewfuse_kernels::plane_sweep::window::WindowBlock;
 use viewfuse_vulkan::kernel::Kernel;
 
 /// Groups of planes of all pixels together.

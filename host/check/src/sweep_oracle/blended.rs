@@ -5,9 +5,9 @@ use super::{BEHIND, Sight, disparity, look_up, mixed, sight};
 use crate::bounded::Bounded;
 use crate::camera_oracle::tents;
 use crate::hull_oracle::bell;
-use viewfuse_core::plane_sweep::blend::{BlendBlock, CUTOFF, HIDDEN_SHARE};
-use viewfuse_core::plane_sweep::frustum::SweptView;
-use viewfuse_core::plane_sweep::{PLANES, Planes};
+use viewfuse_kernels::plane_sweep::blend::{BlendBlock, CUTOFF, HIDDEN_SHARE};
+use viewfuse_kernels::plane_sweep::frustum::SweptView;
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 /// A pixel of a picture.
 #[derive(Clone, Copy, Debug)]

@@ -2,13 +2,13 @@
 
 use super::{BoundedPlanes, exact};
 use crate::bounded::Bounded;
-use viewfuse_core::plane_sweep::census::{
-    CENSUS_SHARE, COLOUR_SHARE, CONTRAST, FULL_TEXTURE, LEAST_TOLD, OUTSIDE_COST, REACH,
+use viewfuse_kernels::plane_sweep::census::{
+    CENSUS_SHARE, COLOUR_SHARE, CONTRAST, FULL_TEXTURE, MIN_TOLD, OUTSIDE_COST, REACH,
 };
-use viewfuse_core::plane_sweep::evidence::ViewPair;
-use viewfuse_core::plane_sweep::frustum::FrustumBlock;
-use viewfuse_core::plane_sweep::window::{PRIOR_COST, PRIOR_WEIGHT, SHARE, WindowBlock};
-use viewfuse_core::plane_sweep::{PLANES, Planes};
+use viewfuse_kernels::plane_sweep::evidence::ViewPair;
+use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
+use viewfuse_kernels::plane_sweep::window::{PRIOR_COST, PRIOR_WEIGHT, SHARE, WindowBlock};
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 /// Cost of a plane times its weight, and the weight, from the colours' difference and the census of all pairs.
 fn cost(frustum: &FrustumBlock, evidence: [f32; 4], census: Bounded, texture: Bounded) -> [Bounded; 2] {
@@ -17,7 +17,7 @@ fn cost(frustum: &FrustumBlock, evidence: [f32; 4], census: Bounded, texture: Bo
     let matched = Bounded::from(COLOUR_SHARE) * colour
         + Bounded::from(CENSUS_SHARE) * census
         + Bounded::from(frustum.dissent_share) * dissent;
-    let least = Bounded::from(LEAST_TOLD);
+    let least = Bounded::from(MIN_TOLD);
     let told = least + (Bounded::ONE - least) * (texture / Bounded::from(FULL_TEXTURE)).lesser(Bounded::ONE);
     let (weight, outside) = (weight * told, Bounded::ONE - inside);
     [matched * weight * inside + Bounded::from(OUTSIDE_COST) * outside, weight * inside + outside]

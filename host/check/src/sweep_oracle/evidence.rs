@@ -3,9 +3,9 @@
 use super::{BEHIND, disparity, look_up, sight};
 use crate::bounded::Bounded;
 use crate::hull_oracle::bell;
-use viewfuse_core::plane_sweep::PLANES;
-use viewfuse_core::plane_sweep::evidence::{LEAST_ALPHA, MOST_DIFFERENCE, UNSEEN, ViewPair};
-use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_kernels::plane_sweep::PLANES;
+use viewfuse_kernels::plane_sweep::evidence::{MAX_DIFFERENCE, MIN_ALPHA, UNSEEN, ViewPair};
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 
 /// A number for each plane, where it is decided.
 type Planes = [Option<Bounded>; PLANES];
@@ -84,7 +84,7 @@ fn look(
         Some(true) => {}
     }
     let texel = look_up(camera, texels, seen.x, seen.y);
-    let shown = texel[3].below(LEAST_ALPHA.into()).map(|transparent| {
+    let shown = texel[3].below(MIN_ALPHA.into()).map(|transparent| {
         (!transparent).then(|| [0, 1, 2].map(|channel| texel[channel] / texel[3] * Bounded::from(view.gain[channel])))
     });
     let inside = if has_silhouettes { texel[3] } else { Bounded::ONE };
@@ -121,7 +121,7 @@ fn compared(pairs: &[ViewPair], looks: &[Look]) -> [Option<Bounded>; 2] {
             (Some(Some(a)), Some(Some(b))) => {
                 let differences = [0, 1, 2].map(|channel| (a[channel] - b[channel]).magnitude());
                 let share = Bounded::from(pair.weight);
-                difference = difference + share * mean(differences).lesser(MOST_DIFFERENCE.into());
+                difference = difference + share * mean(differences).lesser(MAX_DIFFERENCE.into());
                 weight = weight + share;
             }
             _ => return [None; 2],

@@ -3,8 +3,8 @@
 use super::BoundedPlanes;
 use super::costs::mean_of_four;
 use crate::bounded::{Bounded, ROUNDING};
-use viewfuse_core::plane_sweep::path::{CostBlock, JUMP_COST, STEP_COST};
-use viewfuse_core::plane_sweep::{PLANES, Planes};
+use viewfuse_kernels::plane_sweep::path::{CostBlock, JUMP_COST, STEP_COST};
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 /// The pixels of a line in a direction: right, left, down, up.
 fn pixels(block: &CostBlock, direction: u32, number: u32) -> Vec<u32> {

@@ -2,9 +2,9 @@
 
 use super::disparity;
 use crate::bounded::Bounded;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::disparity::{DOUBT_WIDTH, DOUBTFUL_COST, NEAR_PLANES, TEMPERATURE};
-use viewfuse_core::plane_sweep::frustum::FrustumBlock;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::disparity::{DOUBT_WIDTH, DOUBTFUL_COST, NEAR_PLANES, TEMPERATURE};
+use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 
 /// The logistic step from 1 at small costs to 0 at large ones.
 pub(super) fn logistic(cost: Bounded, middle: f32, width: f32) -> Bounded {

@@ -10,7 +10,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_nn::initialisation;
 use viewfuse_weighting::attention::AttentionModel;
-use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
 const TOLERANCE: f64 = 1.0e-5;
 const EMBEDDING_TENSOR: &str = "attention_embedding.paper_fourier";
@@ -37,7 +37,7 @@ pub(super) fn verify(path: &Path, file: &SafeTensors<'_>, report: &mut Report) -
     };
     let source_poses = poses("attention_src")?;
     let sources =
-        Sources::<MOST_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", error.to_string()))?;
+        Sources::<MAX_SOURCES>::new(&source_poses).map_err(|error| content("attention_src", error.to_string()))?;
     let targets = poses("attention_tgt")?;
     let mut covered = vec!["attention_src".to_owned(), "attention_tgt".to_owned()];
     if let Some(reference) = floats(file, EMBEDDING_TENSOR).filter(|values| values.len() == EMBEDDING * targets.len()) {

@@ -17,7 +17,7 @@ use viewfuse_field::genvs::sampling::{Plan, Steps};
 use viewfuse_field::genvs::{Architecture, COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, test_networks};
 use viewfuse_job::progress::Progress;
 use viewfuse_weighting::Weighting;
-use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
 /// Near and far bounds of the file's rays, in units of the distance of an image plane at the focal length.
 const NEAR_FAR: [f32; 2] = [0.8, 1.8];
@@ -157,7 +157,7 @@ impl<D: Device> Comparison<'_, '_, D> {
         let pose = self.file.pose("tgt_pose", &rows[0])?;
         let poses: Vec<_> = sources.iter().map(|camera| camera.pose).collect();
         let poses =
-            Sources::<MOST_SOURCES>::new(&poses).map_err(|error| self.file.wrong("src_poses", error.to_string()))?;
+            Sources::<MAX_SOURCES>::new(&poses).map_err(|error| self.file.wrong("src_poses", error.to_string()))?;
         let target = Camera { pose, pinhole: sources[0].pinhole };
         let plane = 2.0 * target.pinhole.focal()[1] / self.side as f32;
         let features = self.reference.architecture().encoder.feature_count;

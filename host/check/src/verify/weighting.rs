@@ -8,7 +8,7 @@ use std::path::Path;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 use viewfuse_weighting::Weighting;
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_weighting::sources::MAX_SOURCES;
 
 /// Relative difference from the official `f64` weights that passes: our own error is some 1e-6 (see
 /// `viewfuse_core::weighting`), and the official formula's on `f32` poses of nearly equal cameras is as large.
@@ -49,7 +49,7 @@ pub(super) fn verify(path: &Path, json: &Value) -> Result<Report, VerifyError> {
             .collect::<Result<_, _>>()
             .map_err(|message| content(&format!("case '{}', src", case.name), message))?;
         let target = pose(&case.tgt).map_err(|message| content(&format!("case '{}', tgt", case.name), message))?;
-        let sources = Sources::<MOST_SOURCES>::new(&poses)
+        let sources = Sources::<MAX_SOURCES>::new(&poses)
             .map_err(|error| content(&format!("case '{}', src", case.name), error.to_string()))?;
         for (method, official) in &case.official {
             let Some(weighting) = scheme_of(method) else {

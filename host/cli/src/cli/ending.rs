@@ -10,7 +10,7 @@ use viewfuse_job::files::remove_all;
 pub(crate) const INTERRUPTED: u8 = 130;
 
 /// CPU time of all threads after the signal that work may take to stop by itself.
-const MOST_CPU: Duration = Duration::from_millis(1500);
+const MAX_CPU: Duration = Duration::from_millis(1500);
 /// Time without any CPU time after which the process counts as blocked.
 const BLOCKED: Duration = Duration::from_millis(1000);
 /// CPU time that a blocked process may take: the progress bar and this thread.
@@ -28,7 +28,7 @@ pub(crate) fn watch() -> ! {
         if now.saturating_sub(before) > IDLE_CPU {
             (since, before) = (Instant::now(), now);
         }
-        if now.saturating_sub(first) > MOST_CPU || since.elapsed() > BLOCKED {
+        if now.saturating_sub(first) > MAX_CPU || since.elapsed() > BLOCKED {
             end();
         }
     }

@@ -13,7 +13,7 @@ use comfy_table::CellAlignment;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
-use viewfuse_evaluate::pareto::front::{LARGEST_LOSS, SAME_LOOK};
+use viewfuse_evaluate::pareto::front::{MAX_LOSS, SAME_LOOK};
 use viewfuse_evaluate::pareto::record::{DeviceRecord, DifferenceRecord, ParetoRecord, PointRecord, csv_of};
 use viewfuse_evaluate::pareto::settings::{self, EXACT};
 use viewfuse_evaluate::pareto::{Measured, Setting, Subject, plot};
@@ -238,7 +238,7 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     }
     let named = |setting: &Option<String>| setting.clone().unwrap_or_else(|| "none".to_owned());
     if has_truth {
-        say(format_args!("fastest with a loss of at most {LARGEST_LOSS} dB: {}", named(&device.fastest_without_loss)))?;
+        say(format_args!("fastest with a loss of at most {MAX_LOSS} dB: {}", named(&device.fastest_without_loss)))?;
     }
     say(format_args!("fastest at {SAME_LOOK} dB or more from exact: {}", named(&device.fastest_of_same_look)))?;
     if let Some(difference) = &device.exact_versus_first {

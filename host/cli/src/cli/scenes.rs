@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_core::lens::{Lens, Projection};
-use viewfuse_synthetic::collection::{LARGEST_OBJECT_COUNT, ObjectCounts, Settings, make};
+use viewfuse_synthetic::collection::{MAX_OBJECT_COUNT, ObjectCounts, Settings, make};
 use viewfuse_synthetic::kinds::Kind;
 use viewfuse_synthetic::photograph::RAYS_PER_SIDE;
 use viewfuse_synthetic::{Place, Rig, generate, write_shoot};
@@ -102,7 +102,7 @@ struct MakeArguments {
 }
 
 fn object_count() -> clap::builder::RangedI64ValueParser<u32> {
-    clap::value_parser!(u32).range(0..=i64::from(LARGEST_OBJECT_COUNT))
+    clap::value_parser!(u32).range(0..=i64::from(MAX_OBJECT_COUNT))
 }
 
 fn view_count() -> clap::builder::RangedI64ValueParser<u32> {

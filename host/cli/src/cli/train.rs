@@ -12,7 +12,7 @@ use viewfuse_job::files::check_writable;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_train::{
-    Embedding, GenvsSettings, Outcome, PixelNerfSettings, SHARE_OF_LARGEST, Schedule, Variety, WeightingSettings,
+    Embedding, GenvsSettings, MAX_LEVEL_SHARE, Outcome, PixelNerfSettings, Schedule, Variety, WeightingSettings,
     train_genvs, train_pixelnerf, train_weighting,
 };
 use viewfuse_weighting::{WeightingError, WeightingSpec};
@@ -181,7 +181,7 @@ struct GenvsArguments {
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(2..=4096))]
     samples: u32,
     /// Share of the pictures that have the largest noise level, 0 to 1
-    #[arg(long, value_name = "SHARE", default_value_t = SHARE_OF_LARGEST, value_parser = share)]
+    #[arg(long, value_name = "SHARE", default_value_t = MAX_LEVEL_SHARE, value_parser = share)]
     largest_share: f32,
     /// What a new denoiser's estimate is relative to: the colours of the feature image, or nothing, as published
     #[arg(long, value_enum, default_value = "colours")]

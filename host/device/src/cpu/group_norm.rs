@@ -3,7 +3,7 @@
 use super::scratch::with_scratch;
 use crate::parallel::{for_each_row, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_core::network::group_norm::{self, GroupNormBlock, MeanBlock, PART, silu};
+use viewfuse_kernels::network::group_norm::{self, GroupNormBlock, MeanBlock, PART, silu};
 
 pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]) {
     let means = &mut means[..block.channels as usize];
@@ -49,7 +49,7 @@ pub(super) fn group_norm(
     });
 }
 
-/// Some pixels, as [`viewfuse_core::network::group_norm::group_norm_element`] defines them. A struct and not a closure, as
+/// Some pixels, as [`viewfuse_kernels::network::group_norm::group_norm_element`] defines them. A struct and not a closure, as
 /// all that must run with the machine's widest instructions: a closure becomes a function of its own, without them.
 struct Normalised<'a> {
     block: &'a GroupNormBlock,
@@ -86,7 +86,7 @@ impl WithSimd for Normalised<'_> {
     }
 }
 
-/// [`viewfuse_core::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the
+/// [`viewfuse_kernels::network::group_norm::group_norm_partials`] of all groups of a part: channel by channel first, the
 /// channels of a group then summed.
 struct GroupNormPartials<'a> {
     block: &'a GroupNormBlock,

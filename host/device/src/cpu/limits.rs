@@ -3,7 +3,7 @@
 
 use crate::parallel::{for_each_part, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_core::limits::{CHAINS, ChainBlock, ROUND_STEPS};
+use viewfuse_kernels::limits::{CHAINS, ChainBlock, ROUND_STEPS};
 
 /// Fours of a part, 1 MiB.
 const PART: usize = 1 << 16;

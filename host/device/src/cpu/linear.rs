@@ -12,7 +12,7 @@
 use crate::parallel::for_each_part;
 use bytemuck::{Pod, Zeroable, cast_slice, cast_slice_mut};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_core::network::linear::rectified;
+use viewfuse_kernels::network::linear::rectified;
 
 /// Products that are summed before outputs are written: most layers need one pass.
 const DEPTH: usize = 512;

@@ -1,14 +1,14 @@
 //! Lists of samples, and whether numbers are finite.
 
 use crate::parallel::for_each;
-use viewfuse_core::compact::{RUN, list_run, marked_in_run, run_offsets};
-use viewfuse_core::finite::{FINITE_RUN, first_non_finite};
+use viewfuse_kernels::compact::{RUN, list_run, marked_in_run, run_offsets};
+use viewfuse_kernels::finite::{FINITE_RUN, first_non_finite};
 
 /// The fewest runs for a thread.
-const LEAST_RUNS: usize = 64;
+const MIN_RUNS: usize = 64;
 
 pub(super) fn count_marked(element_count: &u32, mask: &[u32], counts: &mut [u32]) {
-    for_each(&mut counts[..element_count.div_ceil(RUN) as usize], LEAST_RUNS, |run, count| {
+    for_each(&mut counts[..element_count.div_ceil(RUN) as usize], MIN_RUNS, |run, count| {
         *count = marked_in_run(mask, *element_count, run as u32);
     });
 }
@@ -28,7 +28,7 @@ pub(super) fn list_marked(element_count: &u32, mask: &[u32], offsets: &[u32], li
 }
 
 pub(super) fn find_non_finite(value_count: &u32, values: &[f32], firsts: &mut [u32]) {
-    for_each(&mut firsts[..value_count.div_ceil(FINITE_RUN) as usize], LEAST_RUNS, |run, first| {
+    for_each(&mut firsts[..value_count.div_ceil(FINITE_RUN) as usize], MIN_RUNS, |run, first| {
         *first = first_non_finite(values, *value_count, run as u32);
     });
 }

@@ -4,7 +4,7 @@ use super::linear::{Ending, Panels};
 use super::network::multiply;
 use crate::parallel::for_each_row;
 use pulp::Arch;
-use viewfuse_core::network::attend::{MatrixBlock, softmax_scale, softmax_value};
+use viewfuse_kernels::network::attend::{MatrixBlock, softmax_scale, softmax_value};
 
 pub(super) fn matrix_product(block: &MatrixBlock, left: &[f32], right: &[f32], outputs: &mut [f32]) {
     let (inner, columns) = (block.inner_count as usize, block.column_count as usize);

@@ -7,15 +7,15 @@ use super::winograd::Winograd;
 use crate::kernels::LayerShape;
 use crate::parallel::{for_each, for_each_part, for_each_row};
 use pulp::Arch;
-use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
-use viewfuse_core::network::depthwise::DepthwiseBlock;
-use viewfuse_core::network::linear::LinearBlock;
-use viewfuse_core::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
-use viewfuse_core::network::transpose::TransposedBlock;
+use viewfuse_kernels::network::convolve::{ConvolveBlock, window_pixel};
+use viewfuse_kernels::network::depthwise::DepthwiseBlock;
+use viewfuse_kernels::network::linear::LinearBlock;
+use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
+use viewfuse_kernels::network::transpose::TransposedBlock;
 
 /// The most rows that a core computes at once: their inputs and outputs (512 columns) stay in its second-level cache,
 /// beside the weights, and the cores finish at about the same time.
-const MOST_ROWS: usize = 96;
+const MAX_ROWS: usize = 96;
 /// Rows of a product's tile (or a multiple): fewer at once are wasted.
 const ROW_STEP: usize = 12;
 
@@ -204,10 +204,10 @@ fn window(outputs: &mut [f32], first: u32, count: usize, pitch: usize, columns: 
 /// The rows that a core computes at once.
 fn chunk_rows(row_count: usize) -> usize {
     let share = row_count.div_ceil(rayon::current_num_threads()).next_multiple_of(ROW_STEP);
-    share.clamp(ROW_STEP, MOST_ROWS)
+    share.clamp(ROW_STEP, MAX_ROWS)
 }
 
-/// The patch of output pixel `pixel`, as [`viewfuse_core::network::convolve::patch_value`] defines it: whole pixels at
+/// The patch of output pixel `pixel`, as [`viewfuse_kernels::network::convolve::patch_value`] defines it: whole pixels at
 /// a time.
 fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f32]) {
     let (out_row, out_column) = (pixel / block.out_width, pixel % block.out_width);
@@ -224,7 +224,7 @@ fn read_patch(block: &ConvolveBlock, inputs: &[f32], pixel: u32, patch: &mut [f3
     }
 }
 
-/// All channels of an output pixel, as [`viewfuse_core::network::depthwise::depthwise_element`] defines them.
+/// All channels of an output pixel, as [`viewfuse_kernels::network::depthwise::depthwise_element`] defines them.
 #[inline(always)]
 fn filter_pixel(block: &DepthwiseBlock, inputs: &[f32], weights: &[f32], pixel: u32, outputs: &mut [f32]) {
     let channels = outputs.len();

@@ -3,14 +3,14 @@
 use crate::parallel::{for_each_row, for_each_rows};
 use pulp::Arch;
 use std::sync::Mutex;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::blend::{self, BlendBlock};
-use viewfuse_core::plane_sweep::census;
-use viewfuse_core::plane_sweep::disparity;
-use viewfuse_core::plane_sweep::evidence::{self, ViewPair};
-use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
-use viewfuse_core::plane_sweep::path::{self, CostBlock, Line};
-use viewfuse_core::plane_sweep::window::{self, WindowBlock};
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::blend::{self, BlendBlock};
+use viewfuse_kernels::plane_sweep::census;
+use viewfuse_kernels::plane_sweep::disparity;
+use viewfuse_kernels::plane_sweep::evidence::{self, ViewPair};
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_kernels::plane_sweep::path::{self, CostBlock, Line};
+use viewfuse_kernels::plane_sweep::window::{self, WindowBlock};
 
 pub(super) fn compare_views(
     block: &FrustumBlock,

@@ -4,8 +4,8 @@ use crate::parallel::for_each_row;
 use pulp::Arch;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::half_precision::Halves;
-use viewfuse_core::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace, in_view_axes, visible_weight, waves};
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace, in_view_axes, visible_weight, waves};
 
 pub(super) fn embed_points(
     block: &EmbedBlock,

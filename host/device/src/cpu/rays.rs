@@ -3,7 +3,7 @@
 use crate::parallel::{for_each, for_each_row};
 use viewfuse_core::depths::{CoarseBlock, FineBlock, coarse_depth, fine_depth, merged_depth, random_draw};
 use viewfuse_core::rays::{CastBlock, PlaceBlock, RayPoint, TargetRay, cast_ray, place_point};
-use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
+use viewfuse_kernels::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
 
 /// Runs a kernel for every sample of every ray, rays in parallel; it gets ray, sample and where to write.
 fn for_each_sample<T: Send>(

@@ -2,10 +2,10 @@
 
 use crate::parallel::{for_each_row, for_each_row_of_two};
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::visual_hull::ObjectBlock;
-use viewfuse_core::visual_hull::hull;
-use viewfuse_core::visual_hull::ray_marching::{self, MarchBlock};
-use viewfuse_core::visual_hull::sweep::{self, OUTSIDE, SweepBlock, SweptPixel};
+use viewfuse_kernels::visual_hull::ObjectBlock;
+use viewfuse_kernels::visual_hull::hull;
+use viewfuse_kernels::visual_hull::ray_marching::{self, MarchBlock};
+use viewfuse_kernels::visual_hull::sweep::{self, OUTSIDE, SweepBlock, SweptPixel};
 
 pub(super) fn hull_entry(
     view: &u32,

@@ -3,9 +3,9 @@
 use crate::parallel::{for_each, for_each_row};
 use pulp::Arch;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace};
 use viewfuse_core::half_precision::{fetch_f16, packed_f16, word_count};
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace};
 
 /// Sums the features of the eight nodes around each point: `add(first, weight, gathered)` adds those of the node whose
 /// first feature is number `first` of the volume.

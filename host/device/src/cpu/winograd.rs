@@ -14,7 +14,7 @@ use super::linear::{Ending, Panels, Rows, load, store};
 use super::scratch::with_scratch;
 use crate::parallel::for_each_part;
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_core::network::convolve::{ConvolveBlock, window_pixel};
+use viewfuse_kernels::network::convolve::{ConvolveBlock, window_pixel};
 
 /// Outputs of a tile in each direction.
 const SIDE: usize = 4;
@@ -25,7 +25,7 @@ const PLACES: usize = REACH * REACH;
 /// Rows of a product's tile.
 const ROW_STEP: usize = 12;
 /// The most tiles that a core computes at once.
-const MOST_TILES: usize = 48;
+const MAX_TILES: usize = 48;
 
 /// Weights of a layer, transformed.
 pub struct Winograd {
@@ -119,7 +119,7 @@ fn tile_rows_at_once(row_count: usize, tiles_across: usize) -> usize {
         let rounds = row_count.div_ceil(*rows).div_ceil(rayon::current_num_threads());
         rounds * (*rows * tiles_across).div_ceil(ROW_STEP)
     };
-    let most = (MOST_TILES / tiles_across).clamp(1, row_count);
+    let most = (MAX_TILES / tiles_across).clamp(1, row_count);
     (1..=most).min_by_key(cost).unwrap_or(1)
 }
 

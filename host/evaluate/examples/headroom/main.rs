@@ -1,9 +1,9 @@
 //! What better depths, visibility or blending could gain on the training-free field: each is replaced by the truth's choice.
 //!
-//! `cargo run --release -p viewfuse-evaluate --example headroom -- SIDE MOST_TARGETS TABLE GROUP=SCENE=PROTOCOL...`
+//! `cargo run --release -p viewfuse-evaluate --example headroom -- SIDE MAX_TARGETS TABLE GROUP=SCENE=PROTOCOL...`
 //!
 //! A scene is a folder, or `made:PLACE/RIG/SEED` or `made:KIND/INDEX`, which is generated with exact depths. Rows are means over
-//! the pictures of a group. Pictures have a longest side of `SIDE`; at most `MOST_TARGETS` of a job are taken. The table goes to
+//! the pictures of a group. Pictures have a longest side of `SIDE`; at most `MAX_TARGETS` of a job are taken. The table goes to
 //! the file `TABLE`, and what was run above it. Columns, all but the first two gains in decibels over the sweep:
 //!
 //! ```text
@@ -35,21 +35,21 @@ use oracle::oracles;
 use samples::Colour;
 use std::path::{Path, PathBuf};
 use table::{Row, Target, table};
-use viewfuse_core::plane_sweep::blend::blend;
 use viewfuse_evaluate::protocol::Protocol;
 use viewfuse_field::training_free::TargetPlanes;
 use viewfuse_job::files::write_whole;
+use viewfuse_kernels::plane_sweep::blend::blend;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::Album;
 use visit::{SCHEME, visit};
 
 /// Largest difference between the picture that is put together here and the field's own, of 1.
-const MOST_DIFFERENCE: f32 = 2.0e-3;
+const MAX_DIFFERENCE: f32 = 2.0e-3;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [side, most_targets, path, jobs @ ..] = arguments.as_slice() else {
-        bail!("usage: headroom SIDE MOST_TARGETS TABLE GROUP=SCENE=PROTOCOL...");
+        bail!("usage: headroom SIDE MAX_TARGETS TABLE GROUP=SCENE=PROTOCOL...");
     };
     let (side, most_targets): (u32, usize) = (side.parse()?, most_targets.parse()?);
     let scratch = std::env::temp_dir().join(format!("viewfuse-headroom-{}", std::process::id()));
@@ -127,7 +127,7 @@ fn check(planes: &TargetPlanes, base: &[Colour]) -> anyhow::Result<Vec<f32>> {
         let at = [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
         let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
         let colour = blend(&planes.block, &planes.views[..], texels, disparities, &planes.costs[..], at).colour;
-        let differs = |channel: usize| !((own[channel] * colour[3] - colour[channel]).abs() <= MOST_DIFFERENCE);
+        let differs = |channel: usize| !((own[channel] * colour[3] - colour[channel]).abs() <= MAX_DIFFERENCE);
         ensure!(!(0..3).any(differs), "pixel {pixel}: {own:?} is not the field's {colour:?}");
         opacity.push(colour[3]);
     }

@@ -4,17 +4,17 @@
 //! could be met by accident.
 
 use crate::samples::{Colour, Samples, disparity, excesses, mean, plane_count, samples};
-use viewfuse_core::plane_sweep::blend::{CUTOFF, HIDDEN_SHARE};
 use viewfuse_field::training_free::TargetPlanes;
+use viewfuse_kernels::plane_sweep::blend::{CUTOFF, HIDDEN_SHARE};
 
 /// Of the sources with the greatest weights, those whose subsets are tried.
-const MOST_SUBSET: usize = 5;
+const MAX_SUBSET: usize = 5;
 /// Factors on the inverse temperature of the softmax over planes.
 const FACTORS: [f32; 7] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0];
 /// Steps of the search for the best convex combination.
 const STEPS: usize = 60;
 /// Share of the posterior from which on a source has a colour.
-const LEAST_SEEN: f32 = 0.05;
+const MIN_SEEN: f32 = 0.05;
 /// A point is on a source's surface up to this difference of depths, as a share of the depth.
 const SAME_DEPTH: f32 = 0.03;
 
@@ -105,7 +105,7 @@ pub(crate) fn oracles(planes: &TargetPlanes, truth: &[Colour], depths: Option<&D
     let all = base.weights.clone();
     let base = base.picture();
     let tempered: Vec<Picture> = tempered.into_iter().map(Mixture::picture).collect();
-    let valid = |view: usize, pixel: usize| of_views[view].weights[pixel] > LEAST_SEEN * all[pixel];
+    let valid = |view: usize, pixel: usize| of_views[view].weights[pixel] > MIN_SEEN * all[pixel];
     let valid: Vec<Vec<bool>> = (0..views).map(|view| (0..count).map(|pixel| valid(view, pixel)).collect()).collect();
     let posterior: Vec<Picture> = of_views.into_iter().map(Mixture::picture).collect();
     let chosen = samples(planes, |pixel| disparity(planes, best_plane[pixel].1));
@@ -232,7 +232,7 @@ fn best_valid(shape: &Shape, pictures: &[Picture], valid: &[Vec<bool>], other: &
 
 /// The best subset of the sources with the greatest weights on a plane, camera weights inside the subset.
 fn best_subset(shape: &Shape, planes: &TargetPlanes, samples: &Samples, truth: &[Colour]) -> Picture {
-    let most = planes.views.len().min(MOST_SUBSET);
+    let most = planes.views.len().min(MAX_SUBSET);
     let own: Picture = (0..truth.len()).map(|pixel| mean(samples, pixel, |_, sample| sample.part)).collect();
     let mut pictures = vec![own.clone()];
     let mut valid = vec![vec![true; truth.len()]];

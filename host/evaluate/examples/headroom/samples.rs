@@ -2,10 +2,10 @@
 
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::lookup::{bilinear_from, split};
-use viewfuse_core::plane_sweep::PLANES;
-use viewfuse_core::plane_sweep::blend::{HIDDEN_SHARE, visibility};
-use viewfuse_core::plane_sweep::frustum::Track;
 use viewfuse_field::training_free::TargetPlanes;
+use viewfuse_kernels::plane_sweep::PLANES;
+use viewfuse_kernels::plane_sweep::blend::{HIDDEN_SHARE, visibility};
+use viewfuse_kernels::plane_sweep::frustum::Track;
 
 /// Red, green, blue.
 pub(crate) type Colour = [f32; 3];
@@ -34,7 +34,7 @@ pub(crate) type Samples = Vec<Vec<Sample>>;
 pub(crate) fn samples(planes: &TargetPlanes, disparity: impl Fn(usize) -> f32) -> Samples {
     let block = &planes.block;
     let width = block.target.width as usize;
-    let of_view = |view: &viewfuse_core::plane_sweep::frustum::SweptView| {
+    let of_view = |view: &viewfuse_kernels::plane_sweep::frustum::SweptView| {
         let camera = &view.camera;
         let sample = |pixel: usize| {
             let (x, y) = ((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5);

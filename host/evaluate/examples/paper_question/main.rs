@@ -30,7 +30,7 @@ pub(crate) const PAPER: [(&str, &[(Column, f64)]); 2] = [
 ];
 
 /// More scenes than a part has.
-const MOST_SCENES: usize = 1_000_000;
+const MAX_SCENES: usize = 1_000_000;
 
 /// How the sources are chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -145,7 +145,7 @@ fn add(groups: &mut Vec<Group>, name: &str, part: &str, path: &Path) -> anyhow::
             protocol if protocol.draws() => Column::Count(job.sources.len()),
             _ => Column::Own,
         };
-        job.scene += place * MOST_SCENES;
+        job.scene += place * MAX_SCENES;
         group.jobs.entry(column.place()).or_insert((column, Vec::new())).1.push(job);
     }
     Ok(())

@@ -4,8 +4,8 @@ use crate::samples::{Sample, Samples, disparity, excesses, mean, plane_count, sa
 use crate::visit::Visit;
 use anyhow::ensure;
 use candle_core::{Device, Tensor};
-use viewfuse_core::plane_sweep::blend::CUTOFF;
 use viewfuse_field::training_free::TargetPlanes;
+use viewfuse_kernels::plane_sweep::blend::CUTOFF;
 
 /// Planes of a pixel that a refinement may change: those of least cost. The others stay as they are.
 pub(crate) const KEPT: usize = 8;
@@ -22,7 +22,7 @@ pub(crate) const OF_SOURCE: usize = 10;
 pub(crate) const WEIGHT: usize = 7;
 pub(crate) const DIRECTION: usize = 8;
 /// The largest difference between the picture that is put together here and the field's own, of 1.
-const MOST_DIFFERENCE: f32 = 2.0e-3;
+const MAX_DIFFERENCE: f32 = 2.0e-3;
 
 /// A picture's pixels; rows of all tensors are pixels.
 pub(crate) struct Candidates {
@@ -112,7 +112,7 @@ impl Candidates {
         }
         let field: Vec<[f32; 3]> = field.iter().map(|own| [0, 1, 2].map(|channel| own[channel] / own[3])).collect();
         for (pixel, (own, of_field)) in field.iter().zip(visit.colours).enumerate() {
-            let differs = |channel: usize| !((own[channel] - of_field[channel]).abs() <= MOST_DIFFERENCE);
+            let differs = |channel: usize| !((own[channel] - of_field[channel]).abs() <= MAX_DIFFERENCE);
             ensure!(!(0..3).any(differs), "{scene}: pixel {pixel}: {own:?} is not the field's {of_field:?}");
         }
         let of_rank: Vec<Samples> =

@@ -38,7 +38,7 @@ use visit::{SCHEME, visit};
 const TRAINING_SCENES: u64 = 16;
 const TARGETS: &str = "2,6";
 /// Most targets of a job.
-const MOST_TARGETS: usize = 4;
+const MAX_TARGETS: usize = 4;
 
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -111,7 +111,7 @@ fn training(folder: &Path, side: u32, as_photographs: bool) -> anyhow::Result<Ve
 /// The targets of a protocol on a scene.
 fn pictures(name: &str, scene: Scene, protocol: &Protocol, side: u32) -> anyhow::Result<Vec<Candidates>> {
     let mut pictures = Vec::new();
-    visit(scene, protocol, side, MOST_TARGETS, |visit| {
+    visit(scene, protocol, side, MAX_TARGETS, |visit| {
         pictures.push(Candidates::of(name, visit)?);
         Ok(())
     })?;

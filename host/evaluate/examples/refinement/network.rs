@@ -8,7 +8,7 @@ use viewfuse_core::random::normal;
 /// Width of all layers.
 const WIDTH: usize = 16;
 /// Logits stay within plus and minus this.
-const MOST_LOGIT: f64 = 3.0;
+const MAX_LOGIT: f64 = 3.0;
 /// Slope of the rectifiers below zero.
 const SLOPE: f64 = 0.1;
 
@@ -124,7 +124,7 @@ impl Network {
     /// The picture.
     pub(crate) fn refine(&self, pixels: &Pixels) -> Result<Refined> {
         let [sources, planes] = self.logits(pixels)?;
-        let bounded = |logits: &Tensor| (logits / MOST_LOGIT)?.tanh()? * MOST_LOGIT;
+        let bounded = |logits: &Tensor| (logits / MAX_LOGIT)?.tanh()? * MAX_LOGIT;
         let (sources, planes) = (bounded(&sources)?, bounded(&planes)?);
         let part = (&pixels.part * sources.exp()?)?;
         let sum = part.unsqueeze(D::Minus1)?.broadcast_mul(&pixels.colour)?.sum(2)?;

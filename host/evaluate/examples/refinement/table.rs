@@ -9,7 +9,7 @@ use viewfuse_evaluate::metrics::interval::Interval;
 pub(crate) const PHOTOGRAPHS: &str = "photographs";
 /// A variant could be part of the field if its worst scene loses no more than this, decibels, and the interval of the mean over
 /// photographs is above zero.
-const LEAST_WORST: f64 = -0.3;
+const MIN_WORST: f64 = -0.3;
 
 /// A scene with its pictures.
 pub(crate) struct Job {
@@ -82,14 +82,14 @@ pub(crate) fn table(measured: &[Measured], jobs: &[Job]) -> String {
             let _ = write!(text, " {mean:+.2} |");
         });
         text.push('\n');
-        if is_kept && least >= LEAST_WORST {
+        if is_kept && least >= MIN_WORST {
             kept.push(own.name);
         }
     }
     let kept = if kept.is_empty() { "none".to_owned() } else { kept.join("; ") };
     let _ = write!(
         text,
-        "\nBetter than the field on photographs beyond the interval, and on no scene worse than {LEAST_WORST} dB: {kept}\n"
+        "\nBetter than the field on photographs beyond the interval, and on no scene worse than {MIN_WORST} dB: {kept}\n"
     );
     text
 }

@@ -1,9 +1,9 @@
 //! How well `auto` knows itself: its choice beside the best fixed one in hindsight, and the scores that it expects beside the
 //! true ones.
 //!
-//! `cargo run --release -p viewfuse-evaluate --example self_knowledge -- SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...`
+//! `cargo run --release -p viewfuse-evaluate --example self_knowledge -- SIDE MAX_TARGETS grid|chosen FOLDER=PROTOCOL...`
 //!
-//! Pictures have a longest side of `SIDE`. Of each protocol at most `MOST_TARGETS` jobs (sets of sources) are rendered, with as
+//! Pictures have a longest side of `SIDE`. Of each protocol at most `MAX_TARGETS` jobs (sets of sources) are rendered, with as
 //! many targets each. With `grid`, all that `auto` tried is rendered at the targets as well, which is what takes the time. Each
 //! line of output is a JSON object, one a job. The last lines are the summary: how well the built-in constants of the
 //! expected score do, and constants that are fitted to these targets, with their errors when each scene in turn is left out of
@@ -31,7 +31,7 @@ use viewfuse_weighting::Weighting;
 fn main() -> anyhow::Result<()> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [side, most_targets, mode, jobs @ ..] = arguments.as_slice() else {
-        bail!("usage: self_knowledge SIDE MOST_TARGETS grid|chosen FOLDER=PROTOCOL...");
+        bail!("usage: self_knowledge SIDE MAX_TARGETS grid|chosen FOLDER=PROTOCOL...");
     };
     let (side, most_targets): (u32, usize) = (side.parse()?, most_targets.parse()?);
     let mut summary = Summary::default();

@@ -8,10 +8,10 @@ use viewfuse_core::camera::Camera;
 use viewfuse_scene::rig::nearest_point_to_lines;
 
 /// Fewest points in the picture from which the depth is estimated.
-pub const FEWEST_POINTS: usize = 8;
+pub const MIN_POINTS: usize = 8;
 
 /// The depth along the target's principal axis in world units, from the first of these that is known: the sparse points
-/// that are inside the target's picture, if there are at least [`FEWEST_POINTS`]; the target's near and far bound; the
+/// that are inside the target's picture, if there are at least [`MIN_POINTS`]; the target's near and far bound; the
 /// point that all cameras look at. Infinite where none is known, which gives the homography of a pure rotation.
 pub fn plane_depth(
     target: &Camera,
@@ -25,11 +25,11 @@ pub fn plane_depth(
         .unwrap_or(f64::INFINITY)
 }
 
-/// The harmonic mean of the depths of the points inside the target's picture; `None` for fewer than [`FEWEST_POINTS`].
+/// The harmonic mean of the depths of the points inside the target's picture; `None` for fewer than [`MIN_POINTS`].
 pub fn depth_of_points(target: &Camera, points: impl IntoIterator<Item = Vec3>) -> Option<f64> {
     let seen = points.into_iter().map(|point| target.project(point)).filter(|place| place.in_image);
     let (sum, count) = seen.fold((0.0, 0_usize), |(sum, count), place| (sum + 1.0 / f64::from(place.depth), count + 1));
-    (count >= FEWEST_POINTS && sum > 0.0).then(|| count as f64 / sum)
+    (count >= MIN_POINTS && sum > 0.0).then(|| count as f64 / sum)
 }
 
 /// The depth in the middle of the disparities between a near and a far bound; `None` unless `0 < near <= far`. The far

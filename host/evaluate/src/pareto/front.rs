@@ -3,7 +3,7 @@
 use super::Point;
 
 /// Largest invisible loss against the photographs, decibels.
-pub const LARGEST_LOSS: f64 = 0.1;
+pub const MAX_LOSS: f64 = 0.1;
 /// Peak signal to noise ratio against the exact picture from which two pictures look the same, decibels: a difference of
 /// 1 % of the range.
 pub const SAME_LOOK: f64 = 40.0;
@@ -31,9 +31,9 @@ pub fn loss(points: &[Point], point: &Point) -> Option<f64> {
     Some(points.first()?.truth_psnr? - point.truth_psnr?)
 }
 
-/// The fastest point that loses at most [`LARGEST_LOSS`] against the photographs. `None` without photographs.
+/// The fastest point that loses at most [`MAX_LOSS`] against the photographs. `None` without photographs.
 pub fn fastest_without_loss(points: &[Point]) -> Option<&Point> {
-    fastest(points, |point| loss(points, point).is_some_and(|loss| loss <= LARGEST_LOSS))
+    fastest(points, |point| loss(points, point).is_some_and(|loss| loss <= MAX_LOSS))
 }
 
 /// The fastest point whose pictures have a PSNR of at least [`SAME_LOOK`] against the first one's.

@@ -104,7 +104,7 @@ pub struct PointRecord {
 }
 
 /// Longest time and largest ratio of a record, up to the sign: larger ones are not of this program, and no axis holds them.
-const LARGEST: f64 = 1.0e9;
+const MAX_NUMBER: f64 = 1.0e9;
 
 impl PointRecord {
     /// Whether a measurement could have given its numbers.
@@ -113,8 +113,8 @@ impl PointRecord {
         let [least, most] = self.seconds_range;
         let times = [self.seconds, least, most, self.encode_seconds];
         let ratios = [root_mean_square, psnr, largest, self.truth_psnr, self.truth_loss, Some(self.gain)];
-        times.iter().all(|time| (0.0..=LARGEST).contains(time))
-            && ratios.iter().flatten().all(|ratio| ratio.abs() <= LARGEST)
+        times.iter().all(|time| (0.0..=MAX_NUMBER).contains(time))
+            && ratios.iter().flatten().all(|ratio| ratio.abs() <= MAX_NUMBER)
     }
 }
 

@@ -73,7 +73,7 @@ impl Benchmark {
     /// Fewest and most sources that it is defined for.
     pub(super) const fn source_range(self) -> [usize; 2] {
         match self {
-            Benchmark::Llff => [1, viewfuse_weighting::sources::MOST_SOURCES],
+            Benchmark::Llff => [1, viewfuse_weighting::sources::MAX_SOURCES],
             Benchmark::Dtu => [1, DTU_SOURCES.len()],
             Benchmark::Blender => [BLENDER_SOURCES.len(), BLENDER_SOURCES.len()],
         }

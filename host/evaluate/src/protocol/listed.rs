@@ -3,7 +3,7 @@
 use super::photographed;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{SelectionError, view_list};
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_weighting::sources::MAX_SOURCES;
 
 /// The views of two lists; a source is never a target.
 pub(super) fn fixed(
@@ -22,7 +22,7 @@ pub(super) fn fixed(
     if count < least_sources {
         return Err(SelectionError::TooFewSources { scene: scene_name(), count, least: least_sources });
     }
-    if count > MOST_SOURCES {
+    if count > MAX_SOURCES {
         return Err(SelectionError::TooManySources { scene: scene_name(), count });
     }
     if targets.is_empty() {

@@ -4,7 +4,7 @@ use super::{Benchmark, CLOSE_DEGREES, CLOSE_SOURCES, COUNTS, Protocol, RANDOM_SO
 use std::fmt;
 use std::str::FromStr;
 use viewfuse_scene::few_shot::SelectionError;
-use viewfuse_weighting::sources::MOST_SOURCES;
+use viewfuse_weighting::sources::MAX_SOURCES;
 
 const GRAMMAR: &str = "random[:sources=N], close[:sources=N,degrees=D], count[:sources=N+N+...], \
      fixed[:cars|chairs|pixelnerf-1|pixelnerf-2], fixed:SOURCES:TARGETS, nearest:K[:TARGETS], llff:K (3, 6, 9), \
@@ -117,7 +117,7 @@ impl FromStr for Protocol {
             if targets.is_some_and(str::is_empty) {
                 return Err(unknown());
             }
-            let sources = source_count(name, count, [1, MOST_SOURCES])?;
+            let sources = source_count(name, count, [1, MAX_SOURCES])?;
             return Ok(Protocol::Nearest { sources, targets: targets.map(str::to_owned) });
         }
         if let Some(benchmark) = Benchmark::ALL.into_iter().find(|benchmark| benchmark.name() == name) {
@@ -143,7 +143,7 @@ impl FromStr for Protocol {
                 return Err(ProtocolError::Repeated { protocol: name.to_owned(), key: key.to_owned() });
             }
             keys.push(key);
-            let count = |text: &str| source_count(name, text, [1, MOST_SOURCES]);
+            let count = |text: &str| source_count(name, text, [1, MAX_SOURCES]);
             match (&mut protocol, key) {
                 (Protocol::Random { sources }, "sources") => *sources = count(value)?,
                 (Protocol::Close { sources, .. }, "sources") => *sources = count(value)?,

@@ -70,7 +70,7 @@ pub struct Finished {
 }
 
 /// Largest score of any metric, up to its sign; larger ones are not of this program.
-const LARGEST_SCORE: f64 = 1.0e9;
+const MAX_SCORE: f64 = 1.0e9;
 /// Longest time of a picture, in seconds.
 const LONGEST_TIME: f64 = 1.0e9;
 /// Most bytes of a journal.
@@ -78,7 +78,7 @@ const LONGEST_JOURNAL: u64 = 4 << 30;
 
 /// Scores as JSON: numbers that JSON cannot hold (the PSNR of equal pictures is infinite) as text.
 mod score_lines {
-    use super::{Deserialize, Duration, LARGEST_SCORE, LONGEST_TIME, Score, Serialize};
+    use super::{Deserialize, Duration, LONGEST_TIME, MAX_SCORE, Score, Serialize};
     use serde::de::Error;
     use serde::{Deserializer, Serializer};
 
@@ -117,7 +117,7 @@ mod score_lines {
                     Number::Finite(value) => (Some(value), format!("{value:e}")),
                     Number::Other(text) => (text.parse().ok(), text),
                 };
-                let possible = value.filter(|value: &f64| !value.is_finite() || value.abs() <= LARGEST_SCORE);
+                let possible = value.filter(|value: &f64| !value.is_finite() || value.abs() <= MAX_SCORE);
                 possible
                     .map(|value| (name.clone(), value))
                     .ok_or_else(|| D::Error::custom(format!("{name} is '{text}'")))

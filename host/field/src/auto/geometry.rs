@@ -8,7 +8,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_scene::rig::Rig;
 
 /// Least squared gap: smaller ones are raised to it.
-const LEAST_SQUARED_GAP: f64 = 1.0e-8;
+const MIN_SQUARED_GAP: f64 = 1.0e-8;
 
 /// A camera's geometry among its sources. With `g_i^2 = (d_i / D)^2 + a_i^2`, where `d_i` is the distance of the
 /// centres, `D` that to what the cameras look at, and `a_i` the angle between the principal axes in radians:
@@ -40,7 +40,7 @@ impl Measure {
         for source in sources {
             let towards = (source.centre_world() - camera.centre_world()).as_dvec3() / self.distance;
             let angle = f64::from(source.axis_angle(camera));
-            let weight = (towards.length_squared() + angle * angle).max(LEAST_SQUARED_GAP).recip();
+            let weight = (towards.length_squared() + angle * angle).max(MIN_SQUARED_GAP).recip();
             sum += weight;
             offset += weight * towards;
             length += weight * towards.length();

@@ -21,16 +21,16 @@ use viewfuse_scene::rig::spread;
 use viewfuse_weighting::Weighting;
 
 /// Most sources that are left out, one at a time.
-pub const MOST_LEFT_OUT: usize = 6;
+pub const MAX_LEFT_OUT: usize = 6;
 /// Most of the other sources that a source is rendered from, the nearest ones.
-pub const MOST_NEIGHBOURS: usize = 8;
+pub const MAX_NEIGHBOURS: usize = 8;
 /// Longest side of these pictures, in pixels.
 pub const SIDE: u32 = 96;
 /// Root mean square error of these pictures, 40 dB: beside errors of 20 to 25 dB, as those of networks, it changes a score by
 /// 0.04 to 0.14 dB if it is independent of them, and those of all schemes alike.
-const MOST_ERROR: f32 = 0.01;
+const MAX_ERROR: f32 = 0.01;
 /// The greatest score, decibels: that of 8-bit pictures that differ in rounding alone.
-const MOST_PSNR: f64 = 51.0;
+const MAX_PSNR: f64 = 51.0;
 
 /// Sources that are left out, each with the others on the device.
 pub(super) struct Trials<'a> {
@@ -67,11 +67,11 @@ pub(super) struct Outcome {
 }
 
 /// The options of pictures of sources that are left out. Where a field can check single pixels, these pictures are within
-/// [`MOST_ERROR`] of the exact ones; elsewhere a check would take a second picture, and they are not bounded.
+/// [`MAX_ERROR`] of the exact ones; elsewhere a check would take a second picture, and they are not bounded.
 pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOptions {
     let camera = stage.scene().views.first().map(|view| view.camera);
     let size = camera.map(|camera| scaled_size(&camera, SIDE.min(stage.side())).into());
-    let bound = stage.renders_pixels().then_some(Bound::Error(MOST_ERROR));
+    let bound = stage.renders_pixels().then_some(Bound::Error(MAX_ERROR));
     RenderOptions { size, settings: Vec::new(), bound, ..options.clone() }
 }
 
@@ -103,11 +103,11 @@ impl<'a> Trials<'a> {
             .collect::<Result<_, _>>()?;
         let surfaces = stage.surfaces();
         let centres: Vec<Vec3> = poses.iter().map(Pose::centre_world).collect();
-        let chosen = spread(&centres, MOST_LEFT_OUT);
+        let chosen = spread(&centres, MAX_LEFT_OUT);
         progress.expect(chosen.len());
         for source in chosen {
             progress.check().map_err(stopped)?;
-            let others = nearest(&poses, source, MOST_NEIGHBOURS);
+            let others = nearest(&poses, source, MAX_NEIGHBOURS);
             let views: Vec<usize> = others.iter().map(|&other| stage.views[other]).collect();
             let images = Arc::new(SourceImages {
                 images: others.iter().map(|&other| reduced[other].clone()).collect(),
@@ -173,7 +173,7 @@ impl<'a> Trials<'a> {
             let frame = stage.frame(weighting, target, &Quiet(progress))?;
             outcomes.push(Outcome {
                 source: *source,
-                psnr: psnr_of_seen(&frame.picture, truth, seen.as_ref()).min(MOST_PSNR),
+                psnr: psnr_of_seen(&frame.picture, truth, seen.as_ref()).min(MAX_PSNR),
                 confidence: mean(&frame.confidences),
                 standing: *standing,
                 copy: *copy,
@@ -191,7 +191,7 @@ fn copy_score(picture: &RgbImage, truth: &RgbImage, seen: Option<&GrayImage>) ->
         true => Cow::Borrowed(picture),
         false => Cow::Owned(imageops::resize(picture, width, height, FilterType::Triangle)),
     };
-    psnr_of_seen(&copy, truth, seen).min(MOST_PSNR)
+    psnr_of_seen(&copy, truth, seen).min(MAX_PSNR)
 }
 
 /// The pixels that a whole photograph shows: those its lens did not see have alpha 0. `None` if it shows all of them.

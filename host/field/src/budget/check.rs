@@ -14,7 +14,7 @@ const EVEN_SHARE: f64 = 0.2;
 /// Share of the draws that goes to all pixels alike that show something: errors of flat surfaces leave no contrast either.
 const SEEN_SHARE: f64 = 0.3;
 /// A pixel shows something if its opacity is at least this.
-const LEAST_OPACITY: f32 = 1.0 / 256.0;
+const MIN_OPACITY: f32 = 1.0 / 256.0;
 /// Standard errors from the estimate to its upper end: a one-sided 95 % of Student's distribution with 23 degrees of freedom is
 /// 1.7; squared differences are skewed.
 const STANDARD_ERRORS: f64 = 2.0;
@@ -32,7 +32,7 @@ pub(super) struct Draw {
 pub(super) fn draw(picture: &Rendered, count: usize, seed: u64) -> Vec<Draw> {
     let contrasts = contrasts(picture);
     let contrast: f64 = contrasts.iter().sum();
-    let is_seen = |colour: &[f32; 4]| colour[3] >= LEAST_OPACITY;
+    let is_seen = |colour: &[f32; 4]| colour[3] >= MIN_OPACITY;
     let seen = picture.colours.iter().filter(|colour| is_seen(colour)).count() as f64;
     let even = 1.0 / contrasts.len().max(1) as f64;
     let seen_share = if seen > 0.0 { SEEN_SHARE } else { 0.0 };

@@ -20,7 +20,7 @@ const EXPECTED_DRAWS: usize = 8;
 /// Pictures that keep another picture's choice have this much more error at most.
 const OTHER_PICTURES: f64 = 1.3;
 /// The most work of two pictures that are compared, as a share of the exact one's: where the comparison fails, it was for nothing.
-const MOST_COMPARED: f32 = 0.7;
+const MAX_COMPARED: f32 = 0.7;
 /// A picture whose error is below the bound by this factor lets the next one begin with less effort.
 const FAR_LESS: f64 = 1.6;
 /// After an exact picture, only one of so many tries less.
@@ -177,7 +177,7 @@ impl Controller {
         let mut effort = self.expected.cheapest_within(most).clamp(1.min(exact), exact);
         let mut below = self.expected.below(effort);
         let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_work).sum();
-        if effort == exact || work > MOST_COMPARED {
+        if effort == exact || work > MAX_COMPARED {
             let rendered = self.picture(search, exact, termination, progress)?;
             self.compared = Some((exact, Estimate::EXACT));
             return Ok((rendered, exact, Estimate::EXACT));

@@ -6,12 +6,12 @@ use crate::Effort;
 /// Errors are expected to be larger than the scaled typical ones by this factor: most first checks then succeed.
 const MARGIN: f64 = 1.15;
 /// The least scale: few draws often miss the few largest differences, so that low estimates prove little.
-const LEAST_SCALE: f64 = 0.9;
+const MIN_SCALE: f64 = 0.9;
 /// Trials of so little work may skip this many efforts at most: typical errors tell little of scenes that are not typical.
 const CHEAP: f32 = 0.1;
-const MOST_SKIPPED: usize = 3;
+const MAX_SKIPPED: usize = 3;
 /// Pictures are compared whose typical errors differ by at least this factor.
-const LEAST_RATIO: f32 = 1.5;
+const MIN_RATIO: f32 = 1.5;
 /// An effort is tried if it is expected to take this share of the time that is left.
 const TIME_SHARE: f64 = 0.75;
 
@@ -51,14 +51,14 @@ impl Expected {
     /// The effort to try after one whose error is too large.
     pub(super) fn after(&self, effort: usize, most: f64) -> usize {
         let next = self.cheapest_within(most).max(effort + 1);
-        let mut near = (effort + 1..=effort + MOST_SKIPPED).rev();
+        let mut near = (effort + 1..=effort + MAX_SKIPPED).rev();
         let cheap = near.find(|near| self.efforts.get(*near).is_some_and(|own| own.typical_work <= CHEAP));
         cheap.map_or(next, |cheap| next.min(cheap))
     }
 
     /// The best effort below another one whose error is typically larger by a factor that a comparison can tell.
     pub(super) fn below(&self, effort: usize) -> usize {
-        let least = LEAST_RATIO * self.efforts[effort].typical_error;
+        let least = MIN_RATIO * self.efforts[effort].typical_error;
         (0..effort).rev().find(|below| self.efforts[*below].typical_error >= least).unwrap_or(0)
     }
 
@@ -78,7 +78,7 @@ impl Expected {
         let found = estimate.value / f64::from(self.efforts[effort].typical_error);
         if found.is_finite() && found > 0.0 {
             let scale = self.scale.map_or(found, |scale| (scale * found).sqrt());
-            self.scale = Some(scale.max(LEAST_SCALE));
+            self.scale = Some(scale.max(MIN_SCALE));
         }
     }
 }
@@ -115,8 +115,8 @@ mod tests {
         // 4, then its geometric mean with 1.
         assert!(expected.scale.is_some_and(|scale| (scale - 2.0).abs() < 1.0e-6));
         (0..20).for_each(|_| expected.learn(0, found(0.0004)));
-        assert_eq!(expected.scale, Some(LEAST_SCALE));
+        assert_eq!(expected.scale, Some(MIN_SCALE));
         expected.learn(0, found(f64::NAN));
-        assert_eq!(expected.scale, Some(LEAST_SCALE));
+        assert_eq!(expected.scale, Some(MIN_SCALE));
     }
 }

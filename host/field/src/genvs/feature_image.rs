@@ -10,11 +10,11 @@ use crate::finite::check_finite_on;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::genvs::{FeatureBlock, VolumeBlock};
 use viewfuse_core::rays::{CastBlock, PlaceBlock};
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::genvs::{FeatureBlock, VolumeBlock};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::linear::{Linear, LinearOptions};
 use viewfuse_nn::loader::Loader;
@@ -22,7 +22,7 @@ use viewfuse_nn::resample::upsample;
 use viewfuse_nn::scratch::Scratch;
 
 /// Rays that the CPU computes at once: their points' activations stay in its caches.
-const LEAST_RAYS: usize = 64;
+const MIN_RAYS: usize = 64;
 /// Length of the last sample as published: any density there is opaque.
 pub const LAST_LENGTH: f32 = 1.0e10;
 
@@ -86,7 +86,7 @@ pub(super) fn render<D: Device>(
     progress: &dyn Progress,
 ) -> Result<Image<D>, FieldError> {
     let half = Size { height: target.height / 2, width: target.width / 2, channels: network.features };
-    let at_once = (device.busy_elements() / ray_sampling.sample_count as usize).max(LEAST_RAYS);
+    let at_once = (device.busy_elements() / ray_sampling.sample_count as usize).max(MIN_RAYS);
     // The buffer of the looked-up features of all views is bound as a whole.
     let a_ray = ray_sampling.sample_count as usize * network.features as usize * views.volumes.len();
     let at_once = at_once.min(device.most_elements::<f32>() / a_ray).max(1);

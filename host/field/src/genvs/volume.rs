@@ -6,11 +6,11 @@ use super::ray_sampling::RaySampling;
 use std::ops::Range;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::genvs::VolumeBlock;
 use viewfuse_core::half_precision::{fetch_f16, word_count};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::genvs::VolumeBlock;
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_nn::scratch::Scratch;
 

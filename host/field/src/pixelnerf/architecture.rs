@@ -11,7 +11,7 @@ use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError, Sizes, TensorShape};
 use viewfuse_nn::resnet;
 
 /// The most octaves: sines of more are noise in `f32`.
-const MOST_OCTAVES: usize = 20;
+const MAX_OCTAVES: usize = 20;
 
 /// Sizes of a member of the family.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +42,7 @@ pub struct Architecture {
 /// Longest side of the published networks' source photographs; also of checkpoints that do not tell theirs.
 const SOURCE_SIDE: u32 = 128;
 /// The largest side that a checkpoint may tell.
-const LARGEST_SIDE: f32 = 65536.0;
+const MAX_SIDE: f32 = 65536.0;
 
 /// The two point networks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,10 +127,10 @@ impl Architecture {
         let stem_channels = sizes.size("encoder.model.conv1.weight", 4, 0)?;
         let width = sizes.size("mlp_coarse.lin_in.weight", 2, 0)?;
         let embedded_len = sizes.size("mlp_coarse.lin_in.weight", 2, 1)?;
-        if embedded_len < 12 || embedded_len % 6 != 0 || embedded_len > 6 + 6 * MOST_OCTAVES {
+        if embedded_len < 12 || embedded_len % 6 != 0 || embedded_len > 6 + 6 * MAX_OCTAVES {
             return Err(sizes.refuse(format!(
                 "mlp_coarse.lin_in.weight takes {embedded_len} numbers a point; this family takes 6 + 6 x octaves (a point \
-                 with sines and cosines, and a direction), at most {MOST_OCTAVES}"
+                 with sines and cosines, and a direction), at most {MAX_OCTAVES}"
             )));
         }
         let block_count = sizes.count(|block| format!("mlp_coarse.blocks.{block}.fc_0.weight"));
@@ -247,7 +247,7 @@ fn linear(tensors: &mut Vec<TensorShape>, name: &str, out_count: usize, in_count
 fn source_side(sizes: &Sizes<'_>) -> Result<u32, CheckpointError> {
     const KEY: &str = "viewfuse.source_side";
     let side = sizes.number(KEY, SOURCE_SIDE as f32)?;
-    if !(1.0..=LARGEST_SIDE).contains(&side) || side.fract() != 0.0 {
+    if !(1.0..=MAX_SIDE).contains(&side) || side.fract() != 0.0 {
         return Err(
             sizes.refuse(format!("its metadata says {KEY} = {side}, which is not a whole number from 1 to 65536"))
         );

@@ -1,6 +1,6 @@
 //! The ways to render a picture, from the cheapest to the exact one.
 
-use super::node_picture::MOST_NODES;
+use super::node_picture::MAX_NODES;
 use super::options::{Omissions, PixelNerfOptions};
 use crate::Effort;
 
@@ -44,7 +44,7 @@ pub(super) fn of(options: &PixelNerfOptions) -> Vec<(Effort, PixelNerfOptions)> 
         ..omissions
     };
     let between_nodes = NODES.map(|(share, interpolation, error, work)| {
-        let nodes = (full.coarse_count * share).div_ceil(64).clamp(1, MOST_NODES);
+        let nodes = (full.coarse_count * share).div_ceil(64).clamp(1, MAX_NODES);
         let omissions = keep(Omissions { nodes, interpolation, ..ALL });
         (Effort::new(format!("{nodes} nodes"), error, work), PixelNerfOptions { sampling: full, omissions })
     });

@@ -2,9 +2,9 @@
 
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::half_precision::word_count;
-use viewfuse_core::pixelnerf::GatherBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::pixelnerf::GatherBlock;
 
 /// Numbers `[row][column][channel]`.
 pub(super) struct Grid<D: Device> {

@@ -7,15 +7,15 @@ use super::sight::Sight;
 use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_nn::linear::{Linear, LinearOptions};
 
 /// Floats of a buffer of activations on the CPU: 4 MiB, which fit into the caches of a few cores. A quarter and four times
 /// as many took the same time.
-const LEAST_ACTIVATIONS: usize = 1 << 20;
+const MIN_ACTIVATIONS: usize = 1 << 20;
 /// Outputs of a matrix product that an invocation computes.
 const OUTPUTS_AN_INVOCATION: usize = 64;
 
@@ -84,7 +84,7 @@ fn points_at_once<D: Device>(
 ) -> usize {
     let latents = if maps { 0 } else { architecture.latent_channels() };
     let widest = architecture.width.max(architecture.embedded_len()).max(latents);
-    let busy = LEAST_ACTIVATIONS.max(device.busy_elements().saturating_mul(OUTPUTS_AN_INVOCATION));
+    let busy = MIN_ACTIVATIONS.max(device.busy_elements().saturating_mul(OUTPUTS_AN_INVOCATION));
     let rows = (busy / widest).min(device.most_elements::<f32>() / widest);
     (rows / view_count.max(1)).clamp(1, most_points.max(1))
 }

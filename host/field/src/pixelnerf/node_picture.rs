@@ -10,27 +10,27 @@ use super::pass::{Evaluated, Renderer};
 use super::picture::{between, widest_step};
 use crate::{FieldError, Rendered};
 use std::mem::replace;
-use viewfuse_core::pixelnerf::radiance;
 use viewfuse_core::rays::{RayPoint, TargetRay, cast_ray};
 use viewfuse_device::Device;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::pixelnerf::radiance;
 
 /// The most nodes on a ray.
-pub(super) const MOST_NODES: u32 = 128;
+pub(super) const MAX_NODES: u32 = 128;
 /// The widest first grid, in pixels, and the rows and columns that it has at least.
 const WIDEST_FIRST_STEP: u32 = 16;
-const LEAST_FIRST_GRID: u32 = 8;
+const MIN_FIRST_GRID: u32 = 8;
 /// In a picture of fewer pixels, a single one of the background's colour instead of the object's is more than an error of 40 dB, and
 /// few checked pixels hardly meet it: a corner of one pixel, whose neighbours on the grid before are empty, may not be lost.
 const SMALL: u32 = 2000;
 /// A node is empty if a whole ray of its density has less optical depth than the first over the square of the number of nodes,
 /// and than the second.
-const LEAST_OPTICAL_DEPTH: [f32; 2] = [512.0, 1.0];
+const MIN_OPTICAL_DEPTH: [f32; 2] = [512.0, 1.0];
 /// A node that nothing is known of.
 const EMPTY: [f32; 4] = [0.0; 4];
 /// Candidates of a ray at a time at least, and of all rays: fewer keep no device busy.
 const AT_ONCE: usize = 4;
-const LEAST_POINTS: usize = 4096;
+const MIN_POINTS: usize = 4096;
 
 /// A picture so far.
 struct Unfinished {
@@ -172,7 +172,7 @@ impl<D: Device> Renderer<'_, D> {
             let mut points = Vec::new();
             let is_left = |(left, transmittance): (&u128, &f32)| *left != 0 && *transmittance > self.early_termination;
             let ray_count = left.iter().zip(&transmittances).filter(|ray| is_left(*ray)).count();
-            let at_once = AT_ONCE.max(LEAST_POINTS / ray_count.max(1));
+            let at_once = AT_ONCE.max(MIN_POINTS / ray_count.max(1));
             for (ray, left) in left.iter_mut().enumerate() {
                 for _ in 0..at_once {
                     if *left == 0 || transmittances[ray] <= self.early_termination {
@@ -225,8 +225,7 @@ impl<D: Device> Renderer<'_, D> {
 
     /// The density below which a node is empty: more nodes are for less error.
     fn least_density(&self) -> f32 {
-        let optical_depth =
-            (LEAST_OPTICAL_DEPTH[0] / (self.omissions.nodes as f32).powi(2)).min(LEAST_OPTICAL_DEPTH[1]);
+        let optical_depth = (MIN_OPTICAL_DEPTH[0] / (self.omissions.nodes as f32).powi(2)).min(MIN_OPTICAL_DEPTH[1]);
         optical_depth / (self.cast.far - self.cast.near)
     }
 }
@@ -303,7 +302,7 @@ fn point(ray: &TargetRay, index: usize, node: usize, count: usize) -> RayPoint {
 /// The step of the first grid: a power of two.
 fn first_step(side: u32) -> u32 {
     let mut step = 2;
-    while step < WIDEST_FIRST_STEP && side >= 2 * step * LEAST_FIRST_GRID {
+    while step < WIDEST_FIRST_STEP && side >= 2 * step * MIN_FIRST_GRID {
         step *= 2;
     }
     step

@@ -3,14 +3,14 @@
 //! Along a ray a network is smooth: its highest frequency spans several samples. The samples of both passes lie where the
 //! exact picture has them, so that their random places cost nothing; only their colours and densities are interpolated.
 
-use super::options::{LEAST_OPACITY, Sampling};
+use super::options::{MIN_OPACITY, Sampling};
 use viewfuse_core::composite::{Composite, Compositor};
 use viewfuse_core::depths::{CoarseBlock, FineBlock, PROBABILITY_FLOOR, coarse_depth, random_draw, stratified_depth};
 use viewfuse_core::math::clamp;
 use viewfuse_core::rays::TargetRay;
 
 /// Rays with less transmittance than this show nothing more.
-const LEAST_TRANSMITTANCE: f32 = 1.0e-4;
+const MIN_TRANSMITTANCE: f32 = 1.0e-4;
 
 /// The values of a ray at evenly spaced nodes.
 pub(super) struct NodeRay<'a> {
@@ -67,7 +67,7 @@ impl NodeRay<'_> {
         let mut weights = vec![0.0; depths.len()];
         let seen = self.sum(&depths, behind, background, |sample, weight| weights[sample] = weight);
         let added_count = sampling.importance_count + sampling.depth_count;
-        if added_count == 0 || seen.opacity < LEAST_OPACITY {
+        if added_count == 0 || seen.opacity < MIN_OPACITY {
             return seen;
         }
         let block = FineBlock {
@@ -119,7 +119,7 @@ impl NodeRay<'_> {
             let length = depths.get(sample + 1).copied().unwrap_or(behind) - depth;
             let [red, green, blue, density] = self.value(*depth);
             tell(sample, compositor.add(&[red, green, blue], density * length, *depth));
-            if compositor.is_terminated(LEAST_TRANSMITTANCE) {
+            if compositor.is_terminated(MIN_TRANSMITTANCE) {
                 break;
             }
         }

@@ -66,7 +66,7 @@ pub struct Omissions {
     /// others only where the four probes around them are not empty. 0 or 1: no probes.
     pub empty_space: u32,
     /// The largest change of the probes' colours, root mean square, `1` from black to white: the largest threshold of a
-    /// part's opacity that stays within it replaces [`LEAST_SHARE`]. 0: always [`LEAST_SHARE`].
+    /// part's opacity that stays within it replaces [`MIN_SHARE`]. 0: always [`MIN_SHARE`].
     pub probe_error: f32,
     /// Rays between alike neighbours: a pixel is interpolated where the colours and opacities around it differ by no more
     /// than this in any channel. 0: every pixel has its ray.
@@ -74,7 +74,7 @@ pub struct Omissions {
     /// Samples of both passes are interpolated along rays between this many evenly spaced nodes, at most 128, at which alone the
     /// second pass's network is evaluated, and not in space that neighbouring rays find empty. 0: no nodes.
     pub nodes: u32,
-    /// Second-pass samples on rays whose first pass has an opacity below [`LEAST_OPACITY`].
+    /// Second-pass samples on rays whose first pass has an opacity below [`MIN_OPACITY`].
     pub empty_rays: bool,
     /// Second-pass samples in parts of a ray that the first pass found empty, one part to either side included.
     pub empty_parts: bool,
@@ -83,9 +83,9 @@ pub struct Omissions {
 }
 
 /// A part is empty if its opacity is below this: 1/512, half of a step of 1/256. The probes may raise this threshold.
-pub const LEAST_SHARE: f32 = 1.0 / 512.0;
+pub const MIN_SHARE: f32 = 1.0 / 512.0;
 /// A ray is empty if its opacity is below this.
-pub const LEAST_OPACITY: f32 = 1.0 / 256.0;
+pub const MIN_OPACITY: f32 = 1.0 / 256.0;
 
 impl Omissions {
     /// Nothing is left out.

@@ -1,23 +1,23 @@
 //! The two passes along a target's rays, some rays at a time: the first finds surfaces, the second adds samples there.
 
 use super::network::{Network, Views, Workspace};
-use super::options::{LEAST_OPACITY, LEAST_SHARE, Omissions, Sampling};
+use super::options::{MIN_OPACITY, MIN_SHARE, Omissions, Sampling};
 use crate::FieldError;
-use viewfuse_core::compact::RUN;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::{CoarseBlock, FineBlock};
 use viewfuse_core::rays::{CastBlock, PlaceBlock};
-use viewfuse_core::sample_mask::{RaysBlock, SampleMaskBlock};
 use viewfuse_device::{Device, Pixels, Rays};
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::compact::RUN;
+use viewfuse_kernels::sample_mask::{RaysBlock, SampleMaskBlock};
 
 /// The most rays at a time.
-pub(super) const MOST_RAYS: usize = 4096;
+pub(super) const MAX_RAYS: usize = 4096;
 
 /// Rays at a time: as many as a buffer of the device holds the samples of.
 pub(super) fn rays_at_once<D: Device>(device: &D, sampling: &Sampling) -> usize {
     let samples = sampling.coarse_count as usize + sampling.importance_count as usize + sampling.depth_count as usize;
-    MOST_RAYS.min(device.most_elements::<[f32; 4]>() / samples).max(1)
+    MAX_RAYS.min(device.most_elements::<[f32; 4]>() / samples).max(1)
 }
 
 /// Bytes of a ray in both passes.
@@ -120,9 +120,9 @@ impl<D: Device> Renderer<'_, D> {
         let mask = (empty_rays || empty_parts || hidden_samples).then_some(SampleMaskBlock {
             sample_count: count,
             part_count: coarse.count,
-            least_share: if empty_parts { seen.map_or(LEAST_SHARE, |seen| seen.least_share) } else { 0.0 },
+            least_share: if empty_parts { seen.map_or(MIN_SHARE, |seen| seen.least_share) } else { 0.0 },
             termination: if hidden_samples { self.early_termination } else { -1.0 },
-            least_opacity: if empty_rays { LEAST_OPACITY } else { 0.0 },
+            least_opacity: if empty_rays { MIN_OPACITY } else { 0.0 },
             width: self.cast.camera.width,
             ..SampleMaskBlock::default()
         });

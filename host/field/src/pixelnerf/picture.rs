@@ -6,7 +6,7 @@ use crate::{FieldError, Rendered};
 use viewfuse_device::Device;
 
 /// Rows and columns that a grid of rays has at least before pixels between are interpolated.
-const LEAST_GRID: u32 = 32;
+const MIN_GRID: u32 = 32;
 /// The widest grid, in pixels.
 const WIDEST_STEP: u32 = 8;
 /// Depths of neighbours that differ by more than this share of the far bound are not on one surface.
@@ -128,7 +128,7 @@ impl<D: Device> Renderer<'_, D> {
 /// The step of the first grid: a power of two.
 pub(super) fn widest_step(side: u32) -> u32 {
     let mut step = 2;
-    while step < WIDEST_STEP && side >= 2 * step * LEAST_GRID {
+    while step < WIDEST_STEP && side >= 2 * step * MIN_GRID {
         step *= 2;
     }
     step

@@ -1,14 +1,14 @@
 //! Probes: the first pass along a few rays finds empty space, and the threshold below which space counts as empty.
 
 use super::network::Workspace;
-use super::options::LEAST_SHARE;
+use super::options::MIN_SHARE;
 use super::pass::{Evaluated, Renderer, Seen, rays_at_once};
 use crate::FieldError;
 use viewfuse_core::composite::Compositor;
 use viewfuse_device::Device;
 
 /// Candidate thresholds of the opacity below which a part of a ray counts as empty, the largest first. The last is
-/// [`LEAST_SHARE`], which is always allowed.
+/// [`MIN_SHARE`], which is always allowed.
 const SHARES: [f32; 5] = [1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 
 impl<D: Device> Renderer<'_, D> {
@@ -44,7 +44,7 @@ impl<D: Device> Renderer<'_, D> {
         }
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
         let harmless = changes.iter().position(|change| *change < most);
-        let least_share = harmless.map_or(LEAST_SHARE, |index| SHARES[index]);
+        let least_share = harmless.map_or(MIN_SHARE, |index| SHARES[index]);
         Ok(Seen { values, part_count: count, columns, rows, least_share })
     }
 }

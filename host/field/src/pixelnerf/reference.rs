@@ -7,9 +7,9 @@ use crate::FieldError;
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{PlaceBlock, RayPoint, TargetRay};
-use viewfuse_core::sample_mask::RaysBlock;
 use viewfuse_device::DeviceError;
 use viewfuse_device::{Device, Pixels, Rays};
+use viewfuse_kernels::sample_mask::RaysBlock;
 use viewfuse_scene::photographs::SourceImages;
 
 /// Sources on a device, with the network.

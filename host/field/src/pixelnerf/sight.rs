@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 use std::mem::replace;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pixelnerf::{is_in_front, visible_weight};
 use viewfuse_core::rays::{CastBlock, RayPoint, cast_ray};
 use viewfuse_device::parallel::map;
 use viewfuse_device::{Device, DeviceError};
+use viewfuse_kernels::pixelnerf::{is_in_front, visible_weight};
 
 /// Cameras and weights of a target's views.
 pub(super) struct Sight {

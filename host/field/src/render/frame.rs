@@ -7,7 +7,7 @@ use std::time::Duration;
 use viewfuse_core::weights::Omission;
 use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::photographs::GroundTruth;
-use viewfuse_weighting::sources::{MOST_SOURCES, SourceWeights};
+use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
 /// One target view's picture with its weights, scores and times.
 #[derive(Clone, Debug)]
@@ -17,7 +17,7 @@ pub struct Frame {
     /// The sources' weights before views were left out.
     pub weights: SourceWeights,
     /// The views that were left out, and the weights that were used.
-    pub omission: Omission<MOST_SOURCES>,
+    pub omission: Omission<MAX_SOURCES>,
     /// Red, green, blue in `[0, 1]` and opacity, not rounded. Row-major.
     pub colours: Vec<[f32; 4]>,
     /// The picture.

@@ -12,7 +12,7 @@ use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::photographs::{Album, GroundTruth, SourceImages, reduced_size, scaled_size, to_rgb8};
 use viewfuse_weighting::Weighting;
-use viewfuse_weighting::sources::{MOST_SOURCES, SourcePoses, SourceWeights};
+use viewfuse_weighting::sources::{MAX_SOURCES, SourcePoses, SourceWeights};
 
 /// Times of the stages. Stages that several frames share are counted once, in their run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -316,7 +316,7 @@ fn relevance_among(sources: &SourcePoses, weighting: &Weighting, leave_out: f32)
                 return Weights::mean(count);
             };
             let weights = weighting.weigh(&others, sources.pose(view)).without_least(leave_out).weights;
-            let mut scores = [0.0; MOST_SOURCES];
+            let mut scores = [0.0; MAX_SOURCES];
             for other in 0..count {
                 if other != view {
                     scores[other as usize] = weights.get(if other < view { other } else { other - 1 });

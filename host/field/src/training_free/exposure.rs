@@ -3,15 +3,15 @@
 use viewfuse_core::camera::CameraBlock;
 
 /// Confidence from which on a pixel's disparity counts.
-const LEAST_CONFIDENCE: f32 = 0.6;
+const MIN_CONFIDENCE: f32 = 0.6;
 /// Stride of the pixels that are sampled, along both axes.
 const STRIDE: u32 = 3;
 /// Colours that are compared lie between these: neither black nor saturated.
 const COMPARABLE: std::ops::Range<f32> = 0.04..0.94;
 /// Fewest common points of a usable pair.
-const FEWEST_POINTS: usize = 24;
+const MIN_POINTS: usize = 24;
 /// Median absolute deviation of a pair's logarithms above which it is ignored.
-const MOST_SPREAD: f64 = 0.06;
+const MAX_SPREAD: f64 = 0.06;
 /// Weight of the prior towards a gain of 1, in common points.
 const PRIOR_POINTS: f64 = 64.0;
 /// Gains as natural logarithms: those below the first are not applied, those above the second are rejected.
@@ -81,7 +81,7 @@ fn ratios(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 2]], steps
         for (row, column) in grid(camera) {
             let texel = (camera.first_texel + row * camera.width + column) as usize;
             let [disparity, confidence] = maps[texel];
-            if confidence < LEAST_CONFIDENCE || disparity < 0.5 * steps[first] {
+            if confidence < MIN_CONFIDENCE || disparity < 0.5 * steps[first] {
                 continue;
             }
             let point = camera.centre_world() + camera.towards(column as f32 + 0.5, row as f32 + 0.5) / disparity;
@@ -104,14 +104,14 @@ fn ratios(cameras: &[CameraBlock], texels: &[[f32; 4]], maps: &[[f32; 2]], steps
         }
         for (second, mut channels) in logarithms.into_iter().enumerate() {
             let count = channels.iter().map(Vec::len).min().unwrap_or(0);
-            if count >= FEWEST_POINTS {
+            if count >= MIN_POINTS {
                 let medians = [0, 1, 2].map(|channel| median(&mut channels[channel]));
                 let spreads = [0, 1, 2].map(|channel| {
                     channels[channel].iter_mut().for_each(|value| *value = (*value - medians[channel]).abs());
                     median(&mut channels[channel])
                 });
                 // Exposure changes all surfaces alike; light that depends on the direction does not.
-                if spreads.iter().any(|spread| *spread > MOST_SPREAD) {
+                if spreads.iter().any(|spread| *spread > MAX_SPREAD) {
                     continue;
                 }
                 ratios.push(Ratio { first, second, logarithms: medians, count: count as f64 });

@@ -1,16 +1,16 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
-//! fusion; the mathematics is in [`viewfuse_core::visual_hull`].
+//! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
 mod bounds;
 
 use crate::{DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
-use viewfuse_core::visual_hull::ray_marching::MarchBlock;
-use viewfuse_core::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
-use viewfuse_core::visual_hull::{NO_SURFACE, ObjectBlock};
 use viewfuse_device::{Device, HullScene, Pixels};
 use viewfuse_job::progress::{Progress, Silent};
+use viewfuse_kernels::visual_hull::ray_marching::MarchBlock;
+use viewfuse_kernels::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
+use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -22,7 +22,7 @@ const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
 /// `viewfuse-evaluate`).
 const EFFORTS: [(f32, f32, f32); 2] = [(0.25, 0.065, 0.2), (0.5, 0.04, 0.4)];
 /// Sources with a longer side than this take most of the time; smaller ones take less than the picture.
-const LEAST_REDUCED: u32 = 256;
+const MIN_REDUCED: u32 = 256;
 
 /// Density from silhouettes and photo-consistency, colour by weighted fusion with visibility.
 #[derive(Clone, Copy, Debug)]
@@ -216,7 +216,7 @@ impl<D: Device> Prepared for Views<'_, D> {
 
     fn efforts(&self) -> Vec<Effort> {
         let side = self.cameras.iter().map(longest_side).max().unwrap_or(1);
-        if side < LEAST_REDUCED {
+        if side < MIN_REDUCED {
             return Vec::new();
         }
         let side = side as f32;

@@ -11,7 +11,7 @@ const PERCENTILES: [f64; 2] = [0.01, 0.99];
 /// Margin in front of the nearest and behind the farthest point.
 const MARGINS: [f32; 2] = [0.85, 1.3];
 /// Fewest points from which bounds are estimated.
-const FEWEST_POINTS: usize = 32;
+const MIN_POINTS: usize = 32;
 
 /// The known depths of a scene.
 #[derive(Clone, Debug)]
@@ -30,7 +30,7 @@ impl Space {
         }
         let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
         let points = sources.points.clone();
-        if points.len() < FEWEST_POINTS { Space { points, bounds: None } } else { Space::of_points(points, &cameras) }
+        if points.len() < MIN_POINTS { Space { points, bounds: None } } else { Space::of_points(points, &cameras) }
     }
 
     /// From surface points. For a camera that sees too few, the bounds are those of all the cameras that see enough; if
@@ -50,7 +50,7 @@ impl Space {
     pub(super) fn surfaces(&self) -> Surfaces {
         match self.bounds {
             // With points, the bounds follow from them.
-            Some([least, greatest]) if self.points.len() < FEWEST_POINTS => {
+            Some([least, greatest]) if self.points.len() < MIN_POINTS => {
                 Surfaces { points: Vec::new(), near_far: Some([1.0 / greatest, 1.0 / least]) }
             }
             _ => Surfaces { points: self.points.clone(), near_far: None },
@@ -67,7 +67,7 @@ impl Space {
 fn in_frustum(points: &[Vec3], camera: &CameraBlock) -> Option<[f32; 2]> {
     let seen = points.iter().map(|point| camera.project(*point)).filter(|seen| seen.in_image);
     let mut depths: Vec<f32> = seen.map(|seen| seen.depth).collect();
-    if depths.len() < FEWEST_POINTS {
+    if depths.len() < MIN_POINTS {
         return None;
     }
     depths.sort_by(f32::total_cmp);

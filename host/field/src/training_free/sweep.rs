@@ -1,5 +1,5 @@
 //! Any sources: planes of equal disparity through the frusta of the sources and of the target; the mathematics is in
-//! [`viewfuse_core::plane_sweep`].
+//! [`viewfuse_kernels::plane_sweep`].
 //!
 //! ```text
 //! matching    costs of the planes in a frustum
@@ -20,12 +20,12 @@ use crate::{
 };
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::blend::BlendBlock;
-use viewfuse_core::plane_sweep::disparity::TEMPERATURE;
-use viewfuse_core::plane_sweep::frustum::SweptView;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::blend::BlendBlock;
+use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
+use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 

@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Most bytes of what has no length: a pipe, a device.
-const MOST_OF_A_PIPE: u64 = 64 << 20;
+const MAX_OF_A_PIPE: u64 = 64 << 20;
 
 /// The bytes of a file that has at most `most` of them; of a pipe or a device at most 64 MiB.
 ///
@@ -14,7 +14,7 @@ const MOST_OF_A_PIPE: u64 = 64 << 20;
 pub fn read_at_most(path: &Path, most: u64) -> io::Result<Vec<u8>> {
     let file = File::open(path)?;
     let metadata = file.metadata()?;
-    let most = if metadata.is_file() { most } else { most.min(MOST_OF_A_PIPE) };
+    let most = if metadata.is_file() { most } else { most.min(MAX_OF_A_PIPE) };
     let too_long = || io::Error::other(format!("it is longer than {most} bytes"));
     let length = metadata.len();
     if length > most {

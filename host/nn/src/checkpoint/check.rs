@@ -5,7 +5,7 @@ use super::error::shortened;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The most names of each kind in a message.
-const MOST_NAMES: usize = 8;
+const MAX_NAMES: usize = 8;
 
 /// The differences, if there are any.
 pub(super) fn compare(
@@ -40,7 +40,7 @@ pub(super) fn compare(
 /// The first few, and how many more.
 fn list(names: impl IntoIterator<Item = String>) -> Option<String> {
     let mut names = names.into_iter();
-    let first: Vec<String> = names.by_ref().take(MOST_NAMES).collect();
+    let first: Vec<String> = names.by_ref().take(MAX_NAMES).collect();
     let more = names.count();
     let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
     (!first.is_empty()).then(|| format!("{}{rest}", first.join(", ")))
@@ -67,5 +67,5 @@ fn longer<'a>(short: &[&str], long: &[&'a str]) -> Option<&'a str> {
     let names: BTreeSet<&str> = long.iter().copied().collect();
     let explained =
         |prefix: &str| short.iter().filter(|name| names.contains(format!("{prefix}{name}").as_str())).count();
-    candidates.take(MOST_NAMES).find(|prefix| 2 * explained(prefix) > short.len())
+    candidates.take(MAX_NAMES).find(|prefix| 2 * explained(prefix) > short.len())
 }

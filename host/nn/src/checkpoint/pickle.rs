@@ -18,9 +18,9 @@ use machine::Machine;
 use std::io;
 
 /// The most opcodes of a pickle. A `state_dict` takes about 40 a tensor.
-pub const MOST_STEPS: u64 = 4_000_000;
+pub const MAX_STEPS: u64 = 4_000_000;
 /// The most values of a pickle, and the most entries of its stack and its memo.
-pub const MOST_VALUES: usize = 500_000;
+pub const MAX_VALUES: usize = 500_000;
 /// The most bytes of all its texts together.
 pub const LONGEST_TEXTS: usize = 16 << 20;
 /// The most memory for reading one pickle, in bytes: for the limits above, with lists that double when they are full.
@@ -166,13 +166,13 @@ impl Pickle {
     /// [`PickleError`].
     pub fn read(input: &mut Input<'_>) -> Result<Pickle, PickleError> {
         let mut machine = Machine::new();
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let at = input.position();
             if let Some(root) = machine.step(input).map_err(|fault| PickleError { at, fault })? {
                 return Ok(Pickle { values: machine.values, texts: machine.texts, wide: machine.wide, root });
             }
         }
-        let fault = Fault::TooMany { what: "opcodes", limit: MOST_STEPS };
+        let fault = Fault::TooMany { what: "opcodes", limit: MAX_STEPS };
         Err(PickleError { at: input.position(), fault })
     }
 

@@ -8,11 +8,11 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
 /// The most memory of one tensor as `f32`, in bytes.
-pub const LARGEST_TENSOR_BYTES: u64 = 4 << 30;
+pub const MAX_TENSOR_BYTES: u64 = 4 << 30;
 /// The most memory of all tensors of a file as `f32`, in bytes.
-pub const LARGEST_TOTAL_BYTES: u64 = 16 << 30;
+pub const MAX_TOTAL_BYTES: u64 = 16 << 30;
 /// The most elements of a tensor whose storage has fewer.
-const LARGEST_REPEATED: u64 = 1 << 20;
+const MAX_REPEATED: u64 = 1 << 20;
 /// Bytes that are read at once.
 pub(super) const CHUNK_BYTES: usize = 1 << 16;
 
@@ -43,9 +43,9 @@ pub(super) fn element_count(shape: &[usize]) -> Option<u64> {
 /// axis of length 0 counts as 1.
 pub(super) fn check_size(name: &str, shape: &[usize]) -> Result<u64, Problem> {
     let bytes = shape.iter().fold(4u128, |product, &length| product.saturating_mul(length.max(1) as u128));
-    if bytes > LARGEST_TENSOR_BYTES.into() {
+    if bytes > MAX_TENSOR_BYTES.into() {
         let what = format!("tensor '{name}' of shape {shape:?}");
-        return Err(Problem::TooLarge { what, bytes, limit: LARGEST_TENSOR_BYTES });
+        return Err(Problem::TooLarge { what, bytes, limit: MAX_TENSOR_BYTES });
     }
     Ok(element_count(shape).unwrap_or(0))
 }
@@ -73,7 +73,7 @@ impl Place {
             ))
         })?;
         // Steps of 0 are fine in small, but would let a file of a few bytes claim gigabytes.
-        if count > storage.count.max(LARGEST_REPEATED) {
+        if count > storage.count.max(MAX_REPEATED) {
             let (shape, stored) = (&claim.shape, storage.count);
             return Err(wrong(format!("shape {shape:?} has more elements than the {stored} of storage '{key}'")));
         }

@@ -5,7 +5,7 @@ use super::element::Element;
 use super::error::{Problem, shortened};
 use super::input::Input;
 use super::place::{Place, Places, check_size};
-use super::state_dict::{MOST_AXES, MOST_TENSORS};
+use super::state_dict::{MAX_AXES, MAX_TENSORS};
 use safetensors::tensor::Metadata;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -46,8 +46,8 @@ pub(super) fn open(file: &File, length: u64) -> Result<(Places, BTreeMap<String,
         let wrong = |what: String| Problem::Content(format!("tensor '{short}': {what}"));
         let element = Element::of_safetensors(info.dtype)
             .ok_or_else(|| wrong(format!("elements of type {:?} are not read", info.dtype)))?;
-        if info.shape.len() > MOST_AXES || places.len() == MOST_TENSORS {
-            return Err(wrong(format!("more than {MOST_AXES} axes, or more than {MOST_TENSORS} tensors")));
+        if info.shape.len() > MAX_AXES || places.len() == MAX_TENSORS {
+            return Err(wrong(format!("more than {MAX_AXES} axes, or more than {MAX_TENSORS} tensors")));
         }
         let extent = check_size(&short, &info.shape)?;
         let start = start + info.data_offsets.0 as u64;

@@ -3,7 +3,7 @@
 use super::{Checkpoint, CheckpointError};
 
 /// The largest size in an architecture. Larger ones are a mistake, or an attempt to fill the memory.
-pub const LARGEST_SIZE: usize = 1 << 14;
+pub const MAX_SIZE: usize = 1 << 14;
 
 /// A checkpoint's shapes, from which the sizes of a network are read.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,7 @@ impl<'a> Sizes<'a> {
     /// One extent of a required tensor with this number of dimensions.
     ///
     /// # Errors
-    /// [`CheckpointError`] if it is not, or if the extent is not from 1 to [`LARGEST_SIZE`].
+    /// [`CheckpointError`] if it is not, or if the extent is not from 1 to [`MAX_SIZE`].
     pub fn size(&self, name: &str, dimensions: usize, axis: usize) -> Result<usize, CheckpointError> {
         let Some(shape) = self.shape(name) else {
             return Err(self.refuse(format!("it has no tensor {name}")));
@@ -46,9 +46,9 @@ impl<'a> Sizes<'a> {
             return Err(self.refuse(format!("{name} has the shape {shape:?} instead of {dimensions} dimensions")));
         }
         match shape.get(axis).copied().unwrap_or(0) {
-            size @ 1..=LARGEST_SIZE => Ok(size),
+            size @ 1..=MAX_SIZE => Ok(size),
             size => Err(self.refuse(format!(
-                "{name} has the size {size} on axis {axis}; sizes from 1 to {LARGEST_SIZE} are supported"
+                "{name} has the size {size} on axis {axis}; sizes from 1 to {MAX_SIZE} are supported"
             ))),
         }
     }

@@ -16,11 +16,11 @@ pub const PLACES: [&str; 5] = ["state_dict", "model", "model_state_dict", "net",
 /// The prefix that `DataParallel` adds to every name.
 const PARALLEL_PREFIX: &str = "module.";
 /// The most tensors of a checkpoint.
-pub(super) const MOST_TENSORS: usize = 50_000;
+pub(super) const MAX_TENSORS: usize = 50_000;
 /// The most axes of a tensor: PyTorch's own limit.
-pub(super) const MOST_AXES: usize = 64;
+pub(super) const MAX_AXES: usize = 64;
 /// The most settings beside the tensors, and the most bytes of each.
-const MOST_SETTINGS: usize = 64;
+const MAX_SETTINGS: usize = 64;
 const LONGEST_SETTING: usize = 1024;
 
 /// The description of a file's tensors.
@@ -106,8 +106,8 @@ pub(super) fn find(pickle: &Pickle, storage_of: &StorageOf<'_>) -> Result<StateD
         if claims.insert(name.to_owned(), claim).is_some() {
             return Err(format!("holds two tensors called '{}'", shortened(name)));
         }
-        if claims.len() > MOST_TENSORS {
-            return Err(format!("holds more than {MOST_TENSORS} tensors, which no network here has"));
+        if claims.len() > MAX_TENSORS {
+            return Err(format!("holds more than {MAX_TENSORS} tensors, which no network here has"));
         }
         Ok(())
     };
@@ -257,7 +257,7 @@ fn axes(pickle: &Pickle, id: Id) -> Option<Vec<usize>> {
         }
         _ => pickle.sequence(id)?,
     };
-    if numbers.len() > MOST_AXES {
+    if numbers.len() > MAX_AXES {
         return None;
     }
     numbers.iter().map(|&number| usize::try_from(pickle.integer(number)?).ok()).collect()
@@ -276,7 +276,7 @@ fn settings(pickle: &Pickle, root: &[(Id, Id)]) -> BTreeMap<String, String> {
         };
         Some((key.to_owned(), value))
     };
-    root.iter().filter_map(setting).take(MOST_SETTINGS).collect()
+    root.iter().filter_map(setting).take(MAX_SETTINGS).collect()
 }
 
 /// Why there is no `state_dict` in a pickle.

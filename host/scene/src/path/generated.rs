@@ -18,7 +18,7 @@ const QUANTILE: f32 = 0.9;
 /// Share of the far bound's disparity in that of the point on a spiral's principal axes, as in LLFF.
 const FAR_SHARE: f32 = 0.75;
 /// Least length of the mean principal axis of forward-facing cameras: 45 degrees from it on average.
-const LEAST_COMMON: f32 = 0.7;
+const MIN_COMMON: f32 = 0.7;
 
 /// `count` cameras on a full circle around the focus of some cameras (at least one), at their mean height and distance,
 /// their principal axes through the focus, with the rig's up direction; frame 0 is on the side of the first camera.
@@ -120,7 +120,7 @@ pub fn spiral(cameras: &[Camera], pinhole: Pinhole, bounds: &[[f32; 2]], count: 
     let number = cameras.len().max(1) as f32;
     let mean = |of: &dyn Fn(&Camera) -> Vec3| cameras.iter().map(of).sum::<Vec3>() / number;
     let forward = mean(&|camera| camera.pose.forward_world());
-    if forward.length() < LEAST_COMMON {
+    if forward.length() < MIN_COMMON {
         return None;
     }
     let middle = mean(&|camera| camera.pose.centre_world());

@@ -19,7 +19,7 @@ const BORDER: u32 = 2;
 /// Reach, in pixels, of the search for solid neighbours of an edge pixel.
 const EDGE_REACH: i64 = 2;
 /// Least alpha of an edge pixel that the flood did not reach.
-const LEAST_EDGE_ALPHA: f32 = 0.05;
+const MIN_EDGE_ALPHA: f32 = 0.05;
 
 /// The choice of the background.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -102,7 +102,7 @@ pub(super) struct Backdrop {
 }
 
 /// The largest deviation of the typical border from one colour with which an object can be separated, of 255.
-pub(super) const MOST_NOISE_LEVEL: f32 = THRESHOLD.1 / NOISE_FACTOR * 255.0;
+pub(super) const MAX_NOISE_LEVEL: f32 = THRESHOLD.1 / NOISE_FACTOR * 255.0;
 
 impl Backdrop {
     /// Estimates the background from the borders of all photographs: the colour is their median, and the threshold is
@@ -262,7 +262,7 @@ fn silhouette(photograph: &Photograph, behind: [f32; 3], threshold: f32) -> Vec<
                 along += contrast * (colours[at][channel] - behind[channel]);
                 length += contrast * contrast;
             }
-            (along / length).clamp(LEAST_EDGE_ALPHA, 1.0)
+            (along / length).clamp(MIN_EDGE_ALPHA, 1.0)
         })
         .collect()
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use image::metadata::Orientation;
 use viewfuse_core::camera::{Camera, Pinhole};
-use viewfuse_core::pose::{LARGEST_COORDINATE, Pose, PoseError};
+use viewfuse_core::pose::{MAX_COORDINATE, Pose, PoseError};
 
 use super::error::SceneError;
 use super::fault::{IntrinsicsFault, Place};
@@ -84,7 +84,7 @@ pub(crate) fn camera_in(raw: &RawView, pinhole: &Pinhole, frame: &SceneFrame) ->
 fn near_far(raw: &RawView, frame: &SceneFrame) -> Result<Option<[f32; 2]>, SceneError> {
     let Some([near, far]) = raw.near_far else { return Ok(None) };
     let [low, high] = [near, far].map(|depth| (depth / frame.scale) as f32);
-    if low > 0.0 && low < high && high <= LARGEST_COORDINATE {
+    if low > 0.0 && low < high && high <= MAX_COORDINATE {
         return Ok(Some([low, high]));
     }
     let RawPose { path, place, .. } = &raw.pose;
@@ -94,7 +94,7 @@ fn near_far(raw: &RawView, frame: &SceneFrame) -> Result<Option<[f32; 2]>, Scene
 fn point(path: &Path, raw: RawPoint, frame: &SceneFrame, place: &[u32]) -> Result<ScenePoint, SceneError> {
     let [x, y, z] = raw.position;
     let position_world = frame.world(DVec3::from_array(raw.position)).as_vec3();
-    if !(position_world.abs().max_element() <= LARGEST_COORDINATE) || position_world.is_nan() {
+    if !(position_world.abs().max_element() <= MAX_COORDINATE) || position_world.is_nan() {
         return Err(SceneError::Point { path: path.to_path_buf(), place: raw.place, x, y, z });
     }
     let mut views: Vec<u32> = raw.views.iter().filter_map(|&view| place.get(view as usize).copied()).collect();

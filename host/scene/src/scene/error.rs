@@ -6,11 +6,11 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 use viewfuse_core::lens::LensError;
-use viewfuse_core::pose::{LARGEST_COORDINATE, PoseError};
+use viewfuse_core::pose::{MAX_COORDINATE, PoseError};
 use viewfuse_job::panics::Panicked;
 use viewfuse_job::text::in_line;
 
-use super::LARGEST_SIDE;
+use super::MAX_SIDE;
 use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place, Short};
 
 /// Why a scene could not be read.
@@ -256,7 +256,7 @@ pub enum SceneError {
         panic: Panicked,
     },
     /// An image header with too large a size.
-    #[error("{path}: the image is {width} x {height}; at most {LARGEST_SIDE} pixels are allowed on a side")]
+    #[error("{path}: the image is {width} x {height}; at most {MAX_SIDE} pixels are allowed on a side")]
     TooLarge {
         /// The image file.
         path: PathBuf,
@@ -372,7 +372,7 @@ pub enum SceneError {
     },
     /// A reconstructed point is not finite, or too far away.
     #[error(
-        "{path}{place}: the point ({}, {}, {}) is not finite, or further than {LARGEST_COORDINATE:e} from the origin",
+        "{path}{place}: the point ({}, {}, {}) is not finite, or further than {MAX_COORDINATE:e} from the origin",
         Short(*x), Short(*y), Short(*z)
     )]
     Point {

@@ -11,17 +11,17 @@ use super::SceneFrame;
 const FAR_FROM_ORIGIN: f64 = 16.0;
 
 /// Spreads of cameras below this share of their distance from the origin are rounding errors of f64.
-const LEAST_SPREAD: f64 = 1.0e-12;
+const MIN_SPREAD: f64 = 1.0e-12;
 
 /// Decimal digits of the cameras' distances that a file must hold: fewer than f32 has.
-const FEWEST_DIGITS: f64 = 6.0;
+const MIN_DIGITS: f64 = 6.0;
 
 /// Range of the cameras' spread, in units of the file, for which the unit is kept.
 const USUAL_SPREADS: std::ops::RangeInclusive<f64> = 1.0e-3..=1.0e4;
 
 /// Least determinant, over the cube of the count, of the matrix of lines that are not parallel; of perpendicular ones it is
 /// about 1/4.
-const LEAST_DETERMINANT: f64 = 1.0e-6;
+const MIN_DETERMINANT: f64 = 1.0e-6;
 
 /// The frame for cameras with these centres and principal axes (unit), in the coordinates of the files, and a warning where
 /// the files' own numbers cannot hold the distances between the cameras.
@@ -34,7 +34,7 @@ pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
         return (SceneFrame::FILE, None);
     }
     // One camera, or several in one place except for rounding: there are no distances to preserve.
-    if spread <= LEAST_SPREAD * far {
+    if spread <= MIN_SPREAD * far {
         let origin = if far > *USUAL_SPREADS.end() { centroid } else { DVec3::ZERO };
         return (SceneFrame { origin, scale: 1.0 }, None);
     }
@@ -45,7 +45,7 @@ pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
     };
     let scale = if USUAL_SPREADS.contains(&spread) { 1.0 } else { spread.log2().floor().exp2() };
     let digits = (spread / (far * f64::EPSILON)).log10();
-    let warning = (digits < FEWEST_DIGITS).then(|| {
+    let warning = (digits < MIN_DIGITS).then(|| {
         format!(
             "the cameras are {spread:.3e} units apart and {far:.3e} from the origin: the files' numbers hold only {} digits \
              of their distances; subtract the offset before they are written",
@@ -67,7 +67,7 @@ pub(crate) fn nearest_point_to_lines(lines: &[(DVec3, DVec3)]) -> Option<DVec3> 
         matrix += across;
         right += across * (point - centroid);
     }
-    if !(matrix.determinant() / (count * count * count) > LEAST_DETERMINANT) {
+    if !(matrix.determinant() / (count * count * count) > MIN_DETERMINANT) {
         return None;
     }
     Some(centroid + matrix.inverse() * right)

@@ -14,17 +14,17 @@ use viewfuse_job::panics::caught;
 
 use super::error::SceneError;
 use super::files::unreadable;
-use super::{LARGEST_SIDE, Photograph};
+use super::{MAX_SIDE, Photograph};
 
 /// Most bytes of a decoded pixel: four channels of 16 bits.
-const LARGEST_PIXEL: u64 = 8;
+const MAX_PIXEL: u64 = 8;
 
 /// Decoded pixels of more bytes than this must have a file of fitting length.
 const SMALL_IMAGE: u64 = 32 << 20;
 
 /// Most decoded bytes for each byte of a file: twice what a plane of one colour takes in the format that packs it best but one
 /// (PNG: 1032). A header of a few bytes must not take memory for pixels that cannot be in the file.
-const LARGEST_RATIO: u64 = 2064;
+const MAX_RATIO: u64 = 2064;
 
 /// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles.
 const DECODER_ALLOWANCE: u64 = 64 << 20;
@@ -46,14 +46,14 @@ pub(super) struct Header {
 /// Size and orientation; nothing of the size that the header states is allocated.
 ///
 /// # Errors
-/// [`SceneError::TooLarge`] if a side has more than [`LARGEST_SIDE`] pixels; otherwise as for any unreadable image.
+/// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels; otherwise as for any unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     let found = match beginning_of_jpeg(path)? {
         Some(found) => found,
         None => described(path, open(path)?)?,
     };
     let [width, height] = found.size;
-    if width > LARGEST_SIDE || height > LARGEST_SIDE {
+    if width > MAX_SIDE || height > MAX_SIDE {
         return Err(SceneError::TooLarge { path: path.to_path_buf(), width, height });
     }
     Ok(found)
@@ -166,13 +166,13 @@ pub(super) fn turned(size: [u32; 2], orientation: Orientation) -> [u32; 2] {
 pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneError> {
     let Header { size: [width, height], orientation, bytes } = header(path)?;
     let length = path.metadata().map_err(|cause| unreadable(path, cause))?.len();
-    if bytes > SMALL_IMAGE && bytes / LARGEST_RATIO > length {
+    if bytes > SMALL_IMAGE && bytes / MAX_RATIO > length {
         return Err(SceneError::Hollow { path: path.to_path_buf(), width, height, length });
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(width);
     limits.max_image_height = Some(height);
-    limits.max_alloc = Some(u64::from(width) * u64::from(height) * LARGEST_PIXEL + DECODER_ALLOWANCE);
+    limits.max_alloc = Some(u64::from(width) * u64::from(height) * MAX_PIXEL + DECODER_ALLOWANCE);
     let mut reader = open(path)?;
     reader.limits(limits);
     Ok((decoding(path, || reader.decode())?, orientation))
@@ -186,7 +186,7 @@ fn decoding<T>(path: &Path, decode: impl FnOnce() -> image::ImageResult<T>) -> R
     }
 }
 
-/// The pixels of any picture as stored: PNG, JPEG, WebP or TIFF of at most [`LARGEST_SIDE`] pixels on a side.
+/// The pixels of any picture as stored: PNG, JPEG, WebP or TIFF of at most [`MAX_SIDE`] pixels on a side.
 ///
 /// # Errors
 /// [`SceneError`] if it cannot be read or decoded, or is too large.

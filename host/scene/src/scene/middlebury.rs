@@ -21,7 +21,7 @@ const SUFFIX: &str = "_par.txt";
 const NUMBER_COUNT: usize = 9 + 9 + 3;
 
 /// Largest skew and other zero entry of K that rounding may leave, in pixels.
-const LARGEST_ROUNDING: f64 = 1.0e-6;
+const MAX_ROUNDING: f64 = 1.0e-6;
 
 /// Middlebury multi-view stereo: `*_par.txt` beside the images.
 pub(super) struct Middlebury;
@@ -86,10 +86,10 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneEr
     let (k, r, t) = (&numbers[..9], &numbers[9..18], &numbers[18..]);
 
     let intrinsics_fault = |fault| SceneError::Intrinsics { path: path(), place: Place::Line(line), fault };
-    if k[1].abs() > LARGEST_ROUNDING {
+    if k[1].abs() > MAX_ROUNDING {
         return Err(intrinsics_fault(IntrinsicsFault::Skew { skew: k[1] }));
     }
-    if [k[3], k[6], k[7], k[8] - 1.0].iter().any(|zero| zero.abs() > LARGEST_ROUNDING) {
+    if [k[3], k[6], k[7], k[8] - 1.0].iter().any(|zero| zero.abs() > MAX_ROUNDING) {
         return Err(intrinsics_fault(IntrinsicsFault::Form));
     }
     let pose = RawPose {

@@ -32,7 +32,7 @@ const WORLD: &str = "world_mat_";
 /// Prefix of the spheres' names.
 const SCALE: &str = "scale_mat_";
 /// Largest skew that rounding of 32-bit matrices may cause, in pixels.
-const LARGEST_SKEW: f64 = 0.05;
+const MAX_SKEW: f64 = 0.05;
 
 /// NeuS and IDR: `cameras*.npz`, `image/`, `mask/`.
 pub(super) struct Neus;
@@ -160,7 +160,7 @@ fn view(file: &Path, number: u64, matrices: &BTreeMap<String, Array>, image: &Pa
     let Parts { k, camera_from_world, centre } =
         take_apart(&projection).ok_or_else(|| fault(IntrinsicsFault::Projection))?;
     let skew = k.y_axis.x;
-    if skew.abs() > LARGEST_SKEW {
+    if skew.abs() > MAX_SKEW {
         return Err(fault(IntrinsicsFault::Skew { skew }));
     }
     let r = camera_from_world.transpose();

@@ -21,9 +21,9 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 /// Most bytes of a header.
 const LONGEST_HEADER: usize = 1 << 16;
 /// Most dimensions of an array.
-const MOST_DIMENSIONS: usize = 8;
+const MAX_DIMENSIONS: usize = 8;
 /// Most bytes of an array in an archive: cameras take some hundred.
-const LARGEST_ENTRY: u64 = 1 << 24;
+const MAX_ENTRY: u64 = 1 << 24;
 
 /// An array of numbers, row-major.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,9 +52,9 @@ pub(super) fn read_npz(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<BTr
         }
         let failed = |fault| SceneError::Numpy { path: path.to_path_buf(), entry: format!(": {name}"), fault };
         let mut bytes = Vec::new();
-        let read = entry.take(LARGEST_ENTRY + 1).read_to_end(&mut bytes);
+        let read = entry.take(MAX_ENTRY + 1).read_to_end(&mut bytes);
         read.map_err(|cause| zip_error(ZipError::Io(cause)))?;
-        if bytes.len() as u64 > LARGEST_ENTRY {
+        if bytes.len() as u64 > MAX_ENTRY {
             return Err(failed(NumpyFault::TooLarge));
         }
         let array = parse(&bytes).map_err(failed)?;
@@ -133,7 +133,7 @@ fn shape(text: &str) -> Result<Vec<usize>, NumpyFault> {
         .filter(|side| !side.is_empty())
         .map(|side| side.parse().map_err(|_| fault()))
         .collect::<Result<_, _>>()?;
-    if sides.len() > MOST_DIMENSIONS { Err(fault()) } else { Ok(sides) }
+    if sides.len() > MAX_DIMENSIONS { Err(fault()) } else { Ok(sides) }
 }
 
 /// Numbers in Fortran order (the first index runs fastest) in C order.

@@ -111,7 +111,7 @@ impl ImageFile {
     /// Reads the header.
     ///
     /// # Errors
-    /// [`SceneError`] if it cannot be read, is not an image, or states a side above [`crate::LARGEST_SIDE`].
+    /// [`SceneError`] if it cannot be read, is not an image, or states a side above [`crate::MAX_SIDE`].
     pub fn open(path: &Path) -> Result<ImageFile, SceneError> {
         let images::Header { size, orientation, .. } = images::header(path)?;
         Ok(ImageFile { path: path.to_path_buf(), size, orientation })

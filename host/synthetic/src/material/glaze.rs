@@ -20,7 +20,7 @@ pub struct Glaze {
 }
 
 /// Most motifs around the axis.
-const LARGEST_COUNT: u32 = 256;
+const MAX_COUNT: u32 = 256;
 
 impl Glaze {
     /// The colour at a point.
@@ -57,6 +57,6 @@ impl Glaze {
     }
 
     pub(super) fn is_sound(&self) -> bool {
-        finite(self.colours) && sizes([self.band]) && (1..=LARGEST_COUNT).contains(&self.count)
+        finite(self.colours) && sizes([self.band]) && (1..=MAX_COUNT).contains(&self.count)
     }
 }

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// The most numbers of unfolded windows in memory at once.
-const MOST_UNFOLDED: usize = 1 << 16;
+const MAX_UNFOLDED: usize = 1 << 16;
 
 /// Positions of windows on an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,7 +84,7 @@ impl Convolution {
     /// Rows of the output that are computed together, so that their windows stay in a core's caches.
     fn strips(&self) -> impl Iterator<Item = Range<usize>> + use<> {
         let [height, width] = self.out_size();
-        let rows = (MOST_UNFOLDED / (width * self.row_len())).clamp(1, height);
+        let rows = (MAX_UNFOLDED / (width * self.row_len())).clamp(1, height);
         (0..height).step_by(rows).map(move |start| start..(start + rows).min(height))
     }
 

@@ -5,7 +5,7 @@
 use super::{Operation, Real};
 use rayon::prelude::*;
 use viewfuse_core::lookup::split;
-use viewfuse_core::network::resample::aligned;
+use viewfuse_kernels::network::resample::aligned;
 
 /// Inputs: images `[image][row][column][channel]`, and smaller ones of as many channels, which are enlarged and added.
 pub(crate) struct AddEnlarged {

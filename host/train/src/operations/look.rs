@@ -12,8 +12,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::depths::{CoarseBlock, coarse_depth};
-use viewfuse_core::genvs::{VolumeBlock, VolumePlace};
 use viewfuse_core::rays::{RayPoint, TargetRay, place_point};
+use viewfuse_kernels::genvs::{VolumeBlock, VolumePlace};
 
 /// Rays of a chunk.
 const CHUNK: usize = 4;

@@ -1,4 +1,4 @@
-//! Group norm with optional SiLU, as [`viewfuse_core::network::group_norm`] has it.
+//! Group norm with optional SiLU, as [`viewfuse_kernels::network::group_norm`] has it.
 
 use super::{Operation, Real};
 use rayon::prelude::*;

@@ -11,8 +11,8 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_axes, waves};
 use viewfuse_core::rays::RayPoint;
+use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_axes, waves};
 
 /// Points of a chunk.
 const CHUNK: usize = 64;

@@ -15,14 +15,14 @@
 //! softmax.
 
 use viewfuse_core::attention::quantised::{
-    FOUR, LEAST_INPUT, MOST_LEVEL, QuantisedAttention, QuantisedLinear, feature_error,
+    FOUR, MAX_LEVEL, MIN_INPUT, QuantisedAttention, QuantisedLinear, feature_error,
 };
 use viewfuse_core::attention::{EMBEDDING, FourierEmbedding, HIDDEN, pose_features};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::Sources;
 
 /// The largest weight of 8 bits.
-const MOST_WEIGHT: f64 = 127.0;
+const MAX_WEIGHT: f64 = 127.0;
 /// Roundings of an output in `f32`: four of them, each of half a unit in the last place, and their products.
 const ROUNDING: f64 = 5.0 / 16_777_216.0;
 
@@ -94,9 +94,9 @@ impl Layer {
 /// The scale of a row, and its weights as whole multiples of it.
 fn levels(row: &[f64]) -> (f32, Vec<i8>) {
     let largest = row.iter().fold(0.0_f64, |largest, weight| largest.max(weight.abs()));
-    let scale = (largest / MOST_WEIGHT) as f32;
+    let scale = (largest / MAX_WEIGHT) as f32;
     let level = |weight: &f64| if scale > 0.0 { (weight / f64::from(scale)).round() } else { 0.0 };
-    (scale, row.iter().map(|weight| level(weight).clamp(-MOST_WEIGHT, MOST_WEIGHT) as i8).collect())
+    (scale, row.iter().map(|weight| level(weight).clamp(-MAX_WEIGHT, MAX_WEIGHT) as i8).collect())
 }
 
 /// The weights that a layer uses, by output and input.
@@ -128,8 +128,8 @@ impl Known {
 /// The same numbers as whole multiples of one step. What is exactly 0 stays so.
 fn as_levels(numbers: &[Known]) -> Vec<Known> {
     let largest = numbers.iter().fold(0.0_f64, |largest, x| largest.max(x.value.abs() + x.error));
-    let step = largest / f64::from(MOST_LEVEL);
-    let least = if largest <= f64::from(LEAST_INPUT) { f64::from(LEAST_INPUT) } else { 0.0 };
+    let step = largest / f64::from(MAX_LEVEL);
+    let least = if largest <= f64::from(MIN_INPUT) { f64::from(MIN_INPUT) } else { 0.0 };
     let level = |x: &Known| match x.value == 0.0 && x.error == 0.0 {
         true => *x,
         false => Known { value: x.value, error: x.error + (0.5 + 1.0e-3) * step + least },

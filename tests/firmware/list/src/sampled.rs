@@ -3,7 +3,7 @@
 use crate::{Emit, Inputs, emit_all, wave};
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::sampler::control::{FIRST_STEP, change_to_come, reached, verdict};
-use viewfuse_core::sampler::{History, MOST_RESULTS, NoiseBlock, Sampler, noisy_element};
+use viewfuse_core::sampler::{History, MAX_RESULTS, NoiseBlock, Sampler, noisy_element};
 use viewfuse_core::schedule::{NoiseSchedule, Preconditioning};
 
 /// Levels of the samplers: few, so that steps are long.
@@ -43,7 +43,7 @@ fn sampled(sampler: Sampler, schedule: &NoiseSchedule, start: f32, emit: Emit) -
         factors.denoised(noisy, 0.625 * factors.network_input(noisy))
     };
     let mut history = History::NONE;
-    let mut results = [0.0; MOST_RESULTS];
+    let mut results = [0.0; MAX_RESULTS];
     let (mut state, mut begun) = (start, start);
     let mut index = 0;
     while index < FEW {

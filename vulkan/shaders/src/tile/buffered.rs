@@ -6,8 +6,8 @@
 
 use super::{FOURS, Place, SHORT_STEP, Shape, Shared, Tiles, read_fours, store_sums, wait_for_all, write};
 use spirv_std::glam::Vec4;
-use viewfuse_core::kernels::Form;
-use viewfuse_core::network::tile::{Sums, TILE};
+use viewfuse_kernels::network::tile::{Sums, TILE};
+use viewfuse_kernels::rows::Form;
 
 /// The workgroup memory of [`Form::Buffered`]: in each array two steps of [`SHORT_STEP`] inner indices.
 pub(crate) struct Buffered<'a> {

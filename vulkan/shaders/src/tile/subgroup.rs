@@ -10,8 +10,8 @@
 use super::{Place, Shape, Tiles, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
 use spirv_std::glam::Vec4;
-use viewfuse_core::kernels::Form;
-use viewfuse_core::network::tile::{Sums, TILE};
+use viewfuse_kernels::network::tile::{Sums, TILE};
+use viewfuse_kernels::rows::Form;
 
 /// Invocations that need the same rows, and inner indices that each of them loads at once.
 const CLUSTER: u32 = Sums::SIDE;

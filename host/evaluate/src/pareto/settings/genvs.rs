@@ -17,7 +17,7 @@ const HEUN: [u32; 2] = [12, 8];
 /// Levels of every multistep sampler.
 const LEVELS: [u32; 5] = [6, 8, 10, 12, 18];
 /// Weight of the views that are left out.
-const LEAST: [f32; 2] = [0.05, 0.2];
+const MIN_SHARES: [f32; 2] = [0.05, 0.2];
 /// Levels with everything skipped.
 const FAST: [u32; 2] = [6, 18];
 /// Error tolerances of a step, where levels are chosen adaptively.
@@ -63,7 +63,7 @@ pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usi
         setting(&format!("{ALL}{words}"), rays, plan, omissions, options.leave_out, factor)
     };
     settings.push(all("", rays, fast, None, 1));
-    settings.extend(LEAST.map(|least| Setting {
+    settings.extend(MIN_SHARES.map(|least| Setting {
         options: RenderOptions { leave_out: least, early_termination: 0.0, ..options.clone() },
         ..all(&format!(", leave out {least}"), rays, fast, None, 1)
     }));

@@ -10,7 +10,7 @@ use viewfuse_nn::checkpoint::{CheckpointError, Sizes, TensorShape};
 pub(in crate::genvs) const PREFIX: &str = "denoiser.model";
 
 /// The most blocks of a level.
-const MOST_BLOCKS: usize = 64;
+const MAX_BLOCKS: usize = 64;
 
 /// Groups of the family's group norms: 32, but at least 4 channels each.
 pub fn group_count(channels: usize) -> usize {
@@ -205,10 +205,10 @@ impl Denoiser {
         let level_count =
             (0..usize::BITS as usize).take_while(|&level| sizes.shape(&block(level, 0, "conv0")).is_some()).count();
         let block_count = sizes.count(|index| block(0, index, "conv0"));
-        if level_count == 0 || block_count > MOST_BLOCKS {
+        if level_count == 0 || block_count > MAX_BLOCKS {
             return Err(sizes.refuse(format!(
                 "the denoiser has {level_count} levels and {block_count} blocks in the first; at least one of each is \
-                 needed, and at most {MOST_BLOCKS} blocks"
+                 needed, and at most {MAX_BLOCKS} blocks"
             )));
         }
         if image_side % (1 << (level_count - 1)) != 0 {

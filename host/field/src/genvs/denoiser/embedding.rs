@@ -6,9 +6,9 @@
 
 use crate::FieldError;
 use viewfuse_core::math::{exp, ln, sin_cos};
-use viewfuse_core::network::group_norm::silu;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::network::group_norm::silu;
 use viewfuse_nn::checkpoint::CheckpointError;
 use viewfuse_nn::linear::{Linear, LinearOptions};
 use viewfuse_nn::loader::{Loader, Tensors};

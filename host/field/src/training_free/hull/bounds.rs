@@ -2,15 +2,15 @@
 
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::visual_hull::ObjectBlock;
-use viewfuse_core::visual_hull::hull::hull_alpha;
 use viewfuse_device::parallel::map;
+use viewfuse_kernels::visual_hull::ObjectBlock;
+use viewfuse_kernels::visual_hull::hull::hull_alpha;
 use viewfuse_scene::rig::nearest_point_to_lines;
 
 /// Grid cells along a side of the two passes, coarse and fine.
 const GRIDS: [usize; 2] = [32, 48];
 /// Least hull alpha of a cell's centre that belongs to the object.
-const LEAST_ALPHA: f32 = 0.2;
+const MIN_ALPHA: f32 = 0.2;
 /// Texels of at least this alpha belong to a silhouette.
 const SILHOUETTE_ALPHA: f32 = 0.3;
 /// The first box is larger than the largest silhouette by this factor.
@@ -91,7 +91,7 @@ fn occupied_box(
     for row in 0..side {
         for column in 0..side {
             let centre = low + cell * (Vec3::new(column as f32, row as f32, slice as f32) + 0.5);
-            if hull_alpha(object, cameras, texels, centre, LEAST_ALPHA) > 0.0 {
+            if hull_alpha(object, cameras, texels, centre, MIN_ALPHA) > 0.0 {
                 let (least, greatest) = found.unwrap_or((centre, centre));
                 found = Some((least.min(centre), greatest.max(centre)));
             }

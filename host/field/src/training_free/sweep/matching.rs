@@ -2,14 +2,14 @@
 
 use crate::FieldError;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::plane_sweep::census::REACH;
-use viewfuse_core::plane_sweep::evidence::ViewPair;
-use viewfuse_core::plane_sweep::frustum::{FrustumBlock, SweptView};
-use viewfuse_core::plane_sweep::path::{CostBlock, DIRECTIONS};
-use viewfuse_core::plane_sweep::window::WindowBlock;
-use viewfuse_core::plane_sweep::{MOST_MATCHED, PLANES, Planes};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::plane_sweep::census::REACH;
+use viewfuse_kernels::plane_sweep::evidence::ViewPair;
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_kernels::plane_sweep::path::{CostBlock, DIRECTIONS};
+use viewfuse_kernels::plane_sweep::window::WindowBlock;
+use viewfuse_kernels::plane_sweep::{MAX_MATCHED, PLANES, Planes};
 use viewfuse_scene::photographs::SourceImage;
 
 /// Most pairs that are compared, for each view.
@@ -64,14 +64,14 @@ pub(super) struct Matching<'d, D: Device> {
 }
 
 impl<D: Device> Matching<'_, D> {
-    /// The frustum of a camera whose planes `swept` are compared on; only the first [`MOST_MATCHED`] of them are.
+    /// The frustum of a camera whose planes `swept` are compared on; only the first [`MAX_MATCHED`] of them are.
     pub(super) fn frustum(&self, camera: CameraBlock, range: Range, swept: &[SweptView]) -> FrustumBlock {
         FrustumBlock {
             camera,
             far_disparity: range.far_disparity,
             disparity_step: range.step,
             group_count: range.group_count,
-            view_count: swept.len().min(MOST_MATCHED) as u32,
+            view_count: swept.len().min(MAX_MATCHED) as u32,
             pair_count: pairs(swept).len() as u32,
             has_silhouettes: u32::from(self.has_silhouettes),
             dissent_share: self.dissent_share,
@@ -126,7 +126,7 @@ impl<D: Device> Matching<'_, D> {
 
 /// The pairs that are compared, of the greatest products of weights.
 fn pairs(swept: &[SweptView]) -> Vec<ViewPair> {
-    let count = swept.len().min(MOST_MATCHED);
+    let count = swept.len().min(MAX_MATCHED);
     let mut pairs: Vec<ViewPair> = (0..count)
         .flat_map(|first| (first + 1..count).map(move |second| (first, second)))
         .map(|(first, second)| ViewPair {

@@ -4,15 +4,15 @@
 use super::{Sweep, Volume};
 use crate::{FieldError, Prepared, Request};
 use viewfuse_core::camera::Camera;
-use viewfuse_core::plane_sweep::Planes;
-use viewfuse_core::plane_sweep::blend::BlendBlock;
-use viewfuse_core::plane_sweep::frustum::SweptView;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::blend::BlendBlock;
+use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::SourceWeights;
 
-/// The arguments of [`viewfuse_core::plane_sweep::blend::blend`] for a target.
+/// The arguments of [`viewfuse_kernels::plane_sweep::blend::blend`] for a target.
 #[derive(Clone, Debug)]
 pub struct TargetPlanes {
     /// The target and its planes.

@@ -16,13 +16,13 @@ pub(super) const SIDE: u32 = 128;
 /// Planes of a frustum.
 const PLANE_COUNT: u32 = 128;
 /// Most sources that are swept, as far apart as possible: the run time does not grow with further ones.
-const MOST_SWEPT: usize = 12;
+const MAX_SWEPT: usize = 12;
 /// Neighbours that each is compared with.
 const NEIGHBOURS: usize = 4;
 /// Confidence from which on a pixel counts.
-const LEAST_CONFIDENCE: f32 = 0.6;
+const MIN_CONFIDENCE: f32 = 0.6;
 /// Most planes between the disparities of two views at the same point.
-const MOST_DIFFERENCE: f32 = 1.5;
+const MAX_DIFFERENCE: f32 = 1.5;
 
 impl<D: Device> Matching<'_, D> {
     /// The depths of a scene, from all its sources at a longest side of [`SIDE`].
@@ -33,7 +33,7 @@ impl<D: Device> Matching<'_, D> {
         let centres: Vec<Vec3> = cameras.iter().map(|camera| camera.pose.centre_world()).collect();
         let range = Range::new(first_guess(&cameras), PLANE_COUNT);
         let mut maps = device.zeros(images.iter().map(|image| image.texels.len()).sum())?;
-        let chosen = spread(&centres, MOST_SWEPT);
+        let chosen = spread(&centres, MAX_SWEPT);
         for &view in &chosen {
             progress.check()?;
             let mut near: Vec<(usize, f32)> = (0..cameras.len())
@@ -65,7 +65,7 @@ fn consistent_points(cameras: &[CameraBlock], maps: &[[f32; 2]], step: f32) -> V
         for row in 2..camera.height.saturating_sub(2) {
             for column in 2..camera.width.saturating_sub(2) {
                 let [disparity, confidence] = maps[(camera.first_texel + row * camera.width + column) as usize];
-                if confidence < LEAST_CONFIDENCE || disparity < 0.5 * step {
+                if confidence < MIN_CONFIDENCE || disparity < 0.5 * step {
                     continue;
                 }
                 let towards = camera.towards(column as f32 + 0.5, row as f32 + 0.5);
@@ -73,7 +73,7 @@ fn consistent_points(cameras: &[CameraBlock], maps: &[[f32; 2]], step: f32) -> V
                 let confirms = |other: &CameraBlock| {
                     let seen = other.project(point);
                     let difference = || (maps[other.texel_at(seen.x, seen.y)][0] - 1.0 / seen.depth).abs();
-                    seen.in_image && difference() < MOST_DIFFERENCE * step
+                    seen.in_image && difference() < MAX_DIFFERENCE * step
                 };
                 if cameras.iter().enumerate().any(|(other, camera)| other != view && confirms(camera)) {
                     points.push(point);

@@ -2,7 +2,7 @@
 //! effect.
 
 use super::super::input::Input;
-use super::{Fault, Id, LONGEST_TEXTS, MOST_VALUES, Object, Span, Value};
+use super::{Fault, Id, LONGEST_TEXTS, MAX_VALUES, Object, Span, Value};
 use std::collections::HashMap;
 
 /// The most bytes of the name of a module or class.
@@ -313,5 +313,5 @@ fn span(start: usize, end: usize) -> Span {
 }
 
 fn bounded(what: &'static str, count: usize) -> Result<(), Fault> {
-    if count < MOST_VALUES { Ok(()) } else { Err(Fault::TooMany { what, limit: MOST_VALUES as u64 }) }
+    if count < MAX_VALUES { Ok(()) } else { Err(Fault::TooMany { what, limit: MAX_VALUES as u64 }) }
 }

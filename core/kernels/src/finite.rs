@@ -1,0 +1,25 @@
+//! Finds the first NaN or infinity among computed numbers on the device: it returns one index for a run of numbers.
+
+use viewfuse_core::fetch::Fetch;
+
+/// Numbers of a run, which one invocation processes.
+pub const FINITE_RUN: u32 = 1024;
+
+/// The result for a run without infinity and NaN, in place of an index.
+pub const ALL_FINITE: u32 = u32::MAX;
+
+/// The index of the first infinite or NaN number of run `run` of `values`, of which there are `value_count`;
+/// [`ALL_FINITE`] if there is none.
+#[inline]
+pub fn first_non_finite(values: &(impl Fetch<f32> + ?Sized), value_count: u32, run: u32) -> u32 {
+    let end = (run * FINITE_RUN + FINITE_RUN).min(value_count);
+    let mut index = run * FINITE_RUN;
+    while index < end {
+        // From the bits: devices may compare NaN as they like.
+        if values.fetch(index as usize).to_bits() & 0x7f80_0000 == 0x7f80_0000 {
+            return index;
+        }
+        index += 1;
+    }
+    ALL_FINITE
+}

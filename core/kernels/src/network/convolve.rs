@@ -1,0 +1,160 @@
+//! Convolution of an image with bias, residual, scaled and rectified output. (Networks' "convolution": a correlation.)
+//!
+//! Input, output and residual may be some of the channels of wider images, so that images are put side by side without
+//! copies.
+//!
+//! It is the matrix product of the image's patches, `[output pixel][row of the window][column of the window][channel]`,
+//! with the weights; [`patch_value`] is that matrix, which devices compute on the fly and do not store.
+
+use super::linear::{first_of_sum, rectified};
+use bytemuck::{Pod, Zeroable};
+use viewfuse_core::fetch::Fetch;
+
+/// A dispatch of [`convolve_element`], as plain data. The yes-or-no fields are 0 or 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct ConvolveBlock {
+    /// Rows of the input image.
+    pub in_height: u32,
+    /// Columns of the input image.
+    pub in_width: u32,
+    /// Channels of the input image.
+    pub in_channels: u32,
+    /// Numbers from an input pixel to the next: its channels may be some of a wider image's.
+    pub in_pitch: u32,
+    /// Where the first pixel's first channel lies.
+    pub in_first: u32,
+    /// How many times each input pixel is repeated in both directions: the image counts as enlarged by this, at least 1.
+    pub enlarge: u32,
+    /// Rows of the output image: `(in_height enlarge + 2 padding - (size - 1) dilation - 1) / stride + 1`.
+    pub out_height: u32,
+    /// Columns of the output image.
+    pub out_width: u32,
+    /// Channels of the output image.
+    pub out_channels: u32,
+    /// Numbers from an output pixel to the next.
+    pub out_pitch: u32,
+    /// Where the first output pixel's first channel lies.
+    pub out_first: u32,
+    /// Side of the window.
+    pub size: u32,
+    /// Pixels from one window to the next.
+    pub stride: u32,
+    /// Pixels from one place of the window to the next: 1 for a window without gaps.
+    pub dilation: u32,
+    /// Rows and columns of zeros around the image.
+    pub padding: u32,
+    /// Factor of the sum, before it is rectified.
+    pub scale: f32,
+    /// Negative outputs become 0.
+    pub relu_outputs: u32,
+    /// Whether there is a residual.
+    pub has_residual: u32,
+    /// Numbers from a pixel of the residual to the next; 0: all pixels have the same.
+    pub residual_pitch: u32,
+    /// Where the residual's first pixel's first channel lies.
+    pub residual_first: u32,
+}
+
+impl ConvolveBlock {
+    /// The same convolution of images that fill their buffers and are not enlarged, with windows without gaps and nothing
+    /// scaled.
+    #[inline]
+    pub fn packed(self) -> ConvolveBlock {
+        ConvolveBlock {
+            in_pitch: self.in_channels,
+            in_first: 0,
+            enlarge: 1,
+            out_pitch: self.out_channels,
+            out_first: 0,
+            dilation: 1,
+            scale: 1.0,
+            residual_pitch: self.out_channels,
+            residual_first: 0,
+            ..self
+        }
+    }
+
+    /// Numbers in a patch: the inner index of the product.
+    #[inline]
+    pub fn patch_len(&self) -> u32 {
+        self.size * self.size * self.in_channels
+    }
+
+    /// Pixels of the output image.
+    #[inline]
+    pub fn pixel_count(&self) -> u32 {
+        self.out_height * self.out_width
+    }
+
+    /// Where channel `channel` of output pixel `pixel` belongs.
+    #[inline]
+    pub fn place(&self, pixel: u32, channel: u32) -> usize {
+        (self.out_first + pixel * self.out_pitch + channel) as usize
+    }
+}
+
+/// Where a place of a window lies in an image that is `height` by `width` times `enlarge`: the pixel's number there, or
+/// `u32::MAX` outside. `top` and `left` are the window's first row and column, in the enlarged image, plus `padding`.
+#[inline(always)]
+pub fn window_pixel(size: [u32; 2], enlarge: u32, padding: u32, row: u32, column: u32) -> u32 {
+    let [height, width] = size;
+    // Left of or above the image the unsigned difference wraps and is too large as well.
+    let (row, column) = (row.wrapping_sub(padding), column.wrapping_sub(padding));
+    if row < height * enlarge && column < width * enlarge { row / enlarge * width + column / enlarge } else { u32::MAX }
+}
+
+/// Number `inner` of the patch that output pixel `pixel` sees: `[row of the window][column of the window][channel]` of
+/// `inputs[row][column][channel]`, 0 outside the image.
+#[inline]
+pub fn patch_value(inputs: &(impl Fetch<f32> + ?Sized), block: &ConvolveBlock, pixel: u32, inner: u32) -> f32 {
+    let (channel, place) = (inner % block.in_channels, inner / block.in_channels);
+    let (window_column, window_row) = (place % block.size, place / block.size);
+    let (out_column, out_row) = (pixel % block.out_width, pixel / block.out_width);
+    let row = out_row * block.stride + window_row * block.dilation;
+    let column = out_column * block.stride + window_column * block.dilation;
+    let seen = window_pixel([block.in_height, block.in_width], block.enlarge, block.padding, row, column);
+    if seen == u32::MAX {
+        return 0.0;
+    }
+    inputs.fetch((block.in_first + seen * block.in_pitch + channel) as usize)
+}
+
+/// The output for channel `channel` of pixel `pixel` from the sum of the products: `bias[channel]` plus
+/// `residual[pixel][channel]` comes first, then `sum`; the result is scaled and rectified.
+#[inline]
+pub fn convolved(
+    bias: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
+    block: &ConvolveBlock,
+    pixel: u32,
+    channel: u32,
+    sum: f32,
+) -> f32 {
+    let element = (block.residual_first + pixel * block.residual_pitch + channel) as usize;
+    let first = first_of_sum(bias, residual, block.has_residual, element, channel as usize);
+    rectified((first + sum) * block.scale, block.relu_outputs)
+}
+
+/// Channel `channel` of output pixel `pixel`: the patch times
+/// `weights[row of the window][column of the window][input channel][output channel]` in the order of the patch, then
+/// [`convolved`].
+#[inline]
+pub fn convolve_element(
+    inputs: &(impl Fetch<f32> + ?Sized),
+    weights: &(impl Fetch<f32> + ?Sized),
+    bias: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
+    block: &ConvolveBlock,
+    pixel: u32,
+    channel: u32,
+) -> f32 {
+    let mut sum = 0.0;
+    let mut inner = 0;
+    while inner < block.patch_len() {
+        let weight = weights.fetch((inner * block.out_channels + channel) as usize);
+        sum += patch_value(inputs, block, pixel, inner) * weight;
+        inner += 1;
+    }
+    convolved(bias, residual, block, pixel, channel, sum)
+}

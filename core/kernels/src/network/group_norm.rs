@@ -1,0 +1,167 @@
+//! Group norm: the channels of an image in groups, each brought to mean 0 and variance 1, then scaled and shifted
+//! channel by channel; and the mean of every channel.
+//!
+//! Statistics are computed in two steps, so that a device has enough parallel work: first of parts of the image, each
+//! in two passes (the mean, then the deviations from it), then the parts' merged (Chan, Golub, LeVeque 1979). Means are
+//! sums of differences from one of the values, and no difference of large sums is taken: of a group whose values are
+//! 1e4 times its deviation only the mean's own rounding is lost, and a constant group has deviations of exactly 0.
+
+use bytemuck::{Pod, Zeroable};
+use viewfuse_core::fetch::Fetch;
+use viewfuse_core::math::{exp, max, sqrt};
+
+/// Pixels whose statistics are taken together.
+pub const PART: u32 = 64;
+
+/// A dispatch of [`group_norm_partials`], [`group_norm_statistics`] or [`group_norm_element`], as plain data. The
+/// yes-or-no field is 0 or 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct GroupNormBlock {
+    /// Pixels of the image, at least 1.
+    pub pixel_count: u32,
+    /// Channels of the image, a multiple of the groups.
+    pub channels: u32,
+    /// Numbers from an input pixel to the next: its channels may be some of a wider image's.
+    pub in_pitch: u32,
+    /// Where the first pixel's first channel lies.
+    pub in_first: u32,
+    /// Groups of neighbouring channels, at least 1.
+    pub group_count: u32,
+    /// Added to variances (epsilon).
+    pub variance_floor: f32,
+    /// Whether outputs go through `x / (1 + e^-x)` (SiLU).
+    pub silu_outputs: u32,
+}
+
+impl GroupNormBlock {
+    /// Parts of the image.
+    #[inline]
+    pub fn part_count(&self) -> u32 {
+        self.pixel_count.div_ceil(PART)
+    }
+
+    /// Channels of a group.
+    #[inline]
+    pub fn group_channels(&self) -> u32 {
+        self.channels / self.group_count
+    }
+
+    #[inline]
+    fn pixels_of(&self, part: u32) -> u32 {
+        PART.min(self.pixel_count - part * PART)
+    }
+}
+
+/// Mean, and sum of the squared deviations from it, of a group in a part of the image: number `element` of
+/// `[part][group]`. Sums run pixel by pixel; the mean's is of differences from the group's first value in the part.
+#[inline]
+pub fn group_norm_partials(inputs: &(impl Fetch<f32> + ?Sized), block: &GroupNormBlock, element: usize) -> [f32; 2] {
+    let (part, group) = (element as u32 / block.group_count, element as u32 % block.group_count);
+    let (pixels, channels) = (block.pixels_of(part), block.group_channels());
+    let first = block.in_first + part * PART * block.in_pitch + group * channels;
+    // Nearer to the mean than 0 is, wherever the group lies.
+    let mut mean = inputs.fetch(first as usize);
+    let mut deviations = 0.0;
+    let mut pass = 0;
+    while pass < 2 {
+        let mut sum = 0.0;
+        let mut pixel = 0;
+        while pixel < pixels {
+            let mut channel = 0;
+            while channel < channels {
+                let value = inputs.fetch((first + pixel * block.in_pitch + channel) as usize) - mean;
+                sum += if pass == 0 { value } else { value * value };
+                channel += 1;
+            }
+            pixel += 1;
+        }
+        if pass == 0 {
+            mean += sum / (pixels * channels) as f32;
+        } else {
+            deviations = sum;
+        }
+        pass += 1;
+    }
+    [mean, deviations]
+}
+
+/// Mean of a group, and what its deviations are multiplied by: `1 / sqrt(variance + variance_floor)`, from the
+/// statistics `partials[part][group]`, merged in their order. A group that is constant everywhere (and no floor) gives
+/// 0 for the factor; one whose squares overflow, or that holds NaN or infinity, gives NaN, so that the fault is
+/// reported and not hidden.
+#[inline]
+pub fn group_norm_statistics(
+    partials: &(impl Fetch<[f32; 2]> + ?Sized),
+    block: &GroupNormBlock,
+    group: usize,
+) -> [f32; 2] {
+    // The first part changes nothing of the mean, however a device divides.
+    let [mut mean, _] = partials.fetch(group);
+    let (mut count, mut deviations) = (0.0, 0.0);
+    let mut part = 0;
+    while part < block.part_count() {
+        let [own_mean, own_deviations] = partials.fetch(part as usize * block.group_count as usize + group);
+        let own = (block.pixels_of(part) * block.group_channels()) as f32;
+        let all = count + own;
+        let difference = own_mean - mean;
+        mean += difference * (own / all);
+        deviations += own_deviations + difference * difference * (count * (own / all));
+        count = all;
+        part += 1;
+    }
+    let spread = deviations / count + block.variance_floor;
+    // Not the other way round: NaN is no spread either.
+    if !(spread <= f32::MAX) {
+        return [mean, f32::NAN];
+    }
+    [mean, if spread > 0.0 { 1.0 / sqrt(spread) } else { 0.0 }]
+}
+
+/// Output number `element` of `[pixel][channel]`: the input less its group's mean, times its group's factor, times
+/// `weights[channel]`, plus `bias[channel]`.
+#[inline]
+pub fn group_norm_element(
+    inputs: &(impl Fetch<f32> + ?Sized),
+    statistics: &(impl Fetch<[f32; 2]> + ?Sized),
+    weights: &(impl Fetch<f32> + ?Sized),
+    bias: &(impl Fetch<f32> + ?Sized),
+    block: &GroupNormBlock,
+    element: usize,
+) -> f32 {
+    let (pixel, channel) = (element as u32 / block.channels, element as u32 % block.channels);
+    let [mean, factor] = statistics.fetch((channel / block.group_channels()) as usize);
+    let input = inputs.fetch((block.in_first + pixel * block.in_pitch + channel) as usize);
+    let value = (input - mean) * (factor * weights.fetch(channel as usize)) + bias.fetch(channel as usize);
+    if block.silu_outputs != 0 { silu(value) } else { value }
+}
+
+/// `x / (1 + e^-x)`: NaN for NaN. Below -87, where the result is no normal number, it is that of -87, -1.4e-36.
+#[inline]
+pub fn silu(x: f32) -> f32 {
+    // Beyond it the exponential ends, and divisors are too large for a device to divide by. NaN is not below.
+    let x = max(-87.0, x);
+    x / (1.0 + exp(-x))
+}
+
+/// A dispatch of [`channel_mean`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeanBlock {
+    /// Pixels of the image, at least 1.
+    pub pixel_count: u32,
+    /// Channels of the image.
+    pub channels: u32,
+}
+
+/// Mean of channel `channel` of `inputs[pixel][channel]`, summed pixel by pixel.
+#[inline]
+pub fn channel_mean(inputs: &(impl Fetch<f32> + ?Sized), block: &MeanBlock, channel: usize) -> f32 {
+    let mut sum = 0.0;
+    let mut pixel = 0;
+    while pixel < block.pixel_count as usize {
+        sum += inputs.fetch(pixel * block.channels as usize + channel);
+        pixel += 1;
+    }
+    sum / block.pixel_count as f32
+}

@@ -1,0 +1,70 @@
+//! Linear layer: a matrix product with bias, residual and rectified input or output, for many points at once.
+
+use bytemuck::{Pod, Zeroable};
+use viewfuse_core::fetch::Fetch;
+
+/// A dispatch of [`linear_element`], as plain data. The yes-or-no fields are 0 or 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LinearBlock {
+    /// Rows of inputs and outputs.
+    pub row_count: u32,
+    /// Columns of the inputs, rows of the weights.
+    pub inner_count: u32,
+    /// Columns of weights and outputs.
+    pub column_count: u32,
+    /// Negative inputs count as 0.
+    pub relu_inputs: u32,
+    /// Negative outputs become 0.
+    pub relu_outputs: u32,
+    /// Whether there is a residual.
+    pub has_residual: u32,
+}
+
+/// Output number `element` of `inputs[row][inner]` times `weights[inner][column]` plus `bias[column]` plus
+/// `residual[row][column]`: bias and residual first, then the products in the order of the inner index.
+#[inline]
+pub fn linear_element(
+    inputs: &(impl Fetch<f32> + ?Sized),
+    weights: &(impl Fetch<f32> + ?Sized),
+    bias: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
+    block: &LinearBlock,
+    element: usize,
+) -> f32 {
+    let (inner_count, column_count) = (block.inner_count as usize, block.column_count as usize);
+    let (row, column) = (element / column_count, element % column_count);
+    let mut sum = first_of_sum(bias, residual, block.has_residual, element, column);
+    let mut inner = 0;
+    while inner < inner_count {
+        sum += input_value(inputs, block, row, inner) * weights.fetch(inner * column_count + column);
+        inner += 1;
+    }
+    rectified(sum, block.relu_outputs)
+}
+
+/// Number `inner` of a row of the inputs, rectified if the block says so.
+#[inline]
+pub fn input_value(inputs: &(impl Fetch<f32> + ?Sized), block: &LinearBlock, row: usize, inner: usize) -> f32 {
+    rectified(inputs.fetch(row * block.inner_count as usize + inner), block.relu_inputs)
+}
+
+/// The start of the sum for output number `element`: `bias[column]` plus `residual[element]`, if there is a residual.
+#[inline]
+pub fn first_of_sum(
+    bias: &(impl Fetch<f32> + ?Sized),
+    residual: &(impl Fetch<f32> + ?Sized),
+    has_residual: u32,
+    element: usize,
+    column: usize,
+) -> f32 {
+    let first = bias.fetch(column);
+    if has_residual != 0 { first + residual.fetch(element) } else { first }
+}
+
+/// `x`, or 0 instead of a negative one if `relu` is not 0. NaN stays NaN: an overflow in one layer is reported behind
+/// the last.
+#[inline]
+pub fn rectified(x: f32, relu: u32) -> f32 {
+    if relu != 0 && x <= 0.0 { 0.0 } else { x }
+}

@@ -1,0 +1,41 @@
+//! The training-free field for any scene: planes of equal disparity are swept through a camera's frustum, the source views
+//! are compared on them, and a picture is blended from the planes on which they agree.
+//!
+//! The frustum is the target's, for a picture, or a source's, for its disparities. Stages, each a data-parallel kernel:
+//!
+//! ```text
+//! frustum     the planes, and their points' image coordinates     FrustumBlock, SweptView, Track
+//! evidence    what the views show there, compared by colour       Evidence
+//! census      ... and by its structure: soft census                census_cost
+//! window      means over windows of three sizes                    row_sums, window_cost
+//! path        semi-global regularisation along four directions     path_cost
+//! disparity   a source's disparity and its confidence              pick_disparity
+//! blend       a target's pixel: softmax over planes                blend
+//! ```
+//!
+//! Disparity is the inverse of the depth along the principal axis, in inverse world units; 0 is infinitely far. Planes go from far
+//! to near. Volumes hold [`PLANES`] neighbouring planes in an element and are laid out `[row][column][group of planes]`.
+//!
+//! Published ideas: plane sweeping (Collins 1996), census (Zabih and Woodfill 1994), semi-global matching (Hirschmüller
+//! 2008), soft visibility and consensus (Penner and Zhang, "Soft 3D reconstruction", 2017), blending by relevance (Buehler et
+//! al. 2001). The cameras' weights enter twice: in the pairs that are compared, and in the blend.
+
+pub mod blend;
+pub mod census;
+pub mod disparity;
+pub mod evidence;
+pub mod frustum;
+pub mod path;
+pub mod window;
+
+/// Neighbouring planes in an element of a volume.
+pub const PLANES: usize = 16;
+/// Most planes of a frustum.
+pub const MAX_PLANES: usize = 128;
+/// Most groups of planes of a frustum.
+pub const MAX_GROUPS: usize = MAX_PLANES / PLANES;
+/// Most views that are compared in a frustum.
+pub const MAX_MATCHED: usize = 8;
+
+/// A number for each plane of a group.
+pub type Planes = [f32; PLANES];

@@ -1,0 +1,288 @@
+//! The list of kernels as code, from their rows.
+
+use super::*;
+use crate::network::tile::TILE;
+use crate::pages::MAX_PAGES;
+use bytemuck::{Pod, Zeroable};
+
+/// Where the rows' bodies are.
+mod bodies {
+    pub(super) use crate::{compact, finite, genvs, limits, network, pixelnerf, plane_sweep, sample_mask, visual_hull};
+    pub(super) use viewfuse_core::{attention, composite, depths, fuse, half_precision, rays, sampler, weighting};
+}
+
+/// Invocations of a workgroup, along its only axis.
+pub const WORKGROUP: u32 = 64;
+
+/// Bytes of memory that every device has for a workgroup.
+pub const SHARED_BYTES: usize = 16 << 10;
+
+/// Elements of a tiled kernel with so many outputs, in [`Form::Single`].
+pub const fn tile_elements(row_count: u32, column_count: u32) -> u32 {
+    Form::Single.elements(row_count, column_count)
+}
+
+/// How many of a matrix product's tiles a workgroup computes at once. The sums of an output run along the inner index in
+/// every form: the results are the same bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Form {
+    /// One tile: 64 rows, 64 columns, 64 sums an invocation. The definition of the others, and what small products take.
+    #[default]
+    Single,
+    /// Two tiles beside each other: 64 rows, 128 columns, 128 sums an invocation.
+    Double,
+    /// Two by two tiles: 128 rows, 128 columns, 256 sums an invocation, more than a GPU keeps in registers. For drivers on
+    /// a CPU, where loads are dear.
+    Quadruple,
+    /// Two tiles beside each other as [`Form::Double`], double-buffered: while a step is multiplied, the next one is fetched
+    /// into the other half of the workgroup's memory. There is one barrier a step instead of two.
+    Buffered,
+    /// One tile, whose rows pass between the invocations of a subgroup instead of through the workgroup's memory. There are
+    /// no barriers. Only for devices with [subgroups that fit](Form::needs_subgroups).
+    Subgroup,
+}
+
+impl Form {
+    /// Every form.
+    pub const ALL: [Form; 5] = [Form::Single, Form::Double, Form::Quadruple, Form::Buffered, Form::Subgroup];
+
+    /// Rows and columns in tiles.
+    pub const fn tiles(self) -> [u32; 2] {
+        match self {
+            Form::Single | Form::Subgroup => [1, 1],
+            Form::Double | Form::Buffered => [1, 2],
+            Form::Quadruple => [2, 2],
+        }
+    }
+
+    /// Whether it passes numbers between the invocations of a subgroup. Its entry points are in a module of their own, which
+    /// only devices with these operations take. A subgroup is full and has 8 to 64 invocations, a power of two.
+    pub const fn needs_subgroups(self) -> bool {
+        matches!(self, Form::Subgroup)
+    }
+
+    /// Elements of a tiled kernel with so many outputs: whole groups of tiles, each invocation 8 times 8 outputs of a tile.
+    pub const fn elements(self, row_count: u32, column_count: u32) -> u32 {
+        let [rows, columns] = self.tiles();
+        row_count.div_ceil(TILE * rows) * column_count.div_ceil(TILE * columns) * WORKGROUP
+    }
+
+    /// Its name in records.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Form::Single => "single",
+            Form::Double => "double",
+            Form::Quadruple => "quadruple",
+            Form::Buffered => "buffered",
+            Form::Subgroup => "subgroup",
+        }
+    }
+}
+
+/// The elements of one dispatch; large work is split into several dispatches. Invocation `i` works on element
+/// `first + i` if `i < count`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Piece {
+    /// The first element.
+    pub first: u32,
+    /// How many there are.
+    pub count: u32,
+}
+
+/// How a kernel accesses an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// It only reads.
+    Read,
+    /// It writes each of its elements, and reads nothing that it writes.
+    Write,
+}
+
+/// How an array is bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// As one buffer of elements.
+    Whole,
+    /// As one buffer with a struct of [`Array::least_bytes`] bytes.
+    One,
+    /// As [`MAX_PAGES`] buffers of elements.
+    Pages,
+}
+
+/// An array that a kernel binds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Array {
+    /// Its name in the entry point; pages add `_a` to `_d`.
+    pub name: &'static str,
+    /// How the kernel accesses it.
+    pub access: Access,
+    /// How it is bound.
+    pub layout: Layout,
+    /// Bytes of an element of the entry point.
+    pub stride: usize,
+    /// Bytes that the kernel reads without checking the length; 0 where it checks.
+    pub least_bytes: usize,
+}
+
+impl Array {
+    const fn new<E>(name: &'static str, access: Access, layout: Layout) -> Array {
+        Array { name, access, layout, stride: size_of::<E>(), least_bytes: 0 }
+    }
+
+    const fn not_empty(self) -> Array {
+        Array { least_bytes: self.stride, ..self }
+    }
+
+    /// How many bindings it takes.
+    pub const fn binding_count(&self) -> usize {
+        match self.layout {
+            Layout::Whole | Layout::One => 1,
+            Layout::Pages => MAX_PAGES,
+        }
+    }
+}
+
+/// An array of a row.
+macro_rules! array {
+    (read $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Whole) };
+    (filled $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (layer $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (optional $name:ident $host:ty) => { array!(read $name $host).not_empty() };
+    (paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Pages) };
+    (write $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Whole) };
+    (write $name:ident $host:ty, $entry:ty) => {{
+        const { assert!(size_of::<$entry>() % size_of::<$host>() == 0) };
+        Array::new::<$entry>(stringify!($name), Access::Write, Layout::Whole)
+    }};
+    (write_paged $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Write, Layout::Pages) };
+    (one $name:ident $host:ty) => { array!(one $name $host, $host) };
+    (one $name:ident $host:ty, $entry:ty) => {
+        Array {
+            least_bytes: size_of::<$entry>(),
+            ..Array::new::<$host>(stringify!($name), Access::Read, Layout::One)
+        }
+    };
+}
+
+/// Whether a row has a mark.
+macro_rules! has {
+    ($mark:ident:) => { false };
+    (twin: twin $(, $rest:ident)*) => { true };
+    (tiled: tiled $(, $rest:ident)*) => { true };
+    ($mark:ident: $other:ident $(, $rest:ident)*) => { has!($mark: $($rest),*) };
+}
+
+macro_rules! list {
+    ($(
+        $(#[$doc:meta])*
+        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
+        by $($body:ident)::+ $(, $way:ident)* {
+            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
+        }
+    )+) => {
+        /// A kernel.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[repr(u32)]
+        pub enum Kernel {
+            $($(#[$doc])* $Kernel,)+
+        }
+
+        impl Kernel {
+            /// Every kernel, in the order of the data.
+            pub const ALL: [Kernel; [$(stringify!($Kernel)),+].len()] = [$(Kernel::$Kernel),+];
+
+            /// Name of its entry point, and of the method of a device that runs it.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Kernel::$Kernel => stringify!($method),)+
+                }
+            }
+
+            /// Name of its entry point for a form of tiles; only tiled kernels have others than [`Form::Single`].
+            pub const fn entry_point(self, form: Form) -> &'static str {
+                match form {
+                    Form::Single => self.name(),
+                    Form::Double => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_double"),)+
+                    },
+                    Form::Quadruple => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_quadruple"),)+
+                    },
+                    Form::Buffered => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_buffered"),)+
+                    },
+                    Form::Subgroup => match self {
+                        $(Kernel::$Kernel => concat!(stringify!($method), "_subgroup"),)+
+                    },
+                }
+            }
+
+            /// What it binds, in the order of the bindings.
+            pub const fn arrays(self) -> &'static [Array] {
+                match self {
+                    $(Kernel::$Kernel => const { &[$(array!($kind $array $host $(, $entry)?)),+] },)+
+                }
+            }
+
+            /// Bytes of its parameters, without the [`Piece`] behind them.
+            pub const fn parameter_bytes(self) -> usize {
+                match self {
+                    $(Kernel::$Kernel => 0 $(+ size_of::<$Block>())?,)+
+                }
+            }
+
+            /// Whether its workgroups compute tiles together: only these kernels use workgroup memory and barriers.
+            pub const fn is_tiled(self) -> bool {
+                match self {
+                    $(Kernel::$Kernel => has!(tiled: $($way),*),)+
+                }
+            }
+
+            /// Whether the CPU runs a faster form of its own. The body is then a definition without a caller in production
+            /// on the CPU.
+            pub const fn has_twin(self) -> bool {
+                match self {
+                    $(Kernel::$Kernel => has!(twin: $($way),*),)+
+                }
+            }
+        }
+
+        // A body that is not there does not compile.
+        $(const _: () = {
+            #[allow(unused_imports)]
+            use bodies::$($body)::+;
+        };)+
+    };
+}
+
+crate::for_each_kernel!(list);
+
+impl Kernel {
+    /// The forms that its entry points have.
+    pub const fn forms(self) -> &'static [Form] {
+        if self.is_tiled() { &Form::ALL } else { &[Form::Single] }
+    }
+
+    /// Bytes of its push constants.
+    pub const fn push_bytes(self) -> usize {
+        self.parameter_bytes() + size_of::<Piece>()
+    }
+
+    /// Whether it binds pages, and so has the specialisation constant 0.
+    pub fn has_pages(self) -> bool {
+        self.arrays().iter().any(|array| array.layout == Layout::Pages)
+    }
+
+    /// How many bindings it has.
+    pub const fn binding_count(self) -> usize {
+        let arrays = self.arrays();
+        let (mut count, mut index) = (0, 0);
+        while index < arrays.len() {
+            count += arrays[index].binding_count();
+            index += 1;
+        }
+        count
+    }
+}
