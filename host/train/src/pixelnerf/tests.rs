@@ -9,7 +9,7 @@ use super::super::gradient_check::{
 };
 use super::super::images::{enlarge, max_pool};
 use super::super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, RectifiedDensity};
-use super::{PixelNerf, SampleCounts, Seen};
+use super::{PixelNerf, PointInputs, SampleCounts};
 use candle_core::{DType, Result, Tensor, Var};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -70,7 +70,7 @@ fn the_graph_is_the_renderers() {
     let grids = network.grids(&pictures).expect("grids");
     let parameters = network.point_parameters().expect("parameters");
     let view_weights = tensor(weights.to_vec(), &[1, 3], DType::F64);
-    let seen = Seen { cameras: &blocks, grids: &grids, weights: &view_weights, parameters: &parameters };
+    let seen = PointInputs { cameras: &blocks, grids: &grids, weights: &view_weights, parameters: &parameters };
     let raw = network.raw(&seen, std::slice::from_ref(&places)).expect("samples");
     let colours = super::logistic(&raw.narrow(1, 0, 3).expect("colours")).expect("colours");
     let densities = raw.narrow(1, 3, 1).and_then(|raw| raw.relu()).expect("densities");
