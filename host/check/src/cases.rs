@@ -67,10 +67,7 @@ fn part_of_output<T>(index: usize, count: usize) -> Output<T> {
 }
 
 macro_rules! visits {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident $arguments:tt $elements:tt by $($body:ident)::+ $(, $way:ident)* { $($arrays:tt)+ }
-    )+) => {
+    ($({ $Kernel:ident $($rest:tt)* })+) => {
         /// Runs an operation on the case of a kernel, which is the type of the kernel's name. A kernel without a case
         /// does not compile.
         pub fn visit<V: Visitor>(kernel: Kernel, visitor: V) -> V::Output {
