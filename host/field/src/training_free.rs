@@ -17,9 +17,9 @@ use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_scene::rig::Rig;
+use viewfuse_scene::rig::gap_warning;
 
-pub use hull::{NoObject, find_object};
+pub use hull::NoObject;
 pub use sweep::{Sweep, TargetPlanes};
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
@@ -38,19 +38,6 @@ impl Default for TrainingFree {
     fn default() -> TrainingFree {
         TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0 }
     }
-}
-
-/// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
-/// photographs.
-const MAX_GAP_DEGREES: f32 = 15.0;
-
-/// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
-pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
-    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MAX_GAP_DEGREES)?;
-    Some(format!(
-        "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
-         reliably up to about {MAX_GAP_DEGREES:.0} degrees; take photographs between them"
-    ))
 }
 
 impl Field for TrainingFree {

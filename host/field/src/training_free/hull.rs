@@ -1,8 +1,6 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
-mod bounds;
-
 use crate::{DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -11,6 +9,7 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_kernels::visual_hull::ray_marching::MarchBlock;
 use viewfuse_kernels::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
 use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_scene::photographs::object_box::{bounding_box, joined};
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -129,7 +128,7 @@ impl<D: Device> Silhouettes<D> {
     /// Uploads images and finds the object.
     fn upload(device: &D, images: &[SourceImage], progress: &dyn Progress) -> Result<Silhouettes<D>, FieldError> {
         let (cameras, texels) = joined(images);
-        let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
+        let object = bounding_box(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
         let scene = HullScene {
             object,
@@ -293,23 +292,6 @@ impl<D: Device> Prepared for Views<'_, D> {
         let (colours, depths) = (device.download(&pixels.colours)?, device.download(&pixels.depths)?);
         Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
     }
-}
-
-/// The bounding box of the visual hull of the sources' silhouettes, or `None` if it is empty.
-pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
-    let (cameras, texels) = joined(&sources.images);
-    bounds::find(&cameras, &texels)
-}
-
-/// All sources' texels, concatenated, and the cameras with the offsets of their texels.
-pub(super) fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
-    let mut cameras = Vec::with_capacity(images.len());
-    let mut texels = Vec::new();
-    for image in images {
-        cameras.push(image.camera.block(texels.len() as u32));
-        texels.extend_from_slice(&image.texels);
-    }
-    (cameras, texels)
 }
 
 /// A pixel's side at the middle of the object.
