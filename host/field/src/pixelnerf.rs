@@ -17,18 +17,20 @@ mod options;
 mod parameters;
 mod pass;
 mod picture;
+mod presets;
 mod probes;
 pub mod reference;
 mod sight;
 pub mod test_networks;
 
 pub use architecture::{Architecture, Level, Pass};
-pub use open::{COMPUTABLE, open};
+pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
 use super::learned::{default_near_far, over_white};
 use super::{
-    About, Effort, Encoding, Encodings, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide,
+    About, Check, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, FieldError, LeftOut, Prepared, Record,
+    Rendered, Request, SourceSide,
 };
 use encoder::{ViewLatents, encode};
 use grid::Grid;
@@ -140,7 +142,7 @@ impl PixelNerf {
 impl Field for PixelNerf {
     fn about(&self) -> About {
         let source_side = SourceSide::Pixels(self.architecture.source_side);
-        About { source_side, ends_rays: true, ..About::new("pixelnerf") }
+        About { source_side, ends_rays: true, ..About::new(ROW.name) }
     }
 
     fn prepare<'a, D: Device>(
@@ -270,36 +272,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(rendered)
     }
 
-    fn efforts(&self) -> Vec<Effort> {
-        efforts::of(&self.field.options).into_iter().map(|(effort, _)| effort).collect()
-    }
-
-    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        if let Some((_, options)) = efforts::of(&self.field.options).get(effort) {
-            self.options = *options;
-        }
-        Ok(Encodings::Kept)
-    }
-
-    fn renders_pixels(&self) -> bool {
-        true
-    }
-
-    fn exact_pixels(
-        &mut self,
-        request: &Request<'_>,
-        pixels: &[u32],
-        progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 4]>, FieldError> {
-        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
-        let options = efforts::exact(&self.field.options);
-        let most_points = pixels.len() * options.sampling.coarse_count as usize;
-        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
-        let renderer = self.renderer(&views, request, options, progress);
-        let mut workspace = self.workspace(request, most_points)?;
-        let mut evaluated = [Evaluated::default(); 2];
-        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
-        Ok(colours)
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        Some(self)
     }
 
     fn record(&self) -> Record {
@@ -340,6 +314,42 @@ impl<D: Device> Prepared for Views<'_, D> {
         ];
         let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
         Record { left_out, memory_estimate, near_far, ..Record::default() }
+    }
+}
+
+impl<D: Device> Efforts for Views<'_, D> {
+    fn list(&self) -> Vec<Effort> {
+        efforts::of(&self.field.options).into_iter().map(|(effort, _)| effort).collect()
+    }
+
+    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        if let Some((_, options)) = efforts::of(&self.field.options).get(effort) {
+            self.options = *options;
+        }
+        Ok(Encodings::Kept)
+    }
+
+    fn check(&mut self) -> Check<'_> {
+        Check::Pixels(self)
+    }
+}
+
+impl<D: Device> ExactPixels for Views<'_, D> {
+    fn exact_pixels(
+        &mut self,
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
+        let options = efforts::exact(&self.field.options);
+        let most_points = pixels.len() * options.sampling.coarse_count as usize;
+        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
+        let renderer = self.renderer(&views, request, options, progress);
+        let mut workspace = self.workspace(request, most_points)?;
+        let mut evaluated = [Evaluated::default(); 2];
+        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
+        Ok(colours)
     }
 }
 

@@ -5,14 +5,17 @@
 //! sweep    any sources: planes through the frusta of sources and target
 //! space    near and far bounds, for the planes
 //! exposure gains that equalise the sources' exposure
+//! presets  settings to compare
 //! ```
 
 mod exposure;
 pub mod hull;
+mod presets;
 mod space;
 mod sweep;
 
-use super::{About, Field, FieldError, Prepared, SourceSide};
+use super::row::{Origin, Row};
+use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
@@ -40,6 +43,17 @@ impl Default for TrainingFree {
     }
 }
 
+/// The training-free field's row.
+pub(crate) const ROW: Row = Row {
+    name: "training-free",
+    title: "training-free field",
+    heading: "Options of the training-free field",
+    origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(TrainingFree::default())) },
+    flags: &[],
+    omissions: &[],
+    presets: presets::of,
+};
+
 impl Field for TrainingFree {
     fn about(&self) -> About {
         About {
@@ -47,7 +61,7 @@ impl Field for TrainingFree {
             least_sources: 2,
             source_side: SourceSide::Share(self.source_share),
             ends_rays: true,
-            ..About::new("training-free")
+            ..About::new(ROW.name)
         }
     }
 
@@ -64,5 +78,9 @@ impl Field for TrainingFree {
             gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
             Ok(Box::new(self.sweep.views(device, sources, progress)?))
         }
+    }
+
+    fn preview(&self) -> Option<TrainingFree> {
+        Some(TrainingFree { sweep: self.sweep.preview(), ..*self })
     }
 }

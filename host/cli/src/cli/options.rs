@@ -11,6 +11,7 @@ use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::About;
 use viewfuse_field::budget::Bound;
 use viewfuse_field::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
+use viewfuse_field::rows;
 use viewfuse_scene::few_shot::{PathChoice, Selection};
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
@@ -41,7 +42,10 @@ impl PictureOptions {
     /// With `exact`, nothing is left out. Options that the field does not have are rejected.
     pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
         if self.early_termination.is_some() && !field.ends_rays {
-            return Err(wrong("--early-termination cannot be used with a GeNVS, which has no early termination"));
+            let title = rows::named(field.name).map_or(field.name, |row| row.title);
+            return Err(wrong(format_args!(
+                "--early-termination cannot be used with a {title}, which has no early termination"
+            )));
         }
         let early_termination =
             if exact || !field.ends_rays { 0.0 } else { self.early_termination.unwrap_or(DEFAULT_EARLY_TERMINATION) };
@@ -51,9 +55,8 @@ impl PictureOptions {
     }
 }
 
-/// Options that a bound replaces: it chooses what is left out.
-const CHOSEN_BY_A_BOUND: [&str; 9] =
-    ["exact", "compute", "probe_step", "probe_error", "half_latents", "sampler", "steps", "tolerance", "half_volumes"];
+/// Options that a bound replaces, beside efforts of the fields' rows: it chooses what is left out.
+const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 
 /// A bound on the error or the time of each picture.
 #[derive(Args)]

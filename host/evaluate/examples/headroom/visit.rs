@@ -83,7 +83,7 @@ pub(crate) fn visit(
         let weighting = Weighting::open(SCHEME)?;
         stage.weigh(&weighting, &Silent)?;
         let frame = stage.frame(&weighting, &target_of(scene, target), &Silent)?;
-        let size = stage.picture_size(target)?;
+        let size = stage.size_at(&scene.views[target].camera)?;
         let camera = scene.views[target].camera;
         let camera = Camera { pinhole: camera.pinhole.resized(size[0], size[1])?, ..camera };
         let relevance = stage.relevance(&weighting);

@@ -2,7 +2,7 @@
 //! would gain.
 
 use super::{Sweep, Volume};
-use crate::{FieldError, Prepared, Request};
+use crate::{FieldError, Prepared, Request, Weighted};
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
