@@ -5,18 +5,17 @@
 //! matching    costs of the planes in a frustum
 //! search      surface points of a scene whose files do not tell its depths
 //! unseen      parts of a picture that its photograph does not show
-//! planes      a target's planes on the host, to be examined
 //! ```
 
 mod matching;
-mod planes;
 mod search;
 mod unseen;
 
 use super::exposure;
 use super::space::Space;
 use crate::{
-    DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable,
+    About, DepthMap, Effort, Encoding, Encodings, Field, FieldError, Prepared, Rendered, Request, Setting, Surfaces,
+    Tunable,
 };
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -29,13 +28,11 @@ use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
-pub use planes::TargetPlanes;
-
 /// Most planes of a frustum in pictures that are only compared with one another.
 const TRIAL_PLANES: u32 = 32;
 
 /// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
-/// work that are typical of them (the example `efforts` of `viewfuse-evaluate`, on the sample room and on herz_jesus_p8).
+/// work that are typical of them (the experiment `efforts` of `viewfuse-research`, on the sample room and on herz_jesus_p8).
 const EFFORTS: [(f32, f32, usize, f32, f32); 6] = [
     (0.25, 0.5, 4, 0.055, 0.09),
     (0.5, 1.0, 1, 0.029, 0.2),
@@ -216,6 +213,26 @@ fn swept(
         }
     };
     order.into_iter().map(view).collect()
+}
+
+impl Field for Sweep {
+    /// Sources at the size of the pictures.
+    fn about(&self) -> About {
+        About { least_sources: 2, ..About::new("plane sweep") }
+    }
+
+    fn prepare<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        if !sources.has_silhouettes {
+            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+            super::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
+        }
+        Ok(Box::new(self.views(device, sources, progress)?))
+    }
 }
 
 impl<D: Device> Views<'_, D> {
