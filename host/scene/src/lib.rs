@@ -25,8 +25,8 @@ mod scene;
 pub mod write;
 
 pub use scene::{
-    FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
-    ScenePoint, Split, View, looked_for, read_picture, reader,
+    FaultLocation, FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, READERS, Scene, SceneError,
+    SceneFrame, ScenePoint, Split, View, looked_for, read_picture, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -3,7 +3,7 @@
 
 use super::TrainError;
 use super::attention::{Attention, Embedding};
-use super::batch::{Batch, BatchSize, Shown, Targets};
+use super::batch::{Batch, BatchSize, SourceDraw, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views};
 use super::genvs_learner::{self, MAX_LEVEL_SHARE};
@@ -122,12 +122,12 @@ impl Learner for WeightingLearner {
         match &self.network {
             Frozen::PixelNerf(network) => {
                 let size = BatchSize { objects, rays };
-                let batch = Batch::draw(&self.scenes, draw, size, Shown::whole(sources), Targets::One, dtype)?;
+                let batch = Batch::draw(&self.scenes, draw, size, SourceDraw::whole(sources), Targets::One, dtype)?;
                 let colours = network.render(&batch, &self.of_batch(&batch)?, draw, SAMPLES)?;
                 (colours - &batch.truth)?.sqr()?.mean_all()
             }
             Frozen::Genvs(network) => {
-                let views = ViewCounts { sources: Shown::whole(sources), targets: 1 };
+                let views = ViewCounts { sources: SourceDraw::whole(sources), targets: 1 };
                 let views = Views::draw(&self.scenes, draw, objects, views, dtype)?;
                 let samples =
                     CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: GENVS_SAMPLES, jitter: 1.0 };
@@ -146,7 +146,7 @@ impl Learner for WeightingLearner {
                 [score(&|batch| self.of_batch(batch))?, score(&|batch| batch.weights(Scheme::MEAN))?]
             }
             Frozen::Genvs(network) => {
-                let views = ViewCounts { sources: Shown::whole(VALIDATION_SOURCES), targets: 1 };
+                let views = ViewCounts { sources: SourceDraw::whole(VALIDATION_SOURCES), targets: 1 };
                 let score = |weigh: &dyn Fn(&Views) -> Result<Tensor>| -> Result<f64> {
                     Ok(genvs_learner::scores(network, &self.validation, views, GENVS_SAMPLES, weigh)?[0])
                 };

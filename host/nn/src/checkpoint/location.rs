@@ -17,11 +17,11 @@ const MAX_REPEATED: u64 = 1 << 20;
 pub(super) const CHUNK_BYTES: usize = 1 << 16;
 
 /// The tensors of a file by name.
-pub(super) type Places = BTreeMap<String, Place>;
+pub(super) type TensorLocations = BTreeMap<String, TensorLocation>;
 
 /// A tensor in a file: every element lies inside it.
 #[derive(Clone, Debug)]
-pub(super) struct Place {
+pub(super) struct TensorLocation {
     /// The type of its elements.
     pub(super) element: Element,
     /// Offset in the file of its first.
@@ -50,7 +50,7 @@ pub(super) fn check_size(name: &str, shape: &[usize]) -> Result<u64, Problem> {
     Ok(element_count(shape).unwrap_or(0))
 }
 
-impl Place {
+impl TensorLocation {
     /// The place of a tensor whose storage takes the bytes from `start`, of which there are `available`. `name` is for
     /// messages.
     pub(super) fn of(
@@ -59,7 +59,7 @@ impl Place {
         storage: Storage<'_>,
         start: u64,
         available: u64,
-    ) -> Result<Place, Problem> {
+    ) -> Result<TensorLocation, Problem> {
         let count = check_size(name, &claim.shape)?;
         let wrong = |what: String| Problem::Content(format!("tensor '{name}': {what}"));
         let key = super::error::shortened(storage.key);
@@ -97,7 +97,7 @@ impl Place {
             expected *= length.max(1);
             fits
         });
-        Ok(Place {
+        Ok(TensorLocation {
             element: claim.element,
             start: start + claim.first * size,
             shape: claim.shape.clone(),

@@ -5,8 +5,6 @@ use super::poses::{Random, looking_at_origin};
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::rays::{RayPoint, TargetRay};
-use viewfuse_device::DeviceError;
-use viewfuse_device::{Device, Rays};
 
 /// Sides of images, pixels.
 const SIDES: [u32; 5] = [1, 7, 33, 64, 128];
@@ -79,14 +77,6 @@ pub fn point(random: &mut Random, views: &[CameraBlock]) -> RayPoint {
         direction: direction(random),
         sample: 0,
     }
-}
-
-/// Rays of pixels in a device's memory.
-///
-/// # Errors
-/// If the device has no memory left.
-pub fn load_rays<D: Device>(device: &D, pixels: &[u32], rays: &[TargetRay]) -> Result<Rays<D>, DeviceError> {
-    Ok(Rays { count: pixels.len() as u32, pixels: device.upload(pixels)?, rays: device.upload(rays)? })
 }
 
 /// Pixels of large pictures.

@@ -22,7 +22,7 @@ const CORNERS: u32 = 8;
 
 /// Sizes of volumes and of the network at points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct LookSizes {
+pub(crate) struct MarchSizes {
     /// Rows, columns, depths of a volume.
     pub(crate) volume: [usize; 3],
     /// Features of a node.
@@ -31,7 +31,7 @@ pub(crate) struct LookSizes {
     pub(crate) width: usize,
 }
 
-impl LookSizes {
+impl MarchSizes {
     /// How many parameters there are, in this order: three layers, of each the weights `[output][input]`, then the biases.
     pub(crate) fn parameter_count(&self) -> usize {
         self.layer(2).end
@@ -50,7 +50,7 @@ impl LookSizes {
 
 /// The views and the sampling of one object's rays.
 #[derive(Clone, Debug)]
-pub(crate) struct Sight {
+pub(crate) struct SampledRays {
     /// Cameras of the views.
     pub(crate) cameras: Vec<CameraBlock>,
     pub(crate) rays: Vec<TargetRay>,
@@ -61,12 +61,12 @@ pub(crate) struct Sight {
 }
 
 /// Inputs: volumes `[object and view][row][column][depth][feature]`, weights of the views `[object][view]`, parameters (see
-/// [`LookSizes::parameter_count`]). Result `[object and ray][feature]`.
+/// [`MarchSizes::parameter_count`]). Result `[object and ray][feature]`.
 #[derive(Clone)]
-pub(crate) struct Look {
-    pub(crate) sizes: LookSizes,
+pub(crate) struct MarchVolumes {
+    pub(crate) sizes: MarchSizes,
     /// `[object]`; all have as many views and rays.
-    pub(crate) sights: Arc<Vec<Sight>>,
+    pub(crate) objects_rays: Arc<Vec<SampledRays>>,
     /// Depths of the samples on a ray.
     pub(crate) samples: CoarseBlock,
     /// Length of a ray's last sample.
@@ -93,21 +93,21 @@ struct Way<T> {
     reaching: Vec<T>,
 }
 
-impl Look {
+impl MarchVolumes {
     fn views(&self) -> usize {
-        self.sights[0].cameras.len()
+        self.objects_rays[0].cameras.len()
     }
 
     fn rays(&self) -> usize {
-        self.sights[0].rays.len()
+        self.objects_rays[0].rays.len()
     }
 
     fn samples(&self) -> usize {
         self.samples.sample_count as usize
     }
 
-    fn points(&self, sight: &Sight, chunk: &Range<usize>) -> Vec<RayPoint> {
-        let rays = &sight.rays[chunk.clone()];
+    fn points(&self, object_rays: &SampledRays, chunk: &Range<usize>) -> Vec<RayPoint> {
+        let rays = &object_rays.rays[chunk.clone()];
         let count = self.samples.sample_count;
         let depths: Vec<f32> = (0..rays.len() * count as usize)
             .map(|index| {
@@ -119,10 +119,10 @@ impl Look {
     }
 
     fn run<T: Real>(&self, [volumes, weights, parameters]: [&[T]; 3], object: usize, chunk: &Range<usize>) -> Way<T> {
-        let LookSizes { volume: [height, width, depth_count], features, width: inner } = self.sizes;
-        let sight = &self.sights[object];
-        let points = self.points(sight, chunk);
-        let [near, far] = sight.near_far;
+        let MarchSizes { volume: [height, width, depth_count], features, width: inner } = self.sizes;
+        let object_rays = &self.objects_rays[object];
+        let points = self.points(object_rays, chunk);
+        let [near, far] = object_rays.near_far;
         let block = VolumeBlock {
             height: height as u32,
             width: width as u32,
@@ -135,7 +135,7 @@ impl Look {
         let mut places = Vec::with_capacity(row_count * CORNERS as usize);
         let mut looked_up = vec![T::zero(); row_count * features];
         let mut fused = vec![T::zero(); points.len() * features];
-        for (view, camera) in sight.cameras.iter().enumerate() {
+        for (view, camera) in object_rays.cameras.iter().enumerate() {
             let volume = &volumes[(object * self.views() + view) * self.sizes.volume_len()..];
             let weight = weights[object * self.views() + view];
             let own = &mut looked_up[view * points.len() * features..][..points.len() * features];
@@ -178,7 +178,7 @@ impl Look {
                 passed = T::zero();
             }
             let is_last = sample + 1 == self.samples();
-            let length = if is_last { self.last_length } else { point.length * sight.length_scale };
+            let length = if is_last { self.last_length } else { point.length * object_rays.length_scale };
             let given = way.raw[index * (1 + features)];
             // NaN stays: the loss must show it.
             let density = if given < T::zero() { T::zero() } else { given };
@@ -219,7 +219,7 @@ impl Look {
         chunk: &Range<usize>,
         [of_volumes, of_weights, of_parameters]: [&mut [T]; 3],
     ) {
-        let LookSizes { features, width: inner, .. } = self.sizes;
+        let MarchSizes { features, width: inner, .. } = self.sizes;
         let way = self.run(inputs, object, chunk);
         let [_, weights, parameters] = inputs;
         let (samples, point_count) = (self.samples(), way.own.len());
@@ -286,16 +286,16 @@ impl Look {
     }
 }
 
-impl Operation<3> for Look {
+impl Operation<3> for MarchVolumes {
     const NAME: &'static str = "look";
 
     fn shape(&self) -> Vec<usize> {
-        vec![self.sights.len() * self.rays(), self.sizes.features]
+        vec![self.objects_rays.len() * self.rays(), self.sizes.features]
     }
 
     fn forward<T: Real>(&self, inputs: [&[T]; 3]) -> Vec<T> {
         let chunks: Vec<(usize, Range<usize>)> =
-            (0..self.sights.len()).flat_map(|object| self.chunks().map(move |chunk| (object, chunk))).collect();
+            (0..self.objects_rays.len()).flat_map(|object| self.chunks().map(move |chunk| (object, chunk))).collect();
         let one = |(object, chunk): &(usize, Range<usize>)| {
             let mut seen = vec![T::zero(); chunk.len() * self.sizes.features];
             self.composite(&self.run(inputs, *object, chunk), &mut seen);
@@ -321,7 +321,7 @@ impl Operation<3> for Look {
             }
             (of_volumes, of_weights, of_parameters)
         };
-        let all: Vec<_> = (0..self.sights.len()).into_par_iter().map(one).collect();
+        let all: Vec<_> = (0..self.objects_rays.len()).into_par_iter().map(one).collect();
         let (mut of_volumes, mut of_weights, mut of_parameters) = (Vec::new(), Vec::new(), Vec::new());
         for (volumes, weights, parameters) in all {
             of_volumes.extend(volumes);

@@ -1,4 +1,4 @@
-//! Helpers of the training tests: toy photographs, random draws, comparison, and gradients compared with slopes.
+//! Helpers of the training tests: toy photographs, random draws, comparison, and gradients compared with difference quotients.
 
 use super::scenes::TrainingScene;
 use candle_core::{DType, Device, Result, Tensor, Var};
@@ -78,10 +78,10 @@ pub(super) fn assert_close(actual: &[f32], expected: &Tensor, share: f64) {
 
 /// That the gradient of each variable is the slope along a random direction of it, by central differences. `error` is a
 /// share of the slope, or of the largest slope where that is more than a thousand times as large.
-pub(super) fn assert_slopes(variables: &[(&str, &Var)], step: f64, error: f64, value: impl Fn() -> Result<Tensor>) {
+pub(super) fn assert_gradients(variables: &[(&str, &Var)], step: f64, error: f64, value: impl Fn() -> Result<Tensor>) {
     let number = |tensor: Tensor| tensor.to_scalar::<f64>().expect("a number");
     let gradients = value().and_then(|value| value.backward()).expect("gradients");
-    let slopes: Vec<(f64, f64)> = variables
+    let gradients: Vec<(f64, f64)> = variables
         .iter()
         .enumerate()
         .map(|(index, (name, variable))| {
@@ -98,9 +98,9 @@ pub(super) fn assert_slopes(variables: &[(&str, &Var)], step: f64, error: f64, v
             (slope, difference)
         })
         .collect();
-    let largest = slopes.iter().fold(0.0_f64, |most, (_, difference)| most.max(difference.abs()));
+    let largest = gradients.iter().fold(0.0_f64, |most, (_, difference)| most.max(difference.abs()));
     assert!(largest > 0.0, "nothing changes anything");
-    for ((name, _), (slope, difference)) in variables.iter().zip(&slopes) {
+    for ((name, _), (slope, difference)) in variables.iter().zip(&gradients) {
         let allowed = error * difference.abs().max(1.0e-3 * largest);
         assert!((slope - difference).abs() <= allowed, "{name}: gradient {slope}, slope {difference}");
     }

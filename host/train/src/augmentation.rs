@@ -1,7 +1,7 @@
 //! What differs from step to step of a run: sources and the scheme that weighs them.
 
 use super::TrainError;
-use super::batch::Shown;
+use super::batch::SourceDraw;
 use super::draw::{Draw, Purpose};
 use serde::{Serialize, Serializer};
 use viewfuse_core::weighting::Scheme;
@@ -9,7 +9,7 @@ use viewfuse_weighting::sources::MAX_SOURCES;
 
 /// What differs from step to step, so that a network works with more than one kind of sources: of each list one is drawn.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Variety {
+pub struct Augmentation {
     /// Numbers of sources, at least 1.
     pub sources: Vec<usize>,
     /// Sides of the sources' pictures, pixels, multiples of 16 up to the settings' side. Empty: that side. Rays are always of
@@ -24,23 +24,23 @@ pub struct Variety {
     pub schemes: Vec<Scheme>,
 }
 
-impl Variety {
+impl Augmentation {
     /// Whole photographs at the settings' side with equal weights, and these numbers of sources.
-    fn whole(sources: &[usize]) -> Variety {
-        Variety { sources: sources.to_vec(), sides: Vec::new(), least_crop: 1.0, schemes: vec![Scheme::MEAN] }
+    fn whole(sources: &[usize]) -> Augmentation {
+        Augmentation { sources: sources.to_vec(), sides: Vec::new(), least_crop: 1.0, schemes: vec![Scheme::MEAN] }
     }
 
     /// The default of a PixelNeRF, as published but for the number of sources: mostly three, so that the network works with
     /// few sources, sometimes one or more, so that it works with any weights.
     #[must_use]
-    pub fn pixelnerf() -> Variety {
-        Variety::whole(&[1, 2, 3, 3, 3, 3, 4, 6])
+    pub fn pixelnerf() -> Augmentation {
+        Augmentation::whole(&[1, 2, 3, 3, 3, 3, 4, 6])
     }
 
-    /// The default of a GeNVS: as [`Variety::pixelnerf`], with one to three sources.
+    /// The default of a GeNVS: as [`Augmentation::pixelnerf`], with one to three sources.
     #[must_use]
-    pub fn genvs() -> Variety {
-        Variety::whole(&[1, 2, 3, 3])
+    pub fn genvs() -> Augmentation {
+        Augmentation::whole(&[1, 2, 3, 3])
     }
 
     /// The largest number of sources.
@@ -69,12 +69,12 @@ impl Variety {
     }
 
     /// The sources of a step, and its scheme.
-    pub(crate) fn drawn(&self, draw: &Draw) -> (Shown, Scheme) {
+    pub(crate) fn drawn(&self, draw: &Draw) -> (SourceDraw, Scheme) {
         let pick = |purpose, count| draw.below(purpose, 0, count);
         let count = self.sources[pick(Purpose::SourceCount, self.sources.len())];
         let side = self.sides.get(pick(Purpose::Sides, self.sides.len())).copied();
         let scheme = self.schemes[pick(Purpose::Schemes, self.schemes.len())];
-        (Shown { count, side, least_crop: self.least_crop }, scheme)
+        (SourceDraw { count, side, least_crop: self.least_crop }, scheme)
     }
 }
 
