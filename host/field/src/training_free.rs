@@ -16,14 +16,12 @@ mod sweep;
 
 use super::row::{Origin, Row};
 use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
-use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_scene::rig::gap_warning;
 
 pub use hull::NoObject;
-pub use sweep::{Sweep, TargetPlanes};
+pub use sweep::Sweep;
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
 #[derive(Clone, Copy, Debug)]
@@ -74,9 +72,7 @@ impl Field for TrainingFree {
         if sources.has_silhouettes {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
-            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-            gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
-            Ok(Box::new(self.sweep.views(device, sources, progress)?))
+            self.sweep.prepare(device, sources, progress)
         }
     }
 
