@@ -2,13 +2,13 @@
 //! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, and how the tests are arranged.
 
 mod crates;
-mod interface;
 mod libraries;
 mod modules;
 mod outside;
 mod release;
 mod rooms;
 mod safety;
+mod summary;
 mod twins;
 
 use serde_json::Value;
