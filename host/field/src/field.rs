@@ -1,5 +1,12 @@
 //! The traits of a field: [`Field`] states its requirements and takes source views to a device; [`Prepared`] encodes views
 //! and renders. A [`Stage`](crate::render::Stage) calls both: it alone decides when a view is encoded.
+//!
+//! What is left out for speed is an [`Effort`]: what it leaves out, its share of the exact picture's time, its typical
+//! error. Its parts are [`Omission`](crate::Omission)s, which have names of their own, and what the render loop leaves out
+//! of any field's work: sources of least weight and samples behind surfaces
+//! ([`RenderOptions`](crate::render::RenderOptions)). A [`Bound`](crate::budget::Bound) chooses among the efforts that a
+//! field lists; trials and previews have efforts of their own. A [`Tunable`] is none: it leaves nothing out, and is chosen
+//! for a scene because pictures become better.
 
 use super::error::FieldError;
 use super::record::Record;

@@ -3,7 +3,7 @@
 //! ```text
 //! error             the errors of a field
 //! finite            NaN and infinity are found at the stage that produced them
-//! record            the record of a field's work
+//! record            what a field may leave out, and the record of its work
 //! field             the traits of a field: it prepares, encodes and renders
 //! renderer          a field on a device, with types erased
 //! any               a field of any kind
@@ -52,7 +52,7 @@ pub use field::{
     About, Check, DepthMap, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, Geometry, LONGEST_DEFAULT_SIDE,
     Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable, Tuned, Weighted,
 };
-pub use record::{Denoising, LeftOut, Record};
+pub use record::{Denoising, LeftOut, Omission, Record, VIEWS};
 pub use renderer::{On, Renderer};
 
 /// The examples of the README, compiled and run.

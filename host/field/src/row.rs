@@ -3,6 +3,7 @@
 
 use super::any::AnyField;
 use super::options::{FieldOptions, Flag, OpenError};
+use super::record::{Omission, VIEWS};
 use super::render::RenderOptions;
 use viewfuse_nn::checkpoint::Checkpoint;
 
@@ -44,18 +45,6 @@ pub enum Origin {
         open: fn(Checkpoint, &FieldOptions) -> Result<AnyField, OpenError>,
     },
 }
-
-/// A part of the work that a field leaves out where a scene does not need it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Omission {
-    /// Its name, with which `--compute` switches it off.
-    pub name: &'static str,
-    /// What is left out.
-    pub what: &'static str,
-}
-
-/// The omission of every learned field.
-pub const VIEWS: Omission = Omission { name: "views", what: "Encode views that no target uses" };
 
 /// A setting to compare with others: a field with its options.
 #[derive(Clone)]

@@ -2,7 +2,7 @@
 
 use super::error::FieldError;
 use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Tunable};
-use super::record::{LeftOut, Record};
+use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
@@ -167,14 +167,8 @@ impl<'a> Session<'a> {
         if !skips_unused && self.is_weighted {
             return record;
         }
-        let count = |views: usize| views as u64;
-        let line = LeftOut {
-            what: "encoded views",
-            switch: skips_unused,
-            left_out: count(self.encoded.iter().filter(|encoded| !**encoded).count()),
-            of: count(self.encoded.len()),
-            cost: "nothing",
-        };
+        let count = self.encoded.iter().filter(|encoded| !**encoded).count();
+        let line = VIEWS.left_out(skips_unused, count as u64, self.encoded.len() as u64);
         record.left_out.insert(0, line);
         record
     }

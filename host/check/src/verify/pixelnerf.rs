@@ -6,7 +6,7 @@ use super::{Quantity, Report, VerifyError};
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{RayPoint, TargetRay};
 use viewfuse_device::Device;
-use viewfuse_field::pixelnerf::reference::{Reference, SeenRays};
+use viewfuse_field::pixelnerf::reference::{Reference, RenderedRays};
 use viewfuse_field::pixelnerf::{Architecture, Omissions, Pass, PixelNerf, PixelNerfOptions, test_networks};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
@@ -178,8 +178,8 @@ impl Comparison<'_> {
         let weights = file.many(&format!("weights.{RAY_WEIGHTS}"), reference.view_count())?;
         for (pass, name, depths) in [(Pass::Coarse, "coarse", "z_coarse"), (Pass::Fine, "fine", "z_all")] {
             let depths = file.many_a_row(depths, rays.len())?;
-            let SeenRays { weights: ours, colours, depths: seen } =
-                reference.look(pass, &weights, &rays, &depths).map_err(|error| self.failed(error))?;
+            let RenderedRays { weights: ours, colours, depths: seen } =
+                reference.render_rays(pass, &weights, &rays, &depths).map_err(|error| self.failed(error))?;
             let compare = |what: &str, ours: &[f32]| -> Result<Quantity, VerifyError> {
                 let key = format!("{name}_{what}");
                 Ok(self.compare(&format!("{what} of rays, {name}"), ours, &file.floats(&key)?, 2.0e-4, false))

@@ -10,6 +10,7 @@ mod name;
 
 pub(crate) use flags::SequenceFlags;
 
+use super::options::EFFORTS;
 use super::wrong;
 use anyhow::Context;
 use clap::Args;
@@ -17,10 +18,9 @@ use clap::builder::{PossibleValue, PossibleValuesParser};
 use flags::{EffortFlags, NETWORK, PictureFlags};
 use name::{Model, model_help};
 use std::path::Path;
-use viewfuse_field::AnyField;
 use viewfuse_field::options::{FieldOptions, OpenError};
-use viewfuse_field::row::VIEWS;
 use viewfuse_field::rows::ROWS;
+use viewfuse_field::{AnyField, Omission, VIEWS};
 
 /// The field, and what its exact pictures depend on.
 #[derive(Args)]
@@ -36,12 +36,12 @@ pub(crate) struct NetworkOptions {
 pub(crate) struct ModelOptions {
     #[command(flatten)]
     network: NetworkOptions,
-    /// Leave nothing out: compute every view, layer and sample, and with GeNVS every call of the published run, heun
+    /// The exact effort: leave nothing out, compute every view, layer and sample, and with GeNVS every call of the published run, heun
     /// over 25 levels, unless --sampler, --steps or --tolerance are given
-    #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = NETWORK)]
+    #[arg(long, conflicts_with_all = ["compute", "leave_out", "early_termination"], help_heading = EFFORTS)]
     pub(crate) exact: bool,
-    /// Switch these omissions off: compute what the scene does not need
-    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',', requires = "model", help_heading = NETWORK)]
+    /// Switch omissions of the default effort off: compute what the scene does not need
+    #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',', requires = "model", help_heading = EFFORTS)]
     compute: Vec<String>,
     #[command(flatten)]
     flags: EffortFlags,
@@ -49,10 +49,11 @@ pub(crate) struct ModelOptions {
 
 /// The values of `--compute`.
 fn omissions() -> Vec<PossibleValue> {
-    let of_row = ROWS.iter().flat_map(|row| {
-        row.omissions.iter().map(|own| PossibleValue::new(own.name).help(format!("{}: {}", row.title, own.what)))
-    });
-    [PossibleValue::new(VIEWS.name).help(VIEWS.what)].into_iter().chain(of_row).collect()
+    let value = |title: &str, Omission { name, what, part, typical_error }: &Omission| {
+        PossibleValue::new(name).help(format!("{title}: {what} {part}; typical error: {typical_error}"))
+    };
+    let of_rows = ROWS.iter().flat_map(|row| row.omissions.iter().map(|own| value(row.title, own)));
+    [value("all", &VIEWS)].into_iter().chain(of_rows).collect()
 }
 
 impl NetworkOptions {

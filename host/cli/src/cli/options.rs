@@ -16,6 +16,9 @@ use viewfuse_scene::few_shot::{PathChoice, Selection};
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
 
+/// Heading of the options that say what is left out.
+pub(crate) const EFFORTS: &str = "Efforts: what is left out, for which time and error";
+
 /// Options of pictures.
 #[derive(Args)]
 pub(crate) struct PictureOptions {
@@ -27,11 +30,11 @@ pub(crate) struct PictureOptions {
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
     /// Leave out the least relevant sources while their weights together stay at or below this
-    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
+    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share, help_heading = EFFORTS)]
     leave_out: f32,
     /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a GeNVS
     /// [default: 1/256]
-    #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share)]
+    #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share, help_heading = EFFORTS)]
     early_termination: Option<f32>,
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -61,12 +64,12 @@ const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 /// A bound on the error or the time of each picture.
 #[derive(Args)]
 pub(crate) struct BoundOptions {
-    /// Leave out what the pictures do not need for this root mean square difference from the exact ones, in decibels (40dB)
+    /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact ones, in decibels (40dB)
     /// or with colours from 0 to 1 (0.01)
-    #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND)]
+    #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
-    /// Leave out what does not fit into this time for each picture: seconds, or milliseconds as 250ms
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error")]
+    /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as 250ms
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
     max_time: Option<Duration>,
 }
 

@@ -5,7 +5,8 @@ use super::{Genvs, GenvsOptions, Omissions, Rays, presets, test_networks};
 use crate::AnyField;
 use crate::learned::{NEAR_FAR, parse_near_far};
 use crate::options::{BOUNDS, BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, list, number};
-use crate::row::{Omission, Origin, Row, Small, TestNetwork, VIEWS};
+use crate::record::{Omission, VIEWS};
+use crate::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
@@ -74,11 +75,17 @@ pub(crate) const ROW: Row = Row {
         )
         .about(FlagAbout::Sequence, BOUNDS_OR_EXACT),
     ],
-    omissions: &[
-        Omission { name: "rows", what: "rows of volumes that no ray reaches" },
-        Omission { name: "calls", what: "calls of the denoiser without a visible effect" },
-    ],
+    omissions: &[ROWS, CALLS],
     presets: presets::of,
+};
+
+pub(super) const ROWS: Omission =
+    Omission { name: "rows", what: "volume rows", part: "that no ray reaches", typical_error: "nothing" };
+pub(super) const CALLS: Omission = Omission {
+    name: "calls",
+    what: "denoiser calls",
+    part: "without a visible effect",
+    typical_error: "invisible changes of a pixel; the error of starting from the frame before must be measured",
 };
 
 const SAMPLES: &str = "samples";
@@ -131,7 +138,7 @@ fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, Open
     let rays = Rays { sample_count, near_far: options.value(NEAR_FAR.name, parse_near_far), ..default };
     let omissions = Omissions {
         unused_views: !options.computes(VIEWS.name),
-        unseen_rows: !options.computes("rows"),
+        unseen_rows: !options.computes(ROWS.name),
         reuse: options.value(REUSE, parse_level),
         half_volumes: options.is_given(HALF_VOLUMES),
     };
@@ -160,7 +167,7 @@ fn plan(options: &FieldOptions) -> Plan {
         from_colours: false,
         compares_orders: false,
         churn: Churn { amount: options.value(CHURN, parse_churn).unwrap_or(0.0), ..Churn::NONE },
-        early_termination: plan.early_termination.filter(|_| !options.computes("calls")),
+        early_termination: plan.early_termination.filter(|_| !options.computes(CALLS.name)),
         seed,
     }
 }

@@ -3,6 +3,7 @@
 use super::efforts;
 use super::encoder::SIDE_STEP;
 use super::feature_image;
+use super::open::{CALLS, ROWS};
 use super::parts::Parts;
 use super::ray_sampling::RaySampling;
 use super::sampling::{Plan, Start};
@@ -195,30 +196,18 @@ impl<D: Device> Prepared for Views<'_, D> {
         let Counts { volume_rows, filled_rows, volume_bytes, kept_bytes, planned_calls, calls } = self.counts;
         let Genvs { architecture, options, .. } = self.field;
         let Omissions { unseen_rows, reuse, half_volumes, .. } = options.omissions;
-        let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let ends = options.plan.early_termination.is_some();
+        let halves = LeftOut {
+            what: "volume bytes",
+            switch: half_volumes,
+            left_out: volume_bytes - kept_bytes.min(volume_bytes),
+            of: volume_bytes,
+            typical_error: "2^-11 of a feature",
+        };
         let left_out = vec![
-            line(
-                "volume rows",
-                unseen_rows && !half_volumes,
-                volume_rows - filled_rows.min(volume_rows),
-                volume_rows,
-                "nothing",
-            ),
-            line(
-                "volume bytes",
-                half_volumes,
-                volume_bytes - kept_bytes.min(volume_bytes),
-                volume_bytes,
-                "2^-11 of a feature",
-            ),
-            line(
-                "denoiser calls",
-                ends || reuse.is_some(),
-                planned_calls - calls,
-                planned_calls,
-                "invisible changes of a pixel; the error of starting from the frame before must be measured",
-            ),
+            ROWS.left_out(unseen_rows && !half_volumes, volume_rows - filled_rows.min(volume_rows), volume_rows),
+            halves,
+            CALLS.left_out(ends || reuse.is_some(), planned_calls - calls, planned_calls),
         ];
         let has_denoiser = architecture.denoiser.is_some();
         let run = GenvsOptions { plan: self.plan, ..*options };

@@ -4,7 +4,8 @@ use super::{Omissions, PixelNerf, PixelNerfOptions, Sampling, presets, test_netw
 use crate::AnyField;
 use crate::learned::NEAR_FAR;
 use crate::options::{BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, list, number};
-use crate::row::{Omission, Origin, Row, Small, TestNetwork, VIEWS};
+use crate::record::{Omission, VIEWS};
+use crate::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_nn::checkpoint::Checkpoint;
 
 /// PixelNeRF's row.
@@ -59,16 +60,36 @@ pub(crate) const ROW: Row = Row {
         )
         .about(FlagAbout::Effort, BOUNDS_OR_EXACT),
     ],
-    omissions: &[
-        Omission { name: "layers", what: "latent layers at every point instead of once on the grid" },
-        Omission { name: "behind", what: "views at points behind their cameras, where their weight is 0" },
-        Omission { name: "space", what: "first-pass samples in empty space" },
-        Omission { name: "rays", what: "second-pass samples on empty rays" },
-        Omission { name: "parts", what: "second-pass samples in empty parts of rays" },
-        Omission { name: "hidden", what: "second-pass samples behind surfaces" },
-    ],
+    omissions: &[LAYERS, BEHIND, SPACE, RAYS, PARTS, HIDDEN],
     presets: presets::of,
 };
+
+pub(super) const LAYERS: Omission = Omission {
+    name: "layers",
+    what: "latent layers at points",
+    part: "in place of once on the grid",
+    typical_error: "rounding",
+};
+pub(super) const BEHIND: Omission = Omission {
+    name: "behind",
+    what: "views at points",
+    part: "behind their cameras, where their weight is 0",
+    typical_error: "nothing",
+};
+pub(super) const SPACE: Omission = Omission {
+    name: "space",
+    what: "first-pass samples",
+    part: "in empty space",
+    typical_error: "objects between the probes; see `viewfuse pareto`",
+};
+pub(super) const RAYS: Omission = Omission {
+    name: "rays",
+    what: "second-pass samples",
+    part: "on empty rays",
+    typical_error: "surfaces that the first pass missed; those behind have at most the transmittance of early termination",
+};
+const PARTS: Omission = Omission { name: "parts", part: "in empty parts of rays", ..RAYS };
+const HIDDEN: Omission = Omission { name: "hidden", part: "behind surfaces", ..RAYS };
 
 const SAMPLES: &str = "samples";
 const PUBLISHED_DEPTH: &str = "published-depth";
@@ -113,16 +134,16 @@ fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, Open
     let error = options.value(PROBE_ERROR, parse_error).unwrap_or(usual.probe_error);
     let omissions = Omissions {
         unused_views: !computes(VIEWS.name),
-        latent_layers: !computes("layers"),
+        latent_layers: !computes(LAYERS.name),
         half_latents: options.is_given(HALF_LATENTS),
-        unseen_points: !computes("behind"),
-        empty_space: if computes("space") { 0 } else { step },
+        unseen_points: !computes(BEHIND.name),
+        empty_space: if computes(SPACE.name) { 0 } else { step },
         probe_error: if options.exact { 0.0 } else { error },
         interpolation: usual.interpolation,
         nodes: usual.nodes,
-        empty_rays: !computes("rays"),
-        empty_parts: !computes("parts"),
-        hidden_samples: !computes("hidden"),
+        empty_rays: !computes(RAYS.name),
+        empty_parts: !computes(PARTS.name),
+        hidden_samples: !computes(HIDDEN.name),
     };
     Ok(AnyField::new(PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions })?))
 }
