@@ -126,7 +126,7 @@ pub(crate) fn switch(text: &str) -> Result<(), String> {
     text.is_empty().then_some(()).ok_or_else(|| "no value".to_owned())
 }
 
-/// A number within bounds, that `is` puts in words.
+/// A number within bounds, `is` says which.
 pub(crate) fn number(text: &str, fits: impl Fn(f32) -> bool, is: &str) -> Result<f32, String> {
     text.parse().ok().filter(|number| fits(*number)).ok_or_else(|| is.to_owned())
 }
