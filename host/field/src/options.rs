@@ -24,12 +24,7 @@ impl FieldOptions {
         self
     }
 
-    /// Whether a switch is given.
-    pub(crate) fn is_given(&self, flag: &str) -> bool {
-        self.flags.contains_key(flag)
-    }
-
-    /// The value of a flag. Opening a field has checked it: `parse` is that of the row.
+    /// The value of a flag, if it is given. Opening a field has checked it: `parse` is that of the row.
     pub(crate) fn value<T>(&self, flag: &str, parse: impl Fn(&str) -> Result<T, String>) -> Option<T> {
         self.flags.get(flag).and_then(|text| parse(text).ok())
     }
@@ -45,8 +40,8 @@ impl FieldOptions {
 pub struct Flag {
     /// Its name, without dashes before it.
     pub name: &'static str,
-    /// The form of its value, the same in all rows that have it; `None` for a switch.
-    pub value: Option<&'static str>,
+    /// The form of its value, the same in all rows that have it; empty for a switch.
+    pub form: &'static str,
     /// Its help.
     pub help: &'static str,
     /// Refuses a text that is no value, with what a value is.
@@ -73,27 +68,33 @@ pub(crate) const BOUNDS: &[&str] = &["max_error", "max_time"];
 /// The same, and the option that leaves nothing out.
 pub(crate) const BOUNDS_OR_EXACT: &[&str] = &["max_error", "max_time", "exact"];
 
-impl Flag {
-    /// A flag of the exact picture, with a value.
-    pub(crate) const fn new(
-        name: &'static str,
-        value: &'static str,
-        help: &'static str,
-        check: fn(&str) -> Result<(), String>,
-    ) -> Flag {
-        Flag { name, value: Some(value), help, check, about: FlagAbout::Picture, conflicts: &[] }
-    }
+/// Declares a field's flags: the type of a value, name, form, parser, what it is about, conflicts, help. Makes the list for
+/// the row (`Given::FLAGS`) and the values that are given (`Given::of`).
+macro_rules! flags {
+    ($($field:ident: $Type:ty = $name:literal, $form:literal, $parse:ident, $About:ident, $conflicts:expr, $help:expr;)+) => {
+        /// The flags that are given.
+        struct Given {
+            $($field: Option<$Type>,)+
+        }
 
-    /// A switch of the exact picture.
-    pub(crate) const fn switch(name: &'static str, help: &'static str) -> Flag {
-        Flag { name, value: None, help, check: |_| Ok(()), about: FlagAbout::Picture, conflicts: &[] }
-    }
+        impl Given {
+            const FLAGS: &'static [Flag] = &[$(Flag {
+                name: $name,
+                form: $form,
+                help: $help,
+                check: |text| $parse(text).map(drop),
+                about: FlagAbout::$About,
+                conflicts: $conflicts,
+            },)+];
 
-    /// The same about something else.
-    pub(crate) const fn about(self, about: FlagAbout, conflicts: &'static [&'static str]) -> Flag {
-        Flag { about, conflicts, ..self }
-    }
+            fn of(options: &FieldOptions) -> Given {
+                Given { $($field: options.value($name, $parse),)+ }
+            }
+        }
+    };
 }
+
+pub(crate) use flags;
 
 /// Why a field cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -120,7 +121,12 @@ impl OpenError {
     }
 }
 
-/// A number within bounds, that `is` puts in words.
+/// The value of a switch.
+pub(crate) fn switch(text: &str) -> Result<(), String> {
+    text.is_empty().then_some(()).ok_or_else(|| "no value".to_owned())
+}
+
+/// A number within bounds, `is` says which.
 pub(crate) fn number(text: &str, fits: impl Fn(f32) -> bool, is: &str) -> Result<f32, String> {
     text.parse().ok().filter(|number| fits(*number)).ok_or_else(|| is.to_owned())
 }

@@ -8,14 +8,14 @@
 mod flags;
 mod name;
 
-pub(crate) use flags::SequenceFlags;
+pub(crate) use flags::{Flags, SEQUENCE};
 
 use super::options::EFFORTS;
 use super::wrong;
 use anyhow::Context;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use flags::{EffortFlags, NETWORK, PictureFlags};
+use flags::{EFFORT, NETWORK, PICTURE};
 use name::{Model, model_help};
 use std::path::Path;
 use viewfuse_field::options::{FieldOptions, OpenError};
@@ -28,7 +28,7 @@ pub(crate) struct NetworkOptions {
     #[arg(long, value_name = "FILE", help = model_help(), help_heading = NETWORK)]
     model: Option<Model>,
     #[command(flatten)]
-    flags: PictureFlags,
+    flags: Flags<PICTURE>,
 }
 
 /// The field and its efforts.
@@ -44,7 +44,7 @@ pub(crate) struct ModelOptions {
     #[arg(long, value_name = "WHAT", value_parser = PossibleValuesParser::new(omissions()), value_delimiter = ',', requires = "model", help_heading = EFFORTS)]
     compute: Vec<String>,
     #[command(flatten)]
-    flags: EffortFlags,
+    flags: Flags<EFFORT>,
 }
 
 /// The values of `--compute`.
@@ -100,7 +100,7 @@ impl ModelOptions {
     }
 
     /// Opens the field, for pictures of their own or for a sequence of them.
-    pub(crate) fn open(&self, seed: u64, sequence: Option<&SequenceFlags>) -> anyhow::Result<AnyField> {
+    pub(crate) fn open(&self, seed: u64, sequence: Option<&Flags<SEQUENCE>>) -> anyhow::Result<AnyField> {
         let options =
             FieldOptions { seed, exact: self.exact, compute: self.compute.clone(), ..FieldOptions::default() };
         let options = self.flags.given_to(options);

@@ -4,7 +4,7 @@ mod identity;
 mod outputs;
 mod stream;
 
-use super::model::{ModelOptions, SequenceFlags};
+use super::model::{Flags, ModelOptions, SEQUENCE};
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::path::PathOptions;
@@ -64,7 +64,7 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     model: ModelOptions,
     #[command(flatten)]
-    sequence: SequenceFlags,
+    sequence: Flags<SEQUENCE>,
     #[command(flatten)]
     device: DeviceOptions,
     /// Seed of every random draw (the training-free field makes none)
@@ -121,13 +121,13 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     writer.set_outputs(arguments.outputs.outputs());
     let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).collect();
     // Frames that follow from one another are not continued.
-    let job = if arguments.sequence.are_given() {
-        job
-    } else {
+    let job = if arguments.sequence.is_empty() {
         let run = run_identity(values, &device.name(), &scene, &job, &files)?;
         let finished = writer.resume(&run)?;
         let is_left = |target: &Target| !finished.contains(&target.name);
         FewShot { targets: job.targets.into_iter().filter(is_left).collect(), ..job }
+    } else {
+        job
     };
     // A frame of a video takes a part of the time that it took to render.
     let (frames, formats) = (10 * job.targets.len().max(1), &arguments.outputs.video);

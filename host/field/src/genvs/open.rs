@@ -4,7 +4,9 @@ use super::sampling::{Plan, Steps};
 use super::{Genvs, GenvsOptions, Omissions, Rays, presets, test_networks};
 use crate::AnyField;
 use crate::learned::{NEAR_FAR, parse_near_far};
-use crate::options::{BOUNDS, BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, list, number};
+use crate::options::{
+    BOUNDS, BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, flags, list, number, switch,
+};
 use crate::record::{Omission, VIEWS};
 use crate::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_core::sampler::Sampler;
@@ -26,55 +28,7 @@ pub(crate) const ROW: Row = Row {
         }],
         open,
     },
-    flags: &[
-        Flag::new(SAMPLES, "N,N,N|N", "Samples on a ray of a GeNVS [default: 64]", |text| parse_samples(text).map(drop)),
-        NEAR_FAR,
-        Flag::new(NOISE, "MAX,MIN", "Largest and smallest noise level [default: 80,0.002]", |text| {
-            parse_noise(text).map(drop)
-        }),
-        Flag::new(
-            SAMPLER,
-            "NAME",
-            "Sampler: euler, heun, dpm++2m, dpm++3m, unipc, ipndm [default: ipndm, with --exact heun]",
-            |text| parse_sampler(text).map(drop),
-        )
-        .about(FlagAbout::Effort, BOUNDS),
-        Flag::new(
-            STEPS,
-            "N",
-            "Noise levels. Each takes one call of the denoiser; with heun two, except the last [default: 10, with --exact 25]",
-            |text| parse_steps(text).map(drop),
-        )
-        .about(FlagAbout::Effort, BOUNDS),
-        Flag::new(
-            TOLERANCE,
-            "ERROR",
-            "Choose the levels adaptively, with each step's error below this (root mean square, of values between -1 and 1); \
-             0.01 is just visible",
-            |text| parse_tolerance(text).map(drop),
-        )
-        .about(FlagAbout::Effort, &["max_error", "max_time", SAMPLER, STEPS]),
-        Flag::new(
-            CHURN,
-            "AMOUNT",
-            "Add this amount of noise between steps over the whole run; multistep samplers start again each time, so use heun",
-            |text| parse_churn(text).map(drop),
-        )
-        .about(FlagAbout::Effort, &[TOLERANCE]),
-        Flag::switch(
-            HALF_VOLUMES,
-            "Keep views' features in half precision (f16): half the memory, but every row of them is computed",
-        )
-        .about(FlagAbout::Effort, BOUNDS_OR_EXACT),
-        Flag::new(
-            REUSE,
-            "LEVEL",
-            "Start each frame from the one before with noise of this level, about the size of the differences between \
-             frames: for orbits",
-            |text| parse_level(text).map(drop),
-        )
-        .about(FlagAbout::Sequence, BOUNDS_OR_EXACT),
-    ],
+    flags: Given::FLAGS,
     omissions: &[ROWS, CALLS],
     presets: presets::of,
 };
@@ -88,16 +42,28 @@ pub(super) const CALLS: Omission = Omission {
     typical_error: "invisible changes of a pixel; the error of starting from the frame before must be measured",
 };
 
-const SAMPLES: &str = "samples";
-const NOISE: &str = "noise";
-const SAMPLER: &str = "sampler";
-const STEPS: &str = "steps";
-const TOLERANCE: &str = "tolerance";
-const CHURN: &str = "churn";
-const HALF_VOLUMES: &str = "half-volumes";
-const REUSE: &str = "reuse";
-/// The flags that concern the denoiser or sequences of pictures.
-const OF_DENOISER: [&str; 7] = [NOISE, SAMPLER, STEPS, TOLERANCE, CHURN, HALF_VOLUMES, REUSE];
+flags! {
+    samples: u32 = "samples", "N,N,N|N", parse_samples, Picture, &[], "Samples on a ray of a GeNVS [default: 64]";
+    near_far: [f32; 2] = "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR;
+    noise: NoiseSchedule = "noise", "MAX,MIN", parse_noise, Picture, &[], "Largest and smallest noise level [default: \
+        80,0.002]";
+    sampler: Sampler = "sampler", "NAME", parse_sampler, Effort, BOUNDS, "Sampler: euler, heun, dpm++2m, dpm++3m, unipc, \
+        ipndm [default: ipndm, with --exact heun]";
+    steps: u32 = "steps", "N", parse_steps, Effort, BOUNDS, "Noise levels. Each takes one call of the denoiser; with heun \
+        two, except the last [default: 10, with --exact 25]";
+    tolerance: f32 = "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"], "Choose \
+        the levels adaptively, with each step's error below this (root mean square, of values between -1 and 1); 0.01 is \
+        just visible";
+    churn: f32 = "churn", "AMOUNT", parse_churn, Effort, &["tolerance"], "Add this amount of noise between steps over the \
+        whole run; multistep samplers start again each time, so use heun";
+    half_volumes: () = "half-volumes", "", switch, Effort, BOUNDS_OR_EXACT, "Keep views' features in half precision (f16): \
+        half the memory, but every row of them is computed";
+    reuse: f32 = "reuse", "LEVEL", parse_level, Sequence, BOUNDS_OR_EXACT, "Start each frame from the one before with noise \
+        of this level, about the size of the differences between frames: for orbits";
+}
+
+/// The flags that say nothing of the denoiser or of sequences of pictures.
+const OF_FEATURES: [&str; 2] = ["samples", "near-far"];
 
 fn parse_samples(text: &str) -> Result<u32, String> {
     count(text, 2..=1024).map_err(|_| "one number, at least 2, for example 64".to_owned())
@@ -133,40 +99,40 @@ fn parse_level(text: &str) -> Result<f32, String> {
 
 /// Opens the network with these options.
 fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
-    let default = Rays::default();
-    let sample_count = options.value(SAMPLES, parse_samples).unwrap_or(default.sample_count);
-    let rays = Rays { sample_count, near_far: options.value(NEAR_FAR.name, parse_near_far), ..default };
+    let (given, default) = (Given::of(options), Rays::default());
+    let sample_count = given.samples.unwrap_or(default.sample_count);
+    let rays = Rays { sample_count, near_far: given.near_far, ..default };
     let omissions = Omissions {
         unused_views: !options.computes(VIEWS.name),
         unseen_rows: !options.computes(ROWS.name),
-        reuse: options.value(REUSE, parse_level),
-        half_volumes: options.is_given(HALF_VOLUMES),
+        reuse: given.reuse,
+        half_volumes: given.half_volumes.is_some(),
     };
-    let field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options), omissions })?;
-    match (OF_DENOISER.iter().find(|flag| options.is_given(flag)), &field.architecture().denoiser) {
-        (Some(flag), None) => Err(OpenError::cannot(*flag, "has no denoiser")),
+    let field = Genvs::new(checkpoint, GenvsOptions { rays, plan: plan(options, &given), omissions })?;
+    let of_denoiser = options.flags.keys().find(|flag| !OF_FEATURES.contains(&flag.as_str()));
+    match (of_denoiser, &field.architecture().denoiser) {
+        (Some(flag), None) => Err(OpenError::cannot(flag, "has no denoiser")),
         _ => Ok(AnyField::new(field)),
     }
 }
 
 /// The published run if nothing may be left out, otherwise the fast one; given options take precedence.
-fn plan(options: &FieldOptions) -> Plan {
+fn plan(options: &FieldOptions, given: &Given) -> Plan {
     let seed = options.seed;
     let plan = if options.exact { Plan::published(seed) } else { Plan::fast(seed) };
-    let steps = match (options.value(TOLERANCE, parse_tolerance), Plan::careful(seed).steps, plan.steps) {
+    let steps = match (given.tolerance, Plan::careful(seed).steps, plan.steps) {
         (Some(tolerance), Steps::Chosen { most_calls, .. }, _) => Steps::Chosen { tolerance, most_calls },
-        (_, _, Steps::Fixed { sampler, level_count }) => Steps::Fixed {
-            sampler: options.value(SAMPLER, parse_sampler).unwrap_or(sampler),
-            level_count: options.value(STEPS, parse_steps).unwrap_or(level_count),
-        },
+        (_, _, Steps::Fixed { sampler, level_count }) => {
+            Steps::Fixed { sampler: given.sampler.unwrap_or(sampler), level_count: given.steps.unwrap_or(level_count) }
+        }
         (_, _, steps) => steps,
     };
     Plan {
         steps,
-        schedule: options.value(NOISE, parse_noise).unwrap_or_else(NoiseSchedule::published),
+        schedule: given.noise.unwrap_or_else(NoiseSchedule::published),
         from_colours: false,
         compares_orders: false,
-        churn: Churn { amount: options.value(CHURN, parse_churn).unwrap_or(0.0), ..Churn::NONE },
+        churn: Churn { amount: given.churn.unwrap_or(0.0), ..Churn::NONE },
         early_termination: plan.early_termination.filter(|_| !options.computes(CALLS.name)),
         seed,
     }
@@ -178,7 +144,7 @@ mod tests {
 
     #[test]
     fn the_help_names_every_sampler() {
-        let help = ROW.flags.iter().find(|flag| flag.name == SAMPLER).expect("a flag").help;
+        let help = ROW.flags.iter().find(|flag| flag.name == "sampler").expect("a flag").help;
         assert!(help.starts_with(&format!("Sampler: {} [", Sampler::ALL.map(Sampler::name).join(", "))), "{help}");
     }
 }

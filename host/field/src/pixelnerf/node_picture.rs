@@ -188,7 +188,7 @@ impl<D: Device> Renderer<'_, D> {
                 break;
             }
             for some in points.chunks(workspace.point_count as usize) {
-                let raw = self.ask_at(workspace, some, evaluated)?;
+                let raw = self.evaluate_at(workspace, some, evaluated)?;
                 for (point, raw) in some.iter().zip(raw.as_chunks::<4>().0) {
                     let [red, green, blue, _] = radiance(raw, point);
                     values[point.sample as usize] = [red, green, blue, raw[3]];
@@ -209,7 +209,7 @@ impl<D: Device> Renderer<'_, D> {
     }
 
     /// The second pass's raw outputs at points, four each; more than there are points.
-    fn ask_at(
+    fn evaluate_at(
         &self,
         workspace: &mut Workspace<D>,
         points: &[RayPoint],

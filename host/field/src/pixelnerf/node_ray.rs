@@ -87,8 +87,8 @@ impl NodeRay<'_> {
         let (mut part, mut below) = (0, 0.0);
         let mut added = Vec::with_capacity(added_count as usize);
         for index in 0..sampling.importance_count {
-            let [wanted, inside] = random_draw(pixel, index, &block);
-            while part + 1 < count && below + mass(part) <= wanted * total {
+            let [draw, inside] = random_draw(pixel, index, &block);
+            while part + 1 < count && below + mass(part) <= draw * total {
                 below += mass(part);
                 part += 1;
             }

@@ -2,8 +2,8 @@
 
 use super::{Omissions, PixelNerf, PixelNerfOptions, Sampling, presets, test_networks};
 use crate::AnyField;
-use crate::learned::NEAR_FAR;
-use crate::options::{BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, list, number};
+use crate::learned::{NEAR_FAR, parse_near_far};
+use crate::options::{BOUNDS_OR_EXACT, FieldOptions, Flag, FlagAbout, OpenError, count, flags, list, number, switch};
 use crate::record::{Omission, VIEWS};
 use crate::row::{Origin, Row, Small, TestNetwork};
 use viewfuse_nn::checkpoint::Checkpoint;
@@ -16,50 +16,12 @@ pub(crate) const ROW: Row = Row {
     origin: Origin::Learned {
         prefix: "encoder.model.",
         test_networks: &[
-            TestNetwork {
-                name: "formula",
-                small: Small::Width,
-                checkpoint: test_networks::deterministic_of_width,
-            },
+            TestNetwork { name: "formula", small: Small::Width, checkpoint: test_networks::deterministic_of_width },
             TestNetwork { name: "body", small: Small::Width, checkpoint: test_networks::body_of_width },
         ],
         open,
     },
-    flags: &[
-        Flag::new(
-            SAMPLES,
-            "N,N,N|N",
-            "Samples on a ray of a PixelNeRF: in the first pass, in the second pass by weight, and in the second pass around \
-             the depth [default: 64,16,16]",
-            |text| parse_samples(text).map(drop),
-        ),
-        NEAR_FAR,
-        Flag::switch(
-            PUBLISHED_DEPTH,
-            "Place second-pass samples around the depth of the published code (the sum of weights times depths, too near \
-             on rays that are not opaque) instead of the mean depth",
-        ),
-        Flag::new(
-            PROBE_STEP,
-            "PIXELS",
-            "Probe one ray in every square of this many pixels on a side for empty space [default: 4]",
-            |text| parse_step(text).map(drop),
-        )
-        .about(FlagAbout::Effort, BOUNDS_OR_EXACT),
-        Flag::new(
-            PROBE_ERROR,
-            "ERROR",
-            "Raise the threshold of empty space while the probes' colours change by at most this, root mean square; 1 is \
-             from black to white [default: 1/128]",
-            |text| parse_error(text).map(drop),
-        )
-        .about(FlagAbout::Effort, BOUNDS_OR_EXACT),
-        Flag::switch(
-            HALF_LATENTS,
-            "Keep the latents that points look up in half precision (f16): half of their memory",
-        )
-        .about(FlagAbout::Effort, BOUNDS_OR_EXACT),
-    ],
+    flags: Given::FLAGS,
     omissions: &[LAYERS, BEHIND, SPACE, RAYS, PARTS, HIDDEN],
     presets: presets::of,
 };
@@ -91,11 +53,19 @@ pub(super) const RAYS: Omission = Omission {
 const PARTS: Omission = Omission { name: "parts", part: "in empty parts of rays", ..RAYS };
 const HIDDEN: Omission = Omission { name: "hidden", part: "behind surfaces", ..RAYS };
 
-const SAMPLES: &str = "samples";
-const PUBLISHED_DEPTH: &str = "published-depth";
-const PROBE_STEP: &str = "probe-step";
-const PROBE_ERROR: &str = "probe-error";
-const HALF_LATENTS: &str = "half-latents";
+flags! {
+    samples: [u32; 3] = "samples", "N,N,N|N", parse_samples, Picture, &[], "Samples on a ray of a PixelNeRF: in the first \
+        pass, in the second pass by weight, and in the second pass around the depth [default: 64,16,16]";
+    near_far: [f32; 2] = "near-far", "NEAR,FAR", parse_near_far, Picture, &[], NEAR_FAR;
+    published_depth: () = "published-depth", "", switch, Picture, &[], "Place second-pass samples around the depth of the \
+        published code (the sum of weights times depths, too near on rays that are not opaque) instead of the mean depth";
+    probe_step: u32 = "probe-step", "PIXELS", parse_step, Effort, BOUNDS_OR_EXACT, "Probe one ray in every square of this \
+        many pixels on a side for empty space [default: 4]";
+    probe_error: f32 = "probe-error", "ERROR", parse_error, Effort, BOUNDS_OR_EXACT, "Raise the threshold of empty space \
+        while the probes' colours change by at most this, root mean square; 1 is from black to white [default: 1/128]";
+    half_latents: () = "half-latents", "", switch, Effort, BOUNDS_OR_EXACT, "Keep the latents that points look up in half \
+        precision (f16): half of their memory";
+}
 
 /// In the first pass, in the second by weight, and in the second around the depth.
 fn parse_samples(text: &str) -> Result<[u32; 3], String> {
@@ -114,36 +84,31 @@ fn parse_error(text: &str) -> Result<f32, String> {
 
 /// Opens the network with these options.
 fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
-    let default = Sampling::default();
-    let [coarse_count, importance_count, depth_count] = options.value(SAMPLES, parse_samples).unwrap_or([
-        default.coarse_count,
-        default.importance_count,
-        default.depth_count,
-    ]);
+    let (given, usual, computes) = (Given::of(options), PixelNerfOptions::default(), |what| options.computes(what));
+    let Sampling { coarse_count, importance_count, depth_count, .. } = usual.sampling;
+    let counts = given.samples.unwrap_or([coarse_count, importance_count, depth_count]);
+    let [coarse_count, importance_count, depth_count] = counts;
     let sampling = Sampling {
         coarse_count,
         importance_count,
         depth_count,
         seed: options.seed,
-        near_far: options.value(NEAR_FAR.name, crate::learned::parse_near_far),
-        published_depth: options.is_given(PUBLISHED_DEPTH),
-        ..default
+        near_far: given.near_far,
+        published_depth: given.published_depth.is_some(),
+        ..usual.sampling
     };
-    let (usual, computes) = (Omissions::default(), |what| options.computes(what));
-    let step = options.value(PROBE_STEP, parse_step).unwrap_or(usual.empty_space);
-    let error = options.value(PROBE_ERROR, parse_error).unwrap_or(usual.probe_error);
+    let Omissions { empty_space, probe_error, .. } = usual.omissions;
     let omissions = Omissions {
         unused_views: !computes(VIEWS.name),
         latent_layers: !computes(LAYERS.name),
-        half_latents: options.is_given(HALF_LATENTS),
+        half_latents: given.half_latents.is_some(),
         unseen_points: !computes(BEHIND.name),
-        empty_space: if computes(SPACE.name) { 0 } else { step },
-        probe_error: if options.exact { 0.0 } else { error },
-        interpolation: usual.interpolation,
-        nodes: usual.nodes,
+        empty_space: if computes(SPACE.name) { 0 } else { given.probe_step.unwrap_or(empty_space) },
+        probe_error: if options.exact { 0.0 } else { given.probe_error.unwrap_or(probe_error) },
         empty_rays: !computes(RAYS.name),
         empty_parts: !computes(PARTS.name),
         hidden_samples: !computes(HIDDEN.name),
+        ..usual.omissions
     };
     Ok(AnyField::new(PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions })?))
 }

@@ -3,7 +3,7 @@
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use viewfuse_field::options::{FieldOptions, Flag, FlagAbout};
-use viewfuse_field::row::{Origin, Row};
+use viewfuse_field::row::Row;
 use viewfuse_field::rows::ROWS;
 
 /// Heading of the options of any network.
@@ -16,9 +16,9 @@ fn stated(name: &str) -> Vec<(&'static Row, &'static Flag)> {
 }
 
 /// The names of all flags about something.
-fn names(about: FlagAbout) -> Vec<&'static str> {
+fn names(about: u8) -> Vec<&'static str> {
     let mut names = Vec::new();
-    for flag in ROWS.iter().flat_map(|row| row.flags).filter(|flag| flag.about == about) {
+    for flag in ROWS.iter().flat_map(|row| row.flags).filter(|flag| flag.about as u8 == about) {
         if !names.contains(&flag.name) {
             names.push(flag.name);
         }
@@ -38,82 +38,60 @@ fn argument(name: &'static str) -> Arg {
             _ => NETWORK,
         })
         .conflicts_with_all(stated.iter().flat_map(|(_, flag)| flag.conflicts.iter().copied()));
-    let argument = match stated.iter().all(|(row, _)| matches!(row.origin, Origin::Learned { .. })) {
-        true => argument.requires("model"),
-        false => argument,
-    };
-    let Some(form) = stated.iter().find_map(|(_, flag)| flag.value) else {
-        return argument.action(ArgAction::SetTrue);
-    };
-    let argument = argument.value_name(form);
+    let is_learned = stated.iter().all(|(row, _)| row.prefix().is_some());
+    let argument = if is_learned { argument.requires("model") } else { argument };
     match stated[..] {
-        [(_, flag)] => argument.value_parser(|text: &str| (flag.check)(text).map(|()| text.to_owned())),
-        _ => argument,
+        [(_, Flag { form: "", .. }), ..] => argument.action(ArgAction::SetTrue),
+        [(_, flag)] => {
+            let parse = move |text: &str| (flag.check)(text).map(|()| text.to_owned());
+            argument.value_name(flag.form).value_parser(parse)
+        }
+        [(_, flag), ..] => argument.value_name(flag.form),
+        [] => argument,
     }
 }
+
+/// What flags are about, as a parameter.
+pub(crate) const PICTURE: u8 = FlagAbout::Picture as u8;
+pub(crate) const EFFORT: u8 = FlagAbout::Effort as u8;
+pub(crate) const SEQUENCE: u8 = FlagAbout::Sequence as u8;
 
 /// The given flags about something, with their values.
-#[derive(Default)]
-struct Given(Vec<(&'static str, String)>);
+pub(crate) struct Flags<const ABOUT: u8>(Vec<(&'static str, String)>);
 
-impl Given {
-    fn of(matches: &ArgMatches, about: FlagAbout) -> Given {
-        let value = |name: &'static str| match stated(name)[0].1.value {
-            None => matches.get_flag(name).then(|| (name, String::new())),
-            Some(_) => matches.get_one::<String>(name).map(|value| (name, value.clone())),
-        };
-        Given(names(about).into_iter().filter_map(value).collect())
+impl<const ABOUT: u8> Flags<ABOUT> {
+    /// `options` with these flags.
+    pub(crate) fn given_to(&self, options: FieldOptions) -> FieldOptions {
+        self.0.iter().fold(options, |options, (name, value)| options.with(*name, value))
+    }
+
+    /// Whether none is given.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
     }
 }
 
-/// Declares the flags about something as a group of arguments.
-macro_rules! groups {
-    ($($(#[$doc:meta])* $Group:ident $about:ident)+) => {$(
-        $(#[$doc])*
-        pub(crate) struct $Group(Given);
+impl<const ABOUT: u8> FromArgMatches for Flags<ABOUT> {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let value = |name: &'static str| match stated(name)[0].1.form {
+            "" => matches.get_flag(name).then(|| (name, String::new())),
+            _ => matches.get_one::<String>(name).map(|value| (name, value.clone())),
+        };
+        Ok(Flags(names(ABOUT).into_iter().filter_map(value).collect()))
+    }
 
-        impl $Group {
-            /// `options` with these flags.
-            pub(crate) fn given_to(&self, options: FieldOptions) -> FieldOptions {
-                self.0.0.iter().fold(options, |options, (name, value)| options.with(*name, value))
-            }
-        }
-
-        impl FromArgMatches for $Group {
-            fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-                Ok($Group(Given::of(matches, FlagAbout::$about)))
-            }
-
-            fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
-                self.0 = Given::of(matches, FlagAbout::$about);
-                Ok(())
-            }
-        }
-
-        impl Args for $Group {
-            fn augment_args(command: Command) -> Command {
-                command.args(names(FlagAbout::$about).into_iter().map(argument))
-            }
-
-            fn augment_args_for_update(command: Command) -> Command {
-                Self::augment_args(command)
-            }
-        }
-    )+};
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Flags::from_arg_matches(matches)?;
+        Ok(())
+    }
 }
 
-groups! {
-    /// What the exact pictures depend on.
-    PictureFlags Picture
-    /// What is left out of them.
-    EffortFlags Effort
-    /// How a picture follows from the one before.
-    SequenceFlags Sequence
-}
+impl<const ABOUT: u8> Args for Flags<ABOUT> {
+    fn augment_args(command: Command) -> Command {
+        command.args(names(ABOUT).into_iter().map(argument))
+    }
 
-impl SequenceFlags {
-    /// Whether pictures follow from one another.
-    pub(crate) fn are_given(&self) -> bool {
-        !self.0.0.is_empty()
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
     }
 }
