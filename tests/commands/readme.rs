@@ -185,7 +185,8 @@ fn tables_are_what_the_program_prints() {
         let arguments: Vec<String> =
             command.strip_prefix("$ viewfuse ").expect("a command").split_whitespace().map(str::to_owned).collect();
         let printed: String = run(&arguments).lines().map(|line| format!("{}\n", line.trim_end())).collect();
-        let stale = format!("{name}.txt is stale: `cargo run --release -p viewfuse-research -- run {name}` makes it again");
+        let stale =
+            format!("{name}.txt is stale: `cargo run --release -p viewfuse-research -- run {name}` makes it again");
         assert_eq!(structure(table), structure(&printed), "{stale}");
         for (old, new) in table.lines().zip(printed.lines()) {
             let differs = |(a, b): (f64, f64)| (a - b).abs() > difference;

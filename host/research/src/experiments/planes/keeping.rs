@@ -4,7 +4,7 @@ use super::TargetPlanes;
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 use viewfuse_device::cpu::Cpu;
-use viewfuse_device::{Device, DeviceError, Element, KernelTime, LayerShape, Memory};
+use viewfuse_device::{Device, DeviceError, Element, KernelTime, LayerShape, Memory, argument};
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
 
@@ -74,15 +74,6 @@ impl Memory for Keeping {
     }
 }
 
-/// How the device's method takes an array of a row.
-macro_rules! argument {
-    (layer $host:ty) => { &<Cpu as Device>::Weights };
-    (optional $host:ty) => { Option<&Vec<$host>> };
-    (write $host:ty) => { &mut Vec<$host> };
-    (write_paged $host:ty) => { &mut Vec<$host> };
-    ($kind:ident $host:ty) => { &Vec<$host> };
-}
-
 /// An array that can be looked at; of the other kinds nothing.
 macro_rules! shown {
     (read $array:ident) => {
@@ -97,13 +88,14 @@ macro_rules! shown {
 }
 
 macro_rules! forward {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc $doc:tt
+        block { $($block:ident: $Block:ty)? }
+        counts { $($count:ident)* }
+        arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }
+        $($rest:tt)*
+    })+) => {
         impl Device for Keeping {
             type Weights = <Cpu as Device>::Weights;
 
@@ -115,11 +107,11 @@ macro_rules! forward {
                 fn $method(
                     &self,
                     $($block: &$Block,)?
-                    $($($count: u32,)+)?
-                    $($array: argument!($kind $host),)+
+                    $($count: u32,)*
+                    $($array: argument!($kind $Host),)+
                 ) -> Result<(), DeviceError> {
                     self.look(Kernel::$Kernel, &[$($block)?], &[$(shown!($kind $array)),+]);
-                    Cpu.$method($($block,)? $($($count,)+)? $($array),+)
+                    Cpu.$method($($block,)? $($count,)* $($array),+)
                 }
             )+
         }
