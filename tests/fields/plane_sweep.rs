@@ -1,9 +1,10 @@
 //! The training-free field on whole photographs, on the CPU: the sample scene with a background, and a painted wall.
 
+use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{RenderOptions, render_all};
+use viewfuse::field::render::{RenderOptions, Stage, render_all};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{On, Rendered, Session};
+use viewfuse::field::{On, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
@@ -77,9 +78,10 @@ fn relevance(count: usize) -> Vec<SourceWeights> {
 fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
     let (field, count) = (TrainingFree::default(), sources.images.len());
     let renderer = On { device: &Cpu, field: &field };
-    let mut session = Session::open(&renderer, sources, &Silent).expect("a session");
-    session.weigh(&relevance(count), &Silent).expect("a weighting");
-    session.render(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
+    let options = RenderOptions::default();
+    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
+    stage.weigh_by(&relevance(count), &Silent).expect("a weighting");
+    stage.picture(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
 }
 
 /// Root mean square difference of the colours away from the border.
@@ -130,19 +132,20 @@ fn sources_without_a_weight_change_no_bit() {
         sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), gain));
         let (field, count) = (TrainingFree::default(), 4);
         let renderer = On { device: &Cpu, field: &field };
-        let mut session = Session::open(&renderer, &sources, &Silent).expect("a session");
+        let options = RenderOptions::default();
+        let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
         let among_three = |own: usize| {
             let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
             (0..3).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
             Weights::from_scores(&scores, count)
         };
-        session.weigh(&(0..4).map(among_three).collect::<Vec<_>>(), &Silent).expect("a weighting");
-        let picture = session.render(&target, &among_three(3), 0.0, &Silent).expect("a picture");
-        let [line] = &session.record().left_out[..] else { panic!("one line") };
+        stage.weigh_by(&(0..4).map(among_three).collect::<Vec<_>>(), &Silent).expect("a weighting");
+        let picture = stage.picture(&target, &among_three(3), 0.0, &Silent).expect("a picture");
+        let [line] = &stage.record().left_out[..] else { panic!("one line") };
         assert_eq!((line.what, line.left_out, line.of), ("encoded views", 1, 4));
         // A later target that uses all four does not change what an earlier one would give.
-        session.render(&target, &Weights::mean(count), 0.0, &Silent).expect("a picture");
-        assert_eq!(session.render(&target, &among_three(3), 0.0, &Silent).expect("a picture"), picture);
+        stage.picture(&target, &Weights::mean(count), 0.0, &Silent).expect("a picture");
+        assert_eq!(stage.picture(&target, &among_three(3), 0.0, &Silent).expect("a picture"), picture);
         picture
     };
     let (alone, beside) = (with_fourth(0.0), with_fourth(0.6));

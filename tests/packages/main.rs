@@ -3,13 +3,13 @@
 
 mod crates;
 mod documents;
-mod interface;
 mod libraries;
 mod modules;
 mod outside;
 mod release;
 mod rooms;
 mod safety;
+mod summary;
 mod twins;
 
 use serde_json::Value;

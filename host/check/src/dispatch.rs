@@ -2,8 +2,8 @@
 //! goes to a device, runs there and comes back. What a case adds is in [`crate::case`].
 
 use viewfuse_device::{Device, DeviceError, Element, LayerShape, Memory};
-use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
+use viewfuse_kernels::{elements, for_each_kernel};
 
 /// An array that a kernel writes, before it runs.
 #[derive(Clone, Debug)]
@@ -158,11 +158,11 @@ pub trait Dispatch: Clone + Send + Sync + 'static {
 
 /// How a dispatch holds an array of a row.
 macro_rules! host {
-    (layer $host:ty) => { LayerWeights };
-    (optional $host:ty) => { Option<Vec<$host>> };
-    (write $host:ty) => { Output<$host> };
-    (write_paged $host:ty) => { Output<$host> };
-    ($kind:ident $host:ty) => { Vec<$host> };
+    (layer $Host:ty) => { LayerWeights };
+    (optional $Host:ty) => { Option<Vec<$Host>> };
+    (write $Host:ty) => { Output<$Host> };
+    (write_paged $Host:ty) => { Output<$Host> };
+    ($kind:ident $Host:ty) => { Vec<$Host> };
 }
 
 /// The argument of a device's method.
@@ -186,40 +186,42 @@ macro_rules! download {
 }
 
 macro_rules! dispatches {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => { $(
-        $(#[$doc])*
+    ($({
+        $Kernel:ident $method:ident
+        doc { $($doc:tt)* }
+        block { $($block:ident: $Block:ty)? }
+        counts { $($count:ident)* }
+        arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }
+        elements { $($elements:tt)* }
+        $($rest:tt)*
+    })+) => { $(
+        $($doc)*
         #[derive(Clone, Debug)]
         pub struct $Kernel {
             $(
                 /// The parameters.
                 pub $block: $Block,
             )?
-            $($(
+            $(
                 #[doc = concat!("`", stringify!($count), "` of the row.")]
                 pub $count: u32,
-            )+)?
+            )*
             $(
                 #[doc = concat!("`", stringify!($array), "` of the row.")]
-                pub $array: host!($kind $host),
+                pub $array: host!($kind $Host),
             )+
         }
 
         impl Dispatch for $Kernel {
             const KERNEL: Kernel = Kernel::$Kernel;
 
-            type Loaded<D: Device> = ($(Vec<<host!($kind $host) as HostArray>::Loaded<D>>,)+);
+            type Loaded<D: Device> = ($(Vec<<host!($kind $Host) as HostArray>::Loaded<D>>,)+);
 
             #[allow(unused_variables)]
             fn element_count(&self) -> usize {
                 $(let $block = &self.$block;)?
-                $($(let $count = self.$count;)+)?
-                let elements: std::ops::Range<u32> = $elements;
+                $(let $count = self.$count;)*
+                let elements: std::ops::Range<u32> = elements!($($elements)*);
                 elements.len()
             }
 
@@ -233,7 +235,7 @@ macro_rules! dispatches {
                 ($($array,)+): &mut Self::Loaded<D>,
                 index: usize,
             ) -> Result<(), DeviceError> {
-                device.$method($(&self.$block,)? $($(self.$count,)+)? $(argument!($kind $array index)),+)
+                device.$method($(&self.$block,)? $(self.$count,)* $(argument!($kind $array index)),+)
             }
 
             #[allow(unused_variables)]

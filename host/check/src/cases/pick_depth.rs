@@ -60,15 +60,12 @@ impl Case for PickDepth {
         let first = (view.first_texel + above) as usize;
         let (entries, guess) = (&entries[first..], &guess[first..]);
         let pixels = first_row * block.width..(first_row + row_count) * block.width;
+        let picked = map(pixels.len(), 1, |index| {
+            let pixel = pixels.start + index as u32;
+            hull_oracle::pick_depth(&object[0], block, block.width, means, entries, guess, pixel)
+        });
         let mut depths = vec![Some(Bounded::ZERO); (view.width * view.height) as usize];
-        depths[(above + pixels.start) as usize..(above + pixels.end) as usize].copy_from_slice(&map(
-            pixels.len(),
-            1,
-            |index| {
-                let pixel = pixels.start + index as u32;
-                hull_oracle::pick_depth(&object[0], block, block.width, means, entries, guess, pixel)
-            },
-        ));
+        depths[(above + pixels.start) as usize..][..pixels.len()].copy_from_slice(&picked);
         depths
     }
 }

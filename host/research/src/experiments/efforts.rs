@@ -10,9 +10,10 @@ use std::path::Path;
 use std::time::Instant;
 use viewfuse_device::cpu::Cpu;
 use viewfuse_field::AnyField;
-use viewfuse_field::family::{self, Family};
 use viewfuse_field::options::FieldOptions;
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
+use viewfuse_field::row::Row;
+use viewfuse_field::rows::{self, ROWS};
 use viewfuse_job::progress::Silent;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::Scene;
@@ -27,7 +28,7 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
     };
     let scene = Scene::open(Path::new(folder))?;
     let field = match model.first() {
-        Some(name) => family::open(checkpoint(name)?, &FieldOptions::default())?,
+        Some(name) => rows::open(checkpoint(name)?, &FieldOptions::default())?,
         None => AnyField::default(),
     };
     let selection =
@@ -79,7 +80,7 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
             -20.0 * error.log10(),
             effort.typical_error,
             seconds / exact_seconds,
-            effort.typical_work,
+            effort.typical_share,
         );
         before = Some(colours);
     }
@@ -88,7 +89,7 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
 
 /// A file, or a test network of its published size.
 fn checkpoint(name: &str) -> anyhow::Result<Checkpoint> {
-    let networks = Family::ALL.into_iter().flat_map(Family::test_networks);
+    let networks = ROWS.into_iter().flat_map(Row::test_networks);
     match networks.into_iter().find(|network| network.name == name) {
         Some(network) => Ok((network.checkpoint)(None)),
         None => Ok(Checkpoint::open(Path::new(name))?),

@@ -16,7 +16,7 @@ use viewfuse_evaluate::metrics::interval::Interval;
 use viewfuse_evaluate::protocol::{Draws, Job, Protocol};
 use viewfuse_field::options::FieldOptions;
 use viewfuse_field::render::{Frame, RenderOptions, Stage, open_album};
-use viewfuse_field::{AnyField, family};
+use viewfuse_field::{AnyField, rows};
 use viewfuse_job::progress::Silent;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::Scene;
@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &[String]) -> anyhow::Result<()> {
     };
     let (protocol, side): (Protocol, u32) = (protocol.parse()?, side.parse()?);
     let scenes = folders.iter().map(|folder| Scene::open(Path::new(folder))).collect::<Result<Vec<_>, _>>()?;
-    let network = family::open(Checkpoint::open(Path::new(model))?, &FieldOptions::default())?;
+    let network = rows::open(Checkpoint::open(Path::new(model))?, &FieldOptions::default())?;
     let plan = protocol.plan(&scenes, Draws { seed: 0, trial_count: 1, target_count: TARGETS }, 2)?;
     // `[share, then the choice by windows][job]`: means over the targets.
     let mut rows = vec![Vec::new(); SHARES.len() + 1];

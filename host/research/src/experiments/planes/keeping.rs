@@ -3,8 +3,9 @@
 use super::TargetPlanes;
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
+use viewfuse_device::argument;
 use viewfuse_device::cpu::Cpu;
-use viewfuse_device::{Device, DeviceError, Element, KernelTime, LayerShape, Memory, argument};
+use viewfuse_device::{Device, DeviceError, Element, KernelTime, LayerShape, Memory};
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
 
@@ -90,7 +91,7 @@ macro_rules! shown {
 macro_rules! forward {
     ($({
         $Kernel:ident $method:ident
-        doc $doc:tt
+        doc { $($doc:tt)* }
         block { $($block:ident: $Block:ty)? }
         counts { $($count:ident)* }
         arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }

@@ -1,11 +1,12 @@
 //! The bounding box of the visual hull.
 
+use super::{SourceImage, SourceImages};
+use crate::rig::nearest_point_to_lines;
+use rayon::prelude::*;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_device::parallel::map;
 use viewfuse_kernels::visual_hull::ObjectBlock;
 use viewfuse_kernels::visual_hull::hull::hull_alpha;
-use viewfuse_scene::rig::nearest_point_to_lines;
 
 /// Grid cells along a side of the two passes, coarse and fine.
 const GRIDS: [usize; 2] = [32, 48];
@@ -16,8 +17,26 @@ const SILHOUETTE_ALPHA: f32 = 0.3;
 /// The first box is larger than the largest silhouette by this factor.
 const ALLOWANCE: f32 = 1.2;
 
-/// The box around every point that is inside all silhouettes, or `None` if there is none.
-pub(super) fn find(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<ObjectBlock> {
+/// The bounding box of the visual hull of the sources' silhouettes, or `None` if it is empty.
+pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
+    let (cameras, texels) = joined(&sources.images);
+    bounding_box(&cameras, &texels)
+}
+
+/// All sources' texels, concatenated, and the cameras with the offsets of their texels.
+pub fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
+    let mut cameras = Vec::with_capacity(images.len());
+    let mut texels = Vec::new();
+    for image in images {
+        cameras.push(image.camera.block(texels.len() as u32));
+        texels.extend_from_slice(&image.texels);
+    }
+    (cameras, texels)
+}
+
+/// The box around every point that is inside all silhouettes, or `None` if there is none. `texels` are those of the
+/// cameras one after the other ([`joined`]).
+pub fn bounding_box(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<ObjectBlock> {
     let view_count = cameras.len() as u32;
     let (middle, radius) = first_guess(cameras, texels)?;
     let reach = Vec3::splat(ALLOWANCE * radius);
@@ -25,7 +44,10 @@ pub(super) fn find(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<Objec
     for side in GRIDS {
         let (low, high) = corners(&object);
         let cell = (high - low) / side as f32;
-        let boxes = map(side, 1, |slice| occupied_box(&object, cameras, texels, low, cell, side, slice));
+        let boxes: Vec<_> = (0..side)
+            .into_par_iter()
+            .map(|slice| occupied_box(&object, cameras, texels, low, cell, side, slice))
+            .collect();
         let inside = boxes.into_iter().flatten().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
         // Only centres of cells were tested: the object may reach up to a cell beyond them.
         object = ObjectBlock::new(inside.0 - cell, inside.1 + cell, view_count);
@@ -52,7 +74,7 @@ fn first_guess(cameras: &[CameraBlock], texels: &[[f32; 4]]) -> Option<(Vec3, f3
             .map(move |(pixel, _)| ((pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5))
             .collect::<Vec<(f32, f32)>>()
     };
-    let silhouettes = map(cameras.len(), 1, |camera| silhouette(&cameras[camera]));
+    let silhouettes: Vec<_> = cameras.par_iter().map(silhouette).collect();
     let lines: Vec<(Vec3, Vec3)> = cameras
         .iter()
         .zip(&silhouettes)

@@ -1,6 +1,6 @@
 //! Which views see a point. Behind its camera a view's weight is 0: nothing of the view is looked up or computed there.
 //!
-//! Points are asked in groups that the same views see, each with these views alone and their weights at its points. Rows of
+//! Points are evaluated in groups that the same views see, each with these views alone and their weights at its points. Rows of
 //! the network do not depend on one another and sums over views run in the same order, so outputs have the same bits.
 
 use super::network::{Network, Views, Workspace};
@@ -14,7 +14,7 @@ use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::pixelnerf::{is_in_front, visible_weight};
 
 /// Cameras and weights of a target's views.
-pub(super) struct Sight {
+pub(super) struct Visibility {
     pub(super) cameras: Vec<CameraBlock>,
     pub(super) weights: Vec<f32>,
 }
@@ -30,7 +30,7 @@ pub(super) struct Group {
     pub(super) points: Vec<usize>,
 }
 
-impl Sight {
+impl Visibility {
     /// Whether a view has weight 0 somewhere on a target's rays: everywhere, or because an end of a ray is behind it.
     pub(super) fn is_partial(&self, cast: &CastBlock) -> bool {
         if self.weights.contains(&0.0) {
@@ -95,40 +95,40 @@ fn frustum(cast: &CastBlock) -> [Vec3; 8] {
 }
 
 impl<D: Device> Network<'_, D> {
-    /// As [`Network::ask`], without views at points where their weight is 0. Returns how many views of points were left out.
-    pub(super) fn ask_seeing(
+    /// As [`Network::evaluate`], without views at points where their weight is 0. Returns how many views of points were left out.
+    pub(super) fn evaluate_visible(
         &self,
         workspace: &mut Workspace<D>,
         views: &Views<'_, D>,
         point_count: u32,
     ) -> Result<u64, DeviceError> {
-        let Some(sight) = &views.sight else {
-            self.ask(workspace, views, point_count)?;
+        let Some(visibility) = &views.visibility else {
+            self.evaluate(workspace, views, point_count)?;
             return Ok(0);
         };
         let points = self.device.download(&workspace.points)?;
-        let groups = sight.groups(&points[..point_count as usize]);
+        let groups = visibility.groups(&points[..point_count as usize]);
         if let [Group { views: seeing, .. }] = &groups[..]
             && seeing.len() == views.latents.len()
         {
-            self.ask(workspace, views, point_count)?;
+            self.evaluate(workspace, views, point_count)?;
             return Ok(0);
         }
         let mut raw = vec![0.0; workspace.point_count as usize * 4];
         let mut left_out = 0;
         for Group { views: seeing, weights, points: indices } in groups {
-            let cameras: Vec<CameraBlock> = seeing.iter().map(|view| sight.cameras[*view]).collect();
+            let cameras: Vec<CameraBlock> = seeing.iter().map(|view| visibility.cameras[*view]).collect();
             let own = Views {
                 cameras: self.device.upload(&cameras)?,
                 weights: self.device.upload(&weights)?,
                 latents: seeing.iter().map(|view| views.latents[*view]).collect(),
-                sight: None,
+                visibility: None,
             };
             let some: Vec<RayPoint> = indices.iter().map(|index| points[*index]).collect();
             let all = replace(&mut workspace.points, self.device.upload(&some)?);
-            let asked = self.ask(workspace, &own, some.len() as u32);
+            let evaluated = self.evaluate(workspace, &own, some.len() as u32);
             workspace.points = all;
-            asked?;
+            evaluated?;
             left_out += ((views.latents.len() - seeing.len()) * some.len()) as u64;
             let outputs = self.device.download(&workspace.raw)?;
             for (index, output) in indices.iter().zip(outputs.as_chunks::<4>().0) {
