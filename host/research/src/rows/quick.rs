@@ -85,7 +85,10 @@ pub(super) fn rows() -> Vec<Row> {
             "efforts",
             &["efforts.txt"],
             vec![
-                work("viewfuse scenes photograph room {WORK}/room --rig forward --views 6 --size 64x48 --seed 7"),
+                Step::Once(
+                    "{WORK}/room",
+                    "viewfuse scenes photograph room {WORK}/room --rig forward --views 6 --size 64x48 --seed 7",
+                ),
                 print("viewfuse-research efforts {WORK}/room 0,1,3,4 2"),
             ],
         ),
