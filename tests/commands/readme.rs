@@ -1,10 +1,11 @@
-//! The READMEs: their commands are run as they stand there, their links lead somewhere, two tables are what the program
+//! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead somewhere, two tables are what the program
 //! prints, and every published package has its own.
 
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
 use viewfuse_tests::places::{links, readmes, repository};
+use viewfuse_tests::source::files;
 
 viewfuse_tests::trials![
     every_command_runs,
@@ -149,7 +150,8 @@ fn headings(text: &str) -> Vec<String> {
 
 fn links_lead_somewhere() {
     let mut count = 0;
-    for path in readmes() {
+    let reports = files(&repository().join("host/research/results"), "md");
+    for path in readmes().into_iter().chain(reports) {
         for (link, file, heading) in links(&path, &read(&path)) {
             assert!(file.exists(), "{}: {link}", path.display());
             if let Some(heading) = heading {

@@ -73,6 +73,8 @@ fn result(row: &Row, place: &Place, command: &Path) -> anyhow::Result<Stamp> {
     let mut kept = Vec::new();
     for step in &row.steps {
         match step {
+            Step::Once(folder, _) if Path::new(&place.path(folder)).exists() => {}
+            Step::Once(_, line) => drop(done(line, place, command, Stdio::null())?),
             Step::Run(line) => drop(done(line, place, command, Stdio::null())?),
             Step::Print(line) => {
                 let text = done(line, place, command, Stdio::piped())?;

@@ -11,6 +11,8 @@ use std::process::{Command, Stdio};
 pub(crate) enum Step {
     /// A command line; what it prints goes into the result's first file, below the line.
     Print(String),
+    /// A folder, and the command line that makes it, whole; it is not run again where the folder is.
+    Once(&'static str, &'static str),
     /// A command line that leaves files: data, unfinished work, or the result itself.
     Run(String),
     /// A file that a step left becomes a file of the result, by this name. Its path begins in the repository or at a place.

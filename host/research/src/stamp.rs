@@ -64,7 +64,13 @@ pub(crate) fn digest(text: &str, paths: &[&str]) -> anyhow::Result<String> {
     let mut parts = text.to_owned();
     for path in paths {
         let mut files = Vec::new();
-        collect(&repository().join(path), &mut files).with_context(|| (*path).to_owned())?;
+        let path = repository().join(path);
+        collect(&path, &mut files).with_context(|| path.display().to_string())?;
+        // A module stands beside its folder.
+        let beside = path.with_extension("rs");
+        if path.is_dir() && beside.exists() {
+            files.push(beside);
+        }
         for file in files {
             let own = match file.extension().is_some_and(|extension| extension == "rs") {
                 true => {

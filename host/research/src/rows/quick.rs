@@ -81,7 +81,17 @@ pub(super) fn rows() -> Vec<Row> {
                 "viewfuse-research self_knowledge 48 1 chosen tests/data/room=nearest:4 tests/data/room=llff:3",
             )],
         ),
-        quick("efforts", &["efforts.txt"], vec![print("viewfuse-research efforts tests/data/room 3,4,6,7 5")]),
+        quick(
+            "efforts",
+            &["efforts.txt"],
+            vec![
+                Step::Once(
+                    "{WORK}/room",
+                    "viewfuse scenes photograph room {WORK}/room --rig forward --views 6 --size 64x48 --seed 7",
+                ),
+                print("viewfuse-research efforts {WORK}/room 0,1,3,4 2"),
+            ],
+        ),
         quick("sweep_time", &["sweep_time.txt"], vec![print("viewfuse-research sweep_time tests/data/room")]),
         quick(
             "pareto_training_free",
