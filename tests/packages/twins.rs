@@ -1,92 +1,93 @@
-//! The mark `twin` of a kernel's row: a kernel with the mark has a form of its own on the CPU, which does not call the
-//! body; the form of a kernel without the mark calls it.
+//! The marks of kernels' rows that no compiler checks: `definition` and `measured` say that no production code calls a
+//! kernel, `twin` that the CPU does not call its body.
 
-use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::Kernel;
+use viewfuse_kernels::{for_each_kernel, has_mark};
 use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
-macro_rules! bodies {
+macro_rules! marks {
     ($({
         $Kernel:ident $method:ident
-        doc $doc:tt block $block:tt counts $counts:tt arrays $arrays:tt elements $elements:tt marks $marks:tt
-        body { $first:ident $(:: $body:ident)* }
+        doc $doc:tt block $block:tt counts $counts:tt arrays $arrays:tt elements $elements:tt
+        marks { $($mark:ident)* }
     })+) => {
-        /// Each kernel with the last name of its body's path.
-        fn bodies() -> Vec<(Kernel, &'static str)> {
-            vec![$((Kernel::$Kernel, [stringify!($first) $(, stringify!($body))*].last().expect("a name"))),+]
+        /// Kernels that production code does not call, by their rows.
+        fn without_caller(kernel: Kernel) -> bool {
+            match kernel {
+                $(Kernel::$Kernel => has_mark!(definition: $($mark)*) || has_mark!(measured: $($mark)*),)+
+            }
         }
     };
 }
 
-for_each_kernel!(bodies);
+for_each_kernel!(marks);
 
-/// Whether code uses a name. Where a function of that name is declared does not count.
-fn uses(code: &str, name: &str) -> bool {
-    let is_part = |character: char| character.is_alphanumeric() || character == '_';
-    code.match_indices(name).any(|(place, _)| {
-        let (before, after) = (&code[..place], &code[place + name.len()..]);
-        !before.ends_with(is_part) && !after.starts_with(is_part) && !before.ends_with("fn ")
+/// Crates that make pictures: what calls a kernel here calls it for a user. What checks and measures devices does not.
+const PRODUCTION: [&str; 6] = ["host/weighting", "host/nn", "host/field", "host/evaluate", "host/view", "host/train"];
+
+fn sources(folders: &[&str]) -> Vec<Source> {
+    let paths = folders.iter().flat_map(|folder| files(&repository().join(folder).join("src"), "rs"));
+    let is_test = |path: &std::path::Path| {
+        path.components().any(|part| part.as_os_str() == "tests" || part.as_os_str() == "tests.rs")
+    };
+    paths.filter(|path| !is_test(path)).map(|path| Source::read(&path)).collect()
+}
+
+/// Whether code calls a method of what is called a device.
+fn calls(sources: &[Source], method: &str) -> bool {
+    let calls = [format!("device.{method}("), format!("device().{method}(")];
+    sources.iter().any(|source| {
+        let code = source.code.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        let code: String = code.split_whitespace().collect();
+        calls.iter().any(|call| code.contains(call))
     })
 }
 
-/// The form of this name: its function, from the name to the brace that ends it.
-fn form<'a>(sources: &'a [Source], name: &str) -> Option<&'a str> {
-    let head = format!("\npub(super) fn {name}(");
-    sources
-        .iter()
-        .find_map(|source| source.code.split(&head).nth(1))
-        .map(|rest| rest.split("\n}\n").next().unwrap_or(rest))
-}
-
 /// What is wrong with the mark of a kernel.
-fn fault(sources: &[Source], name: &str, body: &str, has_twin: bool) -> Option<String> {
-    let Some(form) = form(sources, name) else { return Some(format!("{name} has no form on the CPU")) };
-    // What a form calls may call the body: no file may name the body of a kernel with a twin.
-    let of_twin = has_twin.then(|| sources.iter().any(|source| uses(&source.code, body)));
-    match of_twin {
-        Some(true) => Some(format!("{name} is marked twin, but {body} is called")),
-        None if !uses(form, body) => Some(format!("{name} is not marked twin, but does not call {body}")),
+fn fault(sources: &[Source], method: &str, is_marked: bool) -> Option<String> {
+    match (calls(sources, method), is_marked) {
+        (true, true) => Some(format!("{method} is marked definition or measured, but production code calls it")),
+        (false, false) => Some(format!("{method} has no caller in production, and no mark that says so")),
         _ => None,
     }
 }
 
 #[test]
-fn forms_of_the_cpu_are_as_their_rows_say() {
-    let folder = repository().join("host/device/src/cpu");
-    let sources: Vec<Source> = files(&folder, "rs").iter().map(|path| Source::read(path)).collect();
-    let faults: Vec<String> = bodies()
-        .into_iter()
-        .filter_map(|(kernel, body)| fault(&sources, kernel.name(), body, kernel.has_twin()))
-        .collect();
+fn kernels_without_a_caller_are_marked() {
+    let sources = sources(&PRODUCTION);
+    let faults: Vec<String> =
+        Kernel::ALL.into_iter().filter_map(|kernel| fault(&sources, kernel.name(), without_caller(kernel))).collect();
     assert!(faults.is_empty(), "{faults:#?}");
-    let twins = Kernel::ALL.into_iter().filter(|kernel| kernel.has_twin()).count();
-    assert!((1..Kernel::ALL.len()).contains(&twins), "{twins} twins");
 }
 
 #[test]
-fn a_wrong_mark_is_found() {
-    let source = |body: &str| {
-        let text = format!(
-            "use x::y;\n\npub(super) fn add(block: &Block) {{\n    {body}\n}}\n\nfn other() {{ subtract() }}\n"
-        );
-        [Source::new(&text)]
-    };
-    for (body, has_twin, is_right) in [
-        ("added(block)", false, true),
-        ("core::added::<4>(block)", false, true),
-        ("// added(block)", false, false),
-        ("added_fast(block)", false, false),
-        ("\"added\";", false, false),
-        ("added_fast(block)", true, true),
-        ("map(added)", true, false),
-    ] {
-        let fault = fault(&source(body), "add", "added", has_twin);
-        assert_eq!(fault.is_none(), is_right, "{body}: {fault:?}");
-    }
-    // A form of its body's name, the body of a twin in another function, and no form.
-    assert!(fault(&source("core::add(block)"), "add", "add", false).is_none());
-    assert!(fault(&source("self.0"), "add", "add", false).is_some());
-    assert!(fault(&source(""), "add", "subtract", true).is_some());
-    assert!(fault(&source(""), "subtract", "subtracted", true).is_some());
+fn a_missing_and_a_wrong_mark_are_found() {
+    let called = [Source::new("fn a() { self.device\n    .add(x) }\n// device.subtract(x)\nmodel.subtract(y)\n")];
+    assert!(fault(&called, "add", false).is_none() && fault(&called, "subtract", true).is_none());
+    assert!(fault(&called, "add", true).is_some_and(|fault| fault.contains("production code calls it")));
+    assert!(fault(&called, "subtract", false).is_some_and(|fault| fault.contains("no caller")));
+    let tests = [Source::new("fn a() {}\n\n#[cfg(test)]\nmod tests {\n    fn b() { device.add(x) }\n}\n")];
+    assert!(fault(&tests, "add", false).is_some());
+}
+
+/// Whether a body's function is called.
+fn calls_body(sources: &[Source], kernel: Kernel) -> bool {
+    let call = format!("bodies::{}(", kernel.name());
+    sources.iter().any(|source| source.code.contains(&call))
+}
+
+/// The loops that are made from the rows name no body of a twin, so that only what is written by hand could call one.
+#[test]
+fn no_twin_calls_the_body_that_it_is_tested_against() {
+    let sources = sources(&["host/device"]);
+    let called: Vec<&str> = Kernel::ALL
+        .into_iter()
+        .filter(|kernel| kernel.has_twin() && calls_body(&sources, *kernel))
+        .map(Kernel::name)
+        .collect();
+    assert!(called.is_empty(), "{called:?}");
+    let twins = Kernel::ALL.into_iter().filter(|kernel| kernel.has_twin()).count();
+    assert!((1..Kernel::ALL.len()).contains(&twins), "{twins} twins");
+    assert!(calls_body(&[Source::new("fn a() { bodies::linear(block) }")], Kernel::Linear));
 }

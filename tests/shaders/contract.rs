@@ -76,8 +76,8 @@ fn a_module_that_is_split_goes_to_one_side() {
 #[test]
 fn the_other_module_is_seen() {
     let said = breaches(Part::Kernels, &subgroups());
-    assert!(said.iter().any(|said| said == "linear_subgroup: not a kernel"), "{said:?}");
-    assert!(said.iter().any(|said| said == "linear_buffered: no entry point"), "{said:?}");
+    assert!(said.iter().any(|said| said == "linear::subgroup: not a kernel"), "{said:?}");
+    assert!(said.iter().any(|said| said == "linear::buffered: no entry point"), "{said:?}");
     let said = breaches(Part::Subgroups, &kernels());
     assert!(said.iter().any(|said| said == "linear: not a kernel"), "{said:?}");
 }

@@ -27,7 +27,7 @@ use viewfuse_kernels::pixelnerf::{
     EmbedBlock, GatherBlock, embedded_value, gathered_value, gathered_value_f16, radiance, visible_weight,
 };
 use viewfuse_kernels::sample_mask::{RaysBlock, SampleMaskBlock, is_sampled, weigh_sample};
-use viewfuse_shaders::{Piece, Push, compositing, points, rays, sampler, weighting};
+use viewfuse_shaders::{Piece, Push};
 
 /// What an element holds before anything is written.
 const UNTOUCHED: f32 = -77.0;
@@ -66,7 +66,7 @@ fn weigh_is_core_s() {
     let block = WeighBlock { scheme: Scheme::ERROR.block(), source_count: 7 };
     let mut weights = vec![[UNTOUCHED; MAX_WEIGHED]; 70];
     dispatch(block, 70, |id, push| {
-        weighting::weigh(id, push, &blocks(&sources), &blocks(&targets), &mut weights);
+        viewfuse_shaders::weigh(id, push, &blocks(&sources), &blocks(&targets), &mut weights);
     });
     let sources = Sources::<MAX_WEIGHED>::new(&sources).expect("sources");
     let expected: Vec<_> = targets.iter().map(|target| *weigh(Scheme::ERROR, &sources, target).values()).collect();
@@ -78,13 +78,15 @@ fn attention_is_core_s() {
     let poses = poses(9);
     let embedding = FourierEmbedding::from_flat(&numbers(3, FourierEmbedding::PARAMETERS));
     let mut embedded = vec![[UNTOUCHED; EMBEDDING]; 9];
-    dispatch((), 9, |id, push| weighting::embed_pose(id, &push.piece, &embedding, &blocks(&poses), &mut embedded));
+    dispatch((), 9, |id, push| {
+        viewfuse_shaders::embed_pose(id, &push.piece, &embedding, &blocks(&poses), &mut embedded)
+    });
     let expected: Vec<_> = poses.iter().map(|pose| embedding.embed(pose)).collect();
     assert_eq!(embedded, expected);
 
     let (queries, keys) = (numbers(4, 70 * EMBEDDING), numbers(5, 6 * EMBEDDING));
     let mut weights = vec![[UNTOUCHED; MAX_WEIGHED]; 70];
-    dispatch(6, 70, |id, push| weighting::attend(id, push, &queries, &keys, &mut weights));
+    dispatch(6, 70, |id, push| viewfuse_shaders::attend(id, push, &queries, &keys, &mut weights));
     let expected: Vec<_> = queries
         .chunks(EMBEDDING)
         .map(|query| *viewfuse_core::attention::attend::<MAX_WEIGHED>(query, &keys[..], 6).values())
@@ -97,14 +99,14 @@ fn light_is_core_s() {
     let (weights, latents) = (numbers(6, 5), numbers(7, 5 * 90));
     let block = FuseBlock { view_count: 5, stride: 90, ..FuseBlock::default() };
     let mut fused = vec![UNTOUCHED; 90];
-    dispatch(block, 90, |id, push| compositing::fuse_views(id, push, &weights, &latents, &mut fused));
+    dispatch(block, 90, |id, push| viewfuse_shaders::fuse_views(id, push, &weights, &latents, &mut fused));
     let expected: Vec<f32> = (0..90).map(|at| fuse_element(&weights[..], &latents[at..], &block)).collect();
     assert_eq!(fused, expected);
 
     // Fifteen points of six channels, each with its own weights.
     let weights = numbers(6, 15 * 5);
     let block = FuseBlock { channel_count: 6, weight_stride: 5, ..block };
-    dispatch(block, 90, |id, push| compositing::fuse_views(id, push, &weights, &latents, &mut fused));
+    dispatch(block, 90, |id, push| viewfuse_shaders::fuse_views(id, push, &weights, &latents, &mut fused));
     let expected: Vec<f32> = (0..90).map(|at| fuse_element(&weights[at / 6 * 5..], &latents[at..], &block)).collect();
     assert_eq!(fused, expected);
 
@@ -113,7 +115,7 @@ fn light_is_core_s() {
     let block = CompositeBlock { background: [0.1, 0.2, 0.3], empty_depth: 9.0, sample_count: 6 };
     let (mut colours, mut depths) = (vec![[UNTOUCHED; 4]; 80], vec![UNTOUCHED; 80]);
     dispatch(block, 80, |id, push| {
-        compositing::composite(id, push, &samples, &sample_depths, &mut colours, &mut depths);
+        viewfuse_shaders::composite(id, push, &samples, &sample_depths, &mut colours, &mut depths);
     });
     for (ray, (colour, depth)) in colours.iter().zip(&depths).enumerate() {
         let seen = composite_samples(&samples[ray * 6..], &sample_depths[ray * 6..], &block);
@@ -131,7 +133,7 @@ fn samplers_are_core_s() {
     for (mix, fourth) in [(mix, fourth), (Mix { results: [0.5, -0.25, 0.125, 0.0], ..mix }, &[][..])] {
         let mut mixed = vec![UNTOUCHED; 90];
         dispatch(mix, 90, |id, push| {
-            sampler::mix_pictures(id, push, state, newest, second, third, fourth, &mut mixed);
+            viewfuse_shaders::mix_pictures(id, push, state, newest, second, third, fourth, &mut mixed);
         });
         let last = |at| fourth.get(at).copied().unwrap_or(f32::NAN);
         let expected: Vec<f32> =
@@ -141,7 +143,7 @@ fn samplers_are_core_s() {
 
     let block = NoiseBlock { seed: [7, 8], stream: 3, scale: 0.5 };
     let mut noisy = vec![UNTOUCHED; 90];
-    dispatch(block, 90, |id, push| sampler::add_noise(id, push, state, &mut noisy));
+    dispatch(block, 90, |id, push| viewfuse_shaders::add_noise(id, push, state, &mut noisy));
     let expected: Vec<f32> = (0..90).map(|at| noisy_element(&block, state[at as usize], at)).collect();
     assert_eq!(noisy, expected);
 }
@@ -179,12 +181,12 @@ fn rays_are_core_s() {
     let world = World::new(1);
     let (pixels, expected, block) = rays_of(&world);
     let mut cast = vec![TargetRay::default(); 70];
-    dispatch(block, 70, |id, push| rays::cast_rays(id, push, &pixels, &mut cast));
+    dispatch(block, 70, |id, push| viewfuse_shaders::cast_rays(id, push, &pixels, &mut cast));
     assert_eq!(cast, expected);
 
     let block = CoarseBlock { seed: [3, 4], sample_count: 5, jitter: 0.8 };
     let mut depths = vec![UNTOUCHED; 350];
-    dispatch(block, 350, |id, push| rays::coarse_depths(id, push, &cast, &pixels, &mut depths));
+    dispatch(block, 350, |id, push| viewfuse_shaders::coarse_depths(id, push, &cast, &pixels, &mut depths));
     let place = |at: usize| (at / 5, at as u32 % 5);
     let coarse = |(ray, sample): (usize, u32)| coarse_depth(&cast[ray], pixels[ray], sample, &block);
     assert_eq!(depths, (0..350).map(place).map(coarse).collect::<Vec<f32>>());
@@ -193,7 +195,7 @@ fn rays_are_core_s() {
     let mut placed = vec![RayPoint::default(); samples.len()];
     let block = PlaceBlock { sample_count: 5, first: 0, has_samples: 1 };
     dispatch(block, samples.len() as u32, |id, push| {
-        rays::place_points(id, push, &samples, &cast, &depths, &mut placed)
+        viewfuse_shaders::place_points(id, push, &samples, &cast, &depths, &mut placed)
     });
     let expected: Vec<RayPoint> =
         samples.iter().map(|sample| place_point(&cast[..], &depths[..], 5, *sample)).collect();
@@ -201,7 +203,7 @@ fn rays_are_core_s() {
     // Without a list, from a place on.
     let block = PlaceBlock { sample_count: 5, first: 40, has_samples: 0 };
     let mut placed = vec![RayPoint::default(); 310];
-    dispatch(block, 310, |id, push| rays::place_points(id, push, &[0], &cast, &depths, &mut placed));
+    dispatch(block, 310, |id, push| viewfuse_shaders::place_points(id, push, &[0], &cast, &depths, &mut placed));
     let expected: Vec<RayPoint> = (40..350).map(|sample| place_point(&cast[..], &depths[..], 5, sample)).collect();
     assert_eq!(placed, expected);
 }
@@ -211,7 +213,7 @@ fn what_was_seen_is_core_s() {
     let samples: Vec<[f32; 4]> = optical_depths(70 * 6).iter().map(|depth| [9.0, 9.0, 9.0, *depth]).collect();
     let mut seen = vec![[UNTOUCHED; 2]; 420];
     let block = RaysBlock { sample_count: 6, first_ray: 0 };
-    dispatch(block, 70, |id, push| rays::weigh_samples(id, push, &samples, &mut seen));
+    dispatch(block, 70, |id, push| viewfuse_shaders::weigh_samples(id, push, &samples, &mut seen));
     assert_eq!(seen, seen_by(70, 6));
 
     let (pixels, cast, _) = rays_of(&World::new(1));
@@ -227,7 +229,9 @@ fn what_was_seen_is_core_s() {
     let nearby = SampleMaskBlock { step: 8, seen_columns: 7, seen_rows: 10, width: 48, ..block };
     for block in [block, nearby] {
         let mut wanted = vec![77; 280];
-        dispatch(block, 280, |id, push| rays::sample_mask(id, push, &seen, &cast, &pixels, &depths, &mut wanted));
+        dispatch(block, 280, |id, push| {
+            viewfuse_shaders::sample_mask(id, push, &seen, &cast, &pixels, &depths, &mut wanted)
+        });
         let expected: Vec<u32> = (0..280)
             .map(|at| {
                 let ray = at / 4;
@@ -251,7 +255,7 @@ fn fine_depths_are_core_s() {
         depth_times_opacity: 1,
     };
     let mut draws = vec![[UNTOUCHED; 2]; 490];
-    dispatch(block, 490, |id, push| rays::random_draws(id, push, &pixels, &mut draws));
+    dispatch(block, 490, |id, push| viewfuse_shaders::random_draws(id, push, &pixels, &mut draws));
     let place = |at: usize| (at / 7, at as u32 % 7);
     let drawn = |(ray, sample): (usize, u32)| random_draw(pixels[ray], sample, &block);
     assert_eq!(draws, (0..490).map(place).map(drawn).collect::<Vec<[f32; 2]>>());
@@ -260,7 +264,7 @@ fn fine_depths_are_core_s() {
     let colours: Vec<[f32; 4]> = numbers(15, 70).iter().map(|opacity| [9.0, 9.0, 9.0, *opacity]).collect();
     let mut fine = vec![UNTOUCHED; 490];
     dispatch(block, 490, |id, push| {
-        rays::fine_depths(id, push, &seen, &cast, &colours, &pixel_depths, &draws, &mut fine);
+        viewfuse_shaders::fine_depths(id, push, &seen, &cast, &colours, &pixel_depths, &draws, &mut fine);
     });
     let expected: Vec<f32> = (0..490)
         .map(|at| {
@@ -273,7 +277,7 @@ fn fine_depths_are_core_s() {
 
     let coarse = numbers(16, 70 * 6);
     let mut merged = vec![UNTOUCHED; 70 * 13];
-    dispatch(block, 70 * 13, |id, push| rays::merge_depths(id, push, &coarse, &fine, &mut merged));
+    dispatch(block, 70 * 13, |id, push| viewfuse_shaders::merge_depths(id, push, &coarse, &fine, &mut merged));
     let mut expected = vec![UNTOUCHED; 70 * 13];
     for at in 0..70 * 13 {
         let ray = at / 13;
@@ -302,13 +306,15 @@ fn points_are_core_s() {
     let block = EmbedBlock { point_count: 40, frequency_count: 3, frequency: 1.5 };
     let count = view_count * 40 * block.row_len();
     let mut embedded = vec![UNTOUCHED; count as usize];
-    dispatch(block, count, |id, push| points::embed_points(id, push, &words, &at, &mut embedded));
+    dispatch(block, count, |id, push| viewfuse_shaders::embed_points(id, push, &words, &at, &mut embedded));
     let expected: Vec<f32> = (0..count as usize).map(|at| embedded_value(&views[..], &there[..], &block, at)).collect();
     assert_eq!(embedded, expected);
 
     let (weights, count) = (numbers(18, view_count as usize), 40 * view_count);
     let mut visible = vec![UNTOUCHED; count as usize];
-    dispatch(view_count, count, |id, push| points::visible_weights(id, push, &words, &weights, &at, &mut visible));
+    dispatch(view_count, count, |id, push| {
+        viewfuse_shaders::visible_weights(id, push, &words, &weights, &at, &mut visible)
+    });
     let weight = |at: u32| {
         let point = &there[(at / view_count) as usize];
         visible_weight(&views[..], &weights[..], view_count, point, at % view_count)
@@ -317,7 +323,7 @@ fn points_are_core_s() {
 
     let raw = numbers(19, 160);
     let mut samples = vec![[UNTOUCHED; 4]; 40];
-    dispatch((), 40, |id, push| points::radiance(id, &push.piece, &raw, &at, &mut samples));
+    dispatch((), 40, |id, push| viewfuse_shaders::radiance(id, &push.piece, &raw, &at, &mut samples));
     for (at, point) in there.iter().enumerate() {
         assert_eq!(samples[point.sample as usize], radiance(&raw[at * 4..], point));
     }
@@ -342,7 +348,7 @@ fn gather_latents_is_core_s() {
         };
         let mut gathered = vec![UNTOUCHED; views.len() * 240];
         dispatch(block, 80, |id, push| {
-            points::gather_latents(id, push, &cameras, &at, &grid, &residual, &mut gathered);
+            viewfuse_shaders::gather_latents(id, push, &cameras, &at, &grid, &residual, &mut gathered);
         });
         let own = StartingAt { all: &residual[..], first: 240 };
         let expected: Vec<f32> =
@@ -353,7 +359,7 @@ fn gather_latents_is_core_s() {
         let words: Vec<u32> = (0..90).map(|word| packed_f16(&grid[..], 180, word)).collect();
         let mut gathered = vec![UNTOUCHED; views.len() * 240];
         dispatch(block, 80, |id, push| {
-            points::gather_latents_f16(id, push, &cameras, &at, &words, &residual, &mut gathered);
+            viewfuse_shaders::gather_latents_f16(id, push, &cameras, &at, &words, &residual, &mut gathered);
         });
         let expected: Vec<f32> =
             (0..240).map(|at| gathered_value_f16(&views[..], &there[..], &words[..], &own, &block, at)).collect();

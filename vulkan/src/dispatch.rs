@@ -52,7 +52,7 @@ impl Gpu {
         let page_shift = if needs_pages { self.page_shift } else { 0 };
         let job = Job { kernel, parameters, arrays, page_shift };
         self.with_state(|gpu, state| {
-            let (form, of_form) = match forms::shape(kernel, parameters) {
+            let (form, of_form) = match kernel.shape(parameters) {
                 Some(shape) => {
                     let form = gpu.form(state, &job, &Class::new(kernel, shape))?;
                     (form, 0..form.elements(shape.row_count, shape.column_count))

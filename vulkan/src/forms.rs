@@ -4,12 +4,8 @@
 //! same bits, so a choice changes nothing but the time.
 
 use crate::kernel::{Form, Kernel, TILE, WORKGROUP};
-use bytemuck::AnyBitPattern;
 use std::collections::BTreeMap;
-use viewfuse_kernels::network::attend::MatrixBlock;
-use viewfuse_kernels::network::convolve::ConvolveBlock;
-use viewfuse_kernels::network::linear::LinearBlock;
-use viewfuse_kernels::network::transpose::TransposedBlock;
+use viewfuse_kernels::network::tile::Shape;
 
 /// Dispatches of a measurement, the first of which does not count.
 pub(crate) const ROUNDS: u32 = 4;
@@ -20,42 +16,6 @@ const MEASURED_TILES: u32 = 4096;
 const MEASURED_TILES_OF_SOFTWARE: u32 = 16;
 /// Logarithm of the rows from which on all products are of one class.
 const MAX_ROWS: u32 = 14;
-
-/// The sizes of a product.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Shape {
-    pub(crate) row_count: u32,
-    pub(crate) inner_count: u32,
-    pub(crate) column_count: u32,
-}
-
-/// The product that a dispatch with these parameters computes; `None` for kernels without tiles.
-pub(crate) fn shape(kernel: Kernel, parameters: &[u8]) -> Option<Shape> {
-    let [row_count, inner_count, column_count] = match kernel {
-        Kernel::Linear => {
-            let LinearBlock { row_count, inner_count, column_count, .. } = read(parameters)?;
-            [row_count, inner_count, column_count]
-        }
-        Kernel::MatrixProduct => {
-            let MatrixBlock { row_count, inner_count, column_count, .. } = read(parameters)?;
-            [row_count, inner_count, column_count]
-        }
-        Kernel::Convolve => {
-            let block: ConvolveBlock = read(parameters)?;
-            [block.pixel_count(), block.patch_len(), block.out_channels]
-        }
-        Kernel::ConvolveTransposed => {
-            let block: TransposedBlock = read(parameters)?;
-            [block.pixel_count(), block.in_channels, block.column_count()]
-        }
-        _ => return None,
-    };
-    Some(Shape { row_count, inner_count, column_count })
-}
-
-fn read<B: AnyBitPattern>(parameters: &[u8]) -> Option<B> {
-    bytemuck::try_pod_read_unaligned(parameters).ok()
-}
 
 /// Products of one kernel that have about the same sizes.
 #[derive(Clone, Debug, PartialEq)]
@@ -159,6 +119,7 @@ fn parse_line(line: &str) -> Option<(Key, Form)> {
 mod tests {
     use super::*;
     use bytemuck::bytes_of;
+    use viewfuse_kernels::network::linear::LinearBlock;
 
     fn class(row_count: u32, inner_count: u32, column_count: u32) -> Class {
         Class::new(Kernel::Linear, Shape { row_count, inner_count, column_count })
@@ -167,12 +128,12 @@ mod tests {
     #[test]
     fn shapes_are_read_from_parameters() {
         let block = LinearBlock { row_count: 5, inner_count: 6, column_count: 7, ..LinearBlock::default() };
-        let found = shape(Kernel::Linear, bytes_of(&block));
+        let found = Kernel::Linear.shape(bytes_of(&block));
         assert_eq!(found, Some(Shape { row_count: 5, inner_count: 6, column_count: 7 }));
-        assert_eq!(shape(Kernel::Linear, &[0; 3]), None);
+        assert_eq!(Kernel::Linear.shape(&[0; 3]), None);
         for kernel in Kernel::ALL {
             let parameters = vec![0; kernel.parameter_bytes()];
-            assert_eq!(shape(kernel, &parameters).is_some(), kernel.is_tiled(), "{}", kernel.name());
+            assert_eq!(kernel.shape(&parameters).is_some(), kernel.is_tiled(), "{}", kernel.name());
         }
     }
 

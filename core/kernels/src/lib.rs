@@ -1,10 +1,11 @@
 //! The kernels of viewfuse: functions of one output element each, and the rows that declare them.
 //!
-//! A kernel's body is made of the mathematics of `viewfuse-core`; the CPU calls it in a loop, and an entry point on a Vulkan
-//! device calls it for its invocation. Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32`
+//! A kernel's body ([`bodies`]) is made of the mathematics of `viewfuse-core`; the CPU calls it in a loop, and an entry point
+//! on a Vulkan device calls it for its invocation. Everything here is `no_std`, free of allocation and of `unsafe`, and computes in `f32`
 //! and 32-bit integers. The modules are listed in the order of the data:
 //!
 //! ```text
+//! store             writing elements by index                       Store
 //! pages             buffers in several pages                        Pages, PagesMut
 //! compact           which elements a mask marks, as a list         marked_in_run, run_offsets, list_run
 //! finite            where the first NaN or infinity is             first_non_finite
@@ -15,6 +16,7 @@
 //! visual_hull       the training-free field inside silhouettes     matched depth, signed distance, density and colour
 //! plane_sweep       the training-free field for any scene          evidence, census, paths, disparity, blend
 //! limits            what a device can do at most                   chained, copied
+//! bodies            the kernels: a function of one element each
 //! rows              the list of kernels, one row each              Kernel, for_each_kernel
 //! ```
 //!
@@ -22,6 +24,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod bodies;
 pub mod compact;
 pub mod finite;
 pub mod genvs;
@@ -32,4 +35,5 @@ pub mod pixelnerf;
 pub mod plane_sweep;
 pub mod rows;
 pub mod sample_mask;
+pub mod store;
 pub mod visual_hull;

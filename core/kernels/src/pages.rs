@@ -1,6 +1,7 @@
 //! Reading and writing elements by index in several pages: a buffer that is longer than a device can bind at once lies in up
 //! to four [`Pages`] of equal length, a power of two.
 
+use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
 
 /// How many pages a buffer can have.
@@ -52,10 +53,9 @@ pub struct PagesMut<'a, T> {
     pub shift: u32,
 }
 
-impl<T: Copy> PagesMut<'_, T> {
-    /// Writes the element at `index`, which exists.
+impl<T: Copy> Store<T> for PagesMut<'_, T> {
     #[inline(always)]
-    pub fn store(&mut self, index: usize, value: T) {
+    fn store(&mut self, index: usize, value: T) {
         if self.shift == 0 {
             self.a[index] = value;
             return;

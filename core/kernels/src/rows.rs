@@ -1,12 +1,12 @@
 //! One row a kernel: its name, what it takes, what it binds, what it costs, and its body.
 //!
-//! A kernel is a function of one output element, its *body*, in this crate. Everything else that is known about a kernel
+//! A kernel is a function of one output element, its *body*, the function of its name in [`bodies`](crate::bodies). Everything else that is known about a kernel
 //! follows from its row: the variant of [`Kernel`] with its name, arrays and parameter bytes, the method of a device with
 //! its forwarding on the CPU and on Vulkan, the faulty device of the tests, and the way to the kernel's case. A row is
 //!
 //! ```text
 //! /// What it computes, and what an element is.
-//! Variant name(block: Parameters; count, ...) for element in [first..end; N a core] by path::of::body, mark, ... {
+//! Variant name(block: Parameters; count, ...) for element in [first..end; N a core], mark, ... {
 //!     kind array[place]: Element as EntryElement,
 //! }
 //! ```
@@ -47,10 +47,10 @@
 //! Buffers may be longer than the parameters say. [`for_each_kernel`](crate::for_each_kernel) hands all rows to a macro, in
 //! the form of [`normal_rows`](crate::normal_rows), which alone knows the grammar above.
 //!
-//! A new kernel is its body in a module here, its row, an entry point in `vulkan/shaders/src/`, a form in
-//! `host/device/src/cpu/` and a case with its `f64` evaluation in `host/check/src/cases/`: five files. What is missing of
-//! body, form and case does not compile; a missing entry point, or one that is not what the row says, fails a test, and so
-//! does a module that was not compiled again (`cargo shaders`).
+//! A new kernel is its row, its body in [`bodies`](crate::bodies), a case with its `f64` evaluation in
+//! `host/check/src/cases/`, and a faster form in `host/device/src/cpu/` where it has the mark `twin` or `looped`: three files
+//! or four. Its entry points on a GPU and its loop on the CPU are made from the row. What is missing of body, form and case
+//! does not compile; a module that was not compiled again (`cargo shaders`) fails a test.
 
 mod kernel;
 mod normal;

@@ -1,45 +1,39 @@
 //! The CPU: every kernel a loop over its elements, spread over all cores.
 //!
-//! A kernel's form here is a function of its name in one of the modules, on slices. Most forms call the kernel's body.
-//! Where the row says `twin`, the form has its own, faster loops, and the body in `viewfuse-core` is the definition
-//! that it is tested against.
+//! The loops are made from the rows. Where a row says `twin`, a function of the kernel's name in one of the modules has its
+//! own, faster loops, and the body in `viewfuse-kernels` is the definition that it is tested against; where it says
+//! `looped`, such a function has the loop over the body or its parts.
 
-mod compositing;
+mod fusion;
 mod group_norm;
 mod limits;
 mod linear;
-mod lists;
+mod looped;
 mod matrices;
 mod network;
-mod plane_sweep;
 mod points;
-mod rays;
-mod sampler;
 mod scratch;
-mod visual_hull;
 mod volumes;
-mod weighting;
 mod winograd;
 
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
 use crate::argument;
-use compositing::*;
+use crate::parallel::{Rest, for_each_piece};
+use bytemuck::{Pod, cast_slice_mut};
+use fusion::*;
 use group_norm::*;
 use limits::*;
-use lists::*;
+use looped::*;
 use matrices::*;
 use network::*;
-use plane_sweep::*;
 use points::*;
-use rays::*;
-use sampler::*;
+use pulp::Arch;
+use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
-use visual_hull::*;
 use volumes::*;
-use weighting::*;
 
 pub use network::Weights;
 
@@ -83,7 +77,13 @@ impl Memory for Cpu {
     }
 }
 
-/// How a form takes it: as a slice.
+/// Numbers as elements of several of them, as far as they are whole.
+fn whole_elements<H: Pod, E: Pod>(values: &mut [H]) -> &mut [E] {
+    let count = values.len() * size_of::<H>() / size_of::<E>();
+    cast_slice_mut(&mut values[..count * size_of::<E>() / size_of::<H>()])
+}
+
+/// How what is written by hand takes an array: as a slice.
 macro_rules! lend {
     (optional $array:ident) => {
         $array.map(Vec::as_slice)
@@ -93,14 +93,153 @@ macro_rules! lend {
     };
 }
 
-macro_rules! forms {
+/// The work of a kernel, by the marks of its row.
+macro_rules! compute {
+    ({ twin $($mark:ident)* } $method:ident [$($block:ident)?] [$($count:ident)*] [$($array:tt)*] $elements:tt) => {
+        by_hand!($method [$($block)? $($count)*] [$($array)*])
+    };
+    ({ looped $($mark:ident)* } $method:ident [$($block:ident)?] [$($count:ident)*] [$($array:tt)*] $elements:tt) => {
+        by_hand!($method [$($block)? $($count)*] [$($array)*])
+    };
+    ({ serial } $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
+        serial!($method $block $arrays $elements)
+    };
+    ({ wide } $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
+        parallel!(wide $method $block $arrays $elements)
+    };
+    ({ definition $($mark:ident)* } $($row:tt)*) => { compute!({ $($mark)* } $($row)*) };
+    ({} $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
+        parallel!(plain $method $block $arrays $elements)
+    };
+}
+
+macro_rules! by_hand {
+    (
+        $method:ident [$($argument:ident)*]
+        [$({ $kind:ident $array:ident: $Host:ty, as $entry:tt at $place:tt unless $unless:tt })+]
+    ) => {
+        $method($($argument,)* $(lend!($kind $array)),+)
+    };
+}
+
+/// One element after the other.
+macro_rules! serial {
+    (
+        $method:ident [$($block:ident)?]
+        [$({ $kind:ident $array:ident: $Host:ty, as $entry:tt at {} unless {} })+]
+        { for $element:ident in [$elements:expr] at_least [] }
+    ) => {
+        for $element in $elements {
+            bodies::$method($($block,)? $(whole!($kind $array),)+ $element);
+        }
+    };
+}
+
+/// How a body gets an array.
+macro_rules! whole {
+    (write $array:ident) => {
+        &mut $array[..]
+    };
+    (one $array:ident) => {
+        &$array[0]
+    };
+    ($kind:ident $array:ident) => {
+        &$array[..]
+    };
+}
+
+/// Some elements at a time, on all cores. An optional array's flag says whether it is there.
+macro_rules! parallel {
+    (
+        $width:ident $method:ident [$($block:ident)?]
+        [$({
+            $kind:ident $array:ident: $Host:ty, as { $($entry:tt)? } at { $($place:expr)? }
+            unless { $($other:ident $told:ident $flag:ident)? }
+        })+]
+        { for $element:ident in [$elements:expr] at_least [$least:literal] }
+    ) => {{
+        $($(
+            let mut told = *$told;
+            told.$flag = u32::from($array.is_some());
+            let $told = &told;
+            let $array = $array.map_or(&[][..], Vec::as_slice);
+            let _ = $other;
+        )?)+
+        $(split!($kind $array $Host $(, $entry)?);)+
+        for_each_piece(
+            $elements,
+            $least,
+            |piece| ($(take!($kind $array piece $element $($place)?),)+),
+            |piece, ($(mut $array,)+)| {
+                run!($width for $element in piece {
+                    bodies::$method($($block,)? $(part!($kind $array),)+ $element)
+                });
+            },
+        );
+    }};
+}
+
+/// An array that is written, ready to be split; one that is read, as a slice.
+macro_rules! split {
+    (write $array:ident $Host:ty) => { let mut $array = Rest::new(&mut $array[..]); };
+    (write_paged $array:ident $Host:ty) => { let mut $array = Rest::new(&mut $array[..]); };
+    (write $array:ident $Host:ty, vectors) => { split!(write $array $Host) };
+    (write_paged $array:ident $Host:ty, vectors) => { split!(write $array $Host) };
+    (write $array:ident $Host:ty, $Entry:ty) => { let mut $array = Rest::new(whole_elements::<$Host, $Entry>($array)); };
+    ($kind:ident $array:ident $Host:ty $(, $entry:tt)?) => { let $array = &$array[..]; };
+}
+
+/// What some elements get of an array.
+macro_rules! take {
+    (write $array:ident $piece:ident $element:ident) => {
+        $array.take($piece.start as usize, $piece.end as usize)
+    };
+    (write $array:ident $piece:ident $element:ident $place:expr) => {{
+        let place = |$element: u32| ($place) as usize;
+        $array.take(place($piece.start), place($piece.end))
+    }};
+    (write_paged $($rest:tt)*) => { take!(write $($rest)*) };
+    ($kind:ident $array:ident $piece:ident $element:ident) => { $array };
+}
+
+/// How the body gets it.
+macro_rules! part {
+    (write $array:ident) => {
+        &mut $array
+    };
+    (write_paged $array:ident) => {
+        &mut $array
+    };
+    (one $array:ident) => {
+        &$array[0]
+    };
+    ($kind:ident $array:ident) => {
+        $array
+    };
+}
+
+/// A loop, compiled for the machine's widest vectors too.
+macro_rules! run {
+    (plain $loop:expr) => {
+        $loop
+    };
+    (wide $loop:expr) => {
+        Arch::new().dispatch(
+            #[inline(always)]
+            || $loop,
+        )
+    };
+}
+
+macro_rules! methods {
     ($({
         $Kernel:ident $method:ident
         doc $doc:tt
         block { $($block:ident: $Block:ty)? }
         counts { $($count:ident)* }
         arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }
-        $($rest:tt)*
+        elements $elements:tt
+        marks $marks:tt
     })+) => {
         impl Device for Cpu {
             type Weights = Weights;
@@ -110,13 +249,17 @@ macro_rules! forms {
             }
 
             $(
+                // Not all kernels write all that they could.
+                #[allow(unused_mut)]
                 fn $method(
                     &self,
                     $($block: &$Block,)?
                     $($count: u32,)*
                     $($array: argument!($kind $Host),)+
                 ) -> Result<(), DeviceError> {
-                    $method($($block,)? $($count,)* $(lend!($kind $array)),+);
+                    compute!(
+                        $marks $method [$($block)?] [$($count)*] [$({ $kind $array: $Host, $($how)* })+] $elements
+                    );
                     Ok(())
                 }
             )+
@@ -124,4 +267,4 @@ macro_rules! forms {
     };
 }
 
-for_each_kernel!(forms);
+for_each_kernel!(methods);

@@ -5,7 +5,9 @@
 //! for any number of threads. A part should be 20 µs of work or more: handing it out takes well below 1 µs, waking a thread
 //! a few. Work of a single part runs on the calling thread.
 
+use std::ops::Range;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use viewfuse_kernels::store::Part;
 
 /// Parts for each thread, where there is enough work: many, so that the threads finish at about the same time.
 const PARTS_PER_THREAD: usize = 16;
@@ -70,28 +72,55 @@ pub fn for_each<T: Send>(values: &mut [T], least: usize, work: impl Fn(usize, &m
     });
 }
 
-/// `work(row, a's values, b's values)` for the rows of two arrays with equally many, of `row_len` values in both; `least`
-/// values are enough work for a part.
-pub fn for_each_row_of_two<A: Send, B: Send>(
-    a: &mut [A],
-    b: &mut [B],
-    row_len: usize,
+/// `work(elements, part)` for some of `elements` at a time; `take(elements)` gives each of these their part of what they
+/// write, in order. `least` elements are enough work for a part.
+pub fn for_each_piece<P: Send>(
+    elements: Range<u32>,
     least: usize,
-    work: impl Fn(usize, &mut [A], &mut [B]) + Sync,
+    take: impl FnMut(Range<u32>) -> P + Send,
+    work: impl Fn(Range<u32>, P) + Sync,
 ) {
-    let row_len = row_len.max(1);
-    let row_count = a.len().min(b.len()).div_ceil(row_len);
-    let rows = rows_at_once(row_count, row_len, least);
-    let parts = Mutex::new((0..).step_by(rows).zip(a.chunks_mut(rows * row_len).zip(b.chunks_mut(rows * row_len))));
-    drive(row_count.div_ceil(rows), &|| {
+    let piece_len = rows_at_once(elements.len(), 1, least);
+    let piece_count = elements.len().div_ceil(piece_len);
+    let rest = Mutex::new((elements, take));
+    drive(piece_count, &|| {
         loop {
-            let next = take(&parts).next();
-            let Some((first, (a, b))) = next else { return };
-            for (row, (a, b)) in (first..).zip(a.chunks_mut(row_len).zip(b.chunks_mut(row_len))) {
-                work(row, a, b);
+            let mut rest = self::take(&rest);
+            let (elements, take) = &mut *rest;
+            if elements.start >= elements.end {
+                return;
             }
+            let end = elements.start + piece_len.min(elements.len()) as u32;
+            let piece = elements.start..end;
+            elements.start = end;
+            let part = take(piece.clone());
+            drop(rest);
+            work(piece, part);
         }
     });
+}
+
+/// What is left of an array while [`for_each_piece`] takes its parts.
+pub struct Rest<'a, T> {
+    values: &'a mut [T],
+    first: usize,
+}
+
+impl<'a, T> Rest<'a, T> {
+    /// All of it.
+    pub fn new(values: &'a mut [T]) -> Rest<'a, T> {
+        Rest { values, first: 0 }
+    }
+
+    /// The values `start..end`, as far as there are such; those before them are gone.
+    pub fn take(&mut self, start: usize, end: usize) -> Part<'a, T> {
+        let all = std::mem::take(&mut self.values);
+        let end = (end - self.first).min(all.len());
+        let (taken, rest) = all.split_at_mut(end);
+        let before = start - self.first;
+        (self.values, self.first) = (rest, self.first + end);
+        Part { values: &mut taken[before..], first: start }
+    }
 }
 
 /// The results of `work` for `0..count`, in order; `least` results are enough work for a part.
@@ -127,6 +156,7 @@ fn rows_at_once(row_count: usize, row_len: usize, least: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use viewfuse_kernels::store::Store;
 
     /// Every row once, with its own number, whatever the lengths.
     #[test]
@@ -142,14 +172,25 @@ mod tests {
         }
     }
 
+    /// Every element once, each with the values that are its own: here three, behind the first seven.
     #[test]
-    fn rows_of_two_arrays_stay_together() {
-        let (mut a, mut b) = (vec![0; 1000], vec![0_u8; 1000]);
-        for_each_row_of_two(&mut a, &mut b, 10, 20, |row, a, b| {
-            a.fill(row);
-            b.fill(row as u8);
-        });
-        assert!(a.iter().zip(&b).enumerate().all(|(index, (a, b))| *a == index / 10 && *b == *a as u8));
+    fn pieces_get_their_parts() {
+        for (elements, least) in [(0..0, 1), (0..1, 1), (5..1000, 1), (5..1000, 100), (5..1000, 5000)] {
+            let place = |element: u32| 7 + 3 * element as usize;
+            let mut values = vec![0; place(elements.end) + 4];
+            let mut rest = Rest::new(&mut values);
+            let take = |piece: Range<u32>| rest.take(place(piece.start), place(piece.end));
+            for_each_piece(elements.clone(), least, take, |piece, mut part| {
+                for element in piece {
+                    part.store(place(element) + 2, element);
+                }
+            });
+            let expected = |index: usize| match index.checked_sub(9) {
+                Some(behind) if behind % 3 == 0 && elements.contains(&((behind / 3) as u32)) => behind as u32 / 3,
+                _ => 0,
+            };
+            assert!(values.iter().enumerate().all(|(index, value)| *value == expected(index)), "{elements:?}, {least}");
+        }
     }
 
     #[test]

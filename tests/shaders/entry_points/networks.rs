@@ -7,7 +7,6 @@ use viewfuse_kernels::network::group_norm::{
     GroupNormBlock, MeanBlock, channel_mean, group_norm_element, group_norm_partials, group_norm_statistics,
 };
 use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
-use viewfuse_shaders::{group_norm, matrices, network};
 
 #[test]
 fn other_sizes_are_core_s() {
@@ -16,7 +15,7 @@ fn other_sizes_are_core_s() {
     let block =
         PoolBlock { in_height, in_width, out_height: 4, out_width: 5, channels: 4, size: 3, stride: 2, padding: 1 };
     let mut pooled = vec![UNTOUCHED; 80];
-    dispatch(block, 80, |id, push| network::max_pool(id, push, &inputs, &mut pooled));
+    dispatch(block, 80, |id, push| viewfuse_shaders::max_pool(id, push, &inputs, &mut pooled));
     assert_eq!(pooled, (0..80).map(|at| pooled_element(&inputs[..], &block, at)).collect::<Vec<f32>>());
 
     let (in_channels, out_channels) = (4, 6);
@@ -30,7 +29,7 @@ fn other_sizes_are_core_s() {
         first_channel: 1,
     };
     let mut upsampled = vec![UNTOUCHED; 5 * 11 * 6];
-    dispatch(block, 5 * 11 * 4, |id, push| network::upsample(id, push, &inputs, &mut upsampled));
+    dispatch(block, 5 * 11 * 4, |id, push| viewfuse_shaders::upsample(id, push, &inputs, &mut upsampled));
     let mut expected = vec![UNTOUCHED; 5 * 11 * 6];
     for at in 0..5 * 11 * 4 {
         expected[at / 4 * 6 + 1 + at % 4] = upsampled_element(&inputs[..], &block, at);
@@ -57,7 +56,9 @@ fn convolve_depthwise_is_core_s() {
             is_shared,
         };
         let mut filtered = vec![UNTOUCHED; 80];
-        dispatch(block, 80, |id, push| network::convolve_depthwise(id, push, &inputs, &weights, &mut filtered));
+        dispatch(block, 80, |id, push| {
+            viewfuse_shaders::convolve_depthwise(id, push, &inputs, &weights, &mut filtered)
+        });
         let expected: Vec<f32> = (0..80).map(|at| depthwise_element(&inputs[..], &weights[..], &block, at)).collect();
         assert_eq!(filtered, expected);
     }
@@ -76,11 +77,11 @@ fn normalise_is_core_s() {
     };
     let inputs = numbers(25, 150 * 14);
     let mut partials = vec![[UNTOUCHED; 2]; 12];
-    dispatch(block, 12, |id, push| group_norm::group_norm_partials(id, push, &inputs, &mut partials));
+    dispatch(block, 12, |id, push| viewfuse_shaders::group_norm_partials(id, push, &inputs, &mut partials));
     assert_eq!(partials, (0..12).map(|at| group_norm_partials(&inputs[..], &block, at)).collect::<Vec<[f32; 2]>>());
 
     let mut statistics = vec![[UNTOUCHED; 2]; 4];
-    dispatch(block, 4, |id, push| group_norm::group_norm_statistics(id, push, &partials, &mut statistics));
+    dispatch(block, 4, |id, push| viewfuse_shaders::group_norm_statistics(id, push, &partials, &mut statistics));
     assert_eq!(
         statistics,
         (0..4).map(|group| group_norm_statistics(&partials[..], &block, group)).collect::<Vec<[f32; 2]>>()
@@ -89,14 +90,14 @@ fn normalise_is_core_s() {
     let (weights, bias) = (numbers(26, 12), numbers(27, 12));
     let mut outputs = vec![UNTOUCHED; 1800];
     dispatch(block, 1800, |id, push| {
-        group_norm::group_norm(id, push, &inputs, &statistics, &weights, &bias, &mut outputs);
+        viewfuse_shaders::group_norm(id, push, &inputs, &statistics, &weights, &bias, &mut outputs);
     });
     let normalised = |at| group_norm_element(&inputs[..], &statistics[..], &weights[..], &bias[..], &block, at);
     assert_eq!(outputs, (0..1800).map(normalised).collect::<Vec<f32>>());
 
     let block = MeanBlock { pixel_count: 21, channels: 100 };
     let mut means = vec![UNTOUCHED; 100];
-    dispatch(block, 100, |id, push| group_norm::channel_means(id, push, &inputs, &mut means));
+    dispatch(block, 100, |id, push| viewfuse_shaders::channel_means(id, push, &inputs, &mut means));
     assert_eq!(means, (0..100).map(|channel| channel_mean(&inputs[..], &block, channel)).collect::<Vec<f32>>());
 }
 
@@ -104,7 +105,7 @@ fn normalise_is_core_s() {
 fn softmax_rows_is_core_s() {
     let scores = numbers(28, 70 * 9);
     let mut weights = vec![UNTOUCHED; 70 * 9];
-    dispatch(9, 70, |id, push| matrices::softmax_rows(id, push, &scores, &mut weights));
+    dispatch(9, 70, |id, push| viewfuse_shaders::softmax_rows(id, push, &scores, &mut weights));
     let weight = |at: usize| softmax_value(scores[at], softmax_scale(&scores[..], at / 9 * 9, 9));
     assert_eq!(weights, (0..70 * 9).map(weight).collect::<Vec<f32>>());
 }

@@ -12,7 +12,6 @@ use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 use viewfuse_kernels::plane_sweep::path::{CostBlock, Line, joined_cost};
 use viewfuse_kernels::plane_sweep::window::{WindowBlock, row_sums, window_cost};
 use viewfuse_kernels::plane_sweep::{PLANES, Planes, census};
-use viewfuse_shaders::plane_sweep;
 
 /// What elements hold before anything is written.
 const NOTHING: Planes = [UNTOUCHED; PLANES];
@@ -47,7 +46,7 @@ fn compare_views_is_core_s() {
     let (mut grey, mut found) = (groups(&vec![NOTHING; views.len() * count]), groups(&vec![NOTHING; 4 * count]));
     let (words, texel_fours, maps) = (swept_views(views), fours(texels), twos(disparities));
     dispatch(*frustum, count as u32, |id, push| {
-        plane_sweep::compare_views(id, push, &words, pairs, &texel_fours, &maps, &mut grey, &mut found);
+        viewfuse_shaders::compare_views(id, push, &words, pairs, &texel_fours, &maps, &mut grey, &mut found);
     });
     let (grey, found) = (planes_of(&grey), planes_of(&found));
     let first = frustum.first_row * frustum.camera.width;
@@ -71,7 +70,7 @@ fn census_cost_is_core_s() {
     let above = 2 * (first_row * camera.width * group_count) as usize;
     let mut costs = vec![NOTHING; above + 2 * count];
     dispatch(swept.frustum, count as u32, |id, push| {
-        plane_sweep::census_cost(id, push, &swept.pairs, &grey, &evidence, &mut costs);
+        viewfuse_shaders::census_cost(id, push, &swept.pairs, &grey, &evidence, &mut costs);
     });
     let cost =
         |(pixel, group)| census::census_cost(&swept.frustum, &swept.pairs, &grey[..], &evidence[..], pixel, group);
@@ -88,13 +87,13 @@ fn windows_are_core_s() {
     let weighted: Vec<Planes> = weighted.iter().flat_map(|cost| [*cost, cost.map(|cost| 2.0 * cost)]).collect();
     let count = group_count(&volume);
     let mut sums = vec![NOTHING; 6 * count];
-    dispatch(block, count as u32, |id, push| plane_sweep::row_sums(id, push, &weighted, &mut sums));
+    dispatch(block, count as u32, |id, push| viewfuse_shaders::row_sums(id, push, &weighted, &mut sums));
     let sum = |(pixel, group)| row_sums(&block, &weighted[..], pixel, group);
     let expected: Vec<Planes> = elements(block.group_count, count).flat_map(sum).flatten().collect();
     assert_eq!(sums, expected);
 
     let mut means = vec![NOTHING; count];
-    dispatch(block, count as u32, |id, push| plane_sweep::window_cost(id, push, &sums, &mut means));
+    dispatch(block, count as u32, |id, push| viewfuse_shaders::window_cost(id, push, &sums, &mut means));
     let mean = |(pixel, group)| window_cost(&block, &sums[..], pixel, group);
     assert_eq!(means, elements(block.group_count, count).map(mean).collect::<Vec<Planes>>());
 }
@@ -104,7 +103,7 @@ fn paths_are_core_s() {
     let (block, means) = planes(4, &swept());
     let count = group_count(&block);
     let (given, mut paths) = (groups(&means), groups(&vec![NOTHING; 4 * count]));
-    dispatch(block, block.line_count(), |id, push| plane_sweep::follow_paths(id, push, &given, &mut paths));
+    dispatch(block, block.line_count(), |id, push| viewfuse_shaders::follow_paths(id, push, &given, &mut paths));
     let mut expected = Vec::new();
     for line in 0..block.line_count() {
         let (direction, number, step_count) = block.line(line);
@@ -119,7 +118,7 @@ fn paths_are_core_s() {
     assert_eq!(paths, expected);
 
     let mut costs = vec![NOTHING; count];
-    dispatch(block, count as u32, |id, push| plane_sweep::join_paths(id, push, &paths, &mut costs));
+    dispatch(block, count as u32, |id, push| viewfuse_shaders::join_paths(id, push, &paths, &mut costs));
     let joined = |(pixel, group)| joined_cost(&block, &paths[..], pixel, group);
     assert_eq!(costs, elements(block.group_count, count).map(joined).collect::<Vec<Planes>>());
 }
@@ -132,7 +131,7 @@ fn pick_disparity_is_core_s() {
     frustum.camera.first_texel = 3;
     let count = volume.width * volume.height;
     let mut picked = vec![[UNTOUCHED; 2]; 3 + count as usize];
-    dispatch(frustum, count, |id, push| plane_sweep::pick_disparity(id, push, &costs, &mut picked));
+    dispatch(frustum, count, |id, push| viewfuse_shaders::pick_disparity(id, push, &costs, &mut picked));
     let expected: Vec<[f32; 2]> = (0..count).map(|pixel| pick_disparity(&frustum, &costs, pixel)).collect();
     assert_eq!(picked[3..], expected);
     assert_eq!(picked[..3], [[UNTOUCHED; 2]; 3]);
@@ -160,7 +159,7 @@ fn blend_planes_is_core_s() {
         dispatch(block, count, |id, push| {
             let [ta, tb, tc, td] = pages(&texel_fours, shift);
             let [ca, cb, cc, cd] = pages_mut(&mut colours, shift);
-            plane_sweep::blend_planes(
+            viewfuse_shaders::blend_planes(
                 id,
                 push,
                 &words,

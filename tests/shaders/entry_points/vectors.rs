@@ -6,7 +6,7 @@ use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
-use viewfuse_shaders::loads::{CameraWords, PlaneVectors, PointWords, ViewWords};
+use viewfuse_shaders::loads::InVectors;
 
 /// Structs as `N` fours of words each.
 fn words<T: Pod, const N: usize>(values: &[T]) -> Vec<[UVec4; N]> {
@@ -15,15 +15,15 @@ fn words<T: Pod, const N: usize>(values: &[T]) -> Vec<[UVec4; N]> {
     (0..values.len()).map(|value| std::array::from_fn(|four| fours(value * N + four))).collect()
 }
 
-pub(super) fn cameras(views: &[CameraBlock]) -> Vec<CameraWords> {
+pub(super) fn cameras(views: &[CameraBlock]) -> Vec<<CameraBlock as InVectors>::Vectors> {
     words(views)
 }
 
-pub(super) fn points(points: &[RayPoint]) -> Vec<PointWords> {
+pub(super) fn points(points: &[RayPoint]) -> Vec<<RayPoint as InVectors>::Vectors> {
     words(points)
 }
 
-pub(super) fn swept_views(views: &[SweptView]) -> Vec<ViewWords> {
+pub(super) fn swept_views(views: &[SweptView]) -> Vec<<SweptView as InVectors>::Vectors> {
     words(views)
 }
 
@@ -39,12 +39,12 @@ pub(super) fn twos(values: &[[f32; 2]]) -> Vec<Vec2> {
     values.iter().map(|two| Vec2::from_array(*two)).collect()
 }
 
-pub(super) fn groups(values: &[Planes]) -> Vec<PlaneVectors> {
+pub(super) fn groups(values: &[Planes]) -> Vec<<Planes as InVectors>::Vectors> {
     let group = |planes: &Planes| std::array::from_fn(|four| Vec4::from_slice(&planes[4 * four..]));
     values.iter().map(group).collect()
 }
 
-pub(super) fn planes(values: &[PlaneVectors]) -> Vec<Planes> {
-    let group = |group: &PlaneVectors| std::array::from_fn(|plane| group[plane / 4][plane % 4]);
+pub(super) fn planes(values: &[<Planes as InVectors>::Vectors]) -> Vec<Planes> {
+    let group = |group: &<Planes as InVectors>::Vectors| std::array::from_fn(|plane| group[plane / 4][plane % 4]);
     values.iter().map(group).collect()
 }

@@ -6,7 +6,6 @@ use viewfuse::check::world::World;
 use viewfuse_kernels::visual_hull::hull::hull_entry;
 use viewfuse_kernels::visual_hull::ray_marching::{MarchBlock, march_ray};
 use viewfuse_kernels::visual_hull::sweep::{SweepBlock, match_cost, mean_column, pick_depth, sum_row};
-use viewfuse_shaders::{ray_marching, sweep};
 
 /// Binary logarithm of the pages' length by which a map of this length takes all four.
 pub(super) fn page_shift(length: usize) -> u32 {
@@ -44,7 +43,21 @@ fn hull_entry_is_core_s() {
         dispatch(view, count, |id, push| {
             let [ta, tb, tc, td] = pages(&world.texels, shift);
             let [ea, eb, ec, ed] = pages_mut(&mut entries, shift);
-            sweep::hull_entry(id, push, &world.object, &cameras(&world.views), ta, tb, tc, td, ea, eb, ec, ed, shift);
+            viewfuse_shaders::hull_entry(
+                id,
+                push,
+                &world.object,
+                &cameras(&world.views),
+                ta,
+                tb,
+                tc,
+                td,
+                ea,
+                eb,
+                ec,
+                ed,
+                shift,
+            );
         });
         let expected: Vec<f32> = (0..count)
             .map(|pixel| hull_entry(&world.object, &world.views[..], &world.texels[..], view, pixel))
@@ -75,7 +88,7 @@ fn match_cost_is_core_s() {
             let [ta, tb, tc, td] = pages(&texels, shift);
             let [ea, eb, ec, ed] = pages(&world.entries, shift);
             let World { object, pair_weights, .. } = &world;
-            sweep::match_cost(
+            viewfuse_shaders::match_cost(
                 id,
                 push,
                 object,
@@ -102,13 +115,13 @@ fn costs_and_means(block: &SweepBlock) -> [Vec<f32>; 2] {
     let count = block.width * block.row_count * block.plane_count;
     let costs: Vec<f32> = numbers(11, count as usize).iter().map(|cost| cost + 0.5).collect();
     let mut row_sums = vec![[UNTOUCHED; 2]; count as usize];
-    dispatch(*block, count, |id, push| sweep::sum_row(id, push, &costs, &mut row_sums));
+    dispatch(*block, count, |id, push| viewfuse_shaders::sum_row(id, push, &costs, &mut row_sums));
     let place = |at: u32| (at / block.plane_count, at % block.plane_count);
     let expected: Vec<[f32; 2]> =
         (0..count).map(place).map(|(pixel, plane)| sum_row(block, &costs, pixel, plane)).collect();
     assert_eq!(row_sums, expected);
     let mut means = vec![UNTOUCHED; count as usize];
-    dispatch(*block, count, |id, push| sweep::mean_column(id, push, &costs, &row_sums, &mut means));
+    dispatch(*block, count, |id, push| viewfuse_shaders::mean_column(id, push, &costs, &row_sums, &mut means));
     let expected: Vec<f32> =
         (0..count).map(place).map(|(pixel, plane)| mean_column(block, &costs, &row_sums, pixel, plane)).collect();
     assert_eq!(means, expected);
@@ -133,7 +146,7 @@ fn windows_and_depths_are_core_s() {
             let [ea, eb, ec, ed] = pages(&world.entries, shift);
             let [ga, gb, gc, gd] = pages(&world.depths, shift);
             let [pa, pb, pc, pd] = pages_mut(&mut picked, shift);
-            sweep::pick_depth(
+            viewfuse_shaders::pick_depth(
                 id,
                 push,
                 &world.object,
@@ -182,7 +195,7 @@ fn march_is_core_s() {
             let [da, db, dc, dd] = pages(depths, shift);
             let [ca, cb, cc, cd] = pages_mut(&mut colours, shift);
             let [pa, pb, pc, pd] = pages_mut(&mut seen_depths, shift);
-            ray_marching::march_rays(
+            viewfuse_shaders::march_rays(
                 id, push, object, &words, footprints, ta, tb, tc, td, da, db, dc, dd, weights, ca, cb, cc, cd, pa, pb,
                 pc, pd, shift,
             );

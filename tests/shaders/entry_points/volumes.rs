@@ -9,7 +9,6 @@ use viewfuse_kernels::genvs::{
     DenoiserInputBlock, FeatureBlock, VolumeBlock, denoiser_input, summed_feature, volume_value, volume_value_f16,
     weigh_features,
 };
-use viewfuse_shaders::volumes;
 
 #[test]
 fn gather_volume_is_core_s() {
@@ -27,7 +26,7 @@ fn gather_volume_is_core_s() {
     };
     let mut gathered = vec![UNTOUCHED; views.len() * 120];
     let (words, at) = (cameras(views), points(&there));
-    dispatch(block, 120, |id, push| volumes::gather_volume(id, push, &words, &at, &volume, &mut gathered));
+    dispatch(block, 120, |id, push| viewfuse_shaders::gather_volume(id, push, &words, &at, &volume, &mut gathered));
     let expected: Vec<f32> = (0..120).map(|at| volume_value(&views[..], &there[..], &volume[..], &block, at)).collect();
     assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));
     assert_eq!(gathered[120..240], expected);
@@ -39,7 +38,7 @@ fn halves_are_core_s() {
     let world = World::new(1);
     let (views, there, numbers) = (&world.views, points_of(&world, 40), numbers(35, 5 * 7 * 3 * 3));
     let mut volume = vec![0xabab_abab; 160];
-    dispatch(315, 158, |id, push| volumes::pack_f16(id, push, &numbers, &mut volume));
+    dispatch(315, 158, |id, push| viewfuse_shaders::pack_f16(id, push, &numbers, &mut volume));
     let expected: Vec<u32> = (0..158).map(|word| packed_f16(&numbers[..], 315, word)).collect();
     assert_eq!(volume[..158], expected);
     assert_eq!(volume[158..], [0xabab_abab; 2]);
@@ -56,7 +55,7 @@ fn halves_are_core_s() {
     };
     let mut gathered = vec![UNTOUCHED; views.len() * 120];
     let (words, at) = (cameras(views), points(&there));
-    dispatch(block, 120, |id, push| volumes::gather_volume_f16(id, push, &words, &at, &volume, &mut gathered));
+    dispatch(block, 120, |id, push| viewfuse_shaders::gather_volume_f16(id, push, &words, &at, &volume, &mut gathered));
     let value = |at| volume_value_f16(&views[..], &there[..], &volume[..], &block, at);
     let expected: Vec<f32> = (0..120).map(value).collect();
     assert!(expected.iter().any(|value| *value != 0.0) && expected.contains(&0.0));
@@ -79,7 +78,7 @@ fn features_are_core_s() {
             first_ray: 0,
         };
         let mut weights = vec![UNTOUCHED; 420];
-        dispatch(block, 70, |id, push| volumes::weigh_features(id, push, &raw, &there, &mut weights));
+        dispatch(block, 70, |id, push| viewfuse_shaders::weigh_features(id, push, &raw, &there, &mut weights));
         let mut expected = vec![UNTOUCHED; 420];
         for ray in 0..70 {
             weigh_features(&raw[..], &there[..], &block, ray, |sample, weight| expected[sample] = weight);
@@ -88,7 +87,7 @@ fn features_are_core_s() {
         assert!(weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
 
         let mut summed = vec![UNTOUCHED; 210];
-        dispatch(block, 210, |id, push| volumes::sum_features(id, push, &weights, &fused, &raw, &mut summed));
+        dispatch(block, 210, |id, push| viewfuse_shaders::sum_features(id, push, &weights, &fused, &raw, &mut summed));
         let sum = |at| summed_feature(&weights[..], &fused[..], &raw[..], &block, at);
         assert_eq!(summed, (0..210).map(sum).collect::<Vec<f32>>());
     }
@@ -99,7 +98,7 @@ fn denoiser_input_is_core_s() {
     let (noisy, condition) = (numbers(32, 40 * 3), numbers(33, 40 * 5));
     let block = DenoiserInputBlock { picture_channels: 3, condition_channels: 5, scale: 0.7 };
     let mut inputs = vec![UNTOUCHED; 320];
-    dispatch(block, 320, |id, push| volumes::denoiser_input(id, push, &noisy, &condition, &mut inputs));
+    dispatch(block, 320, |id, push| viewfuse_shaders::denoiser_input(id, push, &noisy, &condition, &mut inputs));
     let expected: Vec<f32> = (0..320).map(|at| denoiser_input(&noisy[..], &condition[..], &block, at)).collect();
     assert_eq!(inputs, expected);
 }

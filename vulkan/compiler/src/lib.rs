@@ -11,7 +11,8 @@
 //! legalise  module -> module                 no composites of pointers
 //! share     module -> module                 workgroup memory is visible to all its invocations
 //! refine    module -> module                 no paths, no contraction of float arithmetic
-//! stamp     the sources of the modules       sha256 of the sources and locked versions; kernels.toml
+//! tokens    text -> tokens                   without comments, documentation and layout
+//! stamp     the sources of the modules       sha256 of their tokens and locked versions; kernels.toml
 //! ```
 
 pub mod backend;
@@ -21,3 +22,4 @@ pub mod refine;
 pub mod share;
 pub mod split;
 pub mod stamp;
+pub mod tokens;

@@ -10,7 +10,7 @@ use spirv_builder::Capability as Enabled;
 use std::collections::HashSet;
 
 /// How the names of entry points end that need operations of subgroups.
-pub const SUFFIX: &str = "_subgroup";
+pub const SUFFIX: &str = "::subgroup";
 /// What the sources are compiled with for their sake.
 pub const CAPABILITIES: [Enabled; 3] =
     [Enabled::GroupNonUniform, Enabled::GroupNonUniformBallot, Enabled::GroupNonUniformShuffle];

@@ -1,12 +1,17 @@
 //! The sources of the modules: `kernels.toml`.
 //!
-//! It holds the sha256 of every file that determines the modules' bytes, the locked versions of the libraries that become
-//! part of them, the sha256 of the modules and the version of the compiler. So a test without a compiler finds a stale module.
+//! It holds the sha256 of the tokens of every source that determines the modules' bytes, the locked versions of the libraries
+//! that become part of them, the sha256 of the modules and the version of the compiler. So a test without a compiler finds a
+//! stale module.
+//!
+//! A comment, documentation or layout makes nothing stale. Neither does a module of `viewfuse-core` that no kernel reaches:
+//! its sources count from the modules that kernels and entry points name, along what these modules name.
 
 use crate::split::Modules;
+use crate::tokens::{names_in, tokens, without_modules};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -16,18 +21,18 @@ pub const MODULE: &str = "vulkan/src/kernels.spv";
 pub const SUBGROUPS: &str = "vulkan/src/subgroups.spv";
 /// Their stamp.
 pub const STAMP: &str = "vulkan/src/kernels.toml";
-/// The modules' source files, and folders with all their Rust files.
-pub const SOURCES: [&str; 11] = [
-    "core/Cargo.toml",
-    "core/kernels/Cargo.toml",
+/// The manifests of what becomes part of the modules: their dependencies, features and kinds of library count.
+pub const MANIFESTS: [&str; 3] = ["core/Cargo.toml", "core/kernels/Cargo.toml", "vulkan/shaders/Cargo.toml"];
+/// The folder of `viewfuse-core`, of which only the modules count that kernels reach.
+pub const CORE: &str = "core/src";
+/// Source files, and folders with all their Rust files.
+pub const SOURCES: [&str; 7] = [
     "core/kernels/src",
-    "core/src",
     "vulkan/compiler/src/compile.rs",
     "vulkan/compiler/src/legalise.rs",
     "vulkan/compiler/src/refine.rs",
     "vulkan/compiler/src/share.rs",
     "vulkan/compiler/src/split.rs",
-    "vulkan/shaders/Cargo.toml",
     "vulkan/shaders/src",
 ];
 /// Libraries with code in the modules.
@@ -52,6 +57,14 @@ pub enum StampError {
         /// The place and the problem.
         source: toml::de::Error,
     },
+    /// A source is not Rust.
+    #[error("{}: {problem}", path.display())]
+    Source {
+        /// Its path.
+        path: PathBuf,
+        /// The problem.
+        problem: String,
+    },
     /// A library is not locked.
     #[error("{}: has no package {library}", path.display())]
     Unlocked {
@@ -67,7 +80,7 @@ pub enum StampError {
 pub struct Inputs {
     /// Locked versions by library, with their checksums.
     pub libraries: BTreeMap<String, String>,
-    /// sha256 by file, relative to the repository.
+    /// sha256 of a source's tokens by file, relative to the repository.
     pub sources: BTreeMap<String, String>,
 }
 
@@ -119,9 +132,15 @@ impl Inputs {
     /// [`StampError`], with the file.
     pub fn read(root: &Path) -> Result<Inputs, StampError> {
         let mut sources = BTreeMap::new();
-        for source in SOURCES {
-            hash_all(root, source, &mut sources)?;
+        for manifest in MANIFESTS {
+            sources.insert(manifest.to_owned(), sha256(manifest_of(&root.join(manifest))?.as_bytes()));
         }
+        let mut read = BTreeMap::new();
+        for source in SOURCES {
+            read_all(root, source, &mut read)?;
+        }
+        read_core(root, &mut read)?;
+        sources.extend(read.into_iter().map(|(file, tokens)| (file, sha256(tokens.join("\n").as_bytes()))));
         let path = root.join("Cargo.lock");
         let lock: Lock =
             toml::from_str(&read_text(&path)?).map_err(|source| StampError::Format { path: path.clone(), source })?;
@@ -200,13 +219,16 @@ fn differences(kind: &str, then: &BTreeMap<String, String>, now: &BTreeMap<Strin
     changed.chain(new).collect()
 }
 
-/// Hashes a file, or all Rust files of a folder and those in it. Carriage returns do not count: a checkout may add them.
-fn hash_all(root: &Path, relative: &str, hashes: &mut BTreeMap<String, String>) -> Result<(), StampError> {
+/// The tokens of sources by file.
+type Sources = BTreeMap<String, Vec<String>>;
+
+/// Reads a file, or all Rust files of a folder and those in it.
+fn read_all(root: &Path, relative: &str, sources: &mut Sources) -> Result<(), StampError> {
     let path = root.join(relative);
     if !path.is_dir() {
-        let bytes = fs::read(&path).map_err(|source| StampError::File { path, source })?;
-        let bytes: Vec<u8> = bytes.into_iter().filter(|byte| *byte != b'\r').collect();
-        hashes.insert(relative.to_owned(), sha256(&bytes));
+        let tokens =
+            tokens(&read_text(&path)?).map_err(|error| StampError::Source { path, problem: error.to_string() })?;
+        sources.insert(relative.to_owned(), tokens);
         return Ok(());
     }
     let failed = |source| StampError::File { path: path.clone(), source };
@@ -214,10 +236,45 @@ fn hash_all(root: &Path, relative: &str, hashes: &mut BTreeMap<String, String>) 
         let entry = entry.map_err(failed)?;
         let name = entry.file_name().to_string_lossy().into_owned();
         if entry.path().is_dir() || name.ends_with(".rs") {
-            hash_all(root, &format!("{relative}/{name}"), hashes)?;
+            read_all(root, &format!("{relative}/{name}"), sources)?;
         }
     }
     Ok(())
+}
+
+/// Reads the modules of `viewfuse-core` that the sources name, those that these name, and so on; and what its root has besides
+/// modules.
+fn read_core(root: &Path, sources: &mut Sources) -> Result<(), StampError> {
+    let mut open: BTreeSet<String> = sources.values().flat_map(|tokens| names_in(tokens, "viewfuse_core")).collect();
+    let mut core = Sources::new();
+    let library = format!("{CORE}/lib.rs");
+    read_all(root, &library, &mut core)?;
+    core.entry(library).and_modify(|tokens| *tokens = without_modules(tokens));
+    while let Some(module) = open.pop_first() {
+        let file = format!("{CORE}/{module}.rs");
+        // Other names are the root's own.
+        if core.contains_key(&file) || !root.join(&file).is_file() {
+            continue;
+        }
+        let mut read = Sources::new();
+        read_all(root, &file, &mut read)?;
+        let folder = format!("{CORE}/{module}");
+        if root.join(&folder).is_dir() {
+            read_all(root, &folder, &mut read)?;
+        }
+        open.extend(read.values().flat_map(|tokens| names_in(tokens, "crate")));
+        core.append(&mut read);
+    }
+    sources.append(&mut core);
+    Ok(())
+}
+
+/// What a manifest says about the code: not its description, nor its lints.
+fn manifest_of(path: &Path) -> Result<String, StampError> {
+    let mut manifest: toml::Table =
+        toml::from_str(&read_text(path)?).map_err(|source| StampError::Format { path: path.to_path_buf(), source })?;
+    manifest.retain(|section, _| section != "package" && section != "lints");
+    Ok(manifest.to_string())
 }
 
 fn read_text(path: &Path) -> Result<String, StampError> {

@@ -1,35 +1,33 @@
-//! Entry points of the kernels on Vulkan devices.
+//! Entry points of the kernels on Vulkan devices, made from the kernels' rows ([`viewfuse_kernels::rows`]).
 //!
-//! An entry point has the name of its kernel and takes its arrays in the order of the kernel's row
-//! ([`viewfuse_kernels::rows`]), its parameters and the [`Piece`] as push constants. It checks whether its element
-//! exists, calls the kernel's body in `viewfuse-core` or the parts of that body, and stores the result. Arrays that may
-//! be longer than a device can bind at once come as four pages. Elements of several numbers are loaded as vectors
-//! (`loads`). Two things are computed here: the matrix products of tiled kernels are summed in workgroup memory or by
-//! subgroups (`tile`), and a few short loops over a ray's samples or a row's columns are in the entry point.
+//! An entry point has the name of its kernel and takes its arrays in the order of the row, its parameters and the [`Piece`]
+//! as push constants. It checks whether its element exists and calls the kernel's body ([`viewfuse_kernels::bodies`]).
+//! Arrays that may be longer than a device can bind at once come as four pages; arrays `as vectors` are loaded and stored
+//! as vectors (`loads`). A tiled kernel has an entry point for each form of a tile: the first of the kernel's name, the
+//! others in a module of that name. What devices do otherwise than the CPU is here: matrix products are summed in workgroup
+//! memory or by subgroups (`tile`), without a panic (`unchecked`).
 //!
 //! On the host the same entry points are plain functions, which tests call.
 #![cfg_attr(target_arch = "spirv", no_std)]
 
-pub mod compositing;
-pub mod group_norm;
-pub mod limits;
-pub mod linear;
-pub mod lists;
+#[macro_use]
+mod entry;
 pub mod loads;
-pub mod matrices;
-pub mod network;
-pub mod plane_sweep;
-pub mod points;
-pub mod ray_marching;
-pub mod rays;
-pub mod sampler;
-pub mod sweep;
 mod tile;
 mod unchecked;
-pub mod volumes;
-pub mod weighting;
 
 pub use viewfuse_kernels::rows::Piece;
+
+use loads::{InVectors, Vectors, VectorsMut};
+use spirv_std::glam::UVec3;
+use spirv_std::spirv;
+use tile::{Buffered, Double, Quadruple, Shared, ShortShared, Single, Subgroup};
+use unchecked::{Endless, Unchecked};
+use viewfuse_kernels::bodies;
+use viewfuse_kernels::for_each_kernel;
+use viewfuse_kernels::network::tile::Shape;
+use viewfuse_kernels::pages::{Pages, PagesMut};
+use viewfuse_kernels::rows::*;
 
 /// Push constants of a kernel with parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,3 +38,5 @@ pub struct Push<P> {
     /// The elements of the dispatch.
     pub piece: Piece,
 }
+
+for_each_kernel!(entries);

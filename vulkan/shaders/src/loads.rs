@@ -10,82 +10,100 @@ use viewfuse_core::pose::PoseBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
+use viewfuse_kernels::store::Store;
 
-/// A [`CameraBlock`].
-pub type CameraWords = [UVec4; 5];
-/// A [`SweptView`].
-pub type ViewWords = [UVec4; 8];
-/// A [`RayPoint`].
-pub type PointWords = [UVec4; 2];
-/// [`Planes`].
-pub type PlaneVectors = [Vec4; 4];
+/// Elements that can be loaded as vectors.
+pub trait InVectors: Sized {
+    /// As many vectors as have the element's bytes.
+    type Vectors: Copy;
 
-const _: () = assert!(size_of::<CameraWords>() == size_of::<CameraBlock>());
-const _: () = assert!(size_of::<ViewWords>() == size_of::<SweptView>());
-const _: () = assert!(size_of::<PointWords>() == size_of::<RayPoint>());
-const _: () = assert!(size_of::<PlaneVectors>() == size_of::<Planes>());
+    /// The element.
+    fn from_vectors(vectors: Self::Vectors) -> Self;
+}
 
-/// Numbers by fours.
+/// Elements that can be stored as vectors, too.
+pub trait IntoVectors: InVectors {
+    /// The element as it is stored.
+    fn into_vectors(self) -> Self::Vectors;
+}
+
+/// Elements that are loaded as vectors.
 #[derive(Clone, Copy)]
-pub(crate) struct Fours<'a, F: ?Sized>(pub(crate) &'a F);
+pub(crate) struct Vectors<'a, F: ?Sized>(pub(crate) &'a F);
 
-impl<F: Fetch<Vec4> + ?Sized> Fetch<[f32; 4]> for Fours<'_, F> {
+impl<T: InVectors, F: Fetch<T::Vectors> + ?Sized> Fetch<T> for Vectors<'_, F> {
     #[inline(always)]
-    fn fetch(&self, index: usize) -> [f32; 4] {
-        self.0.fetch(index).to_array()
+    fn fetch(&self, index: usize) -> T {
+        T::from_vectors(self.0.fetch(index))
     }
 }
 
-/// Numbers by twos.
-#[derive(Clone, Copy)]
-pub(crate) struct Twos<'a>(pub(crate) &'a [Vec2]);
+/// Elements that are stored as vectors.
+pub(crate) struct VectorsMut<'a, F: ?Sized>(pub(crate) &'a mut F);
 
-impl Fetch<[f32; 2]> for Twos<'_> {
+impl<T: IntoVectors, F: Store<T::Vectors> + ?Sized> Store<T> for VectorsMut<'_, F> {
     #[inline(always)]
-    fn fetch(&self, index: usize) -> [f32; 2] {
-        self.0[index].to_array()
+    fn store(&mut self, index: usize, value: T) {
+        self.0.store(index, value.into_vectors());
     }
 }
 
-/// Groups of planes.
-#[derive(Clone, Copy)]
-pub(crate) struct Groups<'a>(pub(crate) &'a [PlaneVectors]);
+impl InVectors for [f32; 4] {
+    type Vectors = Vec4;
 
-impl Fetch<Planes> for Groups<'_> {
     #[inline(always)]
-    fn fetch(&self, index: usize) -> Planes {
-        let [a, b, c, d] = self.0[index];
+    fn from_vectors(four: Vec4) -> [f32; 4] {
+        four.to_array()
+    }
+}
+
+impl IntoVectors for [f32; 4] {
+    #[inline(always)]
+    fn into_vectors(self) -> Vec4 {
+        Vec4::from_array(self)
+    }
+}
+
+impl InVectors for [f32; 2] {
+    type Vectors = Vec2;
+
+    #[inline(always)]
+    fn from_vectors(two: Vec2) -> [f32; 2] {
+        two.to_array()
+    }
+}
+
+impl InVectors for Planes {
+    type Vectors = [Vec4; 4];
+
+    #[inline(always)]
+    fn from_vectors([a, b, c, d]: [Vec4; 4]) -> Planes {
         [a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w]
     }
 }
 
-/// A group of planes as it is stored.
-#[inline(always)]
-pub(crate) fn plane_vectors(planes: &Planes) -> PlaneVectors {
-    let four = |first: usize| Vec4::new(planes[first], planes[first + 1], planes[first + 2], planes[first + 3]);
-    [four(0), four(4), four(8), four(12)]
+impl IntoVectors for Planes {
+    #[inline(always)]
+    fn into_vectors(self) -> [Vec4; 4] {
+        let four = |first: usize| Vec4::new(self[first], self[first + 1], self[first + 2], self[first + 3]);
+        [four(0), four(4), four(8), four(12)]
+    }
 }
 
-/// Cameras.
-#[derive(Clone, Copy)]
-pub(crate) struct Cameras<'a>(pub(crate) &'a [CameraWords]);
+impl InVectors for CameraBlock {
+    type Vectors = [UVec4; 5];
 
-impl Fetch<CameraBlock> for Cameras<'_> {
     #[inline(always)]
-    fn fetch(&self, index: usize) -> CameraBlock {
-        let [right, down, forward, intrinsics, last] = self.0[index];
+    fn from_vectors([right, down, forward, intrinsics, last]: [UVec4; 5]) -> CameraBlock {
         camera(right, down, forward, intrinsics, last)
     }
 }
 
-/// The views of a frustum.
-#[derive(Clone, Copy)]
-pub(crate) struct Views<'a>(pub(crate) &'a [ViewWords]);
+impl InVectors for SweptView {
+    type Vectors = [UVec4; 8];
 
-impl Fetch<SweptView> for Views<'_> {
     #[inline(always)]
-    fn fetch(&self, index: usize) -> SweptView {
-        let [right, down, forward, intrinsics, size, gain, map, rest] = self.0[index];
+    fn from_vectors([right, down, forward, intrinsics, size, gain, map, rest]: [UVec4; 8]) -> SweptView {
         SweptView {
             camera: camera(right, down, forward, intrinsics, size),
             gain: floats(gain),
@@ -99,18 +117,20 @@ impl Fetch<SweptView> for Views<'_> {
     }
 }
 
-/// Points of rays.
-#[derive(Clone, Copy)]
-pub(crate) struct Points<'a>(pub(crate) &'a [PointWords]);
+impl InVectors for RayPoint {
+    type Vectors = [UVec4; 2];
 
-impl Fetch<RayPoint> for Points<'_> {
     #[inline(always)]
-    fn fetch(&self, index: usize) -> RayPoint {
-        let [there, along] = self.0[index];
+    fn from_vectors([there, along]: [UVec4; 2]) -> RayPoint {
         let ([x, y, z, length], [dx, dy, dz, _]) = (floats(there), floats(along));
         RayPoint { position: [x, y, z], length, direction: [dx, dy, dz], sample: along.w }
     }
 }
+
+const _: () = assert!(size_of::<<CameraBlock as InVectors>::Vectors>() == size_of::<CameraBlock>());
+const _: () = assert!(size_of::<<SweptView as InVectors>::Vectors>() == size_of::<SweptView>());
+const _: () = assert!(size_of::<<RayPoint as InVectors>::Vectors>() == size_of::<RayPoint>());
+const _: () = assert!(size_of::<<Planes as InVectors>::Vectors>() == size_of::<Planes>());
 
 #[inline(always)]
 fn camera(right: UVec4, down: UVec4, forward: UVec4, intrinsics: UVec4, last: UVec4) -> CameraBlock {

@@ -15,7 +15,7 @@ pub(crate) use subgroup::Subgroup;
 use spirv_std::arch::{IndexUnchecked, control_barrier};
 use spirv_std::glam::Vec4;
 use spirv_std::memory::{Scope, Semantics};
-use viewfuse_kernels::network::tile::{Sums, TILE};
+use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
 use viewfuse_kernels::rows::Form;
 
 /// Inner indices of a step.
@@ -31,17 +31,6 @@ const STRIDE: u32 = FOURS + 1;
 pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
 /// The same for [`Form::Quadruple`].
 pub(crate) type ShortShared = [Vec4; (SHORT_STEP * STRIDE) as usize];
-
-/// The sizes of the matrices.
-#[derive(Clone, Copy)]
-pub(crate) struct Shape {
-    /// Rows of the left matrix and of the outputs.
-    pub(crate) row_count: u32,
-    /// Columns of the left matrix, rows of the right one.
-    pub(crate) inner_count: u32,
-    /// Columns of the right matrix and of the outputs.
-    pub(crate) column_count: u32,
-}
 
 /// An invocation's place.
 #[derive(Clone, Copy)]
@@ -77,22 +66,7 @@ impl Place {
     }
 }
 
-/// The workgroup memory of a [`Form`], or what it has in its place.
-pub(crate) trait Tiles {
-    /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
-    /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices,
-    /// the last row or column is read and the sum is not stored.
-    fn multiply(
-        self,
-        invocation: u32,
-        shape: Shape,
-        left: impl Fn(u32, u32) -> f32 + Copy,
-        right: impl Fn(u32, u32) -> f32 + Copy,
-        store: impl FnMut(u32, u32, f32),
-    );
-}
-
-/// That of [`Form::Single`].
+/// The workgroup memory of [`Form::Single`].
 pub(crate) struct Single<'a> {
     pub(crate) rows: &'a mut Shared,
     pub(crate) columns: &'a mut Shared,

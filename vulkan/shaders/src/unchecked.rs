@@ -3,6 +3,7 @@
 
 use spirv_std::arch::IndexUnchecked;
 use viewfuse_core::fetch::Fetch;
+use viewfuse_kernels::store::Store;
 
 /// An array with at least one element; an index beyond its end reads the last one.
 #[derive(Clone, Copy)]
@@ -16,11 +17,15 @@ impl Fetch<f32> for Endless<'_> {
     }
 }
 
-/// Writes an element, if it exists.
-#[inline(always)]
-pub(crate) fn store(values: &mut [f32], index: usize, value: f32) {
-    if index < values.len() {
-        // SAFETY: just looked.
-        unsafe { *values.index_unchecked_mut(index) = value };
+/// An array of which an element is written only if it exists.
+pub(crate) struct Unchecked<'a>(pub(crate) &'a mut [f32]);
+
+impl Store<f32> for Unchecked<'_> {
+    #[inline(always)]
+    fn store(&mut self, index: usize, value: f32) {
+        if index < self.0.len() {
+            // SAFETY: just looked.
+            unsafe { *self.0.index_unchecked_mut(index) = value };
+        }
     }
 }

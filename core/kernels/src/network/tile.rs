@@ -9,6 +9,32 @@ use glam::Vec4;
 /// Rows and columns of a tile.
 pub const TILE: u32 = 64;
 
+/// The sizes of a matrix product.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Rows of the left matrix and of the outputs.
+    pub row_count: u32,
+    /// Columns of the left matrix, rows of the right one.
+    pub inner_count: u32,
+    /// Columns of the right matrix and of the outputs.
+    pub column_count: u32,
+}
+
+/// How a device computes the tiles of a matrix product together.
+pub trait Tiles {
+    /// Computes an invocation's part of the matrix product of `left(row, inner)` and `right(inner, column)`, and calls
+    /// `store(row, column, sum)`. All invocations of a workgroup take part, with outputs or without: beyond the matrices,
+    /// the last row or column is read and the sum is not stored.
+    fn multiply(
+        self,
+        invocation: u32,
+        shape: Shape,
+        left: impl Fn(u32, u32) -> f32 + Copy,
+        right: impl Fn(u32, u32) -> f32 + Copy,
+        store: impl FnMut(u32, u32, f32),
+    );
+}
+
 /// Eight times eight sums, `[row][four of columns]`. Only constants are indices here: a device keeps an array in
 /// registers only then.
 #[derive(Clone, Copy, Debug, PartialEq)]

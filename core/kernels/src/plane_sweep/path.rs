@@ -47,6 +47,13 @@ impl CostBlock {
         }
     }
 
+    /// Where a line begins in `paths[direction][line][step][group]`.
+    #[inline]
+    pub fn first_of_line(&self, line: u32) -> usize {
+        let (direction, number, step_count) = self.line(line);
+        (direction * self.width * self.height + number * step_count) as usize * self.group_count as usize
+    }
+
     /// The pixel of a line.
     #[inline]
     pub fn pixel(&self, direction: u32, number: u32, step: u32) -> u32 {

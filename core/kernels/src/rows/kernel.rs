@@ -1,15 +1,9 @@
 //! The list of kernels as code, from their rows.
 
 use super::*;
-use crate::network::tile::TILE;
+use crate::network::tile::{Shape, TILE};
 use crate::pages::MAX_PAGES;
 use bytemuck::{Pod, Zeroable};
-
-/// Where the rows' bodies are.
-mod bodies {
-    pub(super) use crate::{compact, finite, genvs, limits, network, pixelnerf, plane_sweep, sample_mask, visual_hull};
-    pub(super) use viewfuse_core::{attention, composite, depths, fuse, half_precision, rays, sampler, weighting};
-}
 
 /// Invocations of a workgroup, along its only axis.
 pub const WORKGROUP: u32 = 64;
@@ -167,6 +161,27 @@ macro_rules! array {
     };
 }
 
+/// Bytes of a row's parameters.
+macro_rules! parameter_bytes {
+    () => {
+        0
+    };
+    ($block:ident: $Block:ty) => {
+        size_of::<$Block>()
+    };
+}
+
+/// The matrix product that a row's parameters describe.
+macro_rules! shape {
+    ($bytes:ident, $block:ident: $Block:ty, tiles [$rows:expr, $inner:expr, $columns:expr]) => {{
+        let $block: $Block = bytemuck::try_pod_read_unaligned($bytes).ok()?;
+        Some(Shape { row_count: $rows, inner_count: $inner, column_count: $columns })
+    }};
+    ($($other:tt)*) => {
+        None
+    };
+}
+
 /// Whether elements are tiles.
 macro_rules! is_tiled {
     (tiles $($shape:tt)*) => {
@@ -181,12 +196,11 @@ macro_rules! list {
     ($({
         $Kernel:ident $method:ident
         doc { $($doc:tt)* }
-        block { $($block:ident: $Block:ty)? }
+        block { $($block:tt)* }
         counts $counts:tt
         arrays { $({ $kind:ident $array:ident: $Host:ty, as { $($entry:tt)? } $($how:tt)* })+ }
         elements { $($elements:tt)* }
         marks { $($mark:ident)* }
-        body { $($body:ident)::+ }
     })+) => {
         /// A kernel.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -211,16 +225,16 @@ macro_rules! list {
                 match form {
                     Form::Single => self.name(),
                     Form::Double => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "_double"),)+
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::double"),)+
                     },
                     Form::Quadruple => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "_quadruple"),)+
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::quadruple"),)+
                     },
                     Form::Buffered => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "_buffered"),)+
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::buffered"),)+
                     },
                     Form::Subgroup => match self {
-                        $(Kernel::$Kernel => concat!(stringify!($method), "_subgroup"),)+
+                        $(Kernel::$Kernel => concat!(stringify!($method), "::subgroup"),)+
                     },
                 }
             }
@@ -235,7 +249,7 @@ macro_rules! list {
             /// Bytes of its parameters, without the [`Piece`] behind them.
             pub const fn parameter_bytes(self) -> usize {
                 match self {
-                    $(Kernel::$Kernel => 0 $(+ size_of::<$Block>())?,)+
+                    $(Kernel::$Kernel => parameter_bytes!($($block)*),)+
                 }
             }
 
@@ -243,6 +257,14 @@ macro_rules! list {
             pub const fn is_tiled(self) -> bool {
                 match self {
                     $(Kernel::$Kernel => is_tiled!($($elements)*),)+
+                }
+            }
+
+            /// The matrix product that a tiled kernel computes with these parameters; `None` for other kernels, and for
+            /// parameters of another length.
+            pub fn shape(self, parameters: &[u8]) -> Option<Shape> {
+                match self {
+                    $(Kernel::$Kernel => shape!(parameters, $($block)*, $($elements)*),)+
                 }
             }
 
@@ -254,12 +276,6 @@ macro_rules! list {
                 }
             }
         }
-
-        // A body that is not there does not compile.
-        $(const _: () = {
-            #[allow(unused_imports)]
-            use bodies::$($body)::+;
-        };)+
     };
 }
 

@@ -12,7 +12,6 @@
 ///     arrays { { kind array: Element, as { EntryElement } at { place } unless { other block flag } } ... }
 ///     elements { for element in [first..end] at_least [N] }      or { tiles [rows, inner, columns] }
 ///     marks { mark ... }
-///     body { path::of::body }
 /// }
 /// ```
 ///
@@ -25,7 +24,7 @@ macro_rules! normal_rows {
         $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?)
         $(for $element:ident in [$elements:expr $(; $least:literal a core)?])?
         $(tiles [$rows:expr, $inner:expr, $columns:expr])?
-        by $($body:ident)::+ $(, $mark:ident)* {
+        $(, $mark:ident)* {
             $(
                 $kind:ident $array:ident $([$place:expr])?: $Host:ty $(as $entry:tt)?
                 $(= $other:ident if !$told:ident.$flag:ident)?
@@ -45,7 +44,6 @@ macro_rules! normal_rows {
                 $(tiles [$rows, $inner, $columns])?
             }
             marks { $($mark)* }
-            body { $($body)::+ }
         })+ }
     };
 }

@@ -9,44 +9,39 @@ macro_rules! for_each_kernel {
         $crate::normal_rows! { $callback
             /// Weights of the sources for targets, by formula: `weights[target][MAX_WEIGHED]`, zeros beyond the sources.
             /// An element is a target.
-            Weigh weigh(block: WeighBlock; target_count) for target in [0..target_count; 16 a core]
-            by weighting::weigh, definition {
+            Weigh weigh(block: WeighBlock; target_count) for target in [0..target_count; 16 a core], definition {
                 read sources: PoseBlock,
                 read targets: PoseBlock,
                 write weights: f32 as [f32; MAX_WEIGHED],
             }
             /// Embeddings of poses: `embedded[pose][EMBEDDING]`. An element is a pose.
-            EmbedPose embed_pose(; pose_count) for pose in [0..pose_count; 4 a core]
-            by attention::FourierEmbedding, definition {
+            EmbedPose embed_pose(; pose_count) for pose in [0..pose_count], looped, definition {
                 one embedding: f32 as FourierEmbedding,
                 read poses: PoseBlock,
                 write embedded: f32 as [f32; EMBEDDING],
             }
             /// Weights of the sources for targets, by attention: `weights[target][MAX_WEIGHED]` from
             /// `queries[target][EMBEDDING]` and `keys[source][EMBEDDING]`. An element is a target.
-            Attend attend(source_count: u32; target_count) for target in [0..target_count; 16 a core]
-            by attention::attend, definition {
+            Attend attend(source_count: u32; target_count) for target in [0..target_count; 16 a core], definition {
                 read queries: f32,
                 read keys: f32,
                 write weights: f32 as [f32; MAX_WEIGHED],
             }
             /// Rays of a target's pixels. An element is a ray.
-            CastRays cast_rays(block: CastBlock; ray_count) for ray in [0..ray_count; 1024 a core] by rays::cast_ray {
+            CastRays cast_rays(block: CastBlock; ray_count) for ray in [0..ray_count; 1024 a core] {
                 read pixels: u32,
                 write rays: TargetRay,
             }
             /// Evenly spread depths on rays: `depths[ray][sample]`. An element is a sample.
             CoarseDepths coarse_depths(block: CoarseBlock; ray_count)
-            for sample in [0..ray_count * block.sample_count; 1024 a core]
-            by depths::coarse_depth {
+            for sample in [0..ray_count * block.sample_count; 1024 a core] {
                 read rays: TargetRay,
                 read pixels: u32,
                 write depths: f32,
             }
             /// Points of the samples in a list, which number rays and samples flat, or of all samples: `points[point]` from
             /// `depths[ray][sample]`. An element is a point.
-            PlacePoints place_points(block: PlaceBlock; point_count) for point in [0..point_count; 1024 a core]
-            by rays::place_point {
+            PlacePoints place_points(block: PlaceBlock; point_count) for point in [0..point_count; 1024 a core] {
                 optional samples: u32 = depths if !block.has_samples,
                 read rays: TargetRay,
                 read depths: f32,
@@ -55,16 +50,14 @@ macro_rules! for_each_kernel {
             /// Features of points in the axes of views: `embedded[view][point][feature]`. An element is a feature of a
             /// point in a view.
             EmbedPoints embed_points(block: EmbedBlock; view_count)
-            for feature in [0..view_count * block.point_count * block.row_len()]
-            by pixelnerf::embedded_value, twin {
+            for feature in [0..view_count * block.point_count * block.row_len()], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 write embedded: f32,
             }
             /// Weights of views at points: `visible[point][view]`. An element is a view of a point.
             VisibleWeights visible_weights(view_count: u32; point_count)
-            for weight in [0..point_count * view_count; 512 a core]
-            by pixelnerf::visible_weight {
+            for weight in [0..point_count * view_count; 512 a core] {
                 read views: CameraBlock as vectors,
                 read weights: f32,
                 read points: RayPoint as vectors,
@@ -72,8 +65,7 @@ macro_rules! for_each_kernel {
             }
             /// Latents where points appear in a view: its part of `gathered[view][point][channel]`, from the view's
             /// `grid[row][column][channel]`. An element is four channels of a point.
-            GatherLatents gather_latents(block: GatherBlock) for four in [0..block.point_count * block.four_count()]
-            by pixelnerf::gathered_value, twin {
+            GatherLatents gather_latents(block: GatherBlock) for four in [0..block.point_count * block.four_count()], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 read grid: f32,
@@ -82,23 +74,20 @@ macro_rules! for_each_kernel {
             }
             /// Features where points lie in a view's volume: its part of `gathered[view][point][feature]`, from the view's
             /// `volume[row][column][depth][feature]`. An element is a feature of a point.
-            GatherVolume gather_volume(block: VolumeBlock) for feature in [0..block.point_count * block.feature_count]
-            by genvs::volume_value, twin {
+            GatherVolume gather_volume(block: VolumeBlock) for feature in [0..block.point_count * block.feature_count], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 read volume: f32,
                 write gathered: f32,
             }
             /// Numbers in half precision (f16), two in a word, the first in the lower half. An element is a word.
-            PackF16 pack_f16(number_count: u32) for word in [0..word_count(*number_count); 4096 a core]
-            by half_precision::packed_f16 {
+            PackF16 pack_f16(number_count: u32) for word in [0..word_count(*number_count); 4096 a core] {
                 read numbers: f32,
                 write words: u32,
             }
             /// As `gather_latents`, from the words of a grid in half precision. An element is four channels of a point.
             GatherLatentsF16 gather_latents_f16(block: GatherBlock)
-            for four in [0..block.point_count * block.four_count()]
-            by pixelnerf::gathered_value_f16, twin {
+            for four in [0..block.point_count * block.four_count()], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 read grid: u32,
@@ -107,8 +96,7 @@ macro_rules! for_each_kernel {
             }
             /// As `gather_volume`, from the words of a volume in half precision. An element is a feature of a point.
             GatherVolumeF16 gather_volume_f16(block: VolumeBlock)
-            for feature in [0..block.point_count * block.feature_count]
-            by genvs::volume_value_f16, twin {
+            for feature in [0..block.point_count * block.feature_count], twin {
                 read views: CameraBlock as vectors,
                 read points: RayPoint as vectors,
                 read volume: u32,
@@ -116,8 +104,7 @@ macro_rules! for_each_kernel {
             }
             /// Convolutions of an image, summed in an order of the device's choice. An element is an 8x8 part of a tile of
             /// `TILE` pixels and channels.
-            Convolve convolve(block: ConvolveBlock) tiles [block.pixel_count(), block.patch_len(), block.out_channels]
-            by network::convolve::convolve_element, twin {
+            Convolve convolve(block: ConvolveBlock) tiles [block.pixel_count(), block.patch_len(), block.out_channels], twin {
                 filled inputs: f32,
                 layer weights: f32,
                 filled bias: f32,
@@ -127,8 +114,7 @@ macro_rules! for_each_kernel {
             /// Convolutions of every channel by itself, with `weights[place of the window][channel]`. An element is a
             /// channel of an output pixel.
             ConvolveDepthwise convolve_depthwise(block: DepthwiseBlock)
-            for channel in [0..block.pixel_count() * block.channels]
-            by network::depthwise::depthwise_element, twin {
+            for channel in [0..block.pixel_count() * block.channels], twin {
                 filled inputs: f32,
                 filled weights: f32,
                 write outputs: f32,
@@ -136,8 +122,7 @@ macro_rules! for_each_kernel {
             /// Transposed convolutions, summed in an order of the device's choice, with `bias[output channel]`. An element
             /// is an 8x8 part of a tile of `TILE` input pixels and what they become.
             ConvolveTransposed convolve_transposed(block: TransposedBlock)
-            tiles [block.pixel_count(), block.in_channels, block.column_count()]
-            by network::transpose::transposed_element, twin {
+            tiles [block.pixel_count(), block.in_channels, block.column_count()], twin {
                 filled inputs: f32,
                 layer weights: f32,
                 filled bias: f32,
@@ -145,23 +130,20 @@ macro_rules! for_each_kernel {
             }
             /// Largest values of windows. An element is a channel of an output pixel.
             MaxPool max_pool(block: PoolBlock)
-            for channel in [0..block.out_height * block.out_width * block.channels; 1024 a core]
-            by network::resample::pooled_element {
+            for channel in [0..block.out_height * block.out_width * block.channels; 1024 a core] {
                 filled inputs: f32,
                 write outputs: f32,
             }
             /// Enlarged images: writes some channels of the output image. An element is an input channel of an output
             /// pixel.
             Upsample upsample(block: UpsampleBlock)
-            for channel in [0..block.out_height * block.out_width * block.in_channels; 4096 a core]
-            by network::resample::upsampled_element {
+            for channel in [0..block.out_height * block.out_width * block.in_channels; 4096 a core] {
                 filled inputs: f32,
                 write outputs[block.place(channel as usize)]: f32,
             }
             /// Linear layers (a matrix product with bias, residual and rectification), summed in an order of the device's
             /// choice. An element is an 8x8 part of a tile of `TILE` rows and columns.
-            Linear linear(block: LinearBlock) tiles [block.row_count, block.inner_count, block.column_count]
-            by network::linear::linear_element, twin {
+            Linear linear(block: LinearBlock) tiles [block.row_count, block.inner_count, block.column_count], twin {
                 filled inputs: f32,
                 layer weights: f32,
                 filled bias: f32,
@@ -169,31 +151,27 @@ macro_rules! for_each_kernel {
                 write outputs: f32,
             }
             /// Means of an image's channels, from `inputs[pixel][channel]`. An element is a channel.
-            ChannelMeans channel_means(block: MeanBlock) for channel in [0..block.channels]
-            by network::group_norm::channel_mean, twin {
+            ChannelMeans channel_means(block: MeanBlock) for channel in [0..block.channels], twin {
                 filled inputs: f32,
                 write means: f32,
             }
             /// Group-norm statistics of parts of an image, mean and squared deviations: `partials[part][group]`. An element
             /// is a group of channels in a part.
             GroupNormPartials group_norm_partials(block: GroupNormBlock)
-            for group in [0..block.part_count() * block.group_count]
-            by network::group_norm::group_norm_partials, twin {
+            for group in [0..block.part_count() * block.group_count], twin {
                 filled inputs: f32,
                 write partials: [f32; 2],
             }
             /// Group-norm statistics of an image from those of its parts, mean and factor: `statistics[group]`. An element
             /// is a group of channels.
             GroupNormStatistics group_norm_statistics(block: GroupNormBlock)
-            for group in [0..block.group_count; 4096 a core]
-            by network::group_norm::group_norm_statistics {
+            for group in [0..block.group_count; 4096 a core] {
                 read partials: [f32; 2],
                 write statistics: [f32; 2],
             }
             /// Group norm: `outputs[pixel][channel]`, with `weights[channel]` and `bias[channel]`. An element is a
             /// channel of a pixel.
-            GroupNorm group_norm(block: GroupNormBlock) for channel in [0..block.pixel_count * block.channels]
-            by network::group_norm::group_norm_element, twin {
+            GroupNorm group_norm(block: GroupNormBlock) for channel in [0..block.pixel_count * block.channels], twin {
                 filled inputs: f32,
                 read statistics: [f32; 2],
                 filled weights: f32,
@@ -203,29 +181,26 @@ macro_rules! for_each_kernel {
             /// Products of two computed matrices, which may lie in one buffer, summed in an order of the device's choice.
             /// An element is an 8x8 part of a tile of `TILE` rows and columns.
             MatrixProduct matrix_product(block: MatrixBlock)
-            tiles [block.row_count, block.inner_count, block.column_count]
-            by network::attend::matrix_element, twin {
+            tiles [block.row_count, block.inner_count, block.column_count], twin {
                 filled left: f32,
                 filled right: f32,
                 write outputs: f32,
             }
             /// Softmax over rows: `weights[row][column]` from `scores[row][column]`. An element is a row.
-            SoftmaxRows softmax_rows(column_count: u32; row_count) for row in [0..row_count]
-            by network::attend::softmax_value, looped {
+            SoftmaxRows softmax_rows(column_count: u32; row_count) for row in [0..row_count], looped {
                 read scores: f32,
                 write weights: f32,
             }
             /// Weighted sums over views: `fused[element]` from the weights of the element's point and
             /// `latents[view][element]`. An element is a channel of a point.
-            FuseViews fuse_views(block: FuseBlock; element_count) for channel in [0..element_count]
-            by fuse::fuse_element, twin {
+            FuseViews fuse_views(block: FuseBlock; element_count) for channel in [0..element_count], twin {
                 read weights: f32,
                 read latents: f32,
                 write fused: f32,
             }
             /// Colour and optical depth of points: each point's sample of `samples[ray][sample]` (red, green, blue, optical
             /// depth), from `raw[point][4]`. An element is a point.
-            Radiance radiance(; point_count) for point in [0..point_count] by pixelnerf::radiance, serial {
+            Radiance radiance(; point_count) for point in [0..point_count], serial {
                 read raw: f32,
                 read points: RayPoint as vectors,
                 write samples: [f32; 4],
@@ -233,8 +208,7 @@ macro_rules! for_each_kernel {
             /// Pixels from the samples on their rays: `colours[ray]` (red, green, blue, opacity) and `depths[ray]`, from
             /// `samples[ray][sample]` (red, green, blue, optical depth) and `sample_depths[ray][sample]`. An element is a
             /// ray.
-            Composite composite(block: CompositeBlock; ray_count) for ray in [0..ray_count; 64 a core]
-            by composite::composite_samples {
+            Composite composite(block: CompositeBlock; ray_count) for ray in [0..ray_count; 64 a core] {
                 read samples: [f32; 4],
                 read sample_depths: f32,
                 write colours: [f32; 4],
@@ -242,23 +216,20 @@ macro_rules! for_each_kernel {
             }
             /// Weights of samples on rays: `seen[first ray + ray][sample]` is weight and transmittance in front, from
             /// `samples[ray][sample]` (red, green, blue, optical depth). An element is a ray.
-            WeighSamples weigh_samples(block: RaysBlock; ray_count) for ray in [0..ray_count; 32 a core]
-            by sample_mask::weigh_sample {
+            WeighSamples weigh_samples(block: RaysBlock; ray_count) for ray in [0..ray_count; 32 a core] {
                 read samples: [f32; 4],
                 write seen[(block.first_ray + ray) * block.sample_count]: [f32; 2],
             }
             /// Random numbers for fine samples: `draws[ray][sample]`. An element is a fine sample.
             RandomDraws random_draws(block: FineBlock; ray_count)
-            for sample in [0..ray_count * block.fine_count(); 1024 a core]
-            by depths::random_draw {
+            for sample in [0..ray_count * block.fine_count(); 1024 a core] {
                 read pixels: u32,
                 write draws: [f32; 2],
             }
             /// Depths where a first pass saw something: `depths[ray][sample]`, from `seen[ray][part]` and the pixels of
             /// these rays. An element is a fine sample.
             FineDepths fine_depths(block: FineBlock; ray_count)
-            for sample in [0..ray_count * block.fine_count(); 1024 a core]
-            by depths::fine_depth {
+            for sample in [0..ray_count * block.fine_count(); 1024 a core] {
                 read seen: [f32; 2],
                 read rays: TargetRay,
                 read colours: [f32; 4],
@@ -269,8 +240,7 @@ macro_rules! for_each_kernel {
             /// Depths of two passes in order: `merged[ray][sample]` increase, from `coarse[ray][sample]` and
             /// `fine[ray][sample]`. An element is a sample of either.
             MergeDepths merge_depths(block: FineBlock; ray_count)
-            for sample in [0..ray_count * (block.coarse_count + block.fine_count())]
-            by depths::merged_depth, looped {
+            for sample in [0..ray_count * (block.coarse_count + block.fine_count())], looped {
                 read coarse: f32,
                 read fine: f32,
                 write merged: f32,
@@ -278,8 +248,7 @@ macro_rules! for_each_kernel {
             /// The sample mask, which samples are computed: `mask[ray][sample]` is 1 or 0, by `seen[seen ray][part]`. An
             /// element is a sample.
             SampleMask sample_mask(block: SampleMaskBlock; ray_count)
-            for sample in [0..ray_count * block.sample_count; 1024 a core]
-            by sample_mask::is_sampled {
+            for sample in [0..ray_count * block.sample_count; 1024 a core] {
                 read seen: [f32; 2],
                 read rays: TargetRay,
                 read pixels: u32,
@@ -288,43 +257,38 @@ macro_rules! for_each_kernel {
             }
             /// How many elements of each run of 256 (`compact::RUN`) a mask marks: `counts[run]` of
             /// `mask[element]`. An element is a run.
-            CountMarked count_marked(element_count: u32) for run in [0..element_count.div_ceil(RUN); 64 a core]
-            by compact::marked_in_run {
+            CountMarked count_marked(element_count: u32) for run in [0..element_count.div_ceil(RUN); 64 a core] {
                 read mask: u32,
                 write counts: u32,
             }
             /// Where each run's part of a list begins, `offsets[run]`, with one run more than `counts[run]`, and the length
             /// of it all, `total[0]`. There is one element.
-            SumCounts sum_counts(run_count: u32) for all in [0..1] by compact::run_offsets, serial {
+            SumCounts sum_counts(run_count: u32) for all in [0..1], serial {
                 read counts: u32,
                 write offsets: u32,
                 write total: u32,
             }
             /// What a mask marks, in order: `list[place]`. An element is a run.
-            ListMarked list_marked(element_count: u32) for run in [0..element_count.div_ceil(RUN)]
-            by compact::list_run, serial {
+            ListMarked list_marked(element_count: u32) for run in [0..element_count.div_ceil(RUN)], serial {
                 read mask: u32,
                 read offsets: u32,
                 write list: u32,
             }
             /// Where numbers are not finite: `firsts[run]` is the index of the first infinite or NaN number of a run of
             /// 1024 (`finite::FINITE_RUN`), or `u32::MAX`. An element is a run.
-            FindNonFinite find_non_finite(value_count: u32) for run in [0..value_count.div_ceil(FINITE_RUN); 64 a core]
-            by finite::first_non_finite {
+            FindNonFinite find_non_finite(value_count: u32) for run in [0..value_count.div_ceil(FINITE_RUN); 64 a core] {
                 read values: f32,
                 write firsts: u32,
             }
             /// Weights of samples on rays of features: `weights[ray][sample]` from `raw[ray][sample][1 + feature]`. An
             /// element is a ray.
-            WeighFeatures weigh_features(block: FeatureBlock; ray_count) for ray in [0..ray_count; 16 a core]
-            by genvs::weigh_features {
+            WeighFeatures weigh_features(block: FeatureBlock; ray_count) for ray in [0..ray_count; 16 a core] {
                 read raw: f32,
                 read points: RayPoint,
                 write weights[ray * block.sample_count]: f32,
             }
             /// Sums of features along rays: `summed[first ray + ray][feature]`. An element is a feature of a ray.
-            SumFeatures sum_features(block: FeatureBlock; ray_count) for feature in [0..ray_count * block.feature_count]
-            by genvs::summed_feature, twin {
+            SumFeatures sum_features(block: FeatureBlock; ray_count) for feature in [0..ray_count * block.feature_count], twin {
                 read weights: f32,
                 read fused: f32,
                 read raw: f32,
@@ -332,16 +296,14 @@ macro_rules! for_each_kernel {
             }
             /// What the denoiser is given: `inputs[pixel][channel]`. An element is a channel of a pixel.
             DenoiserInput denoiser_input(block: DenoiserInputBlock; pixel_count)
-            for channel in [0..pixel_count * (block.picture_channels + block.condition_channels); 16384 a core]
-            by genvs::denoiser_input {
+            for channel in [0..pixel_count * (block.picture_channels + block.condition_channels); 16384 a core] {
                 read noisy: f32,
                 read condition: f32,
                 write inputs: f32,
             }
             /// Where the rays of one view's pixels enter the visual hull: the view's part of `entries[view][row][column]`.
             /// An element is a pixel of the view.
-            HullEntry hull_entry(view: u32; pixel_count) for pixel in [0..pixel_count; 64 a core]
-            by visual_hull::hull::hull_entry {
+            HullEntry hull_entry(view: u32; pixel_count) for pixel in [0..pixel_count; 64 a core] {
                 one object: ObjectBlock,
                 read views: CameraBlock as vectors,
                 paged texels: [f32; 4],
@@ -349,8 +311,7 @@ macro_rules! for_each_kernel {
             }
             /// How badly other views match, at all planes: `costs[row][column][plane]` of a band. An element is a pixel of
             /// the band.
-            MatchCost match_cost(block: SweepBlock) for pixel in [0..block.row_count * block.width; 16 a core]
-            by visual_hull::sweep::match_cost {
+            MatchCost match_cost(block: SweepBlock) for pixel in [0..block.row_count * block.width; 16 a core] {
                 one object: ObjectBlock,
                 read views: CameraBlock as vectors,
                 paged texels: [f32; 4] as vectors,
@@ -361,15 +322,13 @@ macro_rules! for_each_kernel {
             /// Costs summed over a window's columns: `row_sums[row][column][plane]` = sum, count. An element is a plane of
             /// a pixel of the band.
             SumRow sum_row(block: SweepBlock)
-            for plane in [0..block.row_count * block.width * block.plane_count; 4096 a core]
-            by visual_hull::sweep::sum_row {
+            for plane in [0..block.row_count * block.width * block.plane_count; 4096 a core] {
                 read costs: f32,
                 write row_sums: [f32; 2],
             }
             /// Costs averaged over a window: `means[row][column][plane]`. An element is a plane of a pixel of the band.
             MeanColumn mean_column(block: SweepBlock)
-            for plane in [0..block.row_count * block.width * block.plane_count; 4096 a core]
-            by visual_hull::sweep::mean_column {
+            for plane in [0..block.row_count * block.width * block.plane_count; 4096 a core] {
                 read costs: f32,
                 read row_sums: [f32; 2],
                 write means: f32,
@@ -377,8 +336,7 @@ macro_rules! for_each_kernel {
             /// Depths of least cost, in some rows of a band, counted from its first: their part of
             /// `picked[view][row][column]`. An element is a pixel of the band.
             PickDepth pick_depth(block: SweepBlock; first_row, row_count)
-            for pixel in [first_row * block.width..(first_row + row_count) * block.width; 64 a core]
-            by visual_hull::sweep::pick_depth {
+            for pixel in [first_row * block.width..(first_row + row_count) * block.width; 64 a core] {
                 one object: ObjectBlock,
                 read views: CameraBlock as vectors,
                 read means: f32,
@@ -389,8 +347,7 @@ macro_rules! for_each_kernel {
             /// Rays through the solid, for some rows of a target: `colours[row][column]` (red, green, blue, opacity) and
             /// `pixel_depths[row][column]`. An element is a pixel of the target.
             MarchRays march_rays(block: MarchBlock; first_row, row_count)
-            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 16 a core]
-            by visual_hull::ray_marching::march_ray {
+            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 16 a core] {
                 one object: ObjectBlock,
                 read views: CameraBlock as vectors,
                 read footprints: f32,
@@ -403,8 +360,7 @@ macro_rules! for_each_kernel {
             /// What views show on planes, and how far their colours agree: `grey[view][row][column][group]` and
             /// `evidence[row][column][group][4]` of a band of a frustum. An element is a group of planes of a pixel.
             CompareViews compare_views(block: FrustumBlock)
-            for group in [0..block.row_count * block.camera.width * block.group_count]
-            by plane_sweep::evidence::evidence, looped {
+            for group in [0..block.row_count * block.camera.width * block.group_count], looped {
                 read views: SweptView as vectors,
                 read pairs: ViewPair,
                 read texels: [f32; 4] as vectors,
@@ -416,8 +372,7 @@ macro_rules! for_each_kernel {
             /// `costs[row][column][group][cost times weight, weight]`. An element is a group of planes of a pixel.
             CensusCost census_cost(block: FrustumBlock; first_row, row_count)
             for group in [first_row * block.camera.width * block.group_count ..
-                (first_row + row_count) * block.camera.width * block.group_count; 128 a core]
-            by plane_sweep::census::census_cost, wide {
+                (first_row + row_count) * block.camera.width * block.group_count; 128 a core], wide {
                 read pairs: ViewPair,
                 read grey: Planes,
                 read evidence: Planes,
@@ -426,44 +381,38 @@ macro_rules! for_each_kernel {
             /// Costs summed over rows of three windows: `sums[row][column][group][window][2]`. An element is a group of
             /// planes of a pixel.
             RowSums row_sums(block: WindowBlock)
-            for group in [0..block.width * block.height * block.group_count; 128 a core]
-            by plane_sweep::window::row_sums, wide {
+            for group in [0..block.width * block.height * block.group_count; 128 a core], wide {
                 read costs: Planes,
                 write sums[6 * group]: Planes,
             }
             /// Costs averaged over three windows: `means[row][column][group]`. An element is a group of planes of a pixel.
             WindowCost window_cost(block: WindowBlock)
-            for group in [0..block.width * block.height * block.group_count; 1024 a core]
-            by plane_sweep::window::window_cost, wide {
+            for group in [0..block.width * block.height * block.group_count; 1024 a core], wide {
                 read sums: Planes,
                 write means: Planes,
             }
             /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a line.
-            FollowPaths follow_paths(block: CostBlock) for line in [0..block.line_count(); 1 a core]
-            by plane_sweep::path::Line, wide {
+            FollowPaths follow_paths(block: CostBlock) for line in [0..block.line_count(); 1 a core], wide {
                 read means: Planes as vectors,
-                write paths[block.first_of_path(line)]: Planes as vectors,
+                write paths[block.first_of_line(line)]: Planes as vectors,
             }
             /// The mean of the four directions' costs: `costs[row][column][group]`. An element is a group of planes of a pixel.
             JoinPaths join_paths(block: CostBlock)
-            for group in [0..block.width * block.height * block.group_count; 1024 a core]
-            by plane_sweep::path::joined_cost, wide {
+            for group in [0..block.width * block.height * block.group_count; 1024 a core], wide {
                 read paths: Planes,
                 write costs: Planes,
             }
             /// Disparity and confidence of a view's pixels: the view's part of `disparities[view][row][column]`. An element is
             /// a pixel.
             PickDisparity pick_disparity(block: FrustumBlock)
-            for pixel in [0..block.camera.width * block.camera.height; 64 a core]
-            by plane_sweep::disparity::pick_disparity, wide {
+            for pixel in [0..block.camera.width * block.camera.height; 64 a core], wide {
                 read costs: Planes,
                 write disparities[block.camera.first_texel + pixel]: [f32; 2],
             }
             /// Pixels blended from planes, for some rows of a target: `colours[row][column]` (red, green, blue, opacity),
             /// `pixel_depths[row][column]` and `confidences[row][column]`. An element is a pixel of the target.
             BlendPlanes blend_planes(block: BlendBlock; first_row, row_count)
-            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core]
-            by plane_sweep::blend::blend, wide {
+            for pixel in [first_row * block.target.width..(first_row + row_count) * block.target.width; 64 a core], wide {
                 read views: SweptView as vectors,
                 paged texels: [f32; 4] as vectors,
                 read disparities: [f32; 2] as vectors,
@@ -474,8 +423,7 @@ macro_rules! for_each_kernel {
             }
             /// Linear combinations of pictures: `mixed[element]` of `state[element]` and four results, the newest first.
             /// What has coefficient 0 is not read and may be any buffer. An element is a channel of a pixel.
-            MixPictures mix_pictures(block: Mix; element_count) for channel in [0..element_count; 4096 a core]
-            by sampler::mixed_element {
+            MixPictures mix_pictures(block: Mix; element_count) for channel in [0..element_count; 4096 a core] {
                 read state: f32,
                 read newest: f32,
                 read second: f32,
@@ -484,20 +432,18 @@ macro_rules! for_each_kernel {
                 write mixed: f32,
             }
             /// Pictures with noise. An element is a channel of a pixel.
-            AddNoise add_noise(block: NoiseBlock; element_count) for channel in [0..element_count; 4096 a core]
-            by sampler::noisy_element {
+            AddNoise add_noise(block: NoiseBlock; element_count) for channel in [0..element_count; 4096 a core] {
                 read picture: f32,
                 write noisy: f32,
             }
             /// Numbers copied, to measure how fast a device reads and writes. An element is four numbers.
-            CopyNumbers copy_numbers(; element_count) for four in [0..element_count] by limits::copied, twin, measured {
+            CopyNumbers copy_numbers(; element_count) for four in [0..element_count], twin, measured {
                 read numbers: [f32; 4] as vectors,
                 write copies: [f32; 4] as vectors,
             }
             /// Numbers multiplied and added to, to measure how fast a device computes: `ends[element]` from
             /// `starts[element]`. An element is several chains.
-            MultiplyAdd multiply_add(block: ChainBlock; element_count) for chain in [0..element_count]
-            by limits::chained, twin, measured {
+            MultiplyAdd multiply_add(block: ChainBlock; element_count) for chain in [0..element_count], twin, measured {
                 read starts: f32,
                 write ends: f32,
             }

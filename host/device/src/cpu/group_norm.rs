@@ -3,7 +3,7 @@
 use super::scratch::with_scratch;
 use crate::parallel::{for_each_row, for_each_rows};
 use pulp::{Arch, Simd, WithSimd};
-use viewfuse_kernels::network::group_norm::{self, GroupNormBlock, MeanBlock, PART, silu};
+use viewfuse_kernels::network::group_norm::{GroupNormBlock, MeanBlock, PART, silu};
 
 pub(super) fn channel_means(block: &MeanBlock, inputs: &[f32], means: &mut [f32]) {
     let means = &mut means[..block.channels as usize];
@@ -23,12 +23,6 @@ pub(super) fn group_norm_partials(block: &GroupNormBlock, inputs: &[f32], partia
             Arch::new().dispatch(GroupNormPartials { block, inputs, part, sums, statistics });
         });
     });
-}
-
-pub(super) fn group_norm_statistics(block: &GroupNormBlock, partials: &[[f32; 2]], statistics: &mut [[f32; 2]]) {
-    for (group, statistics) in statistics[..block.group_count as usize].iter_mut().enumerate() {
-        *statistics = group_norm::group_norm_statistics(partials, block, group);
-    }
 }
 
 pub(super) fn group_norm(

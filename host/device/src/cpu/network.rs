@@ -5,12 +5,11 @@ use super::linear::{Ending, Panels, Rows};
 use super::scratch::with_scratch;
 use super::winograd::Winograd;
 use crate::kernels::LayerShape;
-use crate::parallel::{for_each, for_each_part, for_each_row};
+use crate::parallel::{for_each_part, for_each_row};
 use pulp::Arch;
 use viewfuse_kernels::network::convolve::{ConvolveBlock, window_pixel};
 use viewfuse_kernels::network::depthwise::DepthwiseBlock;
 use viewfuse_kernels::network::linear::LinearBlock;
-use viewfuse_kernels::network::resample::{PoolBlock, UpsampleBlock, pooled_element, upsampled_element};
 use viewfuse_kernels::network::transpose::TransposedBlock;
 
 /// The most rows that a core computes at once: their inputs and outputs (512 columns) stay in its second-level cache,
@@ -135,22 +134,6 @@ pub(super) fn convolve_transposed(
     };
     for_each_part(outputs, width * size * size * pitch, &|row, outputs| {
         with_scratch(width * columns, |results| run(results, row, outputs));
-    });
-}
-
-pub(super) fn max_pool(block: &PoolBlock, inputs: &[f32], outputs: &mut [f32]) {
-    let count = (block.out_height * block.out_width * block.channels) as usize;
-    for_each(&mut outputs[..count], 1024, |element, output| *output = pooled_element(inputs, block, element));
-}
-
-pub(super) fn upsample(block: &UpsampleBlock, inputs: &[f32], outputs: &mut [f32]) {
-    let (in_channels, out_channels) = (block.in_channels as usize, block.out_channels as usize);
-    let pixel_count = (block.out_height * block.out_width) as usize;
-    for_each_row(&mut outputs[..pixel_count * out_channels], out_channels, 4096, |pixel, outputs| {
-        let first = block.first_channel as usize;
-        for (channel, output) in outputs[first..first + in_channels].iter_mut().enumerate() {
-            *output = upsampled_element(inputs, block, pixel * in_channels + channel);
-        }
     });
 }
 

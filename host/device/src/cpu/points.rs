@@ -1,11 +1,11 @@
-//! The inputs of PixelNeRF's network at points, and radiance from its outputs.
+//! The inputs of PixelNeRF's network at points.
 
 use crate::parallel::for_each_row;
 use pulp::Arch;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::half_precision::Halves;
 use viewfuse_core::rays::RayPoint;
-use viewfuse_kernels::pixelnerf::{self, EmbedBlock, GatherBlock, GridPlace, in_view_axes, visible_weight, waves};
+use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock, GridPlace, in_view_axes, waves};
 
 pub(super) fn embed_points(
     block: &EmbedBlock,
@@ -27,22 +27,6 @@ pub(super) fn embed_points(
             }
         }
         embedded[row_len - 3..].copy_from_slice(&in_view_axes(view, point.direction));
-    });
-}
-
-pub(super) fn visible_weights(
-    view_count: &u32,
-    point_count: u32,
-    views: &[CameraBlock],
-    weights: &[f32],
-    points: &[RayPoint],
-    visible: &mut [f32],
-) {
-    let count = *view_count as usize;
-    for_each_row(&mut visible[..point_count as usize * count], count, 512, |point, visible| {
-        for (visible, view) in visible.iter_mut().zip(0..) {
-            *visible = visible_weight(views, weights, *view_count, &points[point], view);
-        }
     });
 }
 
@@ -103,12 +87,6 @@ pub(super) fn gather_latents_f16(
             values.iter_mut().enumerate().for_each(|(channel, value)| *value = place.value(&grid, channel));
         }
     });
-}
-
-pub(super) fn radiance(point_count: u32, raw: &[f32], points: &[RayPoint], samples: &mut [[f32; 4]]) {
-    for (raw, point) in raw.chunks_exact(4).zip(&points[..point_count as usize]) {
-        samples[point.sample as usize] = pixelnerf::radiance(raw, point);
-    }
 }
 
 /// [`GridPlace::value`] for all channels together, from the four nodes.

@@ -1,11 +1,11 @@
-//! Feature images from volumes, and the denoiser's inputs.
+//! Feature images from volumes.
 
-use crate::parallel::{for_each, for_each_row};
+use crate::parallel::for_each_row;
 use pulp::Arch;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::half_precision::{fetch_f16, packed_f16, word_count};
+use viewfuse_core::half_precision::fetch_f16;
 use viewfuse_core::rays::RayPoint;
-use viewfuse_kernels::genvs::{self, DenoiserInputBlock, FeatureBlock, VolumeBlock, VolumePlace};
+use viewfuse_kernels::genvs::{FeatureBlock, VolumeBlock, VolumePlace};
 
 /// Sums the features of the eight nodes around each point: `add(first, weight, gathered)` adds those of the node whose
 /// first feature is number `first` of the volume.
@@ -47,12 +47,6 @@ pub(super) fn gather_volume(
     });
 }
 
-pub(super) fn pack_f16(number_count: &u32, numbers: &[f32], words: &mut [u32]) {
-    for_each(&mut words[..word_count(*number_count) as usize], 4096, |element, word| {
-        *word = packed_f16(numbers, *number_count, element);
-    });
-}
-
 pub(super) fn gather_volume_f16(
     block: &VolumeBlock,
     views: &[CameraBlock],
@@ -65,20 +59,6 @@ pub(super) fn gather_volume_f16(
         for (index, sum) in gathered.iter_mut().enumerate() {
             *sum += fetch_f16(words, first % 2 + index) * weight;
         }
-    });
-}
-
-pub(super) fn weigh_features(
-    block: &FeatureBlock,
-    ray_count: u32,
-    raw: &[f32],
-    points: &[RayPoint],
-    weights: &mut [f32],
-) {
-    let samples = block.sample_count as usize;
-    for_each_row(&mut weights[..ray_count as usize * samples], samples, 1024, |ray, weights| {
-        let first = ray * samples;
-        genvs::weigh_features(raw, points, block, ray, |sample, weight| weights[sample - first] = weight);
     });
 }
 
@@ -108,17 +88,4 @@ pub(super) fn sum_features(
             },
         );
     });
-}
-
-pub(super) fn denoiser_input(
-    block: &DenoiserInputBlock,
-    pixel_count: u32,
-    noisy: &[f32],
-    condition: &[f32],
-    inputs: &mut [f32],
-) {
-    let count = (pixel_count * (block.picture_channels + block.condition_channels)) as usize;
-    for (element, input) in inputs[..count].iter_mut().enumerate() {
-        *input = genvs::denoiser_input(noisy, condition, block, element);
-    }
 }

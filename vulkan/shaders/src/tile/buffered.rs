@@ -4,9 +4,9 @@
 //! multiplies the present one, and is then written into the half that nobody reads any more: all invocations have passed
 //! the barrier behind the step before.
 
-use super::{FOURS, Place, SHORT_STEP, Shape, Shared, Tiles, read_fours, store_sums, wait_for_all, write};
+use super::{FOURS, Place, SHORT_STEP, Shared, read_fours, store_sums, wait_for_all, write};
 use spirv_std::glam::Vec4;
-use viewfuse_kernels::network::tile::{Sums, TILE};
+use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
 use viewfuse_kernels::rows::Form;
 
 /// The workgroup memory of [`Form::Buffered`]: in each array two steps of [`SHORT_STEP`] inner indices.

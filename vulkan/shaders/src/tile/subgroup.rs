@@ -7,10 +7,10 @@
 //! A subgroup has 8, 16, 32 or 64 invocations, all of which take part: the pipeline demands full subgroups of the size that
 //! its specialisation constant says.
 
-use super::{Place, Shape, Tiles, store_sums};
+use super::{Place, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
 use spirv_std::glam::Vec4;
-use viewfuse_kernels::network::tile::{Sums, TILE};
+use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
 use viewfuse_kernels::rows::Form;
 
 /// Invocations that need the same rows, and inner indices that each of them loads at once.

@@ -1,7 +1,6 @@
-//! Fusion of views, compositing of samples.
+//! Fusion of views.
 
-use crate::parallel::{for_each_row, for_each_row_of_two};
-use viewfuse_core::composite::{CompositeBlock, composite_samples};
+use crate::parallel::for_each_row;
 use viewfuse_core::fuse::FuseBlock;
 
 pub(super) fn fuse_views(block: &FuseBlock, element_count: u32, weights: &[f32], latents: &[f32], fused: &mut [f32]) {
@@ -16,22 +15,5 @@ pub(super) fn fuse_views(block: &FuseBlock, element_count: u32, weights: &[f32],
                 *fused += weight * latent;
             }
         }
-    });
-}
-
-pub(super) fn composite(
-    block: &CompositeBlock,
-    ray_count: u32,
-    samples: &[[f32; 4]],
-    sample_depths: &[f32],
-    colours: &mut [[f32; 4]],
-    depths: &mut [f32],
-) {
-    let (rays, count) = (ray_count as usize, block.sample_count as usize);
-    for_each_row_of_two(&mut colours[..rays], &mut depths[..rays], 1, 64, |ray, colour, depth| {
-        let own = ray * count..(ray + 1) * count;
-        let seen = composite_samples(&samples[own.clone()], &sample_depths[own], block);
-        colour[0] = [seen.channels[0], seen.channels[1], seen.channels[2], seen.opacity];
-        depth[0] = seen.depth;
     });
 }

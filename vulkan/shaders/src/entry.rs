@@ -1,0 +1,317 @@
+//! Rows to entry points.
+//!
+//! rust-gpu reads its attributes as they stand in the source, so that bindings are numbered from a list of literals. An entry
+//! point without a name of its own has that of its function's path in the crate.
+
+/// The entry points of all rows.
+macro_rules! entries {
+    ($({
+        $Kernel:ident $method:ident
+        doc { $($doc:tt)* }
+        block { $($block:tt)* }
+        counts $counts:tt
+        arrays { $({ $kind:ident $array:ident: $Host:ty, as { $($entry:tt)? } $($how:tt)* })+ }
+        elements { $($elements:tt)* }
+        $($rest:tt)*
+    })+) => {
+        $(entry! {
+            { [$($doc)*] $method { $($block)* } { $($elements)* } }
+            [] [] []
+            [$({ $kind $array: $Host $(, $entry)? })+]
+            [0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23]
+        })+
+    };
+}
+
+/// The entry points of a row. What stands in brackets is the function's parameters, the pages that it puts together and the
+/// arguments of the body so far; then the arrays that are left, and the numbers of bindings that are left.
+macro_rules! entry {
+    // Of tiled kernels all arrays are read and written without a panic.
+    (
+        { $doc:tt $method:ident $block:tt { tiles $shape:tt } } [$($parameters:tt)*] [] [$($arguments:tt)*]
+        [{ write $array:ident: $Host:ty } $($more:tt)*] [$binding:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            { $doc $method $block { tiles $shape } }
+            [$($parameters)* #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: &mut [$Host],]
+            [] [$($arguments)* Unchecked($array),] [$($more)*] [$($bindings)*]
+        }
+    };
+    (
+        { $doc:tt $method:ident $block:tt { tiles $shape:tt } } [$($parameters:tt)*] [] [$($arguments:tt)*]
+        [{ $kind:ident $array:ident: $Host:ty } $($more:tt)*] [$binding:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            { $doc $method $block { tiles $shape } }
+            [$($parameters)* #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: &[$Host],]
+            [] [$($arguments)* Endless($array),] [$($more)*] [$($bindings)*]
+        }
+    };
+    // Pages.
+    (
+        $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
+        [{ paged $array:ident: $Host:ty } $($more:tt)*]
+        [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            $row
+            [$($parameters)*
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &[$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &[$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &[$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &[$Host],
+            ]
+            [$($pages)* { Pages [] $array a b c d }] [$($arguments)* &$array,] [$($more)*] [$($bindings)*]
+        }
+    };
+    (
+        $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
+        [{ paged $array:ident: $Host:ty, vectors } $($more:tt)*]
+        [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            $row
+            [$($parameters)*
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &[<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &[<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &[<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &[<$Host as InVectors>::Vectors],
+            ]
+            [$($pages)* { Pages [] $array a b c d }] [$($arguments)* &Vectors(&$array),] [$($more)*] [$($bindings)*]
+        }
+    };
+    (
+        $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
+        [{ write_paged $array:ident: $Host:ty } $($more:tt)*]
+        [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            $row
+            [$($parameters)*
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &mut [$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &mut [$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &mut [$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &mut [$Host],
+            ]
+            [$($pages)* { PagesMut [mut] $array a b c d }] [$($arguments)* &mut $array,] [$($more)*] [$($bindings)*]
+        }
+    };
+    (
+        $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
+        [{ write_paged $array:ident: $Host:ty, vectors } $($more:tt)*]
+        [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            $row
+            [$($parameters)*
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &mut [<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &mut [<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &mut [<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &mut [<$Host as InVectors>::Vectors],
+            ]
+            [$($pages)* { PagesMut [mut] $array a b c d }] [$($arguments)* &mut VectorsMut(&mut $array),]
+            [$($more)*] [$($bindings)*]
+        }
+    };
+    // One binding: its type, and how the body gets it.
+    (
+        $row:tt [$($parameters:tt)*] $pages:tt [$($arguments:tt)*]
+        [{ $kind:ident $array:ident: $Host:ty $(, $entry:tt)? } $($more:tt)*] [$binding:literal $($bindings:literal)*]
+    ) => {
+        entry! {
+            $row
+            [$($parameters)*
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $binding)] $array: bound!($kind $Host $(, $entry)?),
+            ]
+            $pages [$($arguments)* lent!($kind $array $(, $entry)?),] [$($more)*] [$($bindings)*]
+        }
+    };
+    // The functions.
+    (
+        { [$($doc:tt)*] $method:ident {} { for $($elements:tt)* } }
+        [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
+    ) => {
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        pub fn $method(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] piece: &Piece,
+            $($parameters)*
+        ) {
+            if id.x < piece.count {
+                bodies::$method($($arguments)* piece.first + id.x);
+            }
+        }
+    };
+    (
+        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } }
+        [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
+    ) => {
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $method(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $($parameters)*
+        ) {
+            if id.x < push.piece.count {
+                bodies::$method(&push.parameters, $($arguments)* push.piece.first + id.x);
+            }
+        }
+    };
+    (
+        { [$($doc:tt)*] $method:ident { $block:ident: $Block:ty } { for $($elements:tt)* } }
+        [$($parameters:tt)*] [$({ $Pages:ident [$($mut:tt)?] $array:ident $a:ident $b:ident $c:ident $d:ident })+]
+        [$($arguments:tt)*] [] $bindings:tt
+    ) => {
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $method(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $($parameters)*
+            #[spirv(spec_constant(id = 0, default = 0))] page_shift: u32,
+        ) {
+            if id.x < push.piece.count {
+                $(let $($mut)? $array = $Pages { a: $a, b: $b, c: $c, d: $d, shift: page_shift };)+
+                bodies::$method(&push.parameters, $($arguments)* push.piece.first + id.x);
+            }
+        }
+    };
+    (
+        {
+            [$($doc:tt)*] $method:ident { $block:ident: $Block:ty }
+            { tiles [$row_count:expr, $inner_count:expr, $column_count:expr] }
+        }
+        [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
+    ) => {
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $method(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $($parameters)*
+            #[spirv(workgroup)] rows: &mut Shared,
+            #[spirv(workgroup)] columns: &mut Shared,
+        ) {
+            let $block = &push.parameters;
+            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+            bodies::$method($block, shape, $($arguments)* Single { rows, columns }, push.piece.first + id.x);
+        }
+
+        /// The other forms.
+        pub mod $method {
+            use super::*;
+
+            /// Two tiles beside each other.
+            #[spirv(compute(threads(64)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn double(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] rows: &mut Shared,
+                #[spirv(workgroup)] columns: &mut Shared,
+                #[spirv(workgroup)] more_columns: &mut Shared,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Double { rows, columns, more_columns };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// Two by two tiles.
+            #[spirv(compute(threads(64)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn quadruple(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] rows: &mut ShortShared,
+                #[spirv(workgroup)] more_rows: &mut ShortShared,
+                #[spirv(workgroup)] columns: &mut ShortShared,
+                #[spirv(workgroup)] more_columns: &mut ShortShared,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Quadruple { rows, more_rows, columns, more_columns };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// Two tiles beside each other, double-buffered.
+            #[spirv(compute(threads(64)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn buffered(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+                #[spirv(workgroup)] rows: &mut Shared,
+                #[spirv(workgroup)] columns: &mut Shared,
+                #[spirv(workgroup)] more_columns: &mut Shared,
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Buffered { rows, columns, more_columns };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+
+            /// One tile, by subgroups.
+            #[spirv(compute(threads(64)))]
+            #[allow(clippy::too_many_arguments)]
+            pub fn subgroup(
+                #[spirv(global_invocation_id)] id: UVec3,
+                #[spirv(subgroup_id)] subgroup: u32,
+                #[spirv(subgroup_local_invocation_id)] lane: u32,
+                #[spirv(spec_constant(id = 1, default = 32))] size: u32,
+                #[spirv(push_constant)] push: &Push<$Block>,
+                $($parameters)*
+            ) {
+                let $block = &push.parameters;
+                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+                let tiles = Subgroup { size, subgroup, lane };
+                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            }
+        }
+    };
+}
+
+/// The type of a binding.
+macro_rules! bound {
+    (one $Host:ty) => {
+        &$Host
+    };
+    (one $Host:ty, $Entry:ty) => {
+        &$Entry
+    };
+    (write $Host:ty) => {
+        &mut [$Host]
+    };
+    (write $Host:ty, vectors) => {
+        &mut [<$Host as InVectors>::Vectors]
+    };
+    (write $Host:ty, $Entry:ty) => {
+        &mut [$Entry]
+    };
+    ($kind:ident $Host:ty) => {
+        &[$Host]
+    };
+    ($kind:ident $Host:ty, vectors) => {
+        &[<$Host as InVectors>::Vectors]
+    };
+}
+
+/// How the body gets it.
+macro_rules! lent {
+    (write $array:ident, vectors) => {
+        &mut VectorsMut($array)
+    };
+    ($kind:ident $array:ident, vectors) => {
+        &Vectors($array)
+    };
+    ($kind:ident $array:ident $(, $entry:tt)?) => {
+        $array
+    };
+}
