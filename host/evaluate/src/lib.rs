@@ -8,7 +8,7 @@
 //! baseline     baselines without a field: copies and warps of the nearest sources
 //! evaluator    each weighting scheme on views that are left out      Evaluator
 //! protocol     which views are sources, which are targets
-//! pareto       error against run time
+//! pareto       error against run time (feature `pareto`)
 //! run_folder   an evaluation that resumes after a kill, in shards
 //! summary      its tables: means with intervals
 //! gallery      its pictures
@@ -21,6 +21,7 @@ mod evaluator;
 pub mod gallery;
 pub mod inspect;
 pub mod metrics;
+#[cfg(feature = "pareto")]
 pub mod pareto;
 pub mod protocol;
 #[cfg(feature = "report")]

@@ -57,6 +57,14 @@ impl AnyField {
 impl Default for AnyField {
     /// The training-free field.
     fn default() -> AnyField {
-        AnyField::new(TrainingFree::default())
+        TrainingFree::default().into()
+    }
+}
+
+impl From<TrainingFree> for AnyField {
+    /// Compiled here for both devices, not again in every crate that calls it.
+    #[inline(never)]
+    fn from(field: TrainingFree) -> AnyField {
+        AnyField::new(field)
     }
 }

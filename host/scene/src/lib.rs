@@ -26,7 +26,7 @@ pub mod write;
 
 pub use scene::{
     FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
-    ScenePoint, Split, View, looked_for, read_picture, reader,
+    ScenePoint, Split, View, encode_png, looked_for, picture_size, read_picture, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -25,7 +25,7 @@ pub(crate) fn cheaper(field: &AnyField) -> Option<AnyField> {
         match_side: field.sweep.match_side.min(MATCH_SIDE),
         ..field.sweep
     };
-    Some(AnyField::new(TrainingFree { sweep, ..*field }))
+    Some(AnyField::from(TrainingFree { sweep, ..*field }))
 }
 
 /// The options of coarse pictures.

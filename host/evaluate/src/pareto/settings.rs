@@ -99,7 +99,7 @@ fn of_pixelnerf(field: &PixelNerf, options: &RenderOptions) -> Vec<Setting> {
     let full = field.options().sampling;
     let setting = |words: &str, sampling, omissions, leave_out, early_termination| Setting {
         words: words.to_owned(),
-        field: AnyField::new(field.with_options(PixelNerfOptions { sampling, omissions })),
+        field: AnyField::from(field.with_options(PixelNerfOptions { sampling, omissions })),
         options: RenderOptions { leave_out, early_termination, ..options.clone() },
     };
     let all = |words: &str, sampling| {
@@ -148,7 +148,7 @@ const SOURCES: [(&str, f32); 3] = [("3/4", 0.75), ("1/2", 0.5), ("1/4", 0.25)];
 fn of_training_free(field: &TrainingFree, options: &RenderOptions) -> Vec<Setting> {
     let setting = |words: &str, source_share, leave_out, early_termination| Setting {
         words: words.to_owned(),
-        field: AnyField::new(TrainingFree { source_share, ..*field }),
+        field: AnyField::from(TrainingFree { source_share, ..*field }),
         options: RenderOptions { leave_out, early_termination, ..options.clone() },
     };
     let mut settings = vec![setting(EXACT, 1.0, 0.0, 0.0)];

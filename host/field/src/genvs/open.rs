@@ -3,6 +3,7 @@
 use super::sampling::{Plan, Steps};
 use super::{Genvs, GenvsOptions, Omissions, Rays};
 use crate::AnyField;
+use crate::enlarged::Enlarged;
 use crate::options::{Computable, FieldOptions, OpenError};
 use viewfuse_core::sampler::churn::Churn;
 use viewfuse_core::schedule::NoiseSchedule;
@@ -39,7 +40,23 @@ pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, 
     match (options.given().first(), &field.architecture().denoiser) {
         // All options of this family alone concern the denoiser or sequences of pictures.
         (Some(option), None) => Err(OpenError::cannot(*option, "has no denoiser")),
-        _ => Ok(AnyField::new(field)),
+        _ => Ok(field.into()),
+    }
+}
+
+impl From<Genvs> for AnyField {
+    /// Compiled here for both devices, not again in every crate that calls it.
+    #[inline(never)]
+    fn from(field: Genvs) -> AnyField {
+        AnyField::new(field)
+    }
+}
+
+impl From<Enlarged<Genvs>> for AnyField {
+    /// As above.
+    #[inline(never)]
+    fn from(field: Enlarged<Genvs>) -> AnyField {
+        AnyField::new(field)
     }
 }
 

@@ -52,5 +52,13 @@ pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, 
         empty_parts: !computes("parts"),
         hidden_samples: !computes("hidden"),
     };
-    Ok(AnyField::new(PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions })?))
+    Ok(PixelNerf::new(&checkpoint, PixelNerfOptions { sampling, omissions })?.into())
+}
+
+impl From<PixelNerf> for AnyField {
+    /// Compiled here for both devices, not again in every crate that calls it.
+    #[inline(never)]
+    fn from(field: PixelNerf) -> AnyField {
+        AnyField::new(field)
+    }
 }

@@ -40,7 +40,7 @@ pub(super) fn of_genvs(field: &Genvs, options: &RenderOptions, target_count: usi
     };
     let setting = |words: &str, rays, plan, omissions, leave_out, factor| Setting {
         words: words.to_owned(),
-        field: AnyField::new(Enlarged { field: field.with_options(GenvsOptions { rays, plan, omissions }), factor }),
+        field: AnyField::from(Enlarged { field: field.with_options(GenvsOptions { rays, plan, omissions }), factor }),
         options: RenderOptions { leave_out, early_termination: 0.0, ..options.clone() },
     };
     let fewer = |divisor: u32| Rays { sample_count: rays.sample_count.div_ceil(divisor), ..rays };
