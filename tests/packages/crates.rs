@@ -46,17 +46,17 @@ const ORDER: [&str; 16] = [
 
 /// Heavy dependencies, and where they may be: in crates, always or only as an option.
 const HEAVY: [(&str, &[&str]); 11] = [
-    ("candle-core", &["viewfuse-train"]),
+    ("candle-core", &["viewfuse-research", "viewfuse-train"]),
     ("ndarray", &["viewfuse-train"]),
-    ("faer", &["viewfuse-evaluate?"]),
+    ("faer", &["viewfuse-evaluate?", "viewfuse-research"]),
     ("maud", &["viewfuse-evaluate?"]),
     ("base64", &["viewfuse-evaluate?"]),
-    ("plotters", &["viewfuse-evaluate?", "viewfuse-train"]),
+    ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
     ("tiny_http", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),
     ("clap", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),
-    ("anyhow", &["viewfuse-cli"]),
+    ("anyhow", &["viewfuse-cli", "viewfuse-research"]),
 ];
 
 /// What `cargo tree --prefix none` lists, each crate once, or what is wrong with it.
@@ -104,6 +104,10 @@ fn disorder(packages: &[Value]) -> Vec<String> {
             {
                 problems.push(format!("{name} uses {other}, which stands behind it"));
             }
+            // Nobody installs the experiments.
+            if other == "viewfuse-research" {
+                problems.push(format!("{name} uses {other}"));
+            }
             let is_optional = dependency["optional"] == true;
             let may = |places: &[&str]| {
                 places.iter().any(|place| match place.strip_suffix('?') {
@@ -144,4 +148,5 @@ fn disorder_is_found() {
     assert_eq!(of(package("viewfuse-evaluate", "faer", Value::Null, false)), 1, "not always");
     assert_eq!(of(package("viewfuse-evaluate", "faer", Value::Null, true)), 0);
     assert_eq!(of(package("viewfuse-device", "clap", json!("build"), false)), 1);
+    assert_eq!(of(package("viewfuse-view", "viewfuse-research", Value::Null, true)), 1);
 }

@@ -91,7 +91,12 @@ impl Shown {
                     *shown = bar;
                 }
             }
-            Place::Lines(lines) => lines.show(share, &words, now),
+            Place::Lines(lines) => {
+                if let Some(line) = lines.due(now, share, &words) {
+                    // A closed pipe is ignored.
+                    writeln!(io::stderr().lock(), "{line}").ok();
+                }
+            }
         }
     }
 }
@@ -108,18 +113,15 @@ impl Place {
 }
 
 impl Lines {
-    fn show(&mut self, share: f64, words: &str, now: Instant) {
-        if now.duration_since(self.last) < self.between {
-            return;
-        }
+    /// The line that is to be written now, if it is time for one.
+    fn due(&mut self, now: Instant, share: f64, words: &str) -> Option<&str> {
         let line = format!("progress: {} %, {words}", (100.0 * share) as u64);
         // Without a time between lines each is one of its own.
-        if self.between > Duration::ZERO || line != self.said {
-            self.last = now;
-            // A closed pipe is ignored.
-            writeln!(io::stderr().lock(), "{line}").ok();
-            self.said = line;
+        if now.duration_since(self.last) < self.between || (self.between == Duration::ZERO && line == self.said) {
+            return None;
         }
+        (self.last, self.said) = (now, line);
+        Some(&self.said)
     }
 }
 
@@ -145,7 +147,21 @@ fn bar(words: &str, share: f64, width: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::bar;
+    use super::{Lines, bar};
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn lines_come_at_even_times() {
+        let start = Instant::now();
+        let told = |between: u64, share: fn(u64) -> f64| {
+            let mut lines = Lines { between: Duration::from_millis(between), last: start, said: String::new() };
+            let is_due =
+                |tenth: &u64| lines.due(start + Duration::from_millis(100 * tenth), share(*tenth), "work").is_some();
+            (1..=20).filter(is_due).collect::<Vec<u64>>()
+        };
+        assert_eq!(told(500, |_| 0.5), [5, 10, 15, 20], "also where nothing goes on");
+        assert_eq!(told(0, |tenth| (tenth / 8) as f64 / 10.0), [1, 8, 16], "each change");
+    }
 
     #[test]
     fn a_bar_is_shorter_than_the_terminal() {
