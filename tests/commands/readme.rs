@@ -73,9 +73,11 @@ fn ours(line: &str) -> Option<(&str, &str)> {
 fn is_built_with(feature: &str) -> bool {
     match feature {
         "" => true,
+        "check" => cfg!(feature = "check"),
         "fid" => cfg!(feature = "fid"),
         "pareto" => cfg!(feature = "pareto"),
         "report" => cfg!(feature = "report"),
+        "scenes" => cfg!(feature = "scenes"),
         "train" => cfg!(feature = "train"),
         "view" => cfg!(feature = "view"),
         _ => panic!("no feature '{feature}' is known here"),

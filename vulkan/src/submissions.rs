@@ -132,7 +132,7 @@ impl Submissions {
 
     /// The open submission, or a new one. If all are in flight, it waits for the oldest first. It comes back through
     /// [`Submissions::go_on`].
-    pub(crate) fn take_open(&mut self, done: &mut impl FnMut(Done)) -> Result<Submission, VulkanError> {
+    pub(crate) fn take_open(&mut self, done: &mut dyn FnMut(Done)) -> Result<Submission, VulkanError> {
         if let Some(open) = self.open.take() {
             return Ok(open);
         }
@@ -217,7 +217,7 @@ impl Submissions {
     }
 
     /// Submits what is recorded, and waits until all submissions are done.
-    pub(crate) fn wait(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
+    pub(crate) fn wait(&mut self, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
         self.flush()?;
         while !self.running.is_empty() {
             self.wait_for_oldest(done)?;
@@ -227,7 +227,7 @@ impl Submissions {
 
     /// Waits for the oldest submission, at most for the time limit: earlier ones are done, so all of that time is its
     /// own.
-    fn wait_for_oldest(&mut self, done: &mut impl FnMut(Done)) -> Result<(), VulkanError> {
+    fn wait_for_oldest(&mut self, done: &mut dyn FnMut(Done)) -> Result<(), VulkanError> {
         let Some(oldest) = self.running.front() else { return Ok(()) };
         let nanoseconds = |limit: Duration| u64::try_from(limit.as_nanos()).unwrap_or(u64::MAX);
         let nanoseconds = self.time_limit.map_or(u64::MAX, nanoseconds);

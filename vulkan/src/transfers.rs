@@ -23,27 +23,31 @@ impl Gpu {
     /// [`VulkanError::OutOfMemory`], or another if the device fails.
     pub fn upload<T: Pod>(&self, values: &[T]) -> Result<Buffer<T>, VulkanError> {
         let buffer = self.array::<T>(values.len())?;
-        let bytes: &[u8] = bytemuck::cast_slice(values);
-        let is_one_piece = buffer.array.chunks.len() == 1;
+        self.write(&buffer.array, bytemuck::cast_slice(values))?;
+        Ok(buffer)
+    }
+
+    /// Writes all bytes of an array. Without the type of its elements, so that it is compiled once.
+    fn write(&self, array: &Arc<Array>, bytes: &[u8]) -> Result<(), VulkanError> {
+        let is_one_piece = array.chunks.len() == 1;
         self.with_state(|gpu, state| {
             if is_one_piece && (1..=INLINE).contains(&bytes.len()) {
-                return gpu.update(state, &buffer.array, bytes);
+                return gpu.update(state, array, bytes);
             }
-            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
+            for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.staging(&mut state.upload, MemoryLocation::CpuToGpu)?;
                 let (from, mapped) = gpu.mapped(&mut state.upload)?;
                 mapped[..range.len()].copy_from_slice(&bytes[range.clone()]);
                 let copy = [vk::BufferCopy::default().dst_offset(offset).size(range.len() as u64)];
                 let to = memory.buffer;
-                gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
+                gpu.record(state, &[(array, Access::Write)], |device, submission, _| {
                     // SAFETY: both ranges exist; the submission is waited for before staging is written again.
                     unsafe { device.cmd_copy_buffer(submission.commands, from, to, &copy) };
                     Ok(())
                 })?;
                 state.wait()
             })
-        })?;
-        Ok(buffer)
+        })
     }
 
     /// Records the bytes of a short array with the commands: nobody waits.
@@ -65,16 +69,20 @@ impl Gpu {
     /// As [`Gpu::upload`].
     pub fn zeros<T: Pod>(&self, count: usize) -> Result<Buffer<T>, VulkanError> {
         let buffer = self.array::<T>(count)?;
+        self.clear(&buffer.array)?;
+        Ok(buffer)
+    }
+
+    fn clear(&self, array: &Arc<Array>) -> Result<(), VulkanError> {
         self.with_state(|gpu, state| {
-            gpu.record(state, &[(&buffer.array, Access::Write)], |device, submission, _| {
-                for memory in &buffer.array.chunks {
+            gpu.record(state, &[(array, Access::Write)], |device, submission, _| {
+                for memory in &array.chunks {
                     // SAFETY: the buffer is a multiple of four bytes long.
                     unsafe { device.cmd_fill_buffer(submission.commands, memory.buffer, 0, vk::WHOLE_SIZE, 0) };
                 }
                 Ok(())
             })
-        })?;
-        Ok(buffer)
+        })
     }
 
     /// The values of an array after all earlier dispatches.
@@ -84,14 +92,19 @@ impl Gpu {
     pub fn download<T: Pod>(&self, buffer: &Buffer<T>) -> Result<Vec<T>, VulkanError> {
         buffer.array.check_owner(&self.handle)?;
         let mut values = vec![T::zeroed(); buffer.len()];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
+        self.read(&buffer.array, bytemuck::cast_slice_mut(&mut values))?;
+        Ok(values)
+    }
+
+    /// Reads all bytes of an array.
+    fn read(&self, array: &Arc<Array>, bytes: &mut [u8]) -> Result<(), VulkanError> {
         self.with_state(|gpu, state| {
-            for_each_stretch(&buffer.array, gpu.staging_bytes(), |memory, offset, range| {
+            for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
                 gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
                 let (to, _) = gpu.mapped(&mut state.download)?;
                 let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
                 let from = memory.buffer;
-                gpu.record(state, &[(&buffer.array, Access::Read)], |device, submission, _| {
+                gpu.record(state, &[(array, Access::Read)], |device, submission, _| {
                     let seen = [vk::MemoryBarrier::default()
                         .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
                         .dst_access_mask(vk::AccessFlags::HOST_READ)];
@@ -115,14 +128,17 @@ impl Gpu {
                 bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
                 Ok(())
             })
-        })?;
-        Ok(values)
+        })
     }
 
     /// Memory for an array: one buffer, or one a page if no allocation is large enough.
     fn array<T: Pod>(&self, len: usize) -> Result<Buffer<T>, VulkanError> {
         const { assert!(size_of::<T>() > 0, "elements without bytes cannot be counted on a device") };
-        let stride = size_of::<T>();
+        Ok(Buffer::new(self.array_of(len, size_of::<T>())?))
+    }
+
+    /// The same for elements of so many bytes.
+    fn array_of(&self, len: usize, stride: usize) -> Result<Array, VulkanError> {
         let available = self.handle.limits.allocation;
         // An element goes through staging as a whole.
         let affordable = if stride > self.staging_bytes() {
@@ -147,7 +163,7 @@ impl Gpu {
             chunks => chunks?,
         };
         let (read_in, written_in) = (Stretch::default(), Stretch::default());
-        Ok(Buffer::new(Array { chunks, chunk_len, len, stride, read_in, written_in }))
+        Ok(Array { chunks, chunk_len, len, stride, read_in, written_in })
     }
 
     /// Memory for `len` elements, but at least one, `chunk_len` in each piece. If the whole does not fit, no piece is

@@ -1,6 +1,8 @@
 //! The command line: what each command takes. What each does is in its own file.
 
+#[cfg(feature = "check")]
 mod bench;
+#[cfg(feature = "check")]
 mod check;
 mod compare;
 mod convert;
@@ -24,6 +26,7 @@ mod points;
 mod render;
 #[cfg(feature = "report")]
 mod report;
+#[cfg(feature = "scenes")]
 mod scenes;
 mod select;
 mod shown;
@@ -31,6 +34,7 @@ mod table;
 mod terminal;
 #[cfg(feature = "train")]
 mod train;
+#[cfg(feature = "check")]
 mod verify;
 #[cfg(feature = "view")]
 mod view;
@@ -41,10 +45,14 @@ mod weights;
 use left_out::pareto;
 #[cfg(not(feature = "report"))]
 use left_out::report;
+#[cfg(not(feature = "scenes"))]
+use left_out::scenes;
 #[cfg(not(feature = "train"))]
 use left_out::train;
 #[cfg(not(feature = "view"))]
 use left_out::view;
+#[cfg(not(feature = "check"))]
+use left_out::{bench, check, verify};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -121,14 +129,17 @@ fn long_about() -> String {
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
-    let mut command = Arguments::command();
+    let mut command = left_out::marked(Arguments::command());
     let matches = command.get_matches_mut();
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     terminal::silence_caught_panics();
     terminal::listen()?;
     match arguments.command {
         Command::Render(arguments) => render::run(&arguments, &options::values(&command, &matches)),
+        #[cfg(feature = "view")]
         Command::View(arguments) => view::run(&arguments, &options::given(&command, &matches)),
+        #[cfg(not(feature = "view"))]
+        Command::View(arguments) => view::run(&arguments),
         Command::Weights(arguments) => weights::run(&arguments),
         Command::Select(arguments) => select::run(&arguments),
         Command::Points(arguments) => points::run(&arguments),

@@ -7,7 +7,7 @@
 //! baseline     baselines without a field: copies and warps of the nearest sources
 //! evaluator    each weighting scheme on views that are left out      Evaluator
 //! protocol     which views are sources, which are targets
-//! pareto       error against run time
+//! pareto       error against run time (feature `pareto`)
 //! run_folder   an evaluation that resumes after a kill, in shards
 //! summary      its tables: means with intervals
 //! gallery      its pictures
@@ -19,6 +19,7 @@ pub mod baseline;
 mod evaluator;
 pub mod gallery;
 pub mod metrics;
+#[cfg(feature = "pareto")]
 pub mod pareto;
 pub mod protocol;
 #[cfg(feature = "report")]

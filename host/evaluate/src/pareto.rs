@@ -9,7 +9,6 @@
 
 pub mod difference;
 pub mod front;
-#[cfg(feature = "plot")]
 pub mod plot;
 pub mod record;
 pub mod settings;

@@ -1,20 +1,18 @@
 //! Pictures as PNG files.
 
-use image::{DynamicImage, ImageFormat, Rgba, RgbaImage};
-use std::io::Cursor;
+use image::{DynamicImage, Rgba, RgbaImage};
 use std::path::Path;
 use viewfuse_job::files::{WriteError, write_whole};
+use viewfuse_scene::encode_png;
 
 /// Writes a picture as PNG, completely or not at all.
 ///
 /// # Errors
 /// [`WriteError`].
 pub fn write_png(path: &Path, picture: &DynamicImage) -> Result<(), WriteError> {
-    let mut bytes = Cursor::new(Vec::new());
-    picture
-        .write_to(&mut bytes, ImageFormat::Png)
-        .map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })?;
-    write_whole(path, bytes.get_ref())
+    let bytes = encode_png(picture);
+    let bytes = bytes.map_err(|cause| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() })?;
+    write_whole(path, &bytes)
 }
 
 /// A picture with its opacity as straight alpha: what is in front of a background of one colour (in `[0, 1]`), which was

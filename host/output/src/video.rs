@@ -12,6 +12,7 @@ use std::process::{Command, Stdio};
 use std::str::FromStr;
 use viewfuse_job::files::{WholeFile, WriteError, write_whole};
 use viewfuse_job::progress::{Interrupted, Progress};
+use viewfuse_scene::{SceneError, picture_size, read_picture};
 
 /// The program that compresses videos, where a person has it.
 const FFMPEG: &str = "ffmpeg";
@@ -64,13 +65,8 @@ pub enum VideoError {
     #[error(transparent)]
     Write(#[from] WriteError),
     /// A frame could not be read.
-    #[error("{}: cannot be read: {cause}", path.display())]
-    Frame {
-        /// Its file.
-        path: PathBuf,
-        /// The decoder's error.
-        cause: ImageError,
-    },
+    #[error(transparent)]
+    Frame(#[from] SceneError),
     /// The frames differ in size.
     #[error("{}: has {}x{} pixels, the first frame {}x{}; the frames of a video have one size", path.display(), size[0], size[1], first[0], first[1])]
     Sizes {
@@ -114,8 +110,7 @@ pub fn write_video(
     progress: &dyn Progress,
 ) -> Result<(), VideoError> {
     let first = frames.first().ok_or(VideoError::NoFrames)?;
-    let size = image::image_dimensions(first).map_err(|cause| VideoError::Frame { path: first.clone(), cause })?;
-    let frames = Frames { files: frames, size: size.into(), background, progress };
+    let frames = Frames { files: frames, size: picture_size(first)?, background, progress };
     match format {
         VideoFormat::Webp => {
             let mut animation = Animation::new(frames.size, rate);
@@ -145,7 +140,7 @@ impl Frames<'_> {
         self.progress.expect(self.files.len());
         for path in self.files {
             self.progress.check()?;
-            let frame = image::open(path).map_err(|cause| VideoError::Frame { path: path.clone(), cause })?;
+            let frame = read_picture(path)?;
             let size = [frame.width(), frame.height()];
             if size != self.size {
                 return Err(VideoError::Sizes { path: path.clone(), size, first: self.size });
@@ -222,7 +217,7 @@ fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), Vid
         Some(input) => frames.stream(&mut BufWriter::new(input), rate, |cause| io_error(path, cause)),
         None => Ok(()),
     };
-    if matches!(sent, Err(VideoError::Interrupted(_) | VideoError::Frame { .. } | VideoError::Sizes { .. })) {
+    if matches!(sent, Err(VideoError::Interrupted(_) | VideoError::Frame(_) | VideoError::Sizes { .. })) {
         // It would make a video of the frames that it got.
         child.kill().ok();
     }
@@ -232,9 +227,7 @@ fn compress(path: &Path, frames: &Frames<'_>, rate: FrameRate) -> Result<(), Vid
     }
     let ended = child.wait().map_err(|cause| io_error(path, cause));
     let outcome = match (sent, ended) {
-        (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame { .. } | VideoError::Sizes { .. })), _) => {
-            Err(error)
-        }
+        (Err(error @ (VideoError::Interrupted(_) | VideoError::Frame(_) | VideoError::Sizes { .. })), _) => Err(error),
         (_, Err(error)) => Err(error),
         (sent, Ok(status)) if status.success() => sent,
         (_, Ok(status)) => {

@@ -9,8 +9,8 @@
 //! ```
 
 use crate::rate::FrameRate;
-use image::{DynamicImage, ImageError, ImageFormat};
-use std::io::Cursor;
+use image::codecs::webp::WebPEncoder;
+use image::{DynamicImage, ImageError};
 
 /// Flags of a canvas with frames, and with transparency.
 const ANIMATED: u8 = 0b0000_0010;
@@ -40,9 +40,9 @@ impl Animation {
     /// # Errors
     /// The encoder's error.
     pub fn add(&mut self, frame: &DynamicImage) -> Result<(), ImageError> {
-        let mut file = Cursor::new(Vec::new());
-        frame.write_to(&mut file, ImageFormat::WebP)?;
-        let picture = file.get_ref().get(RIFF..).unwrap_or_default();
+        let mut file = Vec::new();
+        frame.write_with_encoder(WebPEncoder::new_lossless(&mut file))?;
+        let picture = file.get(RIFF..).unwrap_or_default();
         self.is_transparent |= frame.color().has_alpha();
         // Durations are whole milliseconds: rounding the times, not the durations, keeps the pace.
         let time = |index: u64| (1000.0 * index as f64 / self.rate.per_second()).round() as u64;

@@ -28,7 +28,7 @@ pub mod write;
 
 pub use scene::{
     FaultLocation, FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, READERS, Scene, SceneError,
-    SceneFrame, ScenePoint, Split, View, looked_for, read_picture, reader,
+    SceneFrame, ScenePoint, Split, View, encode_png, looked_for, picture_size, read_picture, reader,
 };
 
 /// The examples of the README, compiled and run.

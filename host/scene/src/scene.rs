@@ -43,7 +43,7 @@ use check::Checked;
 pub use error::SceneError;
 pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault};
 use images::Turn;
-pub use images::read_picture;
+pub use images::{encode_png, picture_size, read_picture};
 use reader::Reader;
 pub use split::{Split, UnknownSplit};
 

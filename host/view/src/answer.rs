@@ -9,10 +9,10 @@
 
 use crate::request::Layer;
 use image::codecs::jpeg::JpegEncoder;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ImageError, RgbImage};
+use image::{DynamicImage, ImageError, RgbImage};
 use serde::Serialize;
 use viewfuse_field::render::Frame;
+use viewfuse_scene::encode_png;
 
 /// Quality of coarse pictures and thumbnails, of 100.
 const JPEG_QUALITY: u8 = 88;
@@ -59,8 +59,10 @@ struct LayerPart {
 /// # Errors
 /// If the picture cannot be encoded.
 pub(crate) fn bytes(frame: &Frame, layer: Layer, is_full: bool) -> Result<Vec<u8>, ImageError> {
-    let (media_type, picture) =
-        if is_full { ("image/png", png(&frame.picture)?) } else { ("image/jpeg", jpeg(&frame.picture)?) };
+    let (media_type, picture) = match is_full {
+        true => ("image/png", encode_png(&DynamicImage::ImageRgb8(frame.picture.clone()))?),
+        false => ("image/jpeg", jpeg(&frame.picture)?),
+    };
     let levels = match layer {
         Layer::None => None,
         Layer::Depth => depth_levels(&frame.depths),
@@ -98,16 +100,6 @@ pub(crate) fn bytes(frame: &Frame, layer: Layer, is_full: bool) -> Result<Vec<u8
 pub(crate) fn jpeg(picture: &RgbImage) -> Result<Vec<u8>, ImageError> {
     let mut bytes = Vec::new();
     picture.write_with_encoder(JpegEncoder::new_with_quality(&mut bytes, JPEG_QUALITY))?;
-    Ok(bytes)
-}
-
-fn png(picture: &RgbImage) -> Result<Vec<u8>, ImageError> {
-    let mut bytes = Vec::new();
-    picture.write_with_encoder(PngEncoder::new_with_quality(
-        &mut bytes,
-        CompressionType::Fast,
-        FilterType::Adaptive,
-    ))?;
     Ok(bytes)
 }
 

@@ -4,7 +4,6 @@ use super::environment::instance_options;
 use super::say;
 use super::table::table;
 use clap::Args;
-use comfy_table::CellAlignment;
 use serde_json::json;
 use std::process::ExitCode;
 use viewfuse_device::Memory;
@@ -34,11 +33,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let mut rows = table(["device", "name", "kind", "memory", "Vulkan", "driver", "missing"].map(str::to_owned));
-    for column in [1, 2, 5, 6] {
-        if let Some(column) = rows.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Left);
-        }
-    }
+    rows.align_left([1, 2, 5, 6]);
     let cpu_name = Cpu.name();
     rows.add_row(["cpu", cpu_name.as_str(), "", "", "", "", "nothing"]);
     for adapter in &adapters {

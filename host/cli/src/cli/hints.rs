@@ -1,10 +1,13 @@
 //! Hints at the command's options for errors of the library, printed behind the error.
 
+use image::error::ImageFormatHint;
+use image::{ImageError, ImageFormat};
 use viewfuse_evaluate::EvaluateError;
 use viewfuse_evaluate::protocol::ProtocolError;
 use viewfuse_evaluate::run_folder::FolderError;
 use viewfuse_field::render::RenderError;
 use viewfuse_field::training_free::NoObject;
+use viewfuse_scene::SceneError;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_scene::photographs::PhotographsError;
 
@@ -16,7 +19,7 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let folder = cause.downcast_ref::<FolderError>().and_then(of_run_folder);
         let render = cause.downcast_ref::<RenderError>().and_then(of_render);
         let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
-        let others = || of_training(cause).or_else(|| of_viewer(cause));
+        let others = || of_training(cause).or_else(|| of_viewer(cause)).or_else(|| of_tiff(cause));
         few_shot.or(photographs).or(folder).or(render).or(evaluation).or_else(others)
     })
 }
@@ -85,6 +88,18 @@ fn of_evaluation(error: &EvaluateError) -> Option<&'static str> {
     match error {
         EvaluateError::Selection(error) => of_few_shot(error),
         EvaluateError::Render(error) => of_render(error),
+        _ => None,
+    }
+}
+
+/// A photograph in a format that is a feature.
+fn of_tiff(cause: &(dyn std::error::Error + 'static)) -> Option<&'static str> {
+    match cause.downcast_ref::<SceneError>() {
+        Some(SceneError::Image { cause: ImageError::Unsupported(problem), .. })
+            if problem.format_hint() == ImageFormatHint::Exact(ImageFormat::Tiff) =>
+        {
+            Some("a build with `--features tiff` reads it: `cargo install --path host/cli --features tiff`")
+        }
         _ => None,
     }
 }

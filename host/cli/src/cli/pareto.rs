@@ -9,7 +9,6 @@ use super::table::table;
 use super::terminal::Terminal;
 use super::{on_threads, say, wrong};
 use clap::Args;
-use comfy_table::CellAlignment;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_device::choice::{AnyDevice, DeviceChoice, Several, open_several};
@@ -226,12 +225,8 @@ fn print_device(device: &DeviceRecord) -> std::io::Result<()> {
     let left_out = device.points.first().map_or(&[][..], |point| &point.left_out);
     header.extend(left_out.iter().map(|LeftOut { what, .. }| what.replace(' ', "\n")));
     let mut rows = table(header);
-    if let Some(column) = rows.column_mut(1) {
-        column.set_cell_alignment(CellAlignment::Left);
-    }
-    device.points.iter().for_each(|point| {
-        rows.add_row(row(point, has_truth, has_calls));
-    });
+    rows.align_left([1]);
+    device.points.iter().for_each(|point| rows.add_row(row(point, has_truth, has_calls)));
     say(rows)?;
     if !left_out.is_empty() {
         say("the last columns: how much of it was left out, %")?;

@@ -87,7 +87,7 @@ impl Terminal {
 
     /// Runs what prints while the work goes on.
     pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
-        self.shown.bar.suspend(print)
+        self.shown.aside(print)
     }
 }
 
@@ -126,6 +126,6 @@ impl Progress for Terminal {
 impl Drop for Terminal {
     fn drop(&mut self) {
         self.clock.take();
-        self.shown.bar.finish_and_clear();
+        self.shown.end();
     }
 }

@@ -6,7 +6,7 @@ use super::terminal::Terminal;
 use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
-use std::process::ExitCode;
+use std::process::{Command, ExitCode, Stdio};
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
 use viewfuse_field::{Renderer, auto};
@@ -93,12 +93,24 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
         let (count, path) = (sources.len(), arguments.scene.display());
         say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name()))?;
         say(format_args!("{}", viewer.address()))?;
-        if !arguments.no_browser && open::that_detached(viewer.address()).is_err() {
+        if !arguments.no_browser && !start_browser(&viewer.address().to_string()) {
             say("no browser could be started: open this address")?;
         }
         viewer.serve(&Terminal::without_bar()).map_err(plain)
     })??;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Shows a page with the system's own opener; whether there is one.
+fn start_browser(address: &str) -> bool {
+    let (program, arguments): (&str, &[&str]) = match std::env::consts::OS {
+        "windows" => ("cmd", &["/c", "start", ""]),
+        "macos" => ("open", &[]),
+        _ => ("xdg-open", &[]),
+    };
+    let mut command = Command::new(program);
+    command.args(arguments).arg(address).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.spawn().is_ok()
 }
 
 /// What is best for the sources.

@@ -4,12 +4,11 @@ use super::{ReportError, counted, data_address};
 use crate::PSNR;
 use crate::gallery::{self, SchemePicture, TargetPictures};
 use crate::summary::Metric;
-use image::{ImageFormat, RgbImage};
+use image::{DynamicImage, RgbImage};
 use maud::{Markup, html};
-use std::io::Cursor;
 use std::path::Path;
 use viewfuse_output::sheet::error_map;
-use viewfuse_scene::read_picture;
+use viewfuse_scene::{encode_png, read_picture};
 
 /// Width and height of a bar of weights, in units of the figure.
 const BAR: [f32; 2] = [8.0, 22.0];
@@ -34,10 +33,9 @@ fn error_address(folder: &Path, file: &str, truth: &RgbImage) -> Result<Option<S
     if picture.dimensions() != truth.dimensions() {
         return Ok(None);
     }
-    let mut bytes = Cursor::new(Vec::new());
-    let written = error_map(&picture, truth).write_to(&mut bytes, ImageFormat::Png);
-    written.map_err(|cause| ReportError::Figure(cause.to_string()))?;
-    Ok(Some(data_address("image/png", bytes.get_ref())))
+    let encoded = encode_png(&DynamicImage::ImageRgb8(error_map(&picture, truth)));
+    let bytes = encoded.map_err(|cause| ReportError::Figure(cause.to_string()))?;
+    Ok(Some(data_address("image/png", &bytes)))
 }
 
 /// The pictures of a target.

@@ -1,7 +1,7 @@
 //! Element types of tensors, and their values as numbers.
 
-use half::{bf16, f16};
 use safetensors::Dtype;
+use viewfuse_core::half_precision::f16_value;
 
 /// The type of a tensor's elements, little-endian where they take more than a byte.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,8 +97,8 @@ impl Element {
         match self {
             Element::F64 => f64::from_le_bytes(eight),
             Element::F32 => f32::from_le_bytes(four).into(),
-            Element::F16 => f16::from_le_bytes([byte(0), byte(1)]).into(),
-            Element::Bf16 => bf16::from_le_bytes([byte(0), byte(1)]).into(),
+            Element::F16 => f16_value(u16::from_le_bytes([byte(0), byte(1)]).into()).into(),
+            Element::Bf16 => f32::from_le_bytes([0, 0, byte(0), byte(1)]).into(),
             Element::I64 => i64::from_le_bytes(eight) as f64,
             Element::I32 => i32::from_le_bytes(four).into(),
             Element::I16 => i16::from_le_bytes([byte(0), byte(1)]).into(),

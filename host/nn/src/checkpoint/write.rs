@@ -6,14 +6,19 @@
 use super::error::shortened;
 use super::location::element_count;
 use super::{Checkpoint, CheckpointError, Element};
-use half::f16;
 use safetensors::tensor::TensorInfo;
 use serde::Serialize;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::Path;
+use viewfuse_core::half_precision::{f16_bits, f16_value};
 use viewfuse_job::files::WholeFile;
 use viewfuse_job::progress::Progress;
+
+/// The least number that is not rounded to one in half precision, but to infinity.
+const TOO_LARGE: f32 = 65520.0;
+/// The least number in half precision with all of its bits.
+const MIN_NORMAL: f64 = 6.103515625e-5;
 
 /// The key of the metadata.
 const METADATA: &str = "__metadata__";
@@ -126,8 +131,8 @@ impl Checkpoint {
     ) -> Result<Vec<u8>, CheckpointError> {
         let mut bytes = Vec::new();
         for (at, value) in values.enumerate() {
-            let rounded = f16::from_f64(value);
-            if !rounded.is_finite() {
+            // f16_bits would take what is too large, and infinity, to the largest number.
+            if !((value as f32).abs() < TOO_LARGE) {
                 return Err(CheckpointError::Value {
                     path: self.path().to_path_buf(),
                     tensor: shortened(name),
@@ -136,14 +141,15 @@ impl Checkpoint {
                     problem: "which f16 cannot hold (at most 65504); convert without rounding to it",
                 });
             }
-            let error = (rounded.to_f64() - value).abs();
-            if value.abs() >= f16::MIN_POSITIVE.to_f64() {
+            let bits = f16_bits(value as f32);
+            let error = (f64::from(f16_value(bits)) - value).abs();
+            if value.abs() >= MIN_NORMAL {
                 written.relative_error = written.relative_error.max(error / value.abs());
             } else if value != 0.0 {
                 written.tiny_count += 1;
                 written.tiny_error = written.tiny_error.max(error);
             }
-            bytes.extend(rounded.to_le_bytes());
+            bytes.extend((bits as u16).to_le_bytes());
         }
         Ok(bytes)
     }

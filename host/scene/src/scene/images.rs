@@ -5,11 +5,12 @@
 //! ([`super::check`]); if it is ambiguous, the photograph is refused.
 
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read};
+use std::io::{BufRead, Cursor, Read, Seek};
 use std::path::Path;
 
+use image::codecs::png::PngEncoder;
 use image::metadata::Orientation;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, ImageResult, Limits};
 use viewfuse_job::panics::caught;
 
 use super::error::SceneError;
@@ -32,6 +33,12 @@ const DECODER_ALLOWANCE: u64 = 64 << 20;
 /// Bytes of a JPEG file that are read first for its header: the tags with their thumbnail, colour profiles. The decoder
 /// would read the whole file.
 const JPEG_HEADER: u64 = 256 << 10;
+
+/// What decoders read from: one type for files and bytes in memory, because the decoders of every format are compiled again
+/// for each type that they read from. Nothing outside this module decodes or encodes pictures of several formats.
+trait Source: BufRead + Seek {}
+
+impl<T: BufRead + Seek> Source for T {}
 
 /// The properties in an image file's header.
 pub(super) struct Header {
@@ -69,10 +76,11 @@ fn beginning_of_jpeg(path: &Path) -> Result<Option<Header>, SceneError> {
         return Ok(None);
     }
     file.read_to_end(&mut first).map_err(failed)?;
-    Ok(described(path, ImageReader::with_format(Cursor::new(first), ImageFormat::Jpeg)).ok())
+    let source: Box<dyn Source> = Box::new(Cursor::new(first));
+    Ok(described(path, ImageReader::with_format(source, ImageFormat::Jpeg)).ok())
 }
 
-fn described<R: std::io::BufRead + std::io::Seek>(path: &Path, reader: ImageReader<R>) -> Result<Header, SceneError> {
+fn described(path: &Path, reader: ImageReader<Box<dyn Source>>) -> Result<Header, SceneError> {
     decoding(path, || {
         let mut decoder = reader.into_decoder()?;
         let (width, height) = decoder.dimensions();
@@ -194,8 +202,32 @@ pub fn read_picture(path: &Path) -> Result<DynamicImage, SceneError> {
     Ok(pixels(path)?.0)
 }
 
+/// Width and height of any picture as stored, from its header.
+///
+/// # Errors
+/// As [`read_picture`].
+pub fn picture_size(path: &Path) -> Result<[u32; 2], SceneError> {
+    Ok(header(path)?.size)
+}
+
+/// A picture as a PNG file.
+///
+/// # Errors
+/// The encoder's.
+pub fn encode_png(picture: &DynamicImage) -> ImageResult<Vec<u8>> {
+    let mut bytes = Vec::new();
+    picture.write_with_encoder(PngEncoder::new(&mut bytes))?;
+    Ok(bytes)
+}
+
 /// A reader for the format of the content, independent of the file's extension.
-fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, SceneError> {
-    let reader = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
-    reader.map_err(|cause| unreadable(path, cause))
+fn open(path: &Path) -> Result<ImageReader<Box<dyn Source>>, SceneError> {
+    let found = ImageReader::open(path).and_then(ImageReader::with_guessed_format);
+    let found = found.map_err(|cause| unreadable(path, cause))?;
+    let format = found.format();
+    let mut reader = ImageReader::new(Box::new(found.into_inner()) as Box<dyn Source>);
+    if let Some(format) = format {
+        reader.set_format(format);
+    }
+    Ok(reader)
 }

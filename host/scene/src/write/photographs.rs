@@ -6,7 +6,7 @@ use std::path::Path;
 use image::{DynamicImage, GrayImage};
 
 use super::{Draft, WriteSceneError};
-use crate::Photograph;
+use crate::{Photograph, encode_png};
 
 impl Draft<'_> {
     /// Writes the stored photograph of a view, not undistorted, as `FOLDER/NAME.EXTENSION`; returns its name in the
@@ -75,7 +75,11 @@ impl Draft<'_> {
     fn png(&self, folder: &str, name: &str, picture: DynamicImage) -> Result<String, WriteSceneError> {
         let file = format!("{name}.png");
         let path = self.file(&format!("{folder}/{file}"))?;
-        picture.save(&path).map_err(|cause| WriteSceneError::Encode { path, cause })?;
+        let bytes = match encode_png(&picture) {
+            Ok(bytes) => bytes,
+            Err(cause) => return Err(WriteSceneError::Encode { path, cause }),
+        };
+        fs::write(&path, bytes).map_err(|cause| WriteSceneError::Io { path, cause })?;
         Ok(file)
     }
 }

@@ -1,7 +1,8 @@
 //! Options of what a render writes.
 
+use crate::cli::left_out::told;
 use clap::Args;
-use viewfuse_output::depth::DepthFormat;
+use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::run::Outputs;
 use viewfuse_output::video::VideoFormat;
@@ -16,7 +17,7 @@ pub(crate) struct OutputOptions {
     #[arg(long, help_heading = FILES)]
     alpha: bool,
     /// Formats of depth maps: png (16 bit), exr, npy (both 32-bit floating point); units are in run.json
-    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "png", help_heading = FILES)]
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "png", value_parser = parse_depth, help_heading = FILES)]
     depth: Vec<DepthFormat>,
     /// Write no contact sheets
     #[arg(long, help_heading = FILES)]
@@ -39,6 +40,13 @@ impl OutputOptions {
     pub(crate) fn rate(&self, stated: Option<f64>) -> FrameRate {
         self.fps.or_else(|| stated.and_then(FrameRate::new)).unwrap_or(FrameRate::DEFAULT)
     }
+}
+
+fn parse_depth(text: &str) -> Result<DepthFormat, String> {
+    text.parse().map_err(|error: UnknownDepthFormat| match text {
+        "exr" => told("OpenEXR", "exr"),
+        _ => error.to_string(),
+    })
 }
 
 fn parse_rate(text: &str) -> Result<FrameRate, String> {

@@ -1,20 +1,31 @@
 //! The course of the work as a bar on a terminal, and elsewhere as a line every few seconds.
 
 use super::course::Course;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{self, Write};
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
+use terminal_size::{Width, terminal_size_of};
+use unicode_width::UnicodeWidthChar;
 
-/// Steps of the bar.
-const STEPS: f64 = 1000.0;
+/// Goes to the beginning of the line and clears it.
+const CLEAR: &str = "\r\u{1b}[2K";
+/// Columns of a terminal that does not tell.
+const WIDTH: u16 = 80;
 
 /// What shows a course.
 pub(super) struct Shown {
-    pub(super) bar: ProgressBar,
     course: Mutex<Course>,
-    /// `None` where the bar is shown. Who shows the course holds it, so that what is shown is in order.
-    lines: Mutex<Option<Lines>>,
+    /// Who writes to the terminal holds it, so that what is shown is in order.
+    place: Mutex<Place>,
+}
+
+/// Where a course is shown.
+enum Place {
+    #[cfg(feature = "view")]
+    Nowhere,
+    /// The last line of a terminal, and what it says.
+    Bar(String),
+    Lines(Lines),
 }
 
 /// Lines about the course.
@@ -31,22 +42,29 @@ impl Shown {
     /// On a terminal a bar, elsewhere lines with this time between them; of 0 one for each change.
     pub(super) fn new(label: &str, is_terminal: bool, between: Duration) -> Shown {
         let now = Instant::now();
-        let bar = if is_terminal { ProgressBar::new(STEPS as u64) } else { ProgressBar::hidden() };
-        let template = "{msg} [{wide_bar:.blue}] {percent:>3} %";
-        bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message(label.to_owned());
-        let lines = (!is_terminal).then(|| Lines { between, last: now, said: String::new() });
-        Shown { bar, course: Mutex::new(Course::new(label, now)), lines: Mutex::new(lines) }
+        let place = match is_terminal {
+            true => Place::Bar(String::new()),
+            false => Place::Lines(Lines { between, last: now, said: String::new() }),
+        };
+        Shown { course: Mutex::new(Course::new(label, now)), place: Mutex::new(place) }
     }
 
     /// Shows nothing.
     #[cfg(feature = "view")]
     pub(super) fn hidden() -> Shown {
-        Shown {
-            bar: ProgressBar::hidden(),
-            course: Mutex::new(Course::new("", Instant::now())),
-            lines: Mutex::new(None),
-        }
+        Shown { course: Mutex::new(Course::new("", Instant::now())), place: Mutex::new(Place::Nowhere) }
+    }
+
+    /// Runs what prints, without the bar.
+    pub(super) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
+        let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
+        place.clear();
+        print()
+    }
+
+    /// Removes the bar.
+    pub(super) fn end(&self) {
+        self.aside(|| ());
     }
 
     /// Changes the course and shows it.
@@ -59,17 +77,37 @@ impl Shown {
 
     /// Shows the course as it is now.
     pub(super) fn show(&self) {
-        let Ok(mut lines) = self.lines.lock() else { return };
+        let Ok(mut place) = self.place.lock() else { return };
         let now = Instant::now();
         let Ok((share, words)) = self.course.lock().map(|course| (course.share(), course.words(now))) else { return };
-        let Some(lines) = lines.as_mut() else {
-            self.bar.set_position((STEPS * share) as u64);
-            self.bar.set_message(words);
-            return;
-        };
-        if let Some(line) = lines.due(now, share, &words) {
-            // A closed pipe is ignored.
-            writeln!(io::stderr().lock(), "{line}").ok();
+        match &mut *place {
+            #[cfg(feature = "view")]
+            Place::Nowhere => {}
+            Place::Bar(shown) => {
+                let width = terminal_size_of(io::stderr()).map_or(WIDTH, |(Width(width), _)| width);
+                let bar = bar(&words, share, width.into());
+                if bar != *shown {
+                    write!(io::stderr().lock(), "{CLEAR}{bar}").ok();
+                    *shown = bar;
+                }
+            }
+            Place::Lines(lines) => {
+                if let Some(line) = lines.due(now, share, &words) {
+                    // A closed pipe is ignored.
+                    writeln!(io::stderr().lock(), "{line}").ok();
+                }
+            }
+        }
+    }
+}
+
+impl Place {
+    fn clear(&mut self) {
+        if let Place::Bar(shown) = self
+            && !shown.is_empty()
+        {
+            write!(io::stderr().lock(), "{CLEAR}").ok();
+            shown.clear();
         }
     }
 }
@@ -87,9 +125,29 @@ impl Lines {
     }
 }
 
+/// The words, a bar in what they leave of the width, and the share; shorter than the width, so that no terminal wraps it.
+fn bar(words: &str, share: f64, width: usize) -> String {
+    let end = format!(" {:>3} %", (100.0 * share) as u64);
+    let room = width.saturating_sub(end.len() + 1);
+    let (mut line, mut used) = (String::new(), 0);
+    for character in words.chars() {
+        used += character.width().unwrap_or(0);
+        if used > room {
+            break;
+        }
+        line.push(character);
+    }
+    let steps = room.saturating_sub(used + 3);
+    if steps > 0 {
+        let done = (share * steps as f64) as usize;
+        line += &format!(" [{}{}]", "#".repeat(done), "-".repeat(steps - done));
+    }
+    line + &end
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Lines;
+    use super::{Lines, bar};
     use std::time::{Duration, Instant};
 
     #[test]
@@ -103,5 +161,15 @@ mod tests {
         };
         assert_eq!(told(500, |_| 0.5), [5, 10, 15, 20], "also where nothing goes on");
         assert_eq!(told(0, |tenth| (tenth / 8) as f64 / 10.0), [1, 8, 16], "each change");
+    }
+
+    #[test]
+    fn a_bar_is_shorter_than_the_terminal() {
+        assert_eq!(bar("view 2", 0.5, 24), "view 2 [####----]  50 %");
+        assert_eq!(bar("\u{6f22}", 1.0, 24), "\u{6f22} [############] 100 %");
+        assert_eq!(bar("a long name of a stage", 0.999, 20), "a long name o  99 %");
+        for width in 0..40 {
+            assert!(bar("stage", 0.3, width).chars().count() < width.max(7));
+        }
     }
 }
