@@ -181,15 +181,15 @@ impl Evaluator<'_> {
         targets: &[usize],
         score: impl Fn(&str, usize, Vec<(String, f64)>, Duration) -> Score,
     ) -> Result<(Vec<Score>, HashMap<usize, Option<MaskedTruth>>), EvaluateError> {
-        let Subject { scene, masked, .. } = *subject;
+        let Subject { scene, .. } = *subject;
         let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
         for &target in targets {
             self.progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
-            let ((camera, truth), mask) = (shown_at(scene, stage, target)?, self.mask(masked, stage, target)?);
+            let ((camera, truth), mask) = (shown_at(*subject, stage, target)?, self.mask(*subject, stage, target)?);
             let nearest = nearest_sources(scene, sources, target, BLENDED);
             for &source in &nearest {
                 if let Entry::Vacant(place) = shots.entry(source) {
-                    let (camera, GroundTruth { picture, .. }) = shown_at(scene, stage, source)?;
+                    let (camera, GroundTruth { picture, .. }) = shown_at(*subject, stage, source)?;
                     place.insert(Shot { camera, picture });
                 }
             }
@@ -225,13 +225,13 @@ impl Evaluator<'_> {
     /// The truth of a target with its mask, if masked metrics are requested and it has a mask.
     fn mask(
         &self,
-        masked: Option<&Scene>,
+        subject: Subject<'_>,
         stage: &Stage<'_>,
         target: usize,
     ) -> Result<Option<MaskedTruth>, EvaluateError> {
-        let Some(scene) = masked else { return Ok(None) };
-        let album = open_album(scene, [target], self.renderer, self.options, self.progress)?;
-        let size = stage.picture_size(target)?;
+        let Some(masked) = subject.masked else { return Ok(None) };
+        let album = open_album(masked, [target], self.renderer, self.options, self.progress)?;
+        let size = stage.size_at(&subject.scene.views[target].camera)?;
         let over = |level: f32| album.truth(target, size, Some([level; 3])).map_err(RenderError::from);
         Ok(MaskedTruth::of(over(1.0)?, &over(0.0)?))
     }
@@ -316,12 +316,14 @@ fn nearest_sources(scene: &Scene, sources: &[usize], target: usize, count: usize
 }
 
 /// A view's photograph at working size over the run's background, and the camera of these pixels.
-fn shown_at(scene: &Scene, stage: &Stage<'_>, view: usize) -> Result<(Camera, GroundTruth), EvaluateError> {
-    let [width, height] = stage.picture_size(view)?;
-    let camera = scene.views[view].camera;
-    let resized = camera.pinhole.resized(width, height);
-    let pinhole = resized.map_err(|error| RenderError::Size { width, height, error })?;
-    Ok((Camera { pinhole, ..camera }, stage.truth_at(view, [width, height])?))
+fn shown_at(
+    Subject { scene, album, .. }: Subject<'_>,
+    stage: &Stage<'_>,
+    view: usize,
+) -> Result<(Camera, GroundTruth), EvaluateError> {
+    let camera = stage.at_working_size(&scene.views[view].camera)?;
+    let size = [camera.pinhole.width(), camera.pinhole.height()];
+    Ok((camera, album.truth(view, size, stage.background()).map_err(RenderError::from)?))
 }
 
 /// The depth of the plane that a target's baselines are warped by.

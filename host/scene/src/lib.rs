@@ -11,12 +11,14 @@
 //! path          cameras without photographs: from files, or generated
 //! few_shot      which views are sources, which cameras are targets: FewShot
 //! photographs   sources at working size without their background: SourceImages
+//! inspect       what a scene holds, and likely faults in it
 //! write         a scene written out, in each layout that can hold it: Layout
 //! ```
 #![forbid(unsafe_code)]
 
 pub mod dataset;
 pub mod few_shot;
+pub mod inspect;
 pub mod numpy;
 pub mod path;
 pub mod photographs;

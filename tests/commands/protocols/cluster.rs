@@ -12,14 +12,14 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::TempDir;
 use viewfuse_tests::command::done;
+use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::trials::{is_required, needing, trial};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_CLUSTER";
-const PATIENCE: Duration = Duration::from_secs(300);
 /// What the recipes do, made small.
 const SMALL: &str = "--protocol random --trials 4 --targets-per-trial 1 --size 24x24 --device cpu --weights mean";
 
@@ -122,15 +122,13 @@ impl Place {
 
     /// Kills one worker as soon as there is one.
     fn kill_one(&self, is_over: &mut dyn FnMut() -> bool) -> bool {
-        let start = Instant::now();
-        while !is_over() && start.elapsed() < PATIENCE {
-            if let Some(worker) = self.workers().first() {
-                let killed = Command::new("kill").args(["-KILL", &worker.to_string()]).status();
-                return killed.is_ok_and(|status| status.success());
-            }
-            sleep(Duration::from_millis(2));
-        }
-        false
+        let mut worker = None;
+        wait_until("no worker appeared", || {
+            worker = self.workers().first().copied();
+            worker.is_some() || is_over()
+        });
+        let kill = |worker: u32| Command::new("kill").args(["-KILL", &worker.to_string()]).status();
+        worker.is_some_and(|worker| kill(worker).is_ok_and(|status| status.success()))
     }
 }
 
@@ -185,16 +183,13 @@ impl Slurm {
             command.args(["-D", "-f"]).arg(&settings).stdout(Stdio::null()).stderr(log).spawn().expect("a daemon")
         };
         let slurm = Slurm { daemons: vec![daemon("slurmctld"), daemon("slurmd")], settings };
-        let start = Instant::now();
-        while !slurm.asked(place, "sinfo", &["-h", "-o", "%T"]).contains("idle") {
-            assert!(start.elapsed() < PATIENCE, "the node does not come up: {}", folder.display());
-            sleep(Duration::from_millis(100));
-        }
+        wait_until("the node does not come up", || slurm.asked(place, "sinfo", &["-h", "-o", "%T"]).contains("idle"));
         slurm
     }
 
-    /// What a program of Slurm prints.
+    /// What a program of Slurm prints. It is asked again and again: each time a moment later.
     fn asked(&self, place: &Place, program: &str, arguments: &[&str]) -> String {
+        sleep(Duration::from_millis(100));
         let output = place.command(program).args(arguments).env("SLURM_CONF", &self.settings).output().expect("Slurm");
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
@@ -212,11 +207,7 @@ impl Slurm {
 
     /// Waits for a job's end and returns how many of its tasks are in each state.
     fn ended(&self, place: &Place, job: &str) -> [usize; 2] {
-        let start = Instant::now();
-        while !self.is_over(place, job) {
-            assert!(start.elapsed() < PATIENCE, "the job does not end: {}", self.asked(place, "squeue", &[]));
-            sleep(Duration::from_millis(200));
-        }
+        wait_until("the job does not end", || self.is_over(place, job));
         let tasks = self.asked(place, "scontrol", &["show", "job", job]);
         ["JobState=COMPLETED", "JobState=FAILED"].map(|state| tasks.matches(state).count())
     }

@@ -81,8 +81,8 @@ fn the_graph_is_the_renderers() {
     // And what is seen of the rays: exponentials are good to a few roundings more.
     let lengths = tensor(places.iter().map(|point| point.length).collect(), &[40, 24], DType::F64);
     let shares = sample_weights(&super::density(&raw, &lengths).expect("densities"), &lengths).expect("weights");
-    let looked = reference.look(Pass::Coarse, &weights, &rays, &depths).expect("rays");
-    assert_close(&looked.weights, &shares, 1.0e-4);
+    let rendered = reference.render_rays(Pass::Coarse, &weights, &rays, &depths).expect("rays");
+    assert_close(&rendered.weights, &shares, 1.0e-4);
 }
 
 #[test]
