@@ -16,7 +16,6 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::metrics::psnr;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
-use viewfuse_kernels::plane_sweep::blend::blend;
 use viewfuse_tests::places::repository;
 
 /// Distance of the painted wall.
@@ -111,22 +110,6 @@ fn a_painted_wall_is_found_and_shown() {
     assert!((median - WALL).abs() < 0.05 * WALL, "{median}");
     let copy = inner_error(&wall([1.0; 3]).images[0].texels, &photograph(target, 1.0).texels, 72);
     assert!(copy > 5.0 * error, "a copy is as good: {copy}");
-}
-
-#[test]
-fn the_planes_of_a_target_are_those_of_its_picture() {
-    let (sources, target) = (wall([0.9, 1.0, 1.1]), camera(Vec3::new(0.1, 0.0, 0.0), 40, 30));
-    let rendered = picture(&sources, &target);
-    let targets = [(target, Weights::mean(3))];
-    let planes = TrainingFree::default().sweep.target_planes(&Cpu, &sources, &relevance(3), &targets, &Silent);
-    let planes = planes.expect("planes").remove(0);
-    assert_eq!(planes.sources, [0, 1, 2]);
-    for (pixel, colour) in rendered.colours.iter().enumerate() {
-        let at = [(pixel % 40) as f32 + 0.5, (pixel / 40) as f32 + 0.5];
-        let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
-        let blended = blend(&planes.block, &planes.views[..], texels, disparities, &planes.costs[..], at);
-        assert_eq!(blended.colour, *colour, "pixel {pixel}");
-    }
 }
 
 #[test]

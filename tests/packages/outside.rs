@@ -14,7 +14,7 @@ use viewfuse::job::progress::Silent;
 use viewfuse::output::run::{Circumstances, RunWriter};
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
-use viewfuse::scene::{Place, READERS, Scene, SceneError};
+use viewfuse::scene::{FaultLocation, READERS, Scene, SceneError};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
@@ -159,9 +159,9 @@ fn what_a_reader_gives_is_checked() {
         words[index] = word;
         list.replacen(first, &words.join(" "), 1)
     };
-    assert!(matches!(refused(with(1, "5")), SceneError::Pose { place: Place::Line(1), .. }));
-    assert!(matches!(refused(with(0, "-1")), SceneError::Intrinsics { place: Place::Line(1), .. }));
-    assert!(matches!(refused(with(4, "NaN")), SceneError::NotFinite { place: Place::Line(1), .. }));
+    assert!(matches!(refused(with(1, "5")), SceneError::Pose { place: FaultLocation::Line(1), .. }));
+    assert!(matches!(refused(with(0, "-1")), SceneError::Intrinsics { place: FaultLocation::Line(1), .. }));
+    assert!(matches!(refused(with(4, "NaN")), SceneError::NotFinite { place: FaultLocation::Line(1), .. }));
     assert!(matches!(refused(String::new()), SceneError::NoViews { .. }));
 }
 

@@ -7,13 +7,11 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::source::{Source, files};
 
 macro_rules! bodies {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $first:ident $(:: $body:ident)* $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc $doc:tt block $block:tt counts $counts:tt arrays $arrays:tt elements $elements:tt marks $marks:tt
+        body { $first:ident $(:: $body:ident)* }
+    })+) => {
         /// Each kernel with the last name of its body's path.
         fn bodies() -> Vec<(Kernel, &'static str)> {
             vec![$((Kernel::$Kernel, [stringify!($first) $(, stringify!($body))*].last().expect("a name"))),+]

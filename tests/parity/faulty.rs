@@ -1,6 +1,7 @@
 //! A device that computes on the CPU and gets one kernel wrong.
 
 use viewfuse::device::DeviceError;
+use viewfuse::device::argument;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::device::{Device, Element, KernelTime, LayerShape, Memory};
 use viewfuse_kernels::for_each_kernel;
@@ -88,15 +89,6 @@ impl Memory for Faulty {
     }
 }
 
-/// How the device's method takes an array of a row.
-macro_rules! argument {
-    (layer $host:ty) => { &<Cpu as Device>::Weights };
-    (optional $host:ty) => { Option<&Vec<$host>> };
-    (write $host:ty) => { &mut Vec<$host> };
-    (write_paged $host:ty) => { &mut Vec<$host> };
-    ($kind:ident $host:ty) => { &Vec<$host> };
-}
-
 /// Spoils what is written.
 macro_rules! spoil {
     (write $array:ident) => {
@@ -109,13 +101,14 @@ macro_rules! spoil {
 }
 
 macro_rules! forward {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc $doc:tt
+        block { $($block:ident: $Block:ty)? }
+        counts { $($count:ident)* }
+        arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }
+        $($rest:tt)*
+    })+) => {
         impl Device for Faulty {
             type Weights = <Cpu as Device>::Weights;
 
@@ -127,10 +120,10 @@ macro_rules! forward {
                 fn $method(
                     &self,
                     $($block: &$Block,)?
-                    $($($count: u32,)+)?
-                    $($array: argument!($kind $host),)+
+                    $($count: u32,)*
+                    $($array: argument!($kind $Host),)+
                 ) -> Result<(), DeviceError> {
-                    Cpu.$method($($block,)? $($($count,)+)? $($array),+)?;
+                    Cpu.$method($($block,)? $($count,)* $($array),+)?;
                     if self.kernel == Kernel::$Kernel {
                         $(spoil!($kind $array);)+
                     }

@@ -24,6 +24,7 @@ mod winograd;
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory};
+use crate::argument;
 use compositing::*;
 use group_norm::*;
 use limits::*;
@@ -82,15 +83,6 @@ impl Memory for Cpu {
     }
 }
 
-/// How the CPU's method takes an array of a row.
-macro_rules! argument {
-    (layer $host:ty) => { &Weights };
-    (optional $host:ty) => { Option<&Vec<$host>> };
-    (write $host:ty) => { &mut Vec<$host> };
-    (write_paged $host:ty) => { &mut Vec<$host> };
-    ($kind:ident $host:ty) => { &Vec<$host> };
-}
-
 /// How a form takes it: as a slice.
 macro_rules! lend {
     (optional $array:ident) => {
@@ -102,13 +94,14 @@ macro_rules! lend {
 }
 
 macro_rules! forms {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc $doc:tt
+        block { $($block:ident: $Block:ty)? }
+        counts { $($count:ident)* }
+        arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }
+        $($rest:tt)*
+    })+) => {
         impl Device for Cpu {
             type Weights = Weights;
 
@@ -120,10 +113,10 @@ macro_rules! forms {
                 fn $method(
                     &self,
                     $($block: &$Block,)?
-                    $($($count: u32,)+)?
-                    $($array: argument!($kind $host),)+
+                    $($count: u32,)*
+                    $($array: argument!($kind $Host),)+
                 ) -> Result<(), DeviceError> {
-                    $method($($block,)? $($($count,)+)? $(lend!($kind $array)),+);
+                    $method($($block,)? $($count,)* $(lend!($kind $array)),+);
                     Ok(())
                 }
             )+

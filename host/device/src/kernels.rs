@@ -18,22 +18,25 @@ pub struct LayerShape {
 }
 
 /// How a device's method takes an array of a row.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! argument {
-    (layer $host:ty) => { &Self::Weights };
-    (optional $host:ty) => { Option<&Self::Buffer<$host>> };
-    (write $host:ty) => { &mut Self::Buffer<$host> };
-    (write_paged $host:ty) => { &mut Self::Buffer<$host> };
-    ($kind:ident $host:ty) => { &Self::Buffer<$host> };
+    (layer $Host:ty) => { &<Self as $crate::Device>::Weights };
+    (optional $Host:ty) => { Option<&<Self as $crate::Memory>::Buffer<$Host>> };
+    (write $Host:ty) => { &mut <Self as $crate::Memory>::Buffer<$Host> };
+    (write_paged $Host:ty) => { &mut <Self as $crate::Memory>::Buffer<$Host> };
+    ($kind:ident $Host:ty) => { &<Self as $crate::Memory>::Buffer<$Host> };
 }
 
 macro_rules! device {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc { $($doc:tt)* }
+        block { $($block:ident: $Block:ty)? }
+        counts { $($count:ident)* }
+        arrays { $({ $kind:ident $array:ident: $Host:ty, $($how:tt)* })+ }
+        $($rest:tt)*
+    })+) => {
         /// Something that runs every kernel: a method for each row of [`viewfuse_kernels::rows`], so that a kernel that
         /// exists on one device only does not compile. A method takes the kernel's parameters, the numbers that say how
         /// many elements there are, and the arrays in the order of the row. Buffers may be longer than the parameters say.
@@ -49,7 +52,7 @@ macro_rules! device {
             fn weights(&self, shape: &LayerShape, weights: &[f32]) -> Result<Self::Weights, DeviceError>;
 
             $(
-                $(#[$doc])*
+                $($doc)*
                 ///
                 /// # Errors
                 /// If the device is lost.
@@ -57,8 +60,8 @@ macro_rules! device {
                 fn $method(
                     &self,
                     $($block: &$Block,)?
-                    $($($count: u32,)+)?
-                    $($array: argument!($kind $host),)+
+                    $($count: u32,)*
+                    $($array: argument!($kind $Host),)+
                 ) -> Result<(), DeviceError>;
             )+
         }

@@ -3,12 +3,13 @@
 use super::error::DeviceError;
 use super::kernels::{Device, LayerShape};
 use super::memory::{Element, KernelTime, Memory, Transfers};
+use crate::argument;
 use bytemuck::bytes_of;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use viewfuse_job::files::{read_at_most, write_whole};
-use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
+use viewfuse_kernels::{elements, for_each_kernel};
 use viewfuse_vulkan::{Adapter, Buffer, Gpu, GpuOptions, Instance, Tally, VulkanError};
 
 /// A Vulkan device. Calls return when their work is recorded; it is submitted when a download waits for it, or when there is
@@ -135,15 +136,6 @@ impl Memory for Vulkan {
     }
 }
 
-/// How a Vulkan device's method takes an array of a row.
-macro_rules! argument {
-    (layer $host:ty) => { &Buffer<$host> };
-    (optional $host:ty) => { Option<&Buffer<$host>> };
-    (write $host:ty) => { &mut Buffer<$host> };
-    (write_paged $host:ty) => { &mut Buffer<$host> };
-    ($kind:ident $host:ty) => { &Buffer<$host> };
-}
-
 /// How it is bound. A buffer must be bound also where an optional array is left out.
 macro_rules! bind {
     (optional $array:ident $other:ident) => {
@@ -165,13 +157,18 @@ macro_rules! parameters {
 }
 
 macro_rules! dispatches {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc $doc:tt
+        block { $($block:ident: $Block:ty)? }
+        counts { $($count:ident)* }
+        arrays { $({
+            $kind:ident $array:ident: $Host:ty, as $entry:tt at $place:tt
+            unless { $($other:ident $told:ident $flag:ident)? }
+        })+ }
+        elements { $($elements:tt)* }
+        $($rest:tt)*
+    })+) => {
         impl Device for Vulkan {
             type Weights = Buffer<f32>;
 
@@ -183,8 +180,8 @@ macro_rules! dispatches {
                 fn $method(
                     &self,
                     $($block: &$Block,)?
-                    $($($count: u32,)+)?
-                    $($array: argument!($kind $host),)+
+                    $($count: u32,)*
+                    $($array: argument!($kind $Host),)+
                 ) -> Result<(), DeviceError> {
                     $($(
                         let mut told = *$told;
@@ -192,7 +189,7 @@ macro_rules! dispatches {
                         let $told = &told;
                     )?)+
                     let arrays = [$(bind!($kind $array $($other)?)),+];
-                    Ok(self.gpu.dispatch(Kernel::$Kernel, parameters!($($block)?), $elements, &arrays)?)
+                    Ok(self.gpu.dispatch(Kernel::$Kernel, parameters!($($block)?), elements!($($elements)*), &arrays)?)
                 }
             )+
         }

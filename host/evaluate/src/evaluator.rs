@@ -130,29 +130,7 @@ impl Evaluator<'_> {
         let stage_count = 1 + weightings.len() * of_a_scheme;
         progress.stage("reading the sources", 0..1, stage_count);
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
-        let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
-        for &target in targets {
-            progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
-            let ((camera, truth), mask) = (shown_at(subject, &stage, target)?, self.mask(subject, &stage, target)?);
-            let nearest = nearest_sources(scene, sources, target, BLENDED);
-            for &source in &nearest {
-                if let Entry::Vacant(place) = shots.entry(source) {
-                    let (camera, GroundTruth { picture, .. }) = shown_at(subject, &stage, source)?;
-                    place.insert(Shot { camera, picture });
-                }
-            }
-            let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
-            let depth = depth_of(scene, target);
-            for baseline in Baseline::ALL {
-                let start = Instant::now();
-                let picture = baseline.picture(&nearest, &camera, depth);
-                let time = start.elapsed();
-                let values = self.values(&picture, &truth.picture, truth.seen.as_ref(), mask.as_ref())?;
-                scores.push(score(baseline.name(), target, values, time));
-            }
-            masks.insert(target, mask);
-        }
-        drop(shots);
+        let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, &score)?;
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for (index, row) in weightings.iter().enumerate() {
@@ -192,6 +170,41 @@ impl Evaluator<'_> {
         let share = shared / (scores.len() - first).max(1) as u32;
         scores[first..].iter_mut().for_each(|score: &mut Score| score.time += share);
         Ok(scores)
+    }
+
+    /// Scores the baselines, and reads the masks of the targets.
+    fn baseline_scores(
+        &self,
+        subject: &Subject<'_>,
+        stage: &Stage<'_>,
+        sources: &[usize],
+        targets: &[usize],
+        score: impl Fn(&str, usize, Vec<(String, f64)>, Duration) -> Score,
+    ) -> Result<(Vec<Score>, HashMap<usize, Option<MaskedTruth>>), EvaluateError> {
+        let Subject { scene, .. } = *subject;
+        let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
+        for &target in targets {
+            self.progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
+            let ((camera, truth), mask) = (shown_at(*subject, stage, target)?, self.mask(*subject, stage, target)?);
+            let nearest = nearest_sources(scene, sources, target, BLENDED);
+            for &source in &nearest {
+                if let Entry::Vacant(place) = shots.entry(source) {
+                    let (camera, GroundTruth { picture, .. }) = shown_at(*subject, stage, source)?;
+                    place.insert(Shot { camera, picture });
+                }
+            }
+            let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
+            let depth = depth_of(scene, target);
+            for baseline in Baseline::ALL {
+                let start = Instant::now();
+                let picture = baseline.picture(&nearest, &camera, depth);
+                let time = start.elapsed();
+                let values = self.values(&picture, &truth.picture, truth.seen.as_ref(), mask.as_ref())?;
+                scores.push(score(baseline.name(), target, values, time));
+            }
+            masks.insert(target, mask);
+        }
+        Ok((scores, masks))
     }
 
     /// Every metric of a picture, the masked ones last.
@@ -265,24 +278,24 @@ type SourceGroups = Vec<(Vec<usize>, Vec<usize>)>;
 
 fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> Result<SourceGroups, EvaluateError> {
     let photographed = || (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some());
-    let asked = match &selection.targets {
+    let requested = match &selection.targets {
         Some(list) => Some(view_list(scene, list)?),
         None => None,
     };
-    if let Some(&view) = asked.iter().flatten().find(|&&view| scene.views[view].image.is_none()) {
+    if let Some(&view) = requested.iter().flatten().find(|&&view| scene.views[view].image.is_none()) {
         let view = scene.views[view].name.clone();
         return Err(EvaluateError::NoTruth { scene: scene.path.display().to_string(), view });
     }
     if selection.sources.is_some() {
-        let excluded = asked.clone().unwrap_or_default();
+        let excluded = requested.clone().unwrap_or_default();
         let sources = selection.sources_without(scene, &excluded, least_sources)?;
-        let targets = asked.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
+        let targets = requested.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
         if targets.is_empty() {
             return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
         }
         return Ok(vec![(sources, targets)]);
     }
-    let targets = asked.unwrap_or_else(|| photographed().collect());
+    let targets = requested.unwrap_or_else(|| photographed().collect());
     if targets.is_empty() {
         return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
     }

@@ -16,14 +16,12 @@ mod sweep;
 
 use super::row::{Origin, Row};
 use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
-use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_scene::rig::Rig;
 
-pub use hull::{NoObject, find_object};
-pub use sweep::{Sweep, TargetPlanes};
+pub use hull::NoObject;
+pub use sweep::Sweep;
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
 #[derive(Clone, Copy, Debug)]
@@ -54,19 +52,6 @@ pub(crate) const ROW: Row = Row {
     presets: presets::of,
 };
 
-/// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
-/// photographs.
-const MAX_GAP_DEGREES: f32 = 15.0;
-
-/// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
-pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
-    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MAX_GAP_DEGREES)?;
-    Some(format!(
-        "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
-         reliably up to about {MAX_GAP_DEGREES:.0} degrees; take photographs between them"
-    ))
-}
-
 impl Field for TrainingFree {
     fn about(&self) -> About {
         About {
@@ -87,9 +72,7 @@ impl Field for TrainingFree {
         if sources.has_silhouettes {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
-            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-            gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
-            Ok(Box::new(self.sweep.views(device, sources, progress)?))
+            self.sweep.prepare(device, sources, progress)
         }
     }
 

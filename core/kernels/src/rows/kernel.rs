@@ -146,6 +146,7 @@ impl Array {
 
 /// An array of a row.
 macro_rules! array {
+    ($kind:ident $name:ident $host:ty, vectors) => { array!($kind $name $host) };
     (read $name:ident $host:ty) => { Array::new::<$host>(stringify!($name), Access::Read, Layout::Whole) };
     (filled $name:ident $host:ty) => { array!(read $name $host).not_empty() };
     (layer $name:ident $host:ty) => { array!(read $name $host).not_empty() };
@@ -166,27 +167,32 @@ macro_rules! array {
     };
 }
 
-/// Whether a row has a mark.
-macro_rules! has {
-    ($mark:ident:) => { false };
-    (twin: twin $(, $rest:ident)*) => { true };
-    (tiled: tiled $(, $rest:ident)*) => { true };
-    ($mark:ident: $other:ident $(, $rest:ident)*) => { has!($mark: $($rest),*) };
+/// Whether elements are tiles.
+macro_rules! is_tiled {
+    (tiles $($shape:tt)*) => {
+        true
+    };
+    ($($other:tt)*) => {
+        false
+    };
 }
 
 macro_rules! list {
-    ($(
-        $(#[$doc:meta])*
-        $Kernel:ident $method:ident($($block:ident: $Block:ty)? $(; $($count:ident),+)?) [$elements:expr]
-        by $($body:ident)::+ $(, $way:ident)* {
-            $($kind:ident $array:ident: $host:ty $(as $entry:ty)? $(= $other:ident if !$told:ident.$flag:ident)?),+ $(,)?
-        }
-    )+) => {
+    ($({
+        $Kernel:ident $method:ident
+        doc { $($doc:tt)* }
+        block { $($block:ident: $Block:ty)? }
+        counts $counts:tt
+        arrays { $({ $kind:ident $array:ident: $Host:ty, as { $($entry:tt)? } $($how:tt)* })+ }
+        elements { $($elements:tt)* }
+        marks { $($mark:ident)* }
+        body { $($body:ident)::+ }
+    })+) => {
         /// A kernel.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         #[repr(u32)]
         pub enum Kernel {
-            $($(#[$doc])* $Kernel,)+
+            $($($doc)* $Kernel,)+
         }
 
         impl Kernel {
@@ -222,7 +228,7 @@ macro_rules! list {
             /// What it binds, in the order of the bindings.
             pub const fn arrays(self) -> &'static [Array] {
                 match self {
-                    $(Kernel::$Kernel => const { &[$(array!($kind $array $host $(, $entry)?)),+] },)+
+                    $(Kernel::$Kernel => const { &[$(array!($kind $array $Host $(, $entry)?)),+] },)+
                 }
             }
 
@@ -236,7 +242,7 @@ macro_rules! list {
             /// Whether its workgroups compute tiles together: only these kernels use workgroup memory and barriers.
             pub const fn is_tiled(self) -> bool {
                 match self {
-                    $(Kernel::$Kernel => has!(tiled: $($way),*),)+
+                    $(Kernel::$Kernel => is_tiled!($($elements)*),)+
                 }
             }
 
@@ -244,7 +250,7 @@ macro_rules! list {
             /// on the CPU.
             pub const fn has_twin(self) -> bool {
                 match self {
-                    $(Kernel::$Kernel => has!(twin: $($way),*),)+
+                    $(Kernel::$Kernel => crate::has_mark!(twin: $($mark)*),)+
                 }
             }
         }

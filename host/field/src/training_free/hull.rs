@@ -1,8 +1,6 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
-mod bounds;
-
 use crate::{
     DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Rendered, Request, Weighted,
 };
@@ -13,6 +11,7 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_kernels::visual_hull::ray_marching::MarchBlock;
 use viewfuse_kernels::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
 use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_scene::photographs::object_box::{bounding_box, joined};
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -20,8 +19,8 @@ use viewfuse_weighting::sources::SourceWeights;
 const BAND_ROWS: u32 = 16;
 /// Rows around a band that its depths depend on: the window's and the neighbours' reach.
 const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
-/// Shares of the sources' side, with the error and the work that are typical of them (the example `efforts` of
-/// `viewfuse-evaluate`).
+/// Shares of the sources' side, with the error and the work that are typical of them (the experiment `efforts` of
+/// `viewfuse-research`).
 const EFFORTS: [(f32, f32, f32); 2] = [(0.25, 0.065, 0.2), (0.5, 0.04, 0.4)];
 /// Sources with a longer side than this take most of the time; smaller ones take less than the picture.
 const MIN_REDUCED: u32 = 256;
@@ -131,7 +130,7 @@ impl<D: Device> Silhouettes<D> {
     /// Uploads images and finds the object.
     fn upload(device: &D, images: &[SourceImage], progress: &dyn Progress) -> Result<Silhouettes<D>, FieldError> {
         let (cameras, texels) = joined(images);
-        let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
+        let object = bounding_box(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
         let scene = HullScene {
             object,
@@ -310,23 +309,6 @@ impl<D: Device> Geometry for Views<'_, D> {
         };
         Ok(self.silhouettes().scene.cameras.iter().map(map).collect())
     }
-}
-
-/// The bounding box of the visual hull of the sources' silhouettes, or `None` if it is empty.
-pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
-    let (cameras, texels) = joined(&sources.images);
-    bounds::find(&cameras, &texels)
-}
-
-/// All sources' texels, concatenated, and the cameras with the offsets of their texels.
-pub(super) fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
-    let mut cameras = Vec::with_capacity(images.len());
-    let mut texels = Vec::new();
-    for image in images {
-        cameras.push(image.camera.block(texels.len() as u32));
-        texels.extend_from_slice(&image.texels);
-    }
-    (cameras, texels)
 }
 
 /// A pixel's side at the middle of the object.

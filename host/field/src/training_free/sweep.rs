@@ -6,19 +6,18 @@
 //! search      surface points of a scene whose files do not tell its depths
 //! unseen      parts of a picture that its photograph does not show
 //! efforts     coarser comparisons, from the cheapest to the exact one
-//! planes      a target's planes on the host, to be examined
 //! ```
 
 mod efforts;
 mod matching;
-mod planes;
 mod search;
 mod unseen;
 
 use super::exposure;
 use super::space::Space;
 use crate::{
-    DepthMap, Efforts, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces, Tunable, Tuned, Weighted,
+    About, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces, Tunable,
+    Tuned, Weighted,
 };
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -30,8 +29,6 @@ use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
-
-pub use planes::TargetPlanes;
 
 const NEAR_COST: &str = "near cost";
 const DISSENT_SHARE: &str = "dissent share";
@@ -204,6 +201,26 @@ fn swept(
         }
     };
     order.into_iter().map(view).collect()
+}
+
+impl Field for Sweep {
+    /// Sources at the size of the pictures.
+    fn about(&self) -> About {
+        About { least_sources: 2, ..About::new("plane sweep") }
+    }
+
+    fn prepare<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        if !sources.has_silhouettes {
+            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+            viewfuse_scene::rig::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
+        }
+        Ok(Box::new(self.views(device, sources, progress)?))
+    }
 }
 
 impl<D: Device> Views<'_, D> {

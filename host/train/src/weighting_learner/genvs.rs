@@ -2,7 +2,7 @@
 
 use super::{Frozen, Step, ViewWeights};
 use crate::TrainError;
-use crate::batch::Shown;
+use crate::batch::SourceDraw;
 use crate::genvs::{Genvs, ViewCounts, Views};
 use crate::genvs_learner::{self, MAX_LEVEL_SHARE};
 use crate::scenes::TrainingScene;
@@ -26,7 +26,7 @@ fn weights(views: &Views, weights: ViewWeights<'_>) -> Result<Tensor> {
 
 /// One target of each object.
 fn counts(source_count: usize) -> ViewCounts {
-    ViewCounts { sources: Shown::whole(source_count), targets: 1 }
+    ViewCounts { sources: SourceDraw::whole(source_count), targets: 1 }
 }
 
 impl Frozen for Genvs {

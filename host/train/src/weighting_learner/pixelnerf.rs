@@ -2,7 +2,7 @@
 
 use super::{Frozen, Step, ViewWeights, WeightingSettings};
 use crate::TrainError;
-use crate::batch::{Batch, BatchSize, Shown, Targets};
+use crate::batch::{Batch, BatchSize, SourceDraw, Targets};
 use crate::pixelnerf::{PixelNerf, SampleCounts};
 use crate::pixelnerf_learner;
 use crate::scenes::TrainingScene;
@@ -26,7 +26,7 @@ fn weights(batch: &Batch, weights: ViewWeights<'_>) -> Result<Tensor> {
 impl Frozen for PixelNerf {
     fn loss(&self, step: &Step<'_>, source_count: usize) -> Result<Tensor> {
         let &WeightingSettings { objects, rays, .. } = step.settings;
-        let (size, shown) = (BatchSize { objects, rays }, Shown::whole(source_count));
+        let (size, shown) = (BatchSize { objects, rays }, SourceDraw::whole(source_count));
         let batch = Batch::draw(step.scenes, step.draw, size, shown, Targets::One, step.dtype)?;
         let colours = self.render(&batch, &weights(&batch, step.weights)?, step.draw, SAMPLES)?;
         (colours - &batch.truth)?.sqr()?.mean_all()

@@ -9,7 +9,7 @@ use viewfuse_scene::photographs::{SourceImage, longest_side};
 const TRIAL_PLANES: u32 = 32;
 
 /// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
-/// work that are typical of them (the example `efforts` of `viewfuse-evaluate`, on the sample room and on herz_jesus_p8).
+/// work that are typical of them (the experiment `efforts` of `viewfuse-research`, on the sample room and on herz_jesus_p8).
 const EFFORTS: [(f32, f32, usize, f32, f32); 6] = [
     (0.25, 0.5, 4, 0.055, 0.09),
     (0.5, 1.0, 1, 0.029, 0.2),
