@@ -104,6 +104,9 @@ pub struct Evaluator<'a> {
     pub progress: &'a dyn Progress,
 }
 
+/// The masks of targets, by the index of the view.
+type Masks = HashMap<usize, Option<MaskedTruth>>;
+
 impl Evaluator<'_> {
     /// Scores the baselines and then every scheme on targets that share their sources. `seen` gets each rendered frame with
     /// its scheme's name, its values and the sources at working size.
@@ -130,7 +133,7 @@ impl Evaluator<'_> {
         let stage_count = 1 + weightings.len() * of_a_scheme;
         progress.stage("reading the sources", 0..1, stage_count);
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
-        let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, &score)?;
+        let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, score)?;
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for (index, row) in weightings.iter().enumerate() {
@@ -180,7 +183,7 @@ impl Evaluator<'_> {
         sources: &[usize],
         targets: &[usize],
         score: impl Fn(&str, usize, Vec<(String, f64)>, Duration) -> Score,
-    ) -> Result<(Vec<Score>, HashMap<usize, Option<MaskedTruth>>), EvaluateError> {
+    ) -> Result<(Vec<Score>, Masks), EvaluateError> {
         let Subject { scene, .. } = *subject;
         let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
         for &target in targets {

@@ -22,8 +22,8 @@ pub struct Row {
     pub flags: &'static [Flag],
     /// What may be left out of its work, besides [`VIEWS`].
     pub omissions: &'static [Omission],
-    /// Settings to compare for a field of this row, the exact one first; empty if it is of another. The options say what
-    /// is left out by default; the number is that of the targets.
+    /// Settings to compare for a field of this row, the exact one first; empty if it is of another, or for the exact one
+    /// and the default alone. The options say what is left out by default; the number is that of the targets.
     pub presets: fn(&AnyField, &RenderOptions, usize) -> Vec<Preset>,
 }
 

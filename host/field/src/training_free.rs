@@ -21,6 +21,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 
 pub use hull::NoObject;
+pub(crate) use sweep::ROW as SWEEP;
 pub use sweep::Sweep;
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
@@ -77,6 +78,6 @@ impl Field for TrainingFree {
     }
 
     fn preview(&self) -> Option<TrainingFree> {
-        Some(TrainingFree { sweep: self.sweep.preview(), ..*self })
+        Some(TrainingFree { sweep: self.sweep.cheaper(), ..*self })
     }
 }

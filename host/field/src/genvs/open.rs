@@ -48,7 +48,7 @@ flags! {
     noise: NoiseSchedule = "noise", "MAX,MIN", parse_noise, Picture, &[], "Largest and smallest noise level [default: \
         80,0.002]";
     sampler: Sampler = "sampler", "NAME", parse_sampler, Effort, BOUNDS, "Sampler: euler, heun, dpm++2m, dpm++3m, unipc, \
-        ipndm [default: ipndm, with --exact heun]";
+        ipndm, ipndm-v [default: ipndm, with --exact heun]";
     steps: u32 = "steps", "N", parse_steps, Effort, BOUNDS, "Noise levels. Each takes one call of the denoiser; with heun \
         two, except the last [default: 10, with --exact 25]";
     tolerance: f32 = "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"], "Choose \

@@ -15,9 +15,10 @@ mod unseen;
 
 use super::exposure;
 use super::space::Space;
+use crate::row::{Origin, Row};
 use crate::{
-    About, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces, Tunable,
-    Tuned, Weighted,
+    About, AnyField, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces,
+    Tunable, Tuned, Weighted,
 };
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -203,10 +204,21 @@ fn swept(
     order.into_iter().map(view).collect()
 }
 
+/// The row of the plane sweep alone.
+pub(crate) const ROW: Row = Row {
+    name: "plane-sweep",
+    title: "plane sweep",
+    heading: "Options of the plane sweep",
+    origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(Sweep::default())) },
+    flags: &[],
+    omissions: &[],
+    presets: |_, _, _| Vec::new(),
+};
+
 impl Field for Sweep {
     /// Sources at the size of the pictures.
     fn about(&self) -> About {
-        About { least_sources: 2, ..About::new("plane sweep") }
+        About { least_sources: 2, ..About::new(ROW.name) }
     }
 
     fn prepare<'a, D: Device>(
@@ -220,6 +232,10 @@ impl Field for Sweep {
             viewfuse_scene::rig::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
         }
         Ok(Box::new(self.views(device, sources, progress)?))
+    }
+
+    fn preview(&self) -> Option<Sweep> {
+        Some(self.cheaper())
     }
 }
 

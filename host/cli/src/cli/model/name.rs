@@ -109,14 +109,14 @@ mod tests {
             super::model_help(),
             "Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl), or a test network with deterministic \
              initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS), or a field without a network: \
-             training-free [default: training-free]"
+             training-free, plane-sweep [default: training-free]"
         );
     }
 
     #[test]
     fn models_by_name() {
         for text in
-            ["formula", "formula:64", "body", "body:16", "genvs", "genvs:small", "training-free", "network-005000.pkl"]
+            ["formula", "formula:64", "body", "body:16", "genvs", "genvs:small", "plane-sweep", "network-005000.pkl"]
         {
             let model: Model = text.parse().expect(text);
             assert_eq!(model.to_string(), text);

@@ -24,7 +24,7 @@ const PREVIEW: (u32, u32) = (32, 80);
 
 impl Sweep {
     /// Cheaper settings, for a moving camera.
-    pub(in crate::training_free) fn preview(self) -> Sweep {
+    pub(in crate::training_free) fn cheaper(self) -> Sweep {
         let (planes, side) = PREVIEW;
         Sweep { plane_count: self.plane_count.min(planes), match_side: self.match_side.min(side), ..self }
     }
