@@ -1,5 +1,5 @@
-//! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead somewhere, two tables are what the program
-//! prints, and every published package has its own.
+//! The READMEs: their commands are run as they stand there, their links and those of the results' reports lead somewhere, two
+//! tables are what the program prints, and every published package has its own.
 
 use serde_json::Value;
 use std::path::Path;

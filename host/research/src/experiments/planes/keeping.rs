@@ -21,22 +21,24 @@ impl Keeping {
 
     /// Keeps the arguments of the one kernel: its parameters, and the arrays that it reads.
     fn look(&self, kernel: Kernel, block: &[&dyn Any], arrays: &[&dyn Any]) {
-        fn copied<T: Clone + 'static>(argument: Option<&&dyn Any>) -> Option<T> {
-            argument.and_then(|argument| argument.downcast_ref::<T>()).cloned()
-        }
         if kernel == Kernel::BlendPlanes {
-            let planes = || {
-                Some(TargetPlanes {
-                    block: copied(block.first())?,
-                    views: copied(arrays.first())?,
-                    texels: copied(arrays.get(1))?,
-                    disparities: copied(arrays.get(2))?,
-                    costs: copied(arrays.get(3))?,
-                })
-            };
-            *self.0.lock().unwrap_or_else(PoisonError::into_inner) = planes();
+            *self.0.lock().unwrap_or_else(PoisonError::into_inner) = planes(block, arrays);
         }
     }
+}
+
+/// The arguments of `blend_planes`.
+fn planes(block: &[&dyn Any], arrays: &[&dyn Any]) -> Option<TargetPlanes> {
+    fn copied<T: Clone + 'static>(argument: Option<&&dyn Any>) -> Option<T> {
+        argument.and_then(|argument| argument.downcast_ref::<T>()).cloned()
+    }
+    Some(TargetPlanes {
+        block: copied(block.first())?,
+        views: copied(arrays.first())?,
+        texels: copied(arrays.get(1))?,
+        disparities: copied(arrays.get(2))?,
+        costs: copied(arrays.get(3))?,
+    })
 }
 
 impl Memory for Keeping {
