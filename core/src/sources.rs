@@ -3,6 +3,9 @@
 use crate::pose::Pose;
 use core::fmt;
 
+/// The most source views of a run on a workstation: the `S` of its fixed-size arrays. Firmware chooses its own.
+pub const MAX_SOURCES: usize = 256;
+
 /// Why poses cannot be sources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

@@ -1,4 +1,4 @@
-//! Checkpoints broken at random: each ends in an error or is read, quickly, within its estimate, and without a panic.
+//! Checkpoints broken at random: each ends in an error or is read, within its estimate of memory, and without a panic.
 //!
 //! Memory is counted for the whole process, so that this is one test, in a process of its own.
 
@@ -12,8 +12,6 @@ use viewfuse_tests::places::data;
 
 /// Files that are tried.
 const ROUNDS: u64 = 20_000;
-/// No file here takes longer, however busy the machine is; alone it takes 10 ms at most.
-const LONGEST: Duration = Duration::from_secs(60);
 /// Tensors of files that ask for more are not read here.
 const MAX_READ: u64 = 64 << 20;
 /// What opening may take: so many bytes for each of the file, and something for every file.
@@ -43,7 +41,7 @@ struct Tally {
     longest: Duration,
 }
 
-/// Opens a file and reads it, counting time and memory.
+/// Opens a file and reads it, counting memory; the longest time is only printed.
 fn attempt(path: &Path, bytes: &[u8], tally: &mut Tally) {
     // A new file each time: writing over an old one waits for the disk.
     std::fs::remove_file(path).expect("the last file");
@@ -78,9 +76,7 @@ fn attempt(path: &Path, bytes: &[u8], tally: &mut Tally) {
             }
         }
     }
-    let time = start.elapsed();
-    assert!(time < LONGEST, "a file of {} bytes took {time:?}", bytes.len());
-    tally.longest = tally.longest.max(time);
+    tally.longest = tally.longest.max(start.elapsed());
 }
 
 /// A few changes: bits, bytes, numbers with a meaning, opcodes, pieces cut out, doubled or taken from elsewhere.

@@ -8,13 +8,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::Arc;
-use std::thread::sleep;
-use std::time::{Duration, Instant};
+use viewfuse_tests::patience::end;
 use viewfuse_tests::trials::{is_required, needing};
 
 /// What people call it, in the order in which it is looked for.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
-const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Chromium or Chrome.
 pub(crate) struct Browser {
@@ -78,17 +76,7 @@ impl Browser {
             .stderr(output("messages"))
             .spawn()
             .unwrap_or_else(|error| panic!("{}: {error}", self.program.display()));
-        let start = Instant::now();
-        let status = loop {
-            if let Some(status) = child.try_wait().expect("a process") {
-                break status;
-            }
-            if start.elapsed() > PATIENCE {
-                child.kill().expect("a process to end");
-                panic!("the browser does not come to an end");
-            }
-            sleep(Duration::from_millis(20));
-        };
+        let status = end(&mut child).unwrap_or_else(|error| panic!("the browser does not come to an end: {error}"));
         let text = |name: &str| {
             let bytes = fs::read(profile.path().join(name)).expect("a file");
             String::from_utf8_lossy(&bytes).into_owned()

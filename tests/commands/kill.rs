@@ -146,7 +146,7 @@ fn killed_at_any_moment() {
     let folder = folder();
     let before = inputs(folder.path());
     let mut first: Vec<(Files, Duration)> = Vec::new();
-    let (mut random, mut in_the_middle, mut in_a_file) = (0x9e37_79b9_7f4a_7c15_u64 ^ kills as u64, 0, 0);
+    let (mut random, mut too_late, mut in_a_file) = (0x9e37_79b9_7f4a_7c15_u64 ^ kills as u64, 0, 0);
     for kill in 0..kills {
         let name = format!("out{}", kill % COMMANDS.len());
         let arguments = &COMMANDS[kill % COMMANDS.len()].replace("OUT", &name);
@@ -158,18 +158,26 @@ fn killed_at_any_moment() {
         // By turns into an empty folder and over what an earlier run finished. Scenes never go over what is there.
         let is_never_over = NEVER_OVER.iter().any(|name| arguments.starts_with(name));
         let is_over = (kill % COMMANDS.len() + kill / COMMANDS.len()) % 2 == 1 && !is_never_over;
-        if !is_over && out.is_dir() {
-            fs::remove_dir_all(&out).expect("an output");
-        }
-        let earlier = assert_whole(&out, like);
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let moment = time.mul_f64((random >> 33) as f64 / f64::from(1_u32 << 31));
-        let mut run = command(BINARY, folder.path(), arguments);
-        let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
-        sleep(moment);
-        in_the_middle += usize::from(child.try_wait().expect("a process").is_none());
-        child.kill().expect("a kill");
-        child.wait().expect("an end");
+        let mut moment = time.mul_f64((random >> 33) as f64 / f64::from(1_u32 << 31));
+        let earlier = loop {
+            if !is_over && out.is_dir() {
+                fs::remove_dir_all(&out).expect("an output");
+            }
+            let earlier = assert_whole(&out, like);
+            let mut run = command(BINARY, folder.path(), arguments);
+            let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+            sleep(moment);
+            let is_in_the_middle = child.try_wait().expect("a process").is_none();
+            child.kill().expect("a kill");
+            child.wait().expect("an end");
+            if is_in_the_middle {
+                break earlier;
+            }
+            // The machine is faster than it was when the time was taken.
+            too_late += 1;
+            moment /= 2;
+        };
         let finished = assert_whole(&out, like);
         assert_eq!(lost(&earlier, &finished), None, "viewfuse {arguments} lost what an earlier run finished");
         assert_eq!(inputs(folder.path()), before, "viewfuse {arguments} changed an input");
@@ -185,8 +193,7 @@ fn killed_at_any_moment() {
         let left = files_below(&out).into_iter().map(|(path, _)| path).find(|path| is_unfinished(path));
         assert_eq!(left, None, "viewfuse {arguments} left something");
     }
-    println!("{kills} kills, {in_the_middle} while the command ran, {in_a_file} while a file was written");
-    assert!(in_the_middle * 2 > kills, "the kills come too late: {in_the_middle} of {kills} while the command ran");
+    println!("{kills} kills, {in_a_file} of them while a file was written; {too_late} more came too late");
 }
 
 fn is_unfinished(path: &Path) -> bool {

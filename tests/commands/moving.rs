@@ -8,10 +8,8 @@ use serde_json::{Value, json};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
-use viewfuse_tests::command::{Outcome, command, files_below, names_in, toy, without_progress};
+use std::process::Command;
+use viewfuse_tests::command::{Outcome, command, files_below, killed_when, names_in, toy, without_progress};
 use viewfuse_tests::trials::{is_required, needing, trial};
 
 pub(crate) fn trials() -> Vec<Trial> {
@@ -39,7 +37,6 @@ fn always() -> Vec<Trial> {
 }
 
 const PATH: &str = "render toy --between 2 6 --frames 5 --size 24x24 --weights error:alpha=1 --device cpu --no-sheets";
-const PATIENCE: Duration = Duration::from_secs(300);
 
 fn png(folder: &Path, name: &str) -> RgbImage {
     image::open(folder.join(name)).expect("a picture").to_rgb8()
@@ -97,17 +94,8 @@ fn a_path_as_animated_webp_and_as_y4m() {
 /// Starts a run and kills it without warning when this many frames are in its journal.
 fn killed(folder: &Path, arguments: &str, frames: usize) {
     let journal = folder.join("cut/frames.jsonl");
-    let mut run = command(BINARY, folder, arguments);
-    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
-    let start = Instant::now();
     let lines = || fs::read_to_string(&journal).unwrap_or_default().lines().count();
-    while lines() < 1 + frames {
-        assert!(child.try_wait().expect("a process").is_none(), "the command ended early");
-        assert!(start.elapsed() < PATIENCE, "nothing appeared");
-        sleep(Duration::from_millis(2));
-    }
-    child.kill().expect("a process to kill");
-    child.wait().expect("a dead process");
+    killed_when(BINARY, folder, arguments, || lines() > frames);
     assert!(!folder.join("cut/run.json").exists());
 }
 

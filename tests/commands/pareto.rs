@@ -192,23 +192,25 @@ fn bad_input_is_refused() {
 /// Ctrl-C while it measures: nothing appears, and what was there stays.
 #[cfg(unix)]
 fn ctrl_c_leaves_what_was_there() {
-    use std::process::{Command, Stdio};
-    use std::time::Duration;
+    use std::io::{BufRead, BufReader};
+    use std::process::Stdio;
+    use viewfuse_tests::patience::{end, send};
     let scene = toy();
     let folder = scene.path();
     fs::create_dir(folder.join("out")).expect("a folder");
     fs::write(folder.join("out/pareto.csv"), "older").expect("an older result");
     let arguments = NETWORK.replace("--repeat 2", "--repeat 1000");
     let mut run = command(BINARY, folder, &format!("{arguments} -o out"));
-    let child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
-    std::thread::sleep(Duration::from_secs(2));
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs").success());
-    let output = child.wait_with_output().expect("an end");
-    let said = viewfuse_tests::command::without_progress(&String::from_utf8_lossy(&output.stderr));
-    assert_eq!(
-        (output.status.code(), said.as_str()),
-        (Some(130), "viewfuse: interrupted; nothing half-written is left behind\n")
-    );
+    let run = run.env("VIEWFUSE_PROGRESS", "0").stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = run.spawn().expect("the command starts");
+    let mut news = BufReader::new(child.stderr.take().expect("a pipe")).lines();
+    assert!(news.any(|line| line.expect("text").contains("round 1 of 1000")), "it ended before it measured");
+    // The pipe is read to its end while the command ends.
+    let rest = std::thread::spawn(move || news.map(|line| line.expect("text")).last());
+    send("-INT", &child);
+    assert_eq!(end(&mut child).expect("an end").code(), Some(130));
+    let said = rest.join().expect("what it said");
+    assert_eq!(said.as_deref(), Some("viewfuse: interrupted; nothing half-written is left behind"));
     assert_eq!(names_in(&folder.join("out")), ["pareto.csv"]);
     assert_eq!(fs::read(folder.join("out/pareto.csv")).expect("a file"), b"older");
 }

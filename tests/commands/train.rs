@@ -5,10 +5,7 @@ use super::{BINARY, done};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Stdio};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
-use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, command, names_in};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, interrupt, killed_when, names_in, start};
 use viewfuse_tests::scenes::Folder;
 
 viewfuse_tests::trials![
@@ -40,16 +37,7 @@ fn bytes(folder: &Path, name: &str) -> Vec<u8> {
 
 /// Starts a run and kills it without a warning as soon as it has written its state.
 fn kill(folder: &Path, arguments: &str, state: &str) {
-    let mut run = command(BINARY, folder, arguments);
-    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
-    let start = Instant::now();
-    while !folder.join(state).exists() {
-        assert!(child.try_wait().expect("a process").is_none(), "the command ended early");
-        assert!(start.elapsed() < Duration::from_secs(300), "no state appears");
-        sleep(Duration::from_millis(1));
-    }
-    child.kill().expect("a process to end");
-    child.wait().expect("an end");
+    killed_when(BINARY, folder, arguments, || folder.join(state).exists());
 }
 
 fn a_killed_run_goes_on_and_ends_in_the_same_numbers() {
@@ -107,16 +95,13 @@ fn ctrl_c_writes_the_state_first() {
     let path = folder.path();
     let long = PIXELNERF.replace("--steps 30", "--steps 100000").replace("--write-every 0", "--write-every 1000");
     // The first state appears when the run is asked to end: nothing else writes it.
-    let mut run =
-        command(BINARY, path, &format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", ""));
-    let mut child = run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts");
-    let mut news = BufReader::new(child.stdout.take().expect("its output")).lines();
-    let first = news.next().expect("a line").expect("text");
+    let arguments = format!("{long} --validate-every 5 -o run").replace(" --validate-every 10", "");
+    let mut child = start(BINARY, path, &arguments);
+    let mut news = BufReader::new(child.stdout.take().expect("its output"));
+    let mut first = String::new();
+    news.read_line(&mut first).expect("text");
     assert!(first.starts_with("step 5: "), "{first}");
-    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill runs");
-    assert!(sent.success());
-    let result = child.wait_with_output().expect("its output");
-    assert_eq!(result.status.code(), Some(130), "{}", String::from_utf8_lossy(&result.stderr));
+    interrupt(child, "-INT");
     let record: serde_json::Value = serde_json::from_slice(&bytes(path, "run/record.json")).expect("a record");
     assert!(record["steps"].as_u64() >= Some(5) && path.join("run/state.safetensors").exists(), "{record}");
 }

@@ -1,11 +1,10 @@
 //! `viewfuse view`: who may ask, what is answered, and the page in a browser that is driven as a hand does it.
 //!
 //! ```text
-//! program    the running program, and requests to it
 //! devtools   a browser that is driven
 //! requests   the server, by requests alone
 //! page       the page: what a person does and sees
-//! speed      the first picture, pictures while dragging, memory
+//! moves      pictures while dragging, and that memory does not grow
 //! ```
 //!
 //! The browser is that of `report.rs`: without one its tests are ignored and say why; with `VIEWFUSE_REQUIRE_BROWSER=1` they
@@ -13,27 +12,33 @@
 #![cfg(unix)]
 
 mod devtools;
+mod moves;
 mod page;
-mod program;
 mod requests;
-mod speed;
 
 use super::BINARY;
 use devtools::Tab;
 use libtest_mimic::Trial;
-use program::Program;
 use std::fs;
 use std::path::Path;
 use viewfuse_tests::command::run;
 use viewfuse_tests::places::repository;
+use viewfuse_tests::viewer::Program;
 
 pub(crate) fn trials() -> Vec<Trial> {
-    requests::trials().into_iter().chain(page::trials()).chain(speed::trials()).collect()
+    requests::trials().into_iter().chain(page::trials()).chain(moves::trials()).collect()
+}
+
+/// The viewer on the CPU.
+#[track_caller]
+fn start(folder: &Path, arguments: &str) -> Program {
+    Program::start(BINARY, "cpu", folder, arguments)
 }
 
 /// The room, from the repository's root.
+#[track_caller]
 fn room(more: &str) -> Program {
-    Program::start(&repository(), &format!("tests/data/room {more}"))
+    start(&repository(), &format!("tests/data/room {more}"))
 }
 
 /// Runs the command, which must succeed; it may warn.

@@ -4,9 +4,9 @@ use std::time::{Duration, Instant};
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::budget::{Bound, Kept};
-use viewfuse::field::family::{self, Family};
 use viewfuse::field::options::FieldOptions;
 use viewfuse::field::render::{Frame, RenderOptions, Stage, open_album};
+use viewfuse::field::rows::{self, ROWS};
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::job::progress::Silent;
 use viewfuse::nn::checkpoint::Checkpoint;
@@ -33,13 +33,16 @@ fn job(scene: &Scene, sources: &str, targets: &str) -> FewShot {
 fn network(name: &str, seed: u64) -> AnyField {
     let checkpoint = match name.split_once(':') {
         Some((name, width)) => {
-            let all = Family::ALL.into_iter().flat_map(|family| family.test_networks());
-            let network = all.into_iter().find(|network| network.name == name).expect("a test network");
+            let network = ROWS
+                .into_iter()
+                .flat_map(|row| row.test_networks())
+                .find(|network| network.name == name)
+                .expect("a test network");
             (network.checkpoint)(Some(width.parse().expect("a width")))
         }
         None => Checkpoint::open(&places::data("../../host/models").join(name)).expect("a checkpoint"),
     };
-    family::open(checkpoint, &FieldOptions { seed, ..FieldOptions::default() }).expect("a network")
+    rows::open(checkpoint, &FieldOptions { seed, ..FieldOptions::default() }).expect("a network")
 }
 
 /// A field with its subject.

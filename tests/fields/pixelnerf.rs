@@ -3,8 +3,8 @@
 mod extremes;
 mod halves;
 mod omissions;
-mod sight;
 mod sizes;
+mod visibility;
 
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, test_networks};

@@ -1,9 +1,10 @@
 //! The training-free field on whole photographs, on the CPU: the sample scene with a background, and a painted wall.
 
+use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{RenderOptions, render_all};
+use viewfuse::field::render::{RenderOptions, Stage, render_all};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{On, Rendered, Session};
+use viewfuse::field::{On, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
@@ -15,7 +16,6 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::metrics::psnr;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
-use viewfuse_kernels::plane_sweep::blend::blend;
 use viewfuse_tests::places::repository;
 
 /// Distance of the painted wall.
@@ -78,9 +78,10 @@ fn relevance(count: usize) -> Vec<SourceWeights> {
 fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
     let (field, count) = (TrainingFree::default(), sources.images.len());
     let renderer = On { device: &Cpu, field: &field };
-    let mut session = Session::open(&renderer, sources, &Silent).expect("a session");
-    session.weigh(&relevance(count), &Silent).expect("a weighting");
-    session.render(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
+    let options = RenderOptions::default();
+    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
+    stage.weigh_by(&relevance(count), &Silent).expect("a weighting");
+    stage.picture(target, &Weights::mean(count as u32), 0.0, &Silent).expect("a picture")
 }
 
 /// Root mean square difference of the colours away from the border.
@@ -112,22 +113,6 @@ fn a_painted_wall_is_found_and_shown() {
 }
 
 #[test]
-fn the_planes_of_a_target_are_those_of_its_picture() {
-    let (sources, target) = (wall([0.9, 1.0, 1.1]), camera(Vec3::new(0.1, 0.0, 0.0), 40, 30));
-    let rendered = picture(&sources, &target);
-    let targets = [(target, Weights::mean(3))];
-    let planes = TrainingFree::default().sweep.target_planes(&Cpu, &sources, &relevance(3), &targets, &Silent);
-    let planes = planes.expect("planes").remove(0);
-    assert_eq!(planes.sources, [0, 1, 2]);
-    for (pixel, colour) in rendered.colours.iter().enumerate() {
-        let at = [(pixel % 40) as f32 + 0.5, (pixel / 40) as f32 + 0.5];
-        let (texels, disparities) = (&planes.texels[..], &planes.disparities[..]);
-        let blended = blend(&planes.block, &planes.views[..], texels, disparities, &planes.costs[..], at);
-        assert_eq!(blended.colour, *colour, "pixel {pixel}");
-    }
-}
-
-#[test]
 fn exposures_are_made_equal() {
     let target = camera(Vec3::new(0.0, 0.0, 0.0), 72, 54);
     let gains = [0.8, 1.0, 1.25];
@@ -147,19 +132,20 @@ fn sources_without_a_weight_change_no_bit() {
         sources.images.push(photograph(camera(Vec3::new(0.2, 0.2, 0.0), 72, 54), gain));
         let (field, count) = (TrainingFree::default(), 4);
         let renderer = On { device: &Cpu, field: &field };
-        let mut session = Session::open(&renderer, &sources, &Silent).expect("a session");
+        let options = RenderOptions::default();
+        let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
         let among_three = |own: usize| {
             let mut scores = [0.0; viewfuse::weighting::sources::MAX_SOURCES];
             (0..3).filter(|other| *other != own).for_each(|other| scores[other] = 1.0);
             Weights::from_scores(&scores, count)
         };
-        session.weigh(&(0..4).map(among_three).collect::<Vec<_>>(), &Silent).expect("a weighting");
-        let picture = session.render(&target, &among_three(3), 0.0, &Silent).expect("a picture");
-        let [line] = &session.record().left_out[..] else { panic!("one line") };
+        stage.weigh_by(&(0..4).map(among_three).collect::<Vec<_>>(), &Silent).expect("a weighting");
+        let picture = stage.picture(&target, &among_three(3), 0.0, &Silent).expect("a picture");
+        let [line] = &stage.record().left_out[..] else { panic!("one line") };
         assert_eq!((line.what, line.left_out, line.of), ("encoded views", 1, 4));
         // A later target that uses all four does not change what an earlier one would give.
-        session.render(&target, &Weights::mean(count), 0.0, &Silent).expect("a picture");
-        assert_eq!(session.render(&target, &among_three(3), 0.0, &Silent).expect("a picture"), picture);
+        stage.picture(&target, &Weights::mean(count), 0.0, &Silent).expect("a picture");
+        assert_eq!(stage.picture(&target, &among_three(3), 0.0, &Silent).expect("a picture"), picture);
         picture
     };
     let (alone, beside) = (with_fourth(0.0), with_fourth(0.6));

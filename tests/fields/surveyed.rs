@@ -5,9 +5,9 @@ use std::fs;
 use std::path::Path;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::family;
 use viewfuse::field::options::FieldOptions;
 use viewfuse::field::render::{RenderOptions, render_all};
+use viewfuse::field::rows;
 use viewfuse::field::{AnyField, Renderer};
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
@@ -75,7 +75,7 @@ fn assert_unmoved(name: &str, field: &AnyField, sources: &str, targets: &str, si
 
 fn model(name: &str, options: &FieldOptions) -> AnyField {
     let path = repository().join("host/models").join(name);
-    family::open(Checkpoint::open(&path).expect("a checkpoint"), options).expect("a field")
+    rows::open(Checkpoint::open(&path).expect("a checkpoint"), options).expect("a field")
 }
 
 #[test]
@@ -91,6 +91,6 @@ fn pixelnerf() {
 
 #[test]
 fn genvs() {
-    let field = model("genvs_cars.safetensors", &FieldOptions { steps: Some(2), ..FieldOptions::default() });
+    let field = model("genvs_cars.safetensors", &FieldOptions::default().with("steps", "2"));
     assert_unmoved("car", &field, "16,72,136", "48", 64);
 }

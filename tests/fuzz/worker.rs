@@ -31,7 +31,7 @@ pub(crate) struct Order {
     /// It ends after so many executions, or so many seconds.
     pub(crate) executions: u64,
     pub(crate) seconds: f64,
-    /// Most seconds of an execution.
+    /// An execution that takes so many seconds hangs.
     pub(crate) limit: f64,
     /// Where inputs that fell are kept.
     pub(crate) folder: PathBuf,

@@ -2,7 +2,7 @@
 //! latents where they appear, radiance.
 
 use viewfuse::check::poses::{Random, looking_at_origin, ring};
-use viewfuse::check::sights;
+use viewfuse::check::ray_inputs;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::lookup::bilinear;
@@ -77,11 +77,11 @@ fn visible_weights_sum_to_1() {
     let (mut some, mut whole) = (0, 0);
     for _ in 0..5_000 {
         let count = 1 + random.below(32);
-        let views: Vec<CameraBlock> = (0..count).map(|_| sights::camera(&mut random)).collect();
+        let views: Vec<CameraBlock> = (0..count).map(|_| ray_inputs::camera(&mut random)).collect();
         let scores: Vec<f32> = (0..count).map(|_| random.range(0.1, 1.0) as f32).collect();
         let sum: f32 = scores.iter().sum();
         let weights: Vec<f32> = scores.iter().map(|score| score / sum).collect();
-        let point = sights::point(&mut random, &views);
+        let point = ray_inputs::point(&mut random, &views);
         let visible: Vec<f32> = (0..count as u32)
             .map(|view| visible_weight(&views[..], &weights[..], count as u32, &point, view))
             .collect();
@@ -132,7 +132,7 @@ fn gathering_is_a_look_up_where_the_point_appears() {
         let pixel_centre = [0.5, 0.0][index % 2];
         let block = GatherBlock { pixel_centre, ..block };
         for _ in 0..200 {
-            let point = sights::point(&mut random, &views);
+            let point = ray_inputs::point(&mut random, &views);
             let seen = views[0].project(Vec3::from_array(point.position));
             let (x, y) = ((seen.x - pixel_centre) * 0.5 + 0.5, (seen.y - pixel_centre) * 0.5 + 0.5);
             let expected = if seen.in_front { bilinear(&nodes[..], 4, 5, x, y) } else { nodes[0] };
@@ -141,7 +141,7 @@ fn gathering_is_a_look_up_where_the_point_appears() {
             }
         }
         let added = GatherBlock { has_residual: 1, ..block };
-        let point = sights::point(&mut random, &views);
+        let point = ray_inputs::point(&mut random, &views);
         let plain = gathered_value(&views, &[point], grid, &[0.0; 0], &block, 2);
         assert_eq!(gathered_value(&views, &[point], grid, &[0.0, 0.0, 3.0], &added, 2), 3.0 + plain);
     }

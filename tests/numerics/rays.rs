@@ -2,7 +2,7 @@
 //! and at extremes.
 
 use viewfuse::check::poses::Random;
-use viewfuse::check::sights;
+use viewfuse::check::ray_inputs;
 use viewfuse_core::composite::Compositor;
 use viewfuse_core::depths::{
     CoarseBlock, FineBlock, coarse_depth, fine_depth, inverse_cdf, merged_depth, random_draw, stratified_depth,
@@ -83,7 +83,7 @@ fn chances_are_one_in_each_part() {
 fn rays_go_through_their_pixels() {
     let mut random = Random::new(61);
     for _ in 0..5_000 {
-        let camera = sights::camera(&mut random);
+        let camera = ray_inputs::camera(&mut random);
         let pixel_centre = [0.5, 0.0, 0.3][random.below(3)];
         let block = CastBlock { camera, near: 0.5, far: 2.0, pixel_centre, along_axis: 0 };
         let pixel = random.below((camera.width * camera.height) as usize) as u32;
@@ -130,7 +130,7 @@ fn fine_depths_stay_within_the_ray() {
     let mut random = Random::new(62);
     for case in 0..4_000 {
         let seen = odd_weights(&mut random, case);
-        let ray = sights::ray(&mut random);
+        let ray = ray_inputs::ray(&mut random);
         let block = FineBlock {
             seed: [case as u32, 0],
             coarse_count: 64,
@@ -197,7 +197,7 @@ fn depth_samples_lie_around_the_depth() {
 fn coarse_depths_increase() {
     let mut random = Random::new(63);
     for _ in 0..2_000 {
-        let ray = sights::ray(&mut random);
+        let ray = ray_inputs::ray(&mut random);
         let sample_count = 1 + random.below(128) as u32;
         let seed = [random.below(1 << 30) as u32, 5];
         for jitter in [0.0, 0.3, 1.0] {

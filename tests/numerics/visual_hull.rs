@@ -32,17 +32,17 @@ impl Results {
 type Case = fn(&World, &World, &mut Results);
 
 /// An input by name, and how to put it off by 1 %.
-type Spoiler = (&'static str, fn(&mut World));
+type NegativeControl = (&'static str, fn(&mut World));
 
-/// Compares on several worlds, prints the figures, and makes sure that each spoilt input shows.
-fn check(function: &str, tolerance: f64, case: Case, spoilers: &[Spoiler]) {
-    let run = |spoil: fn(&mut World)| {
+/// Compares on several worlds, prints the figures, and makes sure that each changed input shows.
+fn check(function: &str, tolerance: f64, case: Case, controls: &[NegativeControl]) {
+    let run = |change: fn(&mut World)| {
         let mut results = Results::default();
         for seed in SEEDS {
             let world = World::new(seed);
-            let mut spoilt = world.clone();
-            spoil(&mut spoilt);
-            case(&spoilt, &world, &mut results);
+            let mut changed = world.clone();
+            change(&mut changed);
+            case(&changed, &world, &mut results);
         }
         measure(&results.actual, &results.expected, Limits { tolerance, least: 1.0e-2 })
     };
@@ -55,8 +55,8 @@ fn check(function: &str, tolerance: f64, case: Case, spoilers: &[Spoiler]) {
         agreement.worst.absolute,
         100.0 * agreement.worst_of_bound,
     );
-    for (input, spoil) in spoilers {
-        let outcome = run(*spoil).disagreement;
+    for (input, change) in controls {
+        let outcome = run(*change).disagreement;
         assert!(matches!(outcome, Some(Disagreement::Mismatch { .. })), "{function}, {input} off by 1 %: {outcome:?}");
     }
 }
@@ -72,7 +72,7 @@ fn hull_alpha_agrees() {
             }
         }
     };
-    check("hull_alpha", 1.0e-4, case, &[("focal length", World::spoil_focal), ("texels", World::spoil_texels)]);
+    check("hull_alpha", 1.0e-4, case, &[("focal length", World::change_focal), ("texels", World::change_texels)]);
 }
 
 /// A point beyond the right border of the first image, inside the others.
@@ -128,7 +128,7 @@ fn depth_at_agrees() {
             }
         }
     };
-    check("depth_at", 1.0e-4, case, &[("depths", World::spoil_depths)]);
+    check("depth_at", 1.0e-4, case, &[("depths", World::change_depths)]);
 }
 
 // Depths in footprints are good to 1e-4, and the logistic step has a slope of 1 / (4 SURFACE_WIDTH); colours as a
@@ -146,13 +146,13 @@ fn sample_agrees() {
             (0..3).for_each(|c| results.push(found.colour[c], wanted.map(|sample| sample.1[c])));
         }
     };
-    let spoilers: [Spoiler; 4] = [
-        ("focal length", World::spoil_focal),
-        ("texels", World::spoil_texels),
-        ("depths", World::spoil_depths),
+    let controls: [NegativeControl; 4] = [
+        ("focal length", World::change_focal),
+        ("texels", World::change_texels),
+        ("depths", World::change_depths),
         ("weight", |world| world.weights[1] *= 1.01),
     ];
-    check("sample", 1.0e-3, case, &spoilers);
+    check("sample", 1.0e-3, case, &controls);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! the denoiser's inputs.
 
 use viewfuse::check::poses::Random;
-use viewfuse::check::sights;
+use viewfuse::check::ray_inputs;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
@@ -49,7 +49,7 @@ fn looked_up(volume: &[f32], point: RayPoint) -> [f64; 2] {
 fn rays_with_depths_along_the_axis() {
     let mut random = Random::new(70);
     for _ in 0..200 {
-        let camera = sights::camera(&mut random);
+        let camera = ray_inputs::camera(&mut random);
         let pixel = random.below((camera.width * camera.height) as usize) as u32;
         let ray =
             |along_axis| cast_ray(&CastBlock { camera, near: 0.5, far: 2.0, pixel_centre: 0.5, along_axis }, pixel);

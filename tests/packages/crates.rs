@@ -32,18 +32,18 @@ const ORDER: [&str; 16] = [
 
 /// Heavy dependencies, and where they may be: in crates, always or only as an option.
 const HEAVY: [(&str, &[&str]); 13] = [
-    ("candle-core", &["viewfuse-train"]),
+    ("candle-core", &["viewfuse-research", "viewfuse-train"]),
     ("ndarray", &["viewfuse-train"]),
-    ("faer", &["viewfuse-evaluate?"]),
+    ("faer", &["viewfuse-evaluate?", "viewfuse-research"]),
     ("maud", &["viewfuse-evaluate?"]),
     ("base64", &["viewfuse-evaluate?"]),
-    ("plotters", &["viewfuse-evaluate?", "viewfuse-train"]),
+    ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
     ("tiny_http", &["viewfuse-view"]),
     ("open", &["viewfuse-cli?"]),
     ("clap", &["viewfuse-cli"]),
     ("indicatif", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),
-    ("anyhow", &["viewfuse-cli"]),
+    ("anyhow", &["viewfuse-cli", "viewfuse-research"]),
     ("comfy-table", &["viewfuse-cli"]),
 ];
 
@@ -92,6 +92,10 @@ fn disorder(packages: &[Value]) -> Vec<String> {
             {
                 problems.push(format!("{name} uses {other}, which stands behind it"));
             }
+            // Nobody installs the experiments.
+            if other == "viewfuse-research" {
+                problems.push(format!("{name} uses {other}"));
+            }
             let is_optional = dependency["optional"] == true;
             let may = |places: &[&str]| {
                 places.iter().any(|place| match place.strip_suffix('?') {
@@ -132,4 +136,5 @@ fn disorder_is_found() {
     assert_eq!(of(package("viewfuse-evaluate", "faer", Value::Null, false)), 1, "not always");
     assert_eq!(of(package("viewfuse-evaluate", "faer", Value::Null, true)), 0);
     assert_eq!(of(package("viewfuse-device", "clap", json!("build"), false)), 1);
+    assert_eq!(of(package("viewfuse-view", "viewfuse-research", Value::Null, true)), 1);
 }

@@ -15,6 +15,9 @@ const ALLOWED: [(&str, &str, &str); 1] = [(
     "Vulkan's own loader reads VK_DRIVER_FILES; the error of a driver that is not found says what it was told",
 )];
 
+/// Folders of programs.
+const PROGRAMS: [&str; 3] = ["host/cli/", "host/research/", "vulkan/compiler/"];
+
 /// What a file has that a library must not have, with its line.
 fn faults(path: &str, source: &Source) -> Vec<String> {
     let mut faults = Vec::new();
@@ -48,13 +51,14 @@ fn has_word(code: &str, word: &str) -> bool {
     code.match_indices(word).any(is_start)
 }
 
-/// The sources of all libraries: everything but the command.
+/// The sources of all libraries: everything but programs.
 fn sources() -> Vec<(String, Source)> {
     let root = repository();
     let is_library = |path: &Path| {
         let path = path.strip_prefix(&root).expect("inside").to_string_lossy().into_owned();
         let is_source = path.contains("/src/");
-        (is_source && !path.starts_with("host/cli/") && !path.starts_with("vulkan/compiler/")).then_some(path)
+        let is_program = PROGRAMS.iter().any(|folder| path.starts_with(folder));
+        (is_source && !is_program).then_some(path)
     };
     ["core", "vulkan", "host"]
         .iter()

@@ -1,14 +1,15 @@
 //! The packages as such: which depend on which, in which order their modules stand, what a library must not do, what a
-//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, and how the tests are arranged.
+//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, how the tests are arranged, and what documents may say.
 
 mod crates;
-mod interface;
+mod documents;
 mod libraries;
 mod modules;
 mod outside;
 mod release;
 mod rooms;
 mod safety;
+mod summary;
 mod twins;
 
 use serde_json::Value;

@@ -3,17 +3,18 @@
 
 use std::fmt::Write;
 use std::fs;
+use std::sync::Arc;
 use tempfile::TempDir;
 use viewfuse::device::choice::AnyDevice;
 use viewfuse::device::cpu::Cpu;
-use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, render};
+use viewfuse::field::render::{Finished, Frame, RenderError, RenderOptions, Stage, render};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{AnyField, On, Renderer, Session};
+use viewfuse::field::{AnyField, On, Renderer};
 use viewfuse::job::progress::Silent;
 use viewfuse::output::run::{Circumstances, RunWriter};
 use viewfuse::scene::few_shot::{FewShot, Selection};
 use viewfuse::scene::photographs::{Album, BackgroundChoice};
-use viewfuse::scene::{Place, READERS, Scene, SceneError};
+use viewfuse::scene::{FaultLocation, READERS, Scene, SceneError};
 use viewfuse::weighting::Weighting;
 use viewfuse::weighting::sources::{MAX_SOURCES, SourceWeights};
 use viewfuse_outside::{LIST, Lines, Nearest, Plane};
@@ -113,12 +114,13 @@ fn a_plane_seen_from_a_source_is_its_photograph() {
     let album = Album::open(&scene, sources.iter().copied(), &Silent).expect("photographs");
     let images = album.sources(&sources, 32, BackgroundChoice::Auto, &Silent).expect("sources");
     let renderer = On { device: &Cpu, field: &PLANE };
-    let mut session = Session::open(&renderer, &images, &Silent).expect("a session");
+    let options = RenderOptions::default();
+    let mut stage = Stage::of_sources(Arc::new(images.clone()), &renderer, &options, &Silent).expect("a stage");
     for (view, image) in images.images.iter().enumerate() {
         let mut scores = [0.0; MAX_SOURCES];
         scores[view] = 1.0;
         let weights = SourceWeights::from_scores(&scores, 4);
-        let picture = session.render(&image.camera, &weights, 0.0, &Silent).expect("a picture");
+        let picture = stage.picture(&image.camera, &weights, 0.0, &Silent).expect("a picture");
         let opacities = picture.colours.iter().zip(&image.texels).filter(|(colour, texel)| colour[3] == texel[3]);
         // Rounding may take a point on a border into the next texel.
         let same = opacities.count() as f64 / image.texels.len() as f64;
@@ -157,9 +159,9 @@ fn what_a_reader_gives_is_checked() {
         words[index] = word;
         list.replacen(first, &words.join(" "), 1)
     };
-    assert!(matches!(refused(with(1, "5")), SceneError::Pose { place: Place::Line(1), .. }));
-    assert!(matches!(refused(with(0, "-1")), SceneError::Intrinsics { place: Place::Line(1), .. }));
-    assert!(matches!(refused(with(4, "NaN")), SceneError::NotFinite { place: Place::Line(1), .. }));
+    assert!(matches!(refused(with(1, "5")), SceneError::Pose { place: FaultLocation::Line(1), .. }));
+    assert!(matches!(refused(with(0, "-1")), SceneError::Intrinsics { place: FaultLocation::Line(1), .. }));
+    assert!(matches!(refused(with(4, "NaN")), SceneError::NotFinite { place: FaultLocation::Line(1), .. }));
     assert!(matches!(refused(String::new()), SceneError::NoViews { .. }));
 }
 

@@ -66,6 +66,43 @@ fn there_are_few_rooms_and_nothing_is_hidden_in_them() {
     }
 }
 
+/// Tests assert no time. These files read a clock: to wait with a deadline, to choose work that takes long enough, or to print.
+const CLOCKS: [&str; 8] = [
+    "checkpoints/fuzz.rs",
+    "commands/kill.rs",
+    "commands/view/devtools.rs",
+    "devices/time.rs",
+    "fields/budget.rs",
+    "fuzz/drive.rs",
+    "fuzz/worker.rs",
+    "src/patience.rs",
+];
+
+/// Assertions that name a time that was taken.
+fn timed_assertions(source: &Source) -> Vec<usize> {
+    let is_timed = |line: &str| line.contains("assert") && ["elapsed", "cpu_time"].iter().any(|own| line.contains(own));
+    source.lines().filter(|(_, line)| is_timed(line)).map(|(line, _)| line).collect()
+}
+
+#[test]
+fn no_test_asserts_a_clock() {
+    let tests = repository().join("tests");
+    let mut clocks = BTreeSet::new();
+    for path in files(&tests, "rs").into_iter().filter(|path| !path.starts_with(tests.join("benches"))) {
+        let source = Source::read(&path);
+        if source.code.contains("Instant") {
+            clocks.insert(path.strip_prefix(&tests).expect("inside").to_path_buf());
+        }
+        // The deadline of every wait.
+        if !path.ends_with("src/patience.rs") {
+            assert_eq!(timed_assertions(&source), [0; 0], "{}", path.display());
+        }
+    }
+    assert_eq!(clocks, CLOCKS.map(PathBuf::from).into());
+    let broken = Source::new("fn a() {\n    assert!(start.elapsed() < most);\n}\n");
+    assert_eq!(timed_assertions(&broken), [2]);
+}
+
 #[test]
 fn a_file_that_is_not_compiled_is_found() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -116,8 +116,8 @@ impl<D: Device> Visitor for Parity<'_, D> {
 
     fn visit<C: Case>(self) -> Result<(), Failed> {
         let seeds = 1..=C::SEED_COUNT;
-        let inputs: Vec<C::Inputs> = seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
-        let expected: Vec<Vec<Option<Bounded>>> = inputs.iter().map(C::expected).collect();
+        let inputs: Vec<Vec<C>> = seeds.flat_map(|seed| SIZES.map(|size| C::inputs(seed, size))).collect();
+        let expected: Vec<Vec<Option<Bounded>>> = inputs.iter().map(|inputs| C::all_expected(inputs)).collect();
         let mut actual = Vec::new();
         for inputs in &inputs {
             actual.extend(C::results(self.device, inputs)?);
@@ -127,10 +127,10 @@ impl<D: Device> Visitor for Parity<'_, D> {
         }
         // The last world has several workgroups, the first ones may be too small to show anything.
         let last = inputs.len() - 1;
-        for (input, spoil) in C::SPOILERS {
-            let mut spoilt = inputs[last].clone();
-            spoil(&mut spoilt);
-            let outcome = measure(&C::results(self.device, &spoilt)?, &expected[last], C::LIMITS).disagreement;
+        for (input, change) in C::NEGATIVE_CONTROLS {
+            let mut changed = inputs[last].clone();
+            changed.iter_mut().for_each(change);
+            let outcome = measure(&C::results(self.device, &changed)?, &expected[last], C::LIMITS).disagreement;
             if !matches!(outcome, Some(Disagreement::Mismatch { .. })) {
                 return Err(format!("{input} off by 1 %: {outcome:?}").into());
             }
@@ -146,7 +146,7 @@ fn every_input_has_a_control() -> Result<(), Failed> {
         type Output = Result<(), Failed>;
         fn visit<C: Case>(self) -> Result<(), Failed> {
             let kernel = C::KERNEL;
-            let controls: Vec<&str> = C::SPOILERS.iter().map(|(input, _)| *input).collect();
+            let controls: Vec<&str> = C::NEGATIVE_CONTROLS.iter().map(|(input, _)| *input).collect();
             let read = kernel.arrays().iter().filter(|array| array.access == Access::Read).map(|array| array.name);
             let read: Vec<&str> = read.filter(|array| !C::SHAPES_ONLY.contains(array)).collect();
             let missing: Vec<&&str> = read.iter().filter(|array| !controls.contains(array)).collect();

@@ -2,8 +2,9 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
+use crate::patience;
 use crate::places::data;
 use crate::scenes::Folder;
 
@@ -52,6 +53,44 @@ pub fn done(binary: &str, folder: &Path, arguments: &str) -> String {
     let outcome = run(binary, folder, arguments);
     assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""), "viewfuse {arguments}\n{}", outcome.stdout);
     outcome.stdout
+}
+
+/// Starts the command and kills it without a warning as soon as `ready` holds; it must not end before.
+#[track_caller]
+pub fn killed_when(binary: &str, folder: &Path, arguments: &str, ready: impl FnMut() -> bool) {
+    let mut run = command(binary, folder, arguments);
+    let mut child = run.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+    patience::wait_while_running(&mut child, ready);
+    child.kill().expect("a process to kill");
+    child.wait().expect("a dead process");
+}
+
+/// Starts the command, to be interrupted.
+#[track_caller]
+pub fn start(binary: &str, folder: &Path, arguments: &str) -> Child {
+    let mut run = command(binary, folder, arguments);
+    run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
+}
+
+/// Resident memory of a process in KiB; 0 where the system does not say it, and after its end.
+pub fn resident_kib(process: u32) -> u64 {
+    let text = fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let size = text.lines().find_map(|line| line.strip_prefix("VmRSS:")?.trim().strip_suffix(" kB")?.parse().ok());
+    size.unwrap_or(0)
+}
+
+/// Sends a signal such as `-INT` to a command, which must end by it, say so, and print nothing more.
+#[track_caller]
+pub fn interrupt(mut child: Child, signal: &str) {
+    patience::send(signal, &child);
+    patience::end(&mut child).unwrap_or_else(|error| panic!("{signal} does not end the command: {error}"));
+    let result = child.wait_with_output().expect("its output");
+    let said = without_progress(&String::from_utf8_lossy(&result.stderr));
+    assert_eq!(
+        (result.status.code(), said.as_str()),
+        (Some(130), "viewfuse: interrupted; nothing half-written is left behind\n")
+    );
+    assert_eq!(String::from_utf8_lossy(&result.stdout), "");
 }
 
 /// The job must fail: exit code 1, one line on standard error with every part, nothing on standard output, and the

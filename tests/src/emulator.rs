@@ -6,18 +6,16 @@ pub mod image;
 pub mod list;
 pub mod trace;
 
+use crate::patience;
 use board::Board;
 use image::Image;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
 use trace::Call;
 
 /// Where the library's sources are if not at the compiler's own place for them: their folder, or an archive of it.
 const SOURCES: &str = "VIEWFUSE_RUST_LIBRARY";
-/// A program takes a second, more on a busy machine; a hard fault would otherwise wait for ever.
-const TIME_LIMIT: Duration = Duration::from_secs(900);
 
 /// What was found that the firmware of a board needs.
 pub struct Emulator {
@@ -187,18 +185,7 @@ fn supervised<Stream: Send, T: Send>(
     let stream = stream(&mut child).ok_or("the stream is not there")?;
     let (status, text) = std::thread::scope(|scope| {
         let reader = scope.spawn(|| read(stream));
-        let deadline = Instant::now() + TIME_LIMIT;
-        let status = loop {
-            match child.try_wait() {
-                Ok(None) if Instant::now() < deadline => std::thread::sleep(Duration::from_millis(5)),
-                Ok(None) => {
-                    // It may have ended just now: then there is nothing to kill, and nothing to say.
-                    child.kill().ok();
-                    break child.wait().and(Err(io::Error::from(io::ErrorKind::TimedOut)));
-                }
-                ended => break ended.map(|status| status.is_some_and(|status| status.success())),
-            }
-        };
+        let status = patience::end(&mut child).map(|status| status.success());
         (status, reader.join())
     });
     match (status, text) {

@@ -1,7 +1,9 @@
 //! A field from sources to a picture, and what it left out on the way.
 
+use std::sync::Arc;
 use viewfuse::device::Device;
-use viewfuse::field::{Field, FieldError, LeftOut, On, Record, Rendered, Session};
+use viewfuse::field::render::{RenderOptions, Stage};
+use viewfuse::field::{Field, FieldError, LeftOut, On, Record, Rendered};
 use viewfuse::job::progress::Progress;
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse::weighting::sources::SourceWeights;
@@ -21,10 +23,11 @@ pub fn picture<D: Device + Sync, F: Field + Sync>(
     progress: &dyn Progress,
 ) -> Result<(Rendered, Record), FieldError> {
     let renderer = On { device, field };
-    let mut session = Session::open(&renderer, sources, progress)?;
-    session.weigh(&[], progress)?;
-    let picture = session.render(target, weights, early_termination, progress)?;
-    Ok((picture, session.record()))
+    let options = RenderOptions::default();
+    let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, progress)?;
+    stage.weigh_by(&[], progress)?;
+    let picture = stage.picture(target, weights, early_termination, progress)?;
+    Ok((picture, stage.record()))
 }
 
 /// What a record says of something that may be left out.

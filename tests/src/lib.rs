@@ -9,14 +9,15 @@ pub mod contract;
 pub mod devices;
 pub mod emulator;
 pub mod fields;
-pub mod load;
 pub mod lorry;
 pub mod mixture;
 pub mod module;
+pub mod patience;
 pub mod places;
 pub mod scenes;
 pub mod source;
 pub mod trials;
+pub mod viewer;
 
 /// The examples of the main README and of core's, compiled and run. Core's sources are what the compiled kernels were made
 /// from, so its README is not included there.

@@ -1,5 +1,6 @@
 //! Rust's sources as text: code without its comments, and what stands in its strings.
 
+use proc_macro2::{Span, TokenStream, TokenTree};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -15,28 +16,54 @@ pub struct Source {
 impl Source {
     /// Takes a file's text apart.
     pub fn new(text: &str) -> Source {
+        let tokens: TokenStream = text.parse().unwrap_or_else(|error| panic!("{error}: {text}"));
         let mut source = Source::default();
-        let (mut rest, mut line) = (text, 1);
-        while let Some(first) = rest.chars().next() {
-            let (taken, part) = part(rest, source.code.chars().next_back());
-            let own = &rest[..taken];
-            match part {
-                Part::Code => source.code.push(first),
-                Part::Comment => {}
-                Part::Character => source.code.push_str("''"),
-                Part::String { prefix, end } => {
-                    source.strings.push((line, own[prefix..own.len() - end].to_owned()));
-                    source.code.push_str("\"\"");
-                }
-            }
-            let lines = own.matches('\n').count();
-            if !matches!(part, Part::Code) {
-                source.code.extend(std::iter::repeat_n('\n', lines));
-            }
-            line += lines;
-            rest = &rest[taken..];
-        }
+        source.add(tokens, text, &mut 0);
         source
+    }
+
+    /// `end` is where the last token ended.
+    fn add(&mut self, tokens: TokenStream, text: &str, end: &mut usize) {
+        for token in tokens {
+            // A comment of documentation is tokens, all in the comment's place.
+            let own = &text[token.span().byte_range()];
+            if own.starts_with("//") || own.starts_with("/*") {
+                continue;
+            }
+            match token {
+                TokenTree::Group(group) => {
+                    self.push(text, group.span_open(), end);
+                    self.add(group.stream(), text, end);
+                    self.push(text, group.span_close(), end);
+                }
+                token => self.push(text, token.span(), end),
+            }
+        }
+    }
+
+    fn push(&mut self, text: &str, span: Span, end: &mut usize) {
+        let place = span.byte_range();
+        // Blanks stay; of comments only their lines do.
+        let gap = &text[*end..place.start];
+        let rest = if gap.trim().is_empty() {
+            gap
+        } else {
+            gap.rsplit('\n').next().filter(|own| own.trim().is_empty()).unwrap_or(" ")
+        };
+        let lines = gap.matches('\n').count() - rest.matches('\n').count();
+        self.code.extend(std::iter::repeat_n('\n', lines));
+        self.code.push_str(rest);
+        *end = place.end;
+        let own = &text[place];
+        match (own.find('"'), own.rfind('"')) {
+            (Some(first), Some(last)) if first < last => {
+                self.strings.push((span.start().line, own[first + 1..last].to_owned()));
+                self.code.push_str("\"\"");
+                self.code.extend(own.matches('\n').map(|_| '\n'));
+            }
+            _ if own.len() > 1 && own.ends_with('\'') => self.code.push_str("''"),
+            _ => self.code.push_str(own),
+        }
     }
 
     /// Reads a file without its unit tests, which stand at its end.
@@ -49,83 +76,6 @@ impl Source {
     pub fn lines(&self) -> impl Iterator<Item = (usize, &str)> {
         self.code.lines().enumerate().map(|(place, line)| (place + 1, line))
     }
-}
-
-enum Part {
-    Code,
-    Comment,
-    Character,
-    /// So many bytes before and after what stands in it.
-    String {
-        prefix: usize,
-        end: usize,
-    },
-}
-
-/// What comes next after this character of code, and its length in bytes.
-fn part(rest: &str, before: Option<char>) -> (usize, Part) {
-    let first = rest.chars().next().map_or(0, char::len_utf8);
-    if rest.starts_with("//") {
-        return (rest.find('\n').unwrap_or(rest.len()), Part::Comment);
-    }
-    if rest.starts_with("/*") {
-        return (block_comment(rest), Part::Comment);
-    }
-    if rest.starts_with('"') {
-        return (quoted(rest), Part::String { prefix: 1, end: 1 });
-    }
-    let in_word = before.is_some_and(|before| before.is_alphanumeric() || before == '_');
-    let raw = rest.strip_prefix('r').filter(|_| !in_word || before == Some('b') || before == Some('c'));
-    if let Some(after) = raw {
-        let marks = after.len() - after.trim_start_matches('#').len();
-        if after[marks..].starts_with('"') {
-            let close = format!("\"{}", "#".repeat(marks));
-            let inside = after[marks + 1..].find(&close).unwrap_or(after.len() - marks - 1 - close.len());
-            let prefix = marks + 2;
-            return (prefix + inside + close.len(), Part::String { prefix, end: close.len() });
-        }
-    }
-    if let Some(after) = rest.strip_prefix('\'') {
-        // A character, or a lifetime.
-        if after.starts_with('\\') {
-            let end = after[2..].find('\'').map_or(rest.len(), |end| 2 + end + 2);
-            return (end, Part::Character);
-        }
-        let one = after.chars().next().map_or(0, char::len_utf8);
-        if after[one..].starts_with('\'') {
-            return (one + 2, Part::Character);
-        }
-    }
-    (first, Part::Code)
-}
-
-fn block_comment(rest: &str) -> usize {
-    let (mut depth, mut place) = (0, 0);
-    while place < rest.len() {
-        if rest[place..].starts_with("/*") {
-            (depth, place) = (depth + 1, place + 2);
-        } else if rest[place..].starts_with("*/") {
-            (depth, place) = (depth - 1, place + 2);
-            if depth == 0 {
-                return place;
-            }
-        } else {
-            place += rest[place..].chars().next().map_or(1, char::len_utf8);
-        }
-    }
-    rest.len()
-}
-
-fn quoted(rest: &str) -> usize {
-    let mut is_escaped = false;
-    for (place, character) in rest.char_indices().skip(1) {
-        match character {
-            '"' if !is_escaped => return place + 1,
-            '\\' => is_escaped = !is_escaped,
-            _ => is_escaped = false,
-        }
-    }
-    rest.len()
 }
 
 /// All files of a folder and its folders whose names end so, in the order of their paths; not what lies in target folders.

@@ -10,7 +10,8 @@
 //! subgroups, adapter             devices, what they can do, and missing requirements
 //! handle, buffer                 an opened device, memory in it
 //! forms                          forms of tiles: what is measured, what is chosen
-//! pipelines, submissions         pipelines of kernels, submitted commands
+//! excerpt, pipelines             the part of a module that a kernel needs, pipelines of kernels
+//! submissions                    submitted commands
 //! gpu                            an opened device: its state, recorded commands
 //! remembered                     pipelines and forms from one process to the next
 //! dispatch                       dispatches, split to fit the device
@@ -23,6 +24,7 @@ mod adapter;
 mod buffer;
 mod dispatch;
 mod error;
+mod excerpt;
 mod forms;
 mod gpu;
 mod handle;

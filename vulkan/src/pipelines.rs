@@ -1,6 +1,7 @@
 //! One pipeline per kernel, form and specialisation, created at its first use.
 
 use crate::error::VulkanError;
+use crate::excerpt::excerpt;
 use crate::handle::Handle;
 use crate::kernel::{Form, Kernel};
 use ash::vk;
@@ -23,9 +24,6 @@ pub(crate) struct Pipeline {
 
 /// All pipelines of a device.
 pub(crate) struct Pipelines {
-    module: vk::ShaderModule,
-    /// That of the kernels that need operations of subgroups; null on a device without these.
-    subgroups: vk::ShaderModule,
     cache: vk::PipelineCache,
     layouts: HashMap<Kernel, (vk::DescriptorSetLayout, vk::PipelineLayout)>,
     /// The data that the cache began with.
@@ -37,18 +35,12 @@ pub(crate) struct Pipelines {
 impl Pipelines {
     pub(crate) fn new(handle: &Arc<Handle>) -> Result<Pipelines, VulkanError> {
         let mut pipelines = Pipelines {
-            module: vk::ShaderModule::null(),
-            subgroups: vk::ShaderModule::null(),
             cache: vk::PipelineCache::null(),
             layouts: HashMap::new(),
             recalled: Vec::new(),
             pipelines: HashMap::new(),
             handle: handle.clone(),
         };
-        pipelines.module = shader_module(handle, MODULE)?;
-        if handle.subgroup_size().is_some() {
-            pipelines.subgroups = shader_module(handle, SUBGROUPS)?;
-        }
         // SAFETY: an empty cache needs nothing.
         pipelines.cache = unsafe { handle.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }
             .map_err(|result| handle.failure("vkCreatePipelineCache", result))?;
@@ -142,11 +134,13 @@ impl Pipelines {
         let specialization = vk::SpecializationInfo::default().map_entries(used).data(bytemuck::bytes_of(&data));
         let mut required =
             vk::PipelineShaderStageRequiredSubgroupSizeCreateInfoEXT::default().required_subgroup_size(subgroup_size);
+        let entry_point = kernel.entry_point(form);
+        let module = self.module(if form.needs_subgroups() { SUBGROUPS } else { MODULE }, entry_point)?;
         // No kernel's name has a zero in it.
-        let name = CString::new(kernel.entry_point(form)).unwrap_or_default();
+        let name = CString::new(entry_point).unwrap_or_default();
         let mut stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
-            .module(if form.needs_subgroups() { self.subgroups } else { self.module })
+            .module(module)
             .name(&name);
         if kernel.has_pages() || form.needs_subgroups() {
             stage = stage.specialization_info(&specialization);
@@ -158,12 +152,25 @@ impl Pipelines {
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         // SAFETY: the module has an entry point of this name with these bindings: a test reads it back.
         let created = unsafe { self.handle.device.create_compute_pipelines(self.cache, &info, None) };
+        // SAFETY: pipelines do not need the module that they were created with.
+        unsafe { self.handle.device.destroy_shader_module(module, None) };
         let pipeline = match created {
             Ok(pipelines) => pipelines[0],
             Err((_, result)) => return Err(self.handle.failure("vkCreateComputePipelines", result)),
         };
         self.pipelines.insert((kernel, form, page_shift), pipeline);
         Ok(pipeline)
+    }
+
+    /// A module of this entry point alone.
+    fn module(&self, bytes: &[u8], entry_point: &str) -> Result<vk::ShaderModule, VulkanError> {
+        let code: Vec<u32> = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+        let code = excerpt(&code, entry_point);
+        let info = vk::ShaderModuleCreateInfo::default().code(&code);
+        // SAFETY: the whole module was validated when it was made, and a part that nothing else refers to stays valid; the device
+        // has the features that it needs.
+        unsafe { self.handle.device.create_shader_module(&info, None) }
+            .map_err(|result| self.handle.failure("vkCreateShaderModule", result))
     }
 }
 
@@ -181,16 +188,6 @@ impl Drop for Pipelines {
                 device.destroy_descriptor_set_layout(*set_layout, None);
             }
             device.destroy_pipeline_cache(self.cache, None);
-            device.destroy_shader_module(self.module, None);
-            device.destroy_shader_module(self.subgroups, None);
         }
     }
-}
-
-fn shader_module(handle: &Handle, bytes: &[u8]) -> Result<vk::ShaderModule, VulkanError> {
-    let code: Vec<u32> = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
-    let info = vk::ShaderModuleCreateInfo::default().code(&code);
-    // SAFETY: the module was validated when it was made; the device has the features that it needs.
-    unsafe { handle.device.create_shader_module(&info, None) }
-        .map_err(|result| handle.failure("vkCreateShaderModule", result))
 }

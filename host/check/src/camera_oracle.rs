@@ -42,7 +42,7 @@ pub fn towards(camera: &CameraBlock, at: [f32; 2]) -> Vector {
 
 /// Image coordinates and depth of a point.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct BoundedProjection {
     /// To the right, pixels.
     pub x: Bounded,
     /// Downwards, pixels.
@@ -56,7 +56,7 @@ pub struct Seen {
 }
 
 /// The projection of a point.
-pub fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
+pub fn project(camera: &CameraBlock, point_world: Vector) -> BoundedProjection {
     let origin = centre(camera);
     let offset = [0, 1, 2].map(|axis| point_world[axis] - origin[axis]);
     let [right, down, forward] = axes(camera);
@@ -66,7 +66,7 @@ pub fn project(camera: &CameraBlock, point_world: Vector) -> Seen {
     let x = (focal_x * dot(right, offset) + middle_x * depth) / depth;
     let y = (focal_y * dot(down, offset) + middle_y * depth) / depth;
     let in_front = Bounded::ZERO.below(depth);
-    Seen { x, y, depth, in_front, in_image: inside(camera, in_front, x, y) }
+    BoundedProjection { x, y, depth, in_front, in_image: inside(camera, in_front, x, y) }
 }
 
 /// Whether a point that is projected to these image coordinates is in front of the camera and inside its image; the border

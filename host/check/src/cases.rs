@@ -1,80 +1,70 @@
 //! The cases, one for each kernel and with its name, and the mapping from a kernel to its case.
 
-pub mod attend;
-pub mod blend_planes;
-pub mod census_cost;
-pub mod compare_views;
-pub mod composite;
-pub mod convolutions;
-pub mod depths;
-pub mod depthwise;
-pub mod embed_pose;
-pub mod feature_image;
-pub mod fine_depths;
-pub mod fuse_views;
-pub mod gather_latents;
-pub mod group_norm;
-pub mod half_latents;
-pub mod half_precision;
-pub mod hull_entry;
-pub mod limits;
-pub mod linear;
-pub mod lists;
-pub mod march_rays;
-pub mod match_cost;
-pub mod matrices;
-pub mod paths;
-pub mod pick_depth;
-pub mod pick_disparity;
-pub mod pictures;
-pub mod points;
-pub mod rays;
-pub mod resample;
-pub mod seen;
-pub mod volumes;
-pub mod weigh;
-pub mod window;
-pub mod window_cost;
+mod attend;
+mod blend_planes;
+mod census_cost;
+mod compare_views;
+mod composite;
+mod convolutions;
+mod depths;
+mod depthwise;
+mod embed_pose;
+mod feature_image;
+mod fine_depths;
+mod fuse_views;
+mod gather_latents;
+mod group_norm;
+mod half_precision;
+mod hull_entry;
+mod limits;
+mod linear;
+mod lists;
+mod march_rays;
+mod match_cost;
+mod matrices;
+mod paths;
+mod pick_depth;
+mod pick_disparity;
+mod pictures;
+mod points;
+mod rays;
+mod resample;
+mod sample_mask;
+mod volumes;
+mod weigh;
+mod window;
+mod window_cost;
 
-use super::case::{Case, Visitor};
+use super::agreement::Limits;
+use super::bounded::Bounded;
+use super::case::{Case, NegativeControl, Visitor};
+use super::dispatch::*;
+use super::poses::{Random, numbers, random};
+use viewfuse_device::parallel::map;
+use viewfuse_device::{Device, DeviceError, LayerShape};
 use viewfuse_kernels::for_each_kernel;
-use viewfuse_vulkan::kernel::Kernel;
+use viewfuse_kernels::rows::*;
 
-use attend::*;
-use blend_planes::*;
-use census_cost::*;
-use compare_views::*;
-use composite::*;
-use convolutions::*;
-use depths::*;
-use depthwise::*;
-use embed_pose::*;
-use feature_image::*;
-use fine_depths::*;
-use fuse_views::*;
-use gather_latents::*;
-use group_norm::*;
-use half_latents::*;
-use half_precision::*;
-use hull_entry::*;
-use limits::*;
-use linear::*;
-use lists::*;
-use march_rays::*;
-use match_cost::*;
-use matrices::*;
-use paths::*;
-use pick_depth::*;
-use pick_disparity::*;
-use pictures::*;
-use points::*;
-use rays::*;
-use resample::*;
-use seen::*;
-use volumes::*;
-use weigh::*;
-use window::*;
-use window_cost::*;
+/// Increases numbers by 1 %.
+fn increase<'a>(values: impl IntoIterator<Item = &'a mut f32>) {
+    values.into_iter().for_each(|value| *value *= 1.01);
+}
+
+/// Expected numbers, and so many zeros behind them that stay.
+fn decided(values: impl IntoIterator<Item = Bounded>, behind: usize) -> Vec<Option<Bounded>> {
+    values.into_iter().chain(std::iter::repeat_n(Bounded::ZERO, behind)).map(Some).collect()
+}
+
+/// The rows of two bands, first and count, of which one may have none; see [`Output::Continued`].
+fn bands(row_count: u32) -> impl Iterator<Item = [u32; 2]> {
+    let middle = row_count / 2;
+    [[0, middle], [middle, row_count - middle]].into_iter().filter(|[_, count]| *count > 0)
+}
+
+/// What one of several dispatches writes a part of: an array for the first one.
+fn part_of_output<T>(index: usize, count: usize) -> Output<T> {
+    if index == 0 { Output::Zeros(count) } else { Output::Continued }
+}
 
 macro_rules! visits {
     ($({ $Kernel:ident $($rest:tt)* })+) => {
@@ -85,9 +75,6 @@ macro_rules! visits {
                 $(Kernel::$Kernel => visitor.visit::<$Kernel>(),)+
             }
         }
-
-        // Nor does a case that says it is another kernel's.
-        $(const _: () = assert!(<$Kernel as Case>::KERNEL as u32 == Kernel::$Kernel as u32);)+
     };
 }
 

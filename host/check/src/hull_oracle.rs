@@ -10,7 +10,7 @@ pub use shade::{Colour, Pixel, depth_at, march_ray, sample};
 pub use sweep::{match_cost, mean_column, pick_depth, sum_row};
 
 use crate::bounded::{Bounded, ROUNDING};
-use crate::camera_oracle::{Seen, Vector, along, bilinear, centre, project, tents, towards};
+use crate::camera_oracle::{BoundedProjection, Vector, along, bilinear, centre, project, tents, towards};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_kernels::visual_hull::hull::{ENTRY_ALPHA, ENTRY_STEP, MIN_ALPHA};
 use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};

@@ -15,8 +15,10 @@
 //!   group_norm_oracle,
 //!   matrix_oracle, volume_oracle,
 //!   sweep_oracle
-//! poses, sights, world, swept   inputs for a seed
-//! case, cases                   one for each kernel: inputs, dispatch, expected outputs
+//! poses, ray_inputs, world,     inputs for a seed
+//!   swept
+//! dispatch                      each kernel's parameters and arrays, from its row: upload, run, download
+//! case, cases                   one for each kernel: inputs, negative controls, expected outputs
 //! report, measure               the check of a device's kernels
 //! picture                       a whole picture compared with the CPU's
 //! rates                         rates of kernels beside the device's limits
@@ -32,6 +34,7 @@ pub mod case;
 pub mod cases;
 pub mod compare;
 pub mod compositing_oracle;
+pub mod dispatch;
 pub mod group_norm_oracle;
 pub mod hull_oracle;
 pub mod matrix_oracle;
@@ -42,9 +45,9 @@ pub mod picture;
 pub mod point_oracle;
 pub mod poses;
 pub mod rates;
+pub mod ray_inputs;
 pub mod ray_oracle;
 pub mod report;
-pub mod sights;
 pub mod sweep_oracle;
 pub mod swept;
 pub mod verify;

@@ -79,7 +79,7 @@ impl<D: Device> Visitor for Check<'_, D> {
                 self.progress.check()?;
                 let inputs = C::inputs(seed, size);
                 actual.extend(C::results(self.device, &inputs).map_err(failed)?);
-                expected.extend(C::expected(&inputs));
+                expected.extend(C::all_expected(&inputs));
                 if self.role == Role::Other {
                     on_cpu.extend(C::results(&Cpu, &inputs).map_err(failed)?);
                 }
@@ -113,23 +113,24 @@ impl<D: Device> Visitor for Check<'_, D> {
 /// them, and its own time is subtracted.
 fn seconds_per_element<C: Case, D: Device>(device: &D) -> Result<f64, DeviceError> {
     let inputs = C::inputs(1, SIZES[SIZES.len() - 1]);
-    let mut loaded = C::load(device, &inputs)?;
+    let element_count: usize = inputs.iter().map(C::element_count).sum();
+    let mut loaded = C::upload(device, &inputs)?;
     // Once for what is made at the first use.
     C::run(device, &inputs, &mut loaded)?;
-    C::read(device, &loaded)?;
+    C::read(device, &inputs, &loaded)?;
     let start = Instant::now();
     C::run(device, &inputs, &mut loaded)?;
-    C::read(device, &loaded)?;
+    C::read(device, &inputs, &loaded)?;
     let once = start.elapsed();
     let start = Instant::now();
-    C::read(device, &loaded)?;
+    C::read(device, &inputs, &loaded)?;
     let download = start.elapsed();
     let run_count = (MEASURED.as_secs_f64() / once.as_secs_f64().max(1.0e-6)).clamp(1.0, 1000.0) as u32;
     let start = Instant::now();
     for _ in 0..run_count {
         C::run(device, &inputs, &mut loaded)?;
     }
-    C::read(device, &loaded)?;
+    C::read(device, &inputs, &loaded)?;
     let runs = start.elapsed().saturating_sub(download);
-    Ok(runs.as_secs_f64() / f64::from(run_count) / C::element_count(&inputs) as f64)
+    Ok(runs.as_secs_f64() / f64::from(run_count) / element_count as f64)
 }

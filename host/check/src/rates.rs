@@ -12,6 +12,7 @@ mod limits;
 mod networks;
 mod sweeps;
 
+use super::dispatch::Dispatch;
 use super::report::CheckError;
 use serde::Serialize;
 use std::time::{Duration, Instant};
@@ -79,6 +80,23 @@ struct Work<'a> {
     /// Bytes of all numbers that it reads and writes, once each.
     bytes: f64,
     run: Box<dyn FnMut() -> Result<(), DeviceError> + 'a>,
+}
+
+impl<'a> Work<'a> {
+    fn new<D: Device, K: Dispatch>(
+        device: &'a D,
+        dispatch: K,
+        size: String,
+        operations: Option<f64>,
+        bytes: f64,
+    ) -> Result<Work<'a>, DeviceError>
+    where
+        K::Loaded<D>: 'a,
+    {
+        let mut loaded = K::upload(device, std::slice::from_ref(&dispatch))?;
+        let run = Box::new(move || dispatch.dispatch(device, &mut loaded, 0));
+        Ok(Work { kernel: K::KERNEL, size, operations, bytes, run })
+    }
 }
 
 /// Measures a device.

@@ -34,7 +34,7 @@ fn disparity(far_disparity: f32, disparity_step: f32, plane: usize) -> Bounded {
 
 /// Where a point of a frustum appears in a view.
 #[derive(Clone, Copy, Debug)]
-struct Sight {
+struct PlaneProjection {
     x: Bounded,
     y: Bounded,
     /// The depth in the view over that in the frustum.
@@ -44,7 +44,7 @@ struct Sight {
 }
 
 /// Where the point of this disparity on the ray through `at` appears.
-fn sight(camera: &CameraBlock, view: &CameraBlock, at: [f32; 2], disparity: Bounded) -> Sight {
+fn project_plane(camera: &CameraBlock, view: &CameraBlock, at: [f32; 2], disparity: Bounded) -> PlaneProjection {
     let (origin, other) = (centre(camera), centre(view));
     let axes = axes(view);
     let in_view = |vector: Vector| axes.map(|axis| dot(axis, vector));
@@ -57,7 +57,7 @@ fn sight(camera: &CameraBlock, view: &CameraBlock, at: [f32; 2], disparity: Boun
     let inverse = Bounded::ONE / depth_ratio;
     let x = focal_x * (place[0] * inverse) + principal_x;
     let y = focal_y * (place[1] * inverse) + principal_y;
-    Sight { x, y, depth_ratio, in_image: inside(view, least.below(place[2]), x, y) }
+    PlaneProjection { x, y, depth_ratio, in_image: inside(view, least.below(place[2]), x, y) }
 }
 
 /// Bilinear mixture of numbers that have errors themselves, however it is written: by differences or by shares.

@@ -1,7 +1,6 @@
 //! Small random frusta with views around them, for the kernels of the plane sweep.
 
 use super::world::{Numbers, World};
-use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::plane_sweep::blend::BlendBlock;
 use viewfuse_kernels::plane_sweep::evidence::{UNSEEN, ViewPair};
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
@@ -22,18 +21,6 @@ pub struct Swept {
     pub texels: Vec<[f32; 4]>,
     /// `[view][row][column]`: disparity and confidence.
     pub disparities: Vec<[f32; 2]>,
-}
-
-/// The common inputs in a device's memory.
-pub struct LoadedSwept<D: Device> {
-    /// The views.
-    pub views: D::Buffer<SweptView>,
-    /// The pairs.
-    pub pairs: D::Buffer<ViewPair>,
-    /// The images.
-    pub texels: D::Buffer<[f32; 4]>,
-    /// The maps.
-    pub disparities: D::Buffer<[f32; 2]>,
 }
 
 impl Swept {
@@ -118,28 +105,6 @@ impl Swept {
             has_silhouettes,
         };
         (Swept { disparities, ..self }, block)
-    }
-
-    /// Uploads.
-    ///
-    /// # Errors
-    /// If the device has no memory left.
-    pub fn load<D: Device>(&self, device: &D) -> Result<LoadedSwept<D>, DeviceError> {
-        Ok(LoadedSwept {
-            views: device.upload(&self.views)?,
-            pairs: device.upload(&self.pairs)?,
-            texels: device.upload(&self.texels)?,
-            disparities: device.upload(&self.disparities)?,
-        })
-    }
-
-    /// Changes red and alpha of all views but the first by 1 %, in opposite directions: equal changes would not change the
-    /// colour.
-    pub fn spoil_texels(&mut self) {
-        let first = self.views[1].camera.first_texel as usize;
-        for [red, _, _, alpha] in &mut self.texels[first..] {
-            (*red, *alpha) = (*red * 1.01, *alpha * 0.99);
-        }
     }
 }
 

@@ -10,6 +10,7 @@ mod metrics;
 mod pixelnerf;
 mod weighting;
 
+use file::File;
 use safetensors::SafeTensors;
 use std::path::{Path, PathBuf};
 use viewfuse_device::Device;
@@ -148,6 +149,14 @@ impl Report {
 /// Most bytes of a file of reference values.
 const LONGEST_FILE: u64 = 4 << 30;
 
+/// Compares a field with a file. Returns the names of the known tensors; none if the file has another content.
+type Part<D> = fn(&File<'_>, &D, &mut Report, &dyn Progress) -> Result<Vec<String>, VerifyError>;
+
+/// The parts of the learned fields, by the names of their rows.
+fn parts<D: Device>() -> [(&'static str, Part<D>); 2] {
+    [("pixelnerf", pixelnerf::verify), ("genvs", genvs::verify)]
+}
+
 /// Compares this build with a file; kernels run on the given device.
 ///
 /// # Errors
@@ -161,11 +170,12 @@ pub fn verify<D: Device>(path: &Path, device: &D, progress: &dyn Progress) -> Re
             let mut report = Report { path: path.to_path_buf(), quantities: Vec::new(), not_covered: Vec::new() };
             // The header was read once already.
             let metadata = SafeTensors::read_metadata(&bytes).ok().and_then(|(_, header)| header.metadata().clone());
-            let said = |key: &str| metadata.as_ref()?.get(key).map(String::as_str);
+            let file = File { path, tensors: &tensors, metadata: metadata.unwrap_or_default() };
             let mut covered = attention::verify(path, &tensors, &mut report)?;
-            covered.extend(metrics::verify(path, &tensors, device, &mut report)?);
-            covered.extend(pixelnerf::verify(path, &tensors, said("width"), device, &mut report)?);
-            covered.extend(genvs::verify(path, &tensors, said("member"), device, &mut report, progress)?);
+            covered.extend(metrics::verify(&file, device, &mut report)?);
+            for (_, verify) in parts::<D>() {
+                covered.extend(verify(&file, device, &mut report, progress)?);
+            }
             let mut rest: Vec<&str> =
                 tensors.names().into_iter().filter(|name| !covered.iter().any(|c| c == name)).collect();
             rest.sort_unstable();
@@ -181,4 +191,17 @@ pub fn verify<D: Device>(path: &Path, device: &D, progress: &dyn Progress) -> Re
         return Err(VerifyError::Unknown { path: path.to_path_buf() });
     }
     Ok(report)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use viewfuse_device::cpu::Cpu;
+    use viewfuse_field::rows::ROWS;
+
+    #[test]
+    fn every_learned_field_has_a_part() {
+        let learned: Vec<&str> = ROWS.iter().filter(|row| row.prefix().is_some()).map(|row| row.name).collect();
+        assert_eq!(parts::<Cpu>().map(|(name, _)| name).to_vec(), learned);
+    }
 }

@@ -6,8 +6,6 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, CameraBlock, Pinhole};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::random::uniform;
-use viewfuse_device::DeviceError;
-use viewfuse_device::{Device, HullScene};
 use viewfuse_kernels::visual_hull::sweep::{OUTSIDE, SweepBlock};
 use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
 
@@ -140,22 +138,7 @@ impl World {
         }
     }
 
-    /// The common buffers of the visual hull's kernels, in a device's memory.
-    ///
-    /// # Errors
-    /// If the device has no memory left.
-    pub fn load<D: Device>(&self, device: &D) -> Result<HullScene<D>, DeviceError> {
-        Ok(HullScene {
-            object: self.object,
-            object_buffer: device.upload(&[self.object])?,
-            cameras: self.views.clone(),
-            views: device.upload(&self.views)?,
-            footprints: device.upload(&self.footprints)?,
-            texels: device.upload(&self.texels)?,
-        })
-    }
-
-    /// The same for the oracle.
+    /// What the oracle takes of it.
     pub fn scene(&self) -> Scene<'_> {
         Scene { object: &self.object, views: &self.views, texels: &self.texels }
     }
@@ -166,39 +149,19 @@ impl World {
         if whole.row_count < 10 { whole } else { SweepBlock { first_row: 3, row_count: whole.row_count - 5, ..whole } }
     }
 
-    /// Views with their pixels, in the order of the texels.
-    pub fn pixels(&self) -> impl Iterator<Item = (u32, u32)> {
-        let pixel_count = |camera: &CameraBlock| camera.width * camera.height;
-        (0..).zip(&self.views).flat_map(move |(view, camera)| (0..pixel_count(camera)).map(move |pixel| (view, pixel)))
-    }
-
     /// Changes a view's focal length by 1 %.
-    pub fn spoil_focal(&mut self) {
+    pub fn change_focal(&mut self) {
         self.views[1].intrinsics[0] *= 1.01;
     }
 
-    /// Changes red and alpha of all views but the first by 1 %, in opposite directions: equal changes would not change the
-    /// colour.
-    pub fn spoil_texels(&mut self) {
-        let first = self.views[1].first_texel as usize;
-        for [red, _, _, alpha] in &mut self.texels[first..] {
-            (*red, *alpha) = (*red * 1.01, *alpha * 0.99);
-        }
+    /// Changes the texels of all views but the first by 1 %.
+    pub fn change_texels(&mut self) {
+        change_texels(&mut self.texels[self.views[1].first_texel as usize..]);
     }
 
     /// Changes the depths by 1 %.
-    pub fn spoil_depths(&mut self) {
-        self.depths.iter_mut().filter(|depth| **depth < NO_SURFACE).for_each(|depth| *depth *= 1.01);
-    }
-
-    /// Changes the depths of entry by 1 %.
-    pub fn spoil_entries(&mut self) {
-        self.entries.iter_mut().filter(|depth| **depth < NO_SURFACE).for_each(|depth| *depth *= 1.01);
-    }
-
-    /// Changes a side of the box by 1 %.
-    pub fn spoil_box(&mut self) {
-        self.object.high[0] *= 1.01;
+    pub fn change_depths(&mut self) {
+        change_depths(&mut self.depths);
     }
 
     /// Points all over the box and a little around it.
@@ -208,6 +171,18 @@ impl World {
             .map(|_| Vec3::new(numbers.between(-0.8, 0.8), numbers.between(-0.8, 0.8), numbers.between(-0.8, 0.8)))
             .collect()
     }
+}
+
+/// Changes red and alpha by 1 %, in opposite directions: equal changes would not change the colour.
+pub fn change_texels(texels: &mut [[f32; 4]]) {
+    for [red, _, _, alpha] in texels {
+        (*red, *alpha) = (*red * 1.01, *alpha * 0.99);
+    }
+}
+
+/// Changes the depths of surfaces by 1 %.
+pub fn change_depths(depths: &mut [f32]) {
+    depths.iter_mut().filter(|depth| **depth < NO_SURFACE).for_each(|depth| *depth *= 1.01);
 }
 
 /// Random weights that sum to 1; one of them, and that of `own`, is 0.

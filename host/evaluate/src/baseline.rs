@@ -17,7 +17,7 @@
 pub mod plane;
 mod warp;
 
-pub use warp::Look;
+pub use warp::WarpedSample;
 
 use image::imageops::{self, FilterType};
 use image::{Rgb, RgbImage};
@@ -106,7 +106,7 @@ impl fmt::Display for Baseline {
 }
 
 /// The mean of the samples that are inside their picture; if none is, the first sample. Without samples 0.
-fn mean_of_seen(looks: impl Iterator<Item = Look>) -> [f64; 3] {
+fn mean_of_seen(looks: impl Iterator<Item = WarpedSample>) -> [f64; 3] {
     let (mut sum, mut count, mut first) = ([0.0; 3], 0_u32, None);
     for look in looks {
         if look.inside {

@@ -118,7 +118,7 @@ impl Evaluator<'_> {
         mut seen: impl FnMut(&str, &Frame, &[(String, f64)], &SourceImages),
     ) -> Result<Vec<Score>, EvaluateError> {
         let Evaluator { weightings, renderer, options, progress, .. } = *self;
-        let Subject { scene, album, masked } = subject;
+        let Subject { scene, album, .. } = subject;
         let score = |scheme: &str, target: usize, values: Vec<(String, f64)>, time: Duration| Score {
             scheme: scheme.to_owned(),
             target: scene.views[target].name.clone(),
@@ -130,29 +130,7 @@ impl Evaluator<'_> {
         let stage_count = 1 + weightings.len() * of_a_scheme;
         progress.stage("reading the sources", 0..1, stage_count);
         let mut stage = Stage::prepare(scene, album, sources, renderer, options, progress)?;
-        let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
-        for &target in targets {
-            progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
-            let ((camera, truth), mask) = (shown_at(scene, &stage, target)?, self.mask(masked, &stage, target)?);
-            let nearest = nearest_sources(scene, sources, target, BLENDED);
-            for &source in &nearest {
-                if let Entry::Vacant(place) = shots.entry(source) {
-                    let (camera, GroundTruth { picture, .. }) = shown_at(scene, &stage, source)?;
-                    place.insert(Shot { camera, picture });
-                }
-            }
-            let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
-            let depth = depth_of(scene, target);
-            for baseline in Baseline::ALL {
-                let start = Instant::now();
-                let picture = baseline.picture(&nearest, &camera, depth);
-                let time = start.elapsed();
-                let values = self.values(&picture, &truth.picture, truth.seen.as_ref(), mask.as_ref())?;
-                scores.push(score(baseline.name(), target, values, time));
-            }
-            masks.insert(target, mask);
-        }
-        drop(shots);
+        let (mut scores, masks) = self.baseline_scores(&subject, &stage, sources, targets, &score)?;
         // Views that a field encodes when a target first needs them: all schemes and targets share that.
         let (first, mut shared) = (scores.len(), Duration::ZERO);
         for (index, row) in weightings.iter().enumerate() {
@@ -194,6 +172,41 @@ impl Evaluator<'_> {
         Ok(scores)
     }
 
+    /// Scores the baselines, and reads the masks of the targets.
+    fn baseline_scores(
+        &self,
+        subject: &Subject<'_>,
+        stage: &Stage<'_>,
+        sources: &[usize],
+        targets: &[usize],
+        score: impl Fn(&str, usize, Vec<(String, f64)>, Duration) -> Score,
+    ) -> Result<(Vec<Score>, HashMap<usize, Option<MaskedTruth>>), EvaluateError> {
+        let Subject { scene, .. } = *subject;
+        let (mut scores, mut masks, mut shots) = (Vec::new(), HashMap::new(), HashMap::new());
+        for &target in targets {
+            self.progress.check().map_err(PhotographsError::from).map_err(RenderError::from)?;
+            let ((camera, truth), mask) = (shown_at(*subject, stage, target)?, self.mask(*subject, stage, target)?);
+            let nearest = nearest_sources(scene, sources, target, BLENDED);
+            for &source in &nearest {
+                if let Entry::Vacant(place) = shots.entry(source) {
+                    let (camera, GroundTruth { picture, .. }) = shown_at(*subject, stage, source)?;
+                    place.insert(Shot { camera, picture });
+                }
+            }
+            let nearest: Vec<&Shot> = nearest.iter().filter_map(|source| shots.get(source)).collect();
+            let depth = depth_of(scene, target);
+            for baseline in Baseline::ALL {
+                let start = Instant::now();
+                let picture = baseline.picture(&nearest, &camera, depth);
+                let time = start.elapsed();
+                let values = self.values(&picture, &truth.picture, truth.seen.as_ref(), mask.as_ref())?;
+                scores.push(score(baseline.name(), target, values, time));
+            }
+            masks.insert(target, mask);
+        }
+        Ok((scores, masks))
+    }
+
     /// Every metric of a picture, the masked ones last.
     fn values(
         &self,
@@ -212,13 +225,13 @@ impl Evaluator<'_> {
     /// The truth of a target with its mask, if masked metrics are requested and it has a mask.
     fn mask(
         &self,
-        masked: Option<&Scene>,
+        subject: Subject<'_>,
         stage: &Stage<'_>,
         target: usize,
     ) -> Result<Option<MaskedTruth>, EvaluateError> {
-        let Some(scene) = masked else { return Ok(None) };
-        let album = open_album(scene, [target], self.renderer, self.options, self.progress)?;
-        let size = stage.picture_size(target)?;
+        let Some(masked) = subject.masked else { return Ok(None) };
+        let album = open_album(masked, [target], self.renderer, self.options, self.progress)?;
+        let size = stage.size_at(&subject.scene.views[target].camera)?;
         let over = |level: f32| album.truth(target, size, Some([level; 3])).map_err(RenderError::from);
         Ok(MaskedTruth::of(over(1.0)?, &over(0.0)?))
     }
@@ -265,24 +278,24 @@ type SourceGroups = Vec<(Vec<usize>, Vec<usize>)>;
 
 fn source_groups(scene: &Scene, selection: &Selection, least_sources: usize) -> Result<SourceGroups, EvaluateError> {
     let photographed = || (0..scene.views.len()).filter(|&view| scene.views[view].image.is_some());
-    let asked = match &selection.targets {
+    let requested = match &selection.targets {
         Some(list) => Some(view_list(scene, list)?),
         None => None,
     };
-    if let Some(&view) = asked.iter().flatten().find(|&&view| scene.views[view].image.is_none()) {
+    if let Some(&view) = requested.iter().flatten().find(|&&view| scene.views[view].image.is_none()) {
         let view = scene.views[view].name.clone();
         return Err(EvaluateError::NoTruth { scene: scene.path.display().to_string(), view });
     }
     if selection.sources.is_some() {
-        let excluded = asked.clone().unwrap_or_default();
+        let excluded = requested.clone().unwrap_or_default();
         let sources = selection.sources_without(scene, &excluded, least_sources)?;
-        let targets = asked.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
+        let targets = requested.unwrap_or_else(|| photographed().filter(|view| !sources.contains(view)).collect());
         if targets.is_empty() {
             return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
         }
         return Ok(vec![(sources, targets)]);
     }
-    let targets = asked.unwrap_or_else(|| photographed().collect());
+    let targets = requested.unwrap_or_else(|| photographed().collect());
     if targets.is_empty() {
         return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() }.into());
     }
@@ -303,12 +316,14 @@ fn nearest_sources(scene: &Scene, sources: &[usize], target: usize, count: usize
 }
 
 /// A view's photograph at working size over the run's background, and the camera of these pixels.
-fn shown_at(scene: &Scene, stage: &Stage<'_>, view: usize) -> Result<(Camera, GroundTruth), EvaluateError> {
-    let [width, height] = stage.picture_size(view)?;
-    let camera = scene.views[view].camera;
-    let resized = camera.pinhole.resized(width, height);
-    let pinhole = resized.map_err(|error| RenderError::Size { width, height, error })?;
-    Ok((Camera { pinhole, ..camera }, stage.truth_at(view, [width, height])?))
+fn shown_at(
+    Subject { scene, album, .. }: Subject<'_>,
+    stage: &Stage<'_>,
+    view: usize,
+) -> Result<(Camera, GroundTruth), EvaluateError> {
+    let camera = stage.at_working_size(&scene.views[view].camera)?;
+    let size = [camera.pinhole.width(), camera.pinhole.height()];
+    Ok((camera, album.truth(view, size, stage.background()).map_err(RenderError::from)?))
 }
 
 /// The depth of the plane that a target's baselines are warped by.

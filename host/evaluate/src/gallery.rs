@@ -63,7 +63,7 @@ const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// The pictures of a target. File names are relative to the folder of pictures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Shown {
+pub struct TargetPictures {
     /// The job's number.
     pub job: usize,
     /// The scene's name.
@@ -74,14 +74,14 @@ pub struct Shown {
     pub truth: String,
     /// A copy of the nearest source; null in folders of versions that kept none.
     #[serde(default)]
-    pub copy: Option<ShownCopy>,
+    pub copy: Option<CopyPicture>,
     /// The sources in their order.
-    pub sources: Vec<ShownSource>,
+    pub sources: Vec<SourcePicture>,
     /// The schemes in theirs.
-    pub schemes: Vec<ShownScheme>,
+    pub schemes: Vec<SchemePicture>,
 }
 
-impl Shown {
+impl TargetPictures {
     /// The names of all its pictures.
     fn files(&self) -> impl Iterator<Item = &str> {
         let sources = self.sources.iter().map(|source| source.file.as_str());
@@ -128,7 +128,7 @@ pub fn picture_path(folder: &Path, name: &str) -> Result<PathBuf, GalleryError> 
 
 /// A source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ShownSource {
+pub struct SourcePicture {
     /// The view's name.
     pub name: String,
     /// Its photograph.
@@ -137,7 +137,7 @@ pub struct ShownSource {
 
 /// The copy of the nearest source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ShownCopy {
+pub struct CopyPicture {
     /// The source's name.
     pub source: String,
     /// Its photograph at the target's size.
@@ -148,7 +148,7 @@ pub struct ShownCopy {
 
 /// A scheme's picture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ShownScheme {
+pub struct SchemePicture {
     /// The scheme.
     pub scheme: String,
     /// The rendered picture.
@@ -166,7 +166,7 @@ pub struct Gallery {
     truth: Option<RgbImage>,
     /// The nearest source by its index, and its copy.
     copy: Option<(usize, RgbImage)>,
-    schemes: Vec<(RgbImage, ShownScheme)>,
+    schemes: Vec<(RgbImage, SchemePicture)>,
 }
 
 impl Gallery {
@@ -183,7 +183,7 @@ impl Gallery {
             });
         }
         let finite = |(name, value): &(String, f64)| (name.clone(), Some(*value).filter(|value| value.is_finite()));
-        let shown = ShownScheme {
+        let shown = SchemePicture {
             scheme: scheme.to_owned(),
             file: String::new(),
             weights: frame.omission.weights.values()[..sources.images.len()].to_vec(),
@@ -214,7 +214,7 @@ impl Gallery {
             Some((source, picture)) => {
                 let psnr = Some(psnr(&picture, &truth)).filter(|psnr| psnr.is_finite());
                 let file = write(format!("job-{job:05}-copy.png"), picture)?;
-                Some(ShownCopy { source: names.get(source).cloned().unwrap_or_default(), file, psnr })
+                Some(CopyPicture { source: names.get(source).cloned().unwrap_or_default(), file, psnr })
             }
             None => None,
         };
@@ -222,14 +222,15 @@ impl Gallery {
         let mut sources = Vec::new();
         for (index, (picture, name)) in self.sources.into_iter().zip(names).enumerate() {
             let file = write(format!("job-{job:05}-source-{index:03}.png"), picture)?;
-            sources.push(ShownSource { name: name.clone(), file });
+            sources.push(SourcePicture { name: name.clone(), file });
         }
         let mut schemes = Vec::new();
         for (index, (picture, shown)) in self.schemes.into_iter().enumerate() {
             let file = write(format!("job-{job:05}-scheme-{index:03}.png"), picture)?;
-            schemes.push(ShownScheme { file, ..shown });
+            schemes.push(SchemePicture { file, ..shown });
         }
-        let shown = Shown { job, scene: scene.to_owned(), target: target.to_owned(), truth, copy, sources, schemes };
+        let shown =
+            TargetPictures { job, scene: scene.to_owned(), target: target.to_owned(), truth, copy, sources, schemes };
         let path = folder.join(format!("job-{job:05}.json"));
         let json = serde_json::to_vec(&shown).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
         Ok(write_whole(&path, &json)?)
@@ -257,7 +258,7 @@ fn thumbnail(picture: RgbImage) -> RgbImage {
 ///
 /// # Errors
 /// [`GalleryError`].
-pub fn shown(folder: &Path) -> Result<Vec<Shown>, GalleryError> {
+pub fn shown(folder: &Path) -> Result<Vec<TargetPictures>, GalleryError> {
     let folder = folder.join(PICTURES);
     if !folder.is_dir() {
         return Ok(Vec::new());
@@ -271,7 +272,7 @@ pub fn shown(folder: &Path) -> Result<Vec<Shown>, GalleryError> {
         let path = entry.map_err(unreadable(&folder))?.path();
         if path.extension().is_some_and(|extension| extension == "json") {
             let text = read_at_most(&path, LONGEST_DESCRIPTION).map_err(unreadable(&path))?;
-            let shown: Shown =
+            let shown: TargetPictures =
                 serde_json::from_slice(&text).map_err(|cause| GalleryError::Json { path: path.clone(), cause })?;
             // A folder may come from somebody else: a page must not hold files of whoever makes it.
             if let Some(file) = shown.files().find(|file| !is_picture_name(file)) {

@@ -3,7 +3,6 @@
 //! The modules are listed in the order of the data; a module uses only modules listed above it:
 //!
 //! ```text
-//! inspect      what a scene holds and what looks wrong with it
 //! metrics      metrics of pictures
 //! baseline     baselines without a field: copies and warps of the nearest sources
 //! evaluator    each weighting scheme on views that are left out      Evaluator
@@ -19,7 +18,6 @@
 pub mod baseline;
 mod evaluator;
 pub mod gallery;
-pub mod inspect;
 pub mod metrics;
 pub mod pareto;
 pub mod protocol;

@@ -1,5 +1,5 @@
 //! Error against run time: one scene rendered under a list of settings, each compared with the first one, the exact
-//! one, which skips nothing.
+//! one, which leaves nothing out.
 //!
 //! [`settings`] lists the settings of each field; [`Subject::measure`] renders, [`front`] marks the Pareto-optimal
 //! settings, [`plot`] and [`record`] show the results. Only the lists depend on a particular field.
@@ -20,23 +20,13 @@ use std::sync::Arc;
 use std::time::Duration;
 use viewfuse_device::choice::AnyDevice;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, working_side};
-use viewfuse_field::{AnyField, Record, Renderer};
+use viewfuse_field::row::Preset;
+use viewfuse_field::{Record, Renderer};
 use viewfuse_job::progress::{Progress, Quiet};
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::{Album, SourceImages};
 use viewfuse_weighting::Weighting;
-
-/// One configuration for rendering.
-#[derive(Clone)]
-pub struct Setting {
-    /// A short name, for tables and labels.
-    pub words: String,
-    /// The field, set up for it.
-    pub field: AnyField,
-    /// Options outside of the field. The size must be the same in all settings.
-    pub options: RenderOptions,
-}
 
 /// The result of a setting.
 #[derive(Clone, Debug, PartialEq)]
@@ -104,7 +94,7 @@ impl Subject<'_> {
     pub fn measure(
         &self,
         device: &AnyDevice,
-        settings: &[Setting],
+        settings: &[Preset],
         round_count: u32,
         progress: &dyn Progress,
     ) -> Result<Measured, RenderError> {
@@ -150,11 +140,11 @@ impl Subject<'_> {
     }
 
     /// The sources for each setting; sources of the same size are prepared once.
-    fn images(&self, settings: &[Setting], progress: &dyn Progress) -> Result<Vec<Arc<SourceImages>>, RenderError> {
+    fn images(&self, settings: &[Preset], progress: &dyn Progress) -> Result<Vec<Arc<SourceImages>>, RenderError> {
         let Subject { scene, album, job, .. } = self;
         let mut known: Vec<(u32, Arc<SourceImages>)> = Vec::new();
         let mut images = Vec::new();
-        for Setting { field, options, .. } in settings {
+        for Preset { field, options, .. } in settings {
             let about = field.about();
             let side = about.source_side.of(working_side(scene, options, about.longest_side)?);
             if !known.iter().any(|(known_side, _)| *known_side == side) {

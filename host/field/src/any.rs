@@ -2,7 +2,6 @@
 
 use super::field::{About, Field};
 use super::renderer::{On, Renderer};
-use super::training_free::TrainingFree;
 use std::any::Any;
 use std::sync::Arc;
 use viewfuse_device::choice::AnyDevice;
@@ -16,6 +15,8 @@ trait OnAnyDevice: Any + Send + Sync {
     fn about(&self) -> About;
 
     fn on<'a>(&'a self, device: &'a AnyDevice) -> Box<dyn Renderer + 'a>;
+
+    fn preview(&self) -> Option<AnyField>;
 }
 
 impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
@@ -28,6 +29,10 @@ impl<F: Field + Send + Sync + 'static> OnAnyDevice for F {
             AnyDevice::Cpu(device) => Box::new(On { device, field: self }),
             AnyDevice::Vulkan(device) => Box::new(On { device: device.as_ref(), field: self }),
         }
+    }
+
+    fn preview(&self) -> Option<AnyField> {
+        Field::preview(self).map(AnyField::new)
     }
 }
 
@@ -47,16 +52,14 @@ impl AnyField {
         self.0.on(device)
     }
 
+    /// Its cheaper form for a moving camera, if there is one.
+    pub fn preview(&self) -> Option<AnyField> {
+        self.0.preview()
+    }
+
     /// The field, if it is of this type.
     pub fn downcast_ref<F: Field + 'static>(&self) -> Option<&F> {
         let field: &dyn Any = self.0.as_ref();
         field.downcast_ref()
-    }
-}
-
-impl Default for AnyField {
-    /// The training-free field.
-    fn default() -> AnyField {
-        AnyField::new(TrainingFree::default())
     }
 }

@@ -172,19 +172,19 @@ pub fn choose(
     chosen.candidates = search.candidates;
     let side = coarse.size.map_or(SIDE, |[width, height]| width.max(height));
     chosen.basis = Some(Basis::of(&best, detail::lost_detail(&stage.images.images, side)));
-    let name = |source: usize| stage.scene().views[stage.views[source]].name.clone();
     chosen.left_out = best
         .iter()
-        .map(|&Outcome { source, psnr, standing, confidence, copy }| LeftOutSource {
-            source: name(source),
+        .zip(trials.names())
+        .map(|(&Outcome { psnr, standing, confidence, copy }, source)| LeftOutSource {
+            source: source.to_owned(),
             psnr,
             copy_psnr: copy,
             standing,
             confidence,
         })
         .collect();
-    if let Some(warning) = chosen.copy_warning() {
-        progress.warn(&format!("{}: {warning}", stage.scene().path.display()));
+    if let (Some(warning), Some(of)) = (chosen.copy_warning(), stage.scene()) {
+        progress.warn(&format!("{}: {warning}", of.scene.path.display()));
     }
     Ok(chosen)
 }
@@ -249,7 +249,7 @@ mod tests {
 
     fn outcomes(scores: &[f64]) -> Vec<Outcome> {
         let standing = Standing { gap: 0.1, outside: 0.5 };
-        let of = |&psnr: &f64| Outcome { source: 0, psnr, confidence: None, standing, copy: 10.0 };
+        let of = |&psnr: &f64| Outcome { psnr, confidence: None, standing, copy: 10.0 };
         scores.iter().map(of).collect()
     }
 

@@ -1,11 +1,10 @@
 //! Previews: a field's pictures rendered smaller and enlarged.
 
-use super::{About, Encoding, Field, FieldError, Prepared, Record, Rendered, Request, Setting, Surfaces, Tunable};
+use super::{About, Encoding, Field, FieldError, Geometry, Prepared, Record, Rendered, Request, Tuned, Weighted};
 use viewfuse_core::camera::Camera;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_weighting::sources::SourceWeights;
 
 /// A field whose pictures are rendered with a fraction of the requested rows and columns and then enlarged.
 #[derive(Clone, Debug)]
@@ -42,14 +41,6 @@ impl Prepared for Views<'_> {
         self.inner.encoding()
     }
 
-    fn depends_on_weighting(&self) -> bool {
-        self.inner.depends_on_weighting()
-    }
-
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.inner.weigh(relevance)
-    }
-
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         self.inner.encode(view, progress)
     }
@@ -64,24 +55,20 @@ impl Prepared for Views<'_> {
         Ok(enlarged(rendered, [width, height]))
     }
 
-    fn tunables(&self) -> &'static [Tunable] {
-        self.inner.tunables()
-    }
-
-    fn tune(&mut self, settings: &[Setting]) {
-        self.inner.tune(settings);
-    }
-
-    fn simplify(&mut self) {
-        self.inner.simplify();
-    }
-
-    fn surfaces(&self) -> Surfaces {
-        self.inner.surfaces()
-    }
-
     fn record(&self) -> Record {
         self.inner.record()
+    }
+
+    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
+        self.inner.weighted()
+    }
+
+    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
+        self.inner.tuned()
+    }
+
+    fn geometry(&self) -> Option<&dyn Geometry> {
+        self.inner.geometry()
     }
 }
 

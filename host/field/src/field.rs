@@ -1,5 +1,12 @@
 //! The traits of a field: [`Field`] states its requirements and takes source views to a device; [`Prepared`] encodes views
-//! and renders. [`Session`](crate::session::Session) calls both: it alone decides when a view is encoded.
+//! and renders. A [`Stage`](crate::render::Stage) calls both: it alone decides when a view is encoded.
+//!
+//! What is left out for speed is an [`Effort`]: what it leaves out, its share of the exact picture's time, its typical
+//! error. Its parts are [`Omission`](crate::Omission)s, which have names of their own, and what the render loop leaves out
+//! of any field's work: sources of least weight and samples behind surfaces
+//! ([`RenderOptions`](crate::render::RenderOptions)). A [`Bound`](crate::budget::Bound) chooses among the efforts that a
+//! field lists; trials and previews have efforts of their own. A [`Tunable`] is none: it leaves nothing out, and is chosen
+//! for a scene because pictures become better.
 
 use super::error::FieldError;
 use super::record::Record;
@@ -29,28 +36,22 @@ pub trait Field {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError>;
+
+    /// A cheaper form of the field, for pictures while a camera moves; `None` where its pictures are made smaller instead.
+    fn preview(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
+        None
+    }
 }
 
-/// Source views on a device, with their encodings so far.
+/// Source views on a device, with their encodings so far. What not every field can do is a capability: a value that is
+/// there or not.
 pub trait Prepared {
     /// Which views are encoded.
     fn encoding(&self) -> Encoding {
         Encoding::Used
-    }
-
-    /// Whether a view's encoding depends on how relevant the others are to it: views are then encoded again for each
-    /// weighting, after [`Prepared::weigh`].
-    fn depends_on_weighting(&self) -> bool {
-        false
-    }
-
-    /// Begins a weighting. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0. Called
-    /// only if [`Prepared::depends_on_weighting`].
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    fn weigh(&mut self, _relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        Ok(())
     }
 
     /// Encodes a source view, which is not encoded yet.
@@ -65,104 +66,134 @@ pub trait Prepared {
     /// [`FieldError`].
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError>;
 
-    /// The scalars that can be chosen for a scene, for these sources; none by default.
-    fn tunables(&self) -> &'static [Tunable] {
-        &[]
+    /// The record of its work so far; the stage counts encoded views.
+    fn record(&self) -> Record {
+        Record::default()
     }
 
-    /// Sets scalars for the views and targets that follow; those that are not named take their defaults. Encoded views stay
-    /// as they are. Names that are none of [`Prepared::tunables`] are ignored.
-    fn tune(&mut self, _settings: &[Setting]) {}
-
-    /// What follows is only compared with one another: the field may work with less resolution where that changes the
-    /// comparison little.
-    fn simplify(&mut self) {}
-
-    /// The ways in which the field can render, the cheapest first, the exact one last: what a bound on the error or on the
-    /// time chooses from. Empty for a field with one way.
-    fn efforts(&self) -> Vec<Effort> {
-        Vec::new()
+    /// Views are encoded for a weighting, if a view's encoding depends on how relevant the others are to it.
+    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
+        None
     }
 
-    /// Renders what follows with one of [`Prepared::efforts`], by index; others are ignored.
+    /// Several efforts, if the field can render in more than one way.
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        None
+    }
+
+    /// Scalars that can be chosen for a scene.
+    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
+        None
+    }
+
+    /// What is known of where the surfaces are.
+    fn geometry(&self) -> Option<&dyn Geometry> {
+        None
+    }
+}
+
+/// Views whose encodings depend on the weighting: they are encoded again for each.
+pub trait Weighted {
+    /// Begins a weighting. `relevance[view]` are the weights of all sources for source `view` as a target, its own 0.
     ///
     /// # Errors
     /// [`FieldError`].
-    fn set_effort(&mut self, _effort: usize) -> Result<Encodings, FieldError> {
-        Ok(Encodings::Kept)
-    }
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError>;
+}
 
-    /// Whether the field can tell the error of a picture of an effort from its own steps, by [`Prepared::estimated_error`].
-    fn estimates_errors(&self) -> bool {
-        false
-    }
+/// The efforts with which a field can render.
+pub trait Efforts {
+    /// The efforts, the cheapest first, the exact one last: what a bound on the error or on the time chooses from. The
+    /// same for the life of the prepared views.
+    fn list(&self) -> Vec<Effort>;
 
-    /// The root mean square difference of the last picture from the exact one, colours from 0 to 1. Called only if
-    /// [`Prepared::estimates_errors`], after [`Prepared::set_effort`].
-    fn estimated_error(&self) -> f32 {
-        f32::INFINITY
-    }
+    /// Renders what follows with an effort of the list, by index.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError>;
 
-    /// Whether the field can render pixels alone, by [`Prepared::exact_pixels`], because they are independent of one another.
-    fn renders_pixels(&self) -> bool {
-        false
-    }
+    /// Renders what follows with the effort of trials: pictures that are only compared with one another, and may have less
+    /// resolution where that changes the comparison little. Before views are encoded.
+    fn set_trial(&mut self) {}
 
-    /// Colours and opacities of some pixels of a target, row-major indices: what [`Prepared::render`] would give with the last of
-    /// [`Prepared::efforts`]. Called only if [`Prepared::renders_pixels`]; all [`Request::views`] are encoded.
+    /// How the error of a picture is found; the same kind for the life of the prepared views.
+    fn check(&mut self) -> Check<'_> {
+        Check::Comparison
+    }
+}
+
+/// How the error of a picture of an effort is found.
+pub enum Check<'a> {
+    /// By pixels of the exact picture: pixels are independent of one another.
+    Pixels(&'a mut dyn ExactPixels),
+    /// By the field's own steps: the root mean square difference of the last picture from the exact one, colours from 0
+    /// to 1.
+    Steps(f32),
+    /// By comparing pictures of two efforts.
+    Comparison,
+}
+
+/// Pixels of the exact picture, alone.
+pub trait ExactPixels {
+    /// Colours and opacities of some pixels of a target, row-major indices: what [`Prepared::render`] would give with the
+    /// last of [`Efforts::list`]. All [`Request::views`] are encoded.
     ///
     /// # Errors
     /// [`FieldError`].
     fn exact_pixels(
         &mut self,
-        _request: &Request<'_>,
-        _pixels: &[u32],
-        _progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 4]>, FieldError> {
-        Ok(Vec::new())
-    }
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError>;
+}
 
-    /// What is known of where the surfaces are; nothing by default.
+/// Scalars that can be chosen for a scene.
+pub trait Tuned {
+    /// The scalars, for these sources.
+    fn tunables(&self) -> &'static [Tunable];
+
+    /// Sets scalars for the views and targets that follow; those that are not named take their defaults. Encoded views stay
+    /// as they are. Names that are none of [`Tuned::tunables`] are ignored.
+    fn tune(&mut self, settings: &[Setting]);
+}
+
+/// Where the surfaces are.
+pub trait Geometry {
+    /// What is known before views are encoded; nothing by default.
     fn surfaces(&self) -> Surfaces {
         Surfaces::default()
     }
 
-    /// The depth map of each source view that is encoded, under the current weighting; empty by default, for fields without
-    /// maps of sources. For point clouds.
+    /// The depth map of each source view that is encoded, under the current weighting. For point clouds.
     ///
     /// # Errors
     /// [`FieldError`].
-    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        Ok(Vec::new())
-    }
-
-    /// The record of its work so far; the session counts encoded views.
-    fn record(&self) -> Record {
-        Record::default()
-    }
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError>;
 }
 
-/// A way in which a field can render.
+/// An effort: how a field renders, between the cheapest picture and the exact one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
-    /// What it does, in a few words.
+    /// What it leaves out, or what it keeps, in a few words.
     pub name: String,
     /// The root mean square difference of its pictures from the exact ones that is typical of it, colours from 0 to 1: where
     /// a search begins. 0 for the exact one.
     pub typical_error: f32,
-    /// Its work as a share of the exact one's, likewise.
-    pub typical_work: f32,
+    /// Its share of the exact one's time, likewise.
+    pub typical_share: f32,
 }
 
 impl Effort {
     /// An effort that leaves something out.
-    pub fn new(name: impl Into<String>, typical_error: f32, typical_work: f32) -> Effort {
-        Effort { name: name.into(), typical_error, typical_work }
+    pub fn new(name: impl Into<String>, typical_error: f32, typical_share: f32) -> Effort {
+        Effort { name: name.into(), typical_error, typical_share }
     }
 
     /// The one that leaves nothing out.
     pub fn exact() -> Effort {
-        Effort { name: "exact".to_owned(), typical_error: 0.0, typical_work: 1.0 }
+        Effort { name: "exact".to_owned(), typical_error: 0.0, typical_share: 1.0 }
     }
 }
 

@@ -13,6 +13,7 @@ mod memory;
 mod open;
 mod options;
 mod parts;
+mod presets;
 mod ray_sampling;
 pub mod reference;
 pub mod sampling;
@@ -26,7 +27,7 @@ pub use architecture::{
     Estimate, Level, Resampling, group_count,
 };
 pub use feature_image::{LAST_LENGTH, cast_block, ray_length};
-pub use open::{COMPUTABLE, open};
+pub(crate) use open::ROW;
 pub use options::{GenvsOptions, Omissions, Rays};
 
 use super::learned::{NoDepths, default_near_far};
@@ -117,7 +118,7 @@ impl Genvs {
 impl Field for Genvs {
     fn about(&self) -> About {
         let side = self.architecture.image_side as u32;
-        About { source_side: SourceSide::Pixels(side), longest_side: side, ..About::new("genvs") }
+        About { source_side: SourceSide::Pixels(side), longest_side: side, ..About::new(ROW.name) }
     }
 
     fn prepare<'a, D: Device>(

@@ -1,7 +1,25 @@
-//! Common parts of learned fields: the form of their input images, and default near and far bounds.
+//! Common parts of learned fields: the form of their input images, and near and far bounds.
 
+use super::options::{Flag, list};
 use viewfuse_core::camera::Camera;
 use viewfuse_scene::rig::Rig;
+
+/// The flag of near and far bounds.
+pub(super) const NEAR_FAR: Flag = Flag::new(
+    "near-far",
+    "NEAR,FAR",
+    "Near and far bounds of rays, world units [default: 8/13 and 18/13 of the cameras' distance from the point that they look \
+     at]",
+    |text| parse_near_far(text).map(drop),
+);
+
+pub(super) fn parse_near_far(text: &str) -> Result<[f32; 2], String> {
+    let bounds: Option<[f32; 2]> = list(text).and_then(|bounds| bounds.try_into().ok());
+    let fits = |[near, far]: &[f32; 2]| *near >= 0.0 && near < far && far.is_finite();
+    bounds
+        .filter(fits)
+        .ok_or_else(|| "two distances, for example 0.8,1.8, the first at least 0 and less than the second".to_owned())
+}
 
 /// Near and far bounds as published for SRN's cars (0.8 and 1.8 for cameras at distance 1.3), as multiples of the cameras'
 /// distance from the point that they look at.

@@ -3,22 +3,22 @@
 //! ```text
 //! error             the errors of a field
 //! finite            NaN and infinity are found at the stage that produced them
-//! record            the record of a field's work
+//! record            what a field may leave out, and the record of its work
 //! field             the traits of a field: it prepares, encodes and renders
 //! renderer          a field on a device, with types erased
-//! session           when views are encoded
-//! training_free     visual hull and plane sweep
 //! any               a field of any kind
-//! options           options of learned fields
-//! learned           common parts of learned fields
-//! *                 the learned fields, a folder each
-//! family            one row a learned field
-//! enlarged          previews: small pictures, enlarged
+//! session           when views are encoded
 //! scores            PSNR and SSIM of what a photograph shows
 //! budget            how much of a field's work a bound on the error or on the time needs
 //! render            the render loop, from a scene to pictures
 //! point_cloud       the sources' depths as one cloud of points
 //! auto              the scheme and the field's scalars for a scene, and the score to expect
+//! enlarged          previews: small pictures, enlarged
+//! options           a person's options of a field, and the flags that take them
+//! row               what a field states of itself
+//! learned           common parts of learned fields
+//! *                 the fields, a folder each
+//! rows              one row a field
 //! ```
 //!
 //! A field of your own implements [`Field`] and [`Prepared`]; [`On`] puts it on a device, and [`render::render`] renders
@@ -30,7 +30,6 @@ pub mod auto;
 pub mod budget;
 pub mod enlarged;
 pub mod error;
-pub mod family;
 pub mod field;
 pub mod finite;
 pub mod genvs;
@@ -41,19 +40,20 @@ pub mod point_cloud;
 pub mod record;
 pub mod render;
 pub mod renderer;
+pub mod row;
+pub mod rows;
 pub mod scores;
-pub mod session;
+mod session;
 pub mod training_free;
 
 pub use any::AnyField;
 pub use error::FieldError;
 pub use field::{
-    About, DepthMap, Effort, Encoding, Encodings, Field, LONGEST_DEFAULT_SIDE, Prepared, Rendered, Request, Setting,
-    SourceSide, Surfaces, Tunable,
+    About, Check, DepthMap, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, Geometry, LONGEST_DEFAULT_SIDE,
+    Prepared, Rendered, Request, Setting, SourceSide, Surfaces, Tunable, Tuned, Weighted,
 };
-pub use record::{Denoising, LeftOut, Record};
+pub use record::{Denoising, LeftOut, Omission, Record, VIEWS};
 pub use renderer::{On, Renderer};
-pub use session::Session;
 
 /// The examples of the README, compiled and run.
 #[cfg(doctest)]

@@ -1,95 +1,137 @@
-//! Options of learned fields. A field has defaults for missing options, and rejects options that it does not have.
+//! A person's options of a field, as text by the flags of its row. A field has defaults for missing options, and rejects
+//! options that it does not have.
 
-use viewfuse_core::sampler::Sampler;
-use viewfuse_core::schedule::NoiseSchedule;
+use std::collections::BTreeMap;
 use viewfuse_nn::checkpoint::CheckpointError;
 
-/// An omission of a family that `compute` switches off: name and help.
-pub type Computable = (&'static str, &'static str);
-
-/// Options of a learned field. Errors name them as the members here, with dashes.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Options of a field as a person gives them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FieldOptions {
     /// Seed of every random draw.
     pub seed: u64,
     /// Leave nothing out.
     pub exact: bool,
-    /// Near and far bounds of rays, world units.
-    pub near_far: Option<[f32; 2]>,
-    /// Samples on a ray: as many numbers as the field takes; empty for its default.
-    pub samples: Vec<u32>,
-    /// Omissions that are switched off, by names of the family's list.
+    /// Omissions that are switched off, by names of the row's list.
     pub compute: Vec<String>,
-    /// Second-pass samples around the depth that the published code takes.
-    pub published_depth: bool,
-    /// Side in pixels of the squares in which one ray is probed for empty space.
-    pub probe_step: Option<u32>,
-    /// The largest change of the probes' colours.
-    pub probe_error: Option<f32>,
-    /// Keep the grids of latents that points look up in half precision (f16).
-    pub half_latents: bool,
-    /// The largest and the smallest noise level.
-    pub noise: Option<NoiseSchedule>,
-    /// The sampler.
-    pub sampler: Option<Sampler>,
-    /// The number of noise levels.
-    pub steps: Option<u32>,
-    /// The largest error of a step of adaptive levels.
-    pub tolerance: Option<f32>,
-    /// Noise that is added between steps (churn), over the whole run.
-    pub churn: Option<f32>,
-    /// Keep views' features in half precision (f16).
-    pub half_volumes: bool,
-    /// The noise level at which a frame starts from the one before.
-    pub reuse: Option<f32>,
+    /// Values by the names of the row's flags; those of switches are empty.
+    pub flags: BTreeMap<String, String>,
 }
 
 impl FieldOptions {
-    /// Names of the given options, of those that not every field has.
-    pub fn given(&self) -> Vec<&'static str> {
-        let all = [
-            ("published-depth", self.published_depth),
-            ("probe-step", self.probe_step.is_some()),
-            ("probe-error", self.probe_error.is_some()),
-            ("half-latents", self.half_latents),
-            ("sampler", self.sampler.is_some()),
-            ("steps", self.steps.is_some()),
-            ("tolerance", self.tolerance.is_some()),
-            ("churn", self.churn.is_some()),
-            ("half-volumes", self.half_volumes),
-            ("reuse", self.reuse.is_some()),
-            ("noise", self.noise.is_some()),
-        ];
-        all.into_iter().filter(|(_, is_given)| *is_given).map(|(name, _)| name).collect()
+    /// These options with a flag; the value of a switch is empty.
+    pub fn with(mut self, flag: impl Into<String>, value: impl Into<String>) -> FieldOptions {
+        self.flags.insert(flag.into(), value.into());
+        self
+    }
+
+    /// Whether a switch is given.
+    pub(crate) fn is_given(&self, flag: &str) -> bool {
+        self.flags.contains_key(flag)
+    }
+
+    /// The value of a flag. Opening a field has checked it: `parse` is that of the row.
+    pub(crate) fn value<T>(&self, flag: &str, parse: impl Fn(&str) -> Result<T, String>) -> Option<T> {
+        self.flags.get(flag).and_then(|text| parse(text).ok())
     }
 
     /// Whether an omission is switched off.
-    pub fn computes(&self, what: &str) -> bool {
+    pub(crate) fn computes(&self, what: &str) -> bool {
         self.exact || self.compute.iter().any(|name| name == what)
     }
 }
 
-/// Why a learned field cannot be opened.
+/// A flag of a field, and what it takes.
+#[derive(Clone, Copy, Debug)]
+pub struct Flag {
+    /// Its name, without dashes before it.
+    pub name: &'static str,
+    /// The form of its value, the same in all rows that have it; `None` for a switch.
+    pub value: Option<&'static str>,
+    /// Its help.
+    pub help: &'static str,
+    /// Refuses a text that is no value, with what a value is.
+    pub check: fn(&str) -> Result<(), String>,
+    /// What it is about.
+    pub about: FlagAbout,
+    /// Options of a command with which it cannot be given, `-` as `_` where they are not of a row.
+    pub conflicts: &'static [&'static str],
+}
+
+/// What a flag is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlagAbout {
+    /// The exact picture.
+    Picture,
+    /// An effort: what is left out of the exact picture.
+    Effort,
+    /// How a picture follows from the one before.
+    Sequence,
+}
+
+/// Options that choose all efforts: a flag of one of them would say the same twice.
+pub(crate) const BOUNDS: &[&str] = &["max_error", "max_time"];
+/// The same, and the option that leaves nothing out.
+pub(crate) const BOUNDS_OR_EXACT: &[&str] = &["max_error", "max_time", "exact"];
+
+impl Flag {
+    /// A flag of the exact picture, with a value.
+    pub(crate) const fn new(
+        name: &'static str,
+        value: &'static str,
+        help: &'static str,
+        check: fn(&str) -> Result<(), String>,
+    ) -> Flag {
+        Flag { name, value: Some(value), help, check, about: FlagAbout::Picture, conflicts: &[] }
+    }
+
+    /// A switch of the exact picture.
+    pub(crate) const fn switch(name: &'static str, help: &'static str) -> Flag {
+        Flag { name, value: None, help, check: |_| Ok(()), about: FlagAbout::Picture, conflicts: &[] }
+    }
+
+    /// The same about something else.
+    pub(crate) const fn about(self, about: FlagAbout, conflicts: &'static [&'static str]) -> Flag {
+        Flag { about, conflicts, ..self }
+    }
+}
+
+/// Why a field cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum OpenError {
-    /// The checkpoint is of no family, or cannot be read.
+    /// The checkpoint is of no field, or cannot be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
-    /// An option does not go with the network.
+    /// An option does not go with the field.
     #[error("{option} {problem} with a network that {reason}")]
     Refused {
         /// The option's name, perhaps with a value.
         option: String,
         /// The problem, for example "cannot be used".
-        problem: &'static str,
+        problem: String,
         /// The reason, for example "is a PixelNeRF".
         reason: String,
     },
 }
 
 impl OpenError {
-    /// An option that the network does not have.
+    /// An option that the field does not have.
     pub fn cannot(option: impl Into<String>, reason: impl Into<String>) -> OpenError {
-        OpenError::Refused { option: option.into(), problem: "cannot be used", reason: reason.into() }
+        OpenError::Refused { option: option.into(), problem: "cannot be used".to_owned(), reason: reason.into() }
     }
+}
+
+/// A number within bounds, that `is` puts in words.
+pub(crate) fn number(text: &str, fits: impl Fn(f32) -> bool, is: &str) -> Result<f32, String> {
+    text.parse().ok().filter(|number| fits(*number)).ok_or_else(|| is.to_owned())
+}
+
+/// A whole number within bounds.
+pub(crate) fn count(text: &str, bounds: std::ops::RangeInclusive<u32>) -> Result<u32, String> {
+    let count = text.parse().ok().filter(|count| bounds.contains(count));
+    count.ok_or_else(|| format!("a whole number in {}..={}", bounds.start(), bounds.end()))
+}
+
+/// Numbers between commas; `None` if there is something else.
+pub(crate) fn list<T: std::str::FromStr>(text: &str) -> Option<Vec<T>> {
+    text.split(',').map(|number| number.trim().parse().ok()).collect()
 }

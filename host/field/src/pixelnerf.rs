@@ -17,25 +17,27 @@ mod options;
 mod parameters;
 mod pass;
 mod picture;
+mod presets;
 mod probes;
 pub mod reference;
-mod sight;
 pub mod test_networks;
+mod visibility;
 
 pub use architecture::{Architecture, Level, Pass};
-pub use open::{COMPUTABLE, open};
+pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
 use super::learned::{default_near_far, over_white};
 use super::{
-    About, Effort, Encoding, Encodings, Field, FieldError, LeftOut, Prepared, Record, Rendered, Request, SourceSide,
+    About, Check, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, FieldError, LeftOut, Prepared, Record,
+    Rendered, Request, SourceSide,
 };
 use encoder::{ViewLatents, encode};
 use grid::Grid;
 use network::{Network, Workspace};
+use open::{BEHIND, LAYERS, RAYS, SPACE};
 use parameters::{DeviceParameters, HostParameters};
 use pass::{Evaluated, Renderer};
-use sight::Sight;
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_core::rays::CastBlock;
@@ -44,6 +46,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use visibility::Visibility;
 
 /// A PixelNeRF with its parameters, ready for any device.
 pub struct PixelNerf {
@@ -140,7 +143,7 @@ impl PixelNerf {
 impl Field for PixelNerf {
     fn about(&self) -> About {
         let source_side = SourceSide::Pixels(self.architecture.source_side);
-        About { source_side, ends_rays: true, ..About::new("pixelnerf") }
+        About { source_side, ends_rays: true, ..About::new(ROW.name) }
     }
 
     fn prepare<'a, D: Device>(
@@ -173,13 +176,13 @@ impl<D: Device> Views<'_, D> {
         target: Option<&CastBlock>,
     ) -> Result<network::Views<'_, D>, DeviceError> {
         let cameras: Vec<CameraBlock> = views.iter().map(|view| self.cameras[*view]).collect();
-        let sight = Sight { cameras, weights: weights.to_vec() };
+        let visibility = Visibility { cameras, weights: weights.to_vec() };
         let target = target.filter(|_| self.field.options.omissions.unseen_points);
         Ok(network::Views {
-            cameras: self.device.upload(&sight.cameras)?,
+            cameras: self.device.upload(&visibility.cameras)?,
             weights: self.device.upload(weights)?,
             latents: views.iter().filter_map(|view| self.latents[*view].as_ref()).collect(),
-            sight: target.is_some_and(|cast| sight.is_partial(cast)).then_some(sight),
+            visibility: target.is_some_and(|cast| visibility.is_partial(cast)).then_some(visibility),
         })
     }
 
@@ -249,18 +252,18 @@ impl<D: Device> Prepared for Views<'_, D> {
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
         let step = if omissions.nodes > 0 { 0 } else { omissions.empty_space };
-        let seen = match step > 1 {
+        let probes = match step > 1 {
             true => {
-                let mut probes = Evaluated::default();
-                let seen = renderer.probe(&mut workspace, step, &mut probes)?;
-                evaluated[0].evaluated += probes.evaluated;
-                evaluated[0].unseen += probes.unseen;
-                Some(seen)
+                let mut work = Evaluated::default();
+                let probes = renderer.probe(&mut workspace, step, &mut work)?;
+                evaluated[0].evaluated += work.evaluated;
+                evaluated[0].unseen += work.unseen;
+                Some(probes)
             }
             false => None,
         };
         let mut rendered = match omissions.nodes {
-            0 => renderer.picture(&mut workspace, seen.as_ref(), &mut evaluated)?,
+            0 => renderer.picture(&mut workspace, probes.as_ref(), &mut evaluated)?,
             _ => renderer.picture_between_nodes(&mut workspace, &mut evaluated)?,
         };
         along_axis(&mut rendered, &renderer.cast);
@@ -270,36 +273,8 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(rendered)
     }
 
-    fn efforts(&self) -> Vec<Effort> {
-        efforts::of(&self.field.options).into_iter().map(|(effort, _)| effort).collect()
-    }
-
-    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        if let Some((_, options)) = efforts::of(&self.field.options).get(effort) {
-            self.options = *options;
-        }
-        Ok(Encodings::Kept)
-    }
-
-    fn renders_pixels(&self) -> bool {
-        true
-    }
-
-    fn exact_pixels(
-        &mut self,
-        request: &Request<'_>,
-        pixels: &[u32],
-        progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 4]>, FieldError> {
-        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
-        let options = efforts::exact(&self.field.options);
-        let most_points = pixels.len() * options.sampling.coarse_count as usize;
-        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
-        let renderer = self.renderer(&views, request, options, progress);
-        let mut workspace = self.workspace(request, most_points)?;
-        let mut evaluated = [Evaluated::default(); 2];
-        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
-        Ok(colours)
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        Some(self)
     }
 
     fn record(&self) -> Record {
@@ -317,29 +292,61 @@ impl<D: Device> Prepared for Views<'_, D> {
             nodes,
             ..
         } = self.options.omissions;
-        let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let omitted = |pass: Evaluated| pass.samples.saturating_sub(pass.evaluated);
+        let first = empty_space > 1 || interpolation > 0.0 || nodes > 0;
+        let second = empty_rays || empty_parts || hidden_samples || nodes > 0;
+        let halves = LeftOut {
+            what: "latent bytes",
+            switch: half_latents,
+            left_out: latent_bytes - kept_bytes,
+            of: latent_bytes,
+            typical_error: "2^-11 of a latent",
+        };
         let left_out = vec![
-            line("latent layers at points", latent_layers, mapped_rows, latent_rows, "rounding"),
-            line("latent bytes", half_latents, latent_bytes - kept_bytes, latent_bytes, "2^-11 of a latent"),
-            line("views at points", unseen_points, coarse.unseen + fine.unseen, point_views, "nothing"),
-            line(
-                "first-pass samples",
-                empty_space > 1 || interpolation > 0.0 || nodes > 0,
-                omitted(coarse),
-                coarse.samples,
-                "objects between the probes; see `viewfuse pareto`",
-            ),
-            line(
-                "second-pass samples",
-                empty_rays || empty_parts || hidden_samples || nodes > 0,
-                omitted(fine),
-                fine.samples,
-                "surfaces that the first pass missed; those behind have at most the transmittance of early termination",
-            ),
+            LAYERS.left_out(latent_layers, mapped_rows, latent_rows),
+            halves,
+            BEHIND.left_out(unseen_points, coarse.unseen + fine.unseen, point_views),
+            SPACE.left_out(first, omitted(coarse), coarse.samples),
+            RAYS.left_out(second, omitted(fine), fine.samples),
         ];
         let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
         Record { left_out, memory_estimate, near_far, ..Record::default() }
+    }
+}
+
+impl<D: Device> Efforts for Views<'_, D> {
+    fn list(&self) -> Vec<Effort> {
+        efforts::of(&self.field.options).into_iter().map(|(effort, _)| effort).collect()
+    }
+
+    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        if let Some((_, options)) = efforts::of(&self.field.options).get(effort) {
+            self.options = *options;
+        }
+        Ok(Encodings::Kept)
+    }
+
+    fn check(&mut self) -> Check<'_> {
+        Check::Pixels(self)
+    }
+}
+
+impl<D: Device> ExactPixels for Views<'_, D> {
+    fn exact_pixels(
+        &mut self,
+        request: &Request<'_>,
+        pixels: &[u32],
+        progress: &dyn Progress,
+    ) -> Result<Vec<[f32; 4]>, FieldError> {
+        // Nothing less than exact: what leaves out empty parts of rays misses mist in its own check.
+        let options = efforts::exact(&self.field.options);
+        let most_points = pixels.len() * options.sampling.coarse_count as usize;
+        let views = self.used(request.views, &request.view_weights(), Some(&self.cast(request)))?;
+        let renderer = self.renderer(&views, request, options, progress);
+        let mut workspace = self.workspace(request, most_points)?;
+        let mut evaluated = [Evaluated::default(); 2];
+        let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
+        Ok(colours)
     }
 }
 

@@ -1,4 +1,5 @@
-//! The record of a field's work: for the run record, and for comparing settings.
+//! What a field may leave out of its work, and the record of what it left out: for the run record, and for comparing
+//! settings.
 
 use serde::Serialize;
 
@@ -15,10 +16,34 @@ pub struct Record {
     pub near_far: Option<[f32; 2]>,
 }
 
-/// An omission: work that a field leaves out because a scene does not need it.
+/// An omission: a part of the work that an effort leaves out where a scene does not need it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Omission {
+    /// Its name, with which `--compute` switches it off.
+    pub name: &'static str,
+    /// The kind of work.
+    pub what: &'static str,
+    /// Which part of this work, for example "in empty space".
+    pub part: &'static str,
+    /// Its typical error.
+    pub typical_error: &'static str,
+}
+
+/// The omission of every field that encodes a view when a target first uses it.
+pub const VIEWS: Omission =
+    Omission { name: "views", what: "encoded views", part: "that no target uses", typical_error: "nothing" };
+
+impl Omission {
+    /// The record of so many omitted units of all.
+    pub fn left_out(&self, switch: bool, left_out: u64, of: u64) -> LeftOut {
+        LeftOut { what: self.what, switch, left_out, of, typical_error: self.typical_error }
+    }
+}
+
+/// How much of a kind of work was left out: its share of the time is near `left_out / of` of that of this work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// Its name.
+    /// The kind of work.
     pub what: &'static str,
     /// Whether it is switched on.
     pub switch: bool,
@@ -26,8 +51,8 @@ pub struct LeftOut {
     pub left_out: u64,
     /// All units.
     pub of: u64,
-    /// The possible error.
-    pub cost: &'static str,
+    /// The typical error.
+    pub typical_error: &'static str,
 }
 
 /// The diffusion sampling of a field.

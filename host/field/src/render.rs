@@ -15,6 +15,7 @@ mod stage;
 pub use error::RenderError;
 pub use frame::{Frame, Truth};
 pub use options::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions, open_album, working_side};
+pub(crate) use stage::SceneSources;
 pub use stage::{Stage, StageCosts};
 
 use crate::{Record, Renderer};

@@ -1,8 +1,8 @@
 //! The life cycle of source views, the same for all fields: prepared, encoded when needed, used for rendering.
 
 use super::error::FieldError;
-use super::field::{DepthMap, Effort, Encoding, Encodings, Prepared, Rendered, Request, Setting, Surfaces, Tunable};
-use super::record::{LeftOut, Record};
+use super::field::{Check, Effort, Encoding, Encodings, Prepared, Rendered, Request, Tunable};
+use super::record::{Record, VIEWS};
 use super::renderer::Renderer;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::weights::Weights;
@@ -10,42 +10,69 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_weighting::sources::{MAX_SOURCES, SourceWeights};
 
+/// How errors are found, without the means: see [`Check`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Judge {
+    /// From exact pixels.
+    Pixels,
+    /// By the field, from its own steps.
+    Steps,
+    /// By comparing two pictures.
+    Comparison,
+}
+
 /// Source views on a renderer's device, with the set of encoded views (for the current weighting, if encodings depend on
 /// it).
-pub struct Session<'a> {
+pub(crate) struct Session<'a> {
     renderer: &'a dyn Renderer,
-    prepared: Box<dyn Prepared + 'a>,
+    pub(crate) prepared: Box<dyn Prepared + 'a>,
     /// `[view]`.
     encoded: Vec<bool>,
+    is_weighted: bool,
     /// The weights of the weighting that began, if encodings depend on it.
     relevance: Option<Vec<SourceWeights>>,
+    /// The field's efforts; none for a field with one way to render.
+    pub(crate) efforts: Vec<Effort>,
+    pub(crate) judge: Judge,
+    pub(crate) tunables: &'static [Tunable],
     effort: Option<usize>,
 }
 
 impl<'a> Session<'a> {
     /// Takes source views to the device.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn open(
+    pub(crate) fn open(
         renderer: &'a dyn Renderer,
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Session<'a>, FieldError> {
-        let prepared = renderer.prepare(sources, progress)?;
-        let encoded = vec![false; sources.images.len()];
-        Ok(Session { renderer, prepared, encoded, relevance: None, effort: None })
+        let mut prepared = renderer.prepare(sources, progress)?;
+        let judge = match prepared.efforts().map(|efforts| efforts.check()) {
+            Some(Check::Pixels(_)) => Judge::Pixels,
+            Some(Check::Steps(_)) => Judge::Steps,
+            Some(Check::Comparison) | None => Judge::Comparison,
+        };
+        let efforts = prepared.efforts().map_or_else(Vec::new, |efforts| efforts.list());
+        let tunables = prepared.tuned().map_or(&[][..], |tuned| tuned.tunables());
+        let (is_weighted, encoded) = (prepared.weighted().is_some(), vec![false; sources.images.len()]);
+        Ok(Session {
+            renderer,
+            prepared,
+            encoded,
+            is_weighted,
+            relevance: None,
+            efforts,
+            judge,
+            tunables,
+            effort: None,
+        })
     }
 
     /// Begins a weighting: encodes all views, if all of them contribute to each picture. `relevance[view]` are the weights of
     /// all sources for source `view` as a target, its own 0.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.prepared.depends_on_weighting() {
+    pub(crate) fn weigh(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
+        if let Some(weighted) = self.prepared.weighted() {
             self.encoded.fill(false);
-            self.prepared.weigh(relevance)?;
+            weighted.weigh(relevance)?;
             self.relevance = Some(relevance.to_vec());
         }
         match self.prepared.encoding() {
@@ -55,10 +82,7 @@ impl<'a> Session<'a> {
     }
 
     /// Encodes the views that are not encoded yet.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
+    pub(crate) fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
         progress.expect(self.encoded.iter().filter(|encoded| !**encoded).count());
         for view in 0..self.encoded.len() {
             if self.encode_view(view, progress)? {
@@ -71,11 +95,8 @@ impl<'a> Session<'a> {
     /// Encodes the views that a target with these weights needs and no earlier target needed, so that the time of
     /// encoding is separate from that of rendering, which would do it otherwise. If encodings depend on the weighting
     /// and none has begun, all weights are equal.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn encode(&mut self, weights: &SourceWeights, progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.prepared.depends_on_weighting() && self.relevance.is_none() {
+    pub(crate) fn encode(&mut self, weights: &SourceWeights, progress: &dyn Progress) -> Result<(), FieldError> {
+        if self.is_weighted && self.relevance.is_none() {
             self.weigh(&even(self.encoded.len()), progress)?;
         }
         let mut is_new = false;
@@ -90,10 +111,7 @@ impl<'a> Session<'a> {
 
     /// Renders a target with the sources' weights for it. `early_termination` is the transmittance below which samples
     /// are left out.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn render(
+    pub(crate) fn render(
         &mut self,
         camera: &Camera,
         weights: &SourceWeights,
@@ -105,104 +123,52 @@ impl<'a> Session<'a> {
         self.prepared.render(&Request { camera, weights, views, early_termination }, progress)
     }
 
-    /// The ways in which the field can render; see [`Prepared::efforts`].
-    pub fn efforts(&self) -> Vec<Effort> {
-        self.prepared.efforts()
-    }
-
-    /// Renders what follows with one of [`Session::efforts`]. Views that this effort needs otherwise are encoded again.
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<Encodings, FieldError> {
-        if self.effort == Some(effort) || effort >= self.prepared.efforts().len() {
-            return Ok(Encodings::Kept);
+    /// Renders what follows with one of the efforts. Views that this effort needs otherwise are encoded again.
+    pub(crate) fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        if self.effort == Some(effort) || effort >= self.efforts.len() {
+            return Ok(());
         }
+        let Some(efforts) = self.prepared.efforts() else { return Ok(()) };
         self.effort = Some(effort);
-        let encodings = self.prepared.set_effort(effort)?;
-        if encodings == Encodings::Dropped {
+        if efforts.set(effort)? == Encodings::Dropped {
             self.encoded.fill(false);
             if let Some(relevance) = self.relevance.take() {
                 self.weigh(&relevance, progress)?;
             }
         }
-        Ok(encodings)
+        Ok(())
     }
 
-    /// See [`Prepared::estimates_errors`].
-    pub fn estimates_errors(&self) -> bool {
-        self.prepared.estimates_errors()
+    /// How the error of the last picture is found.
+    pub(crate) fn check(&mut self) -> Check<'_> {
+        self.prepared.efforts().map_or(Check::Comparison, |efforts| efforts.check())
     }
 
-    /// See [`Prepared::estimated_error`].
-    pub fn estimated_error(&self) -> f32 {
-        self.prepared.estimated_error()
-    }
-
-    /// See [`Prepared::renders_pixels`].
-    pub fn renders_pixels(&self) -> bool {
-        self.prepared.renders_pixels()
-    }
-
-    /// Exact colours of some pixels; see [`Prepared::exact_pixels`].
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn exact_pixels(
+    /// Exact colours of some pixels; `None` if the field's pixels are not independent.
+    pub(crate) fn exact_pixels(
         &mut self,
         camera: &Camera,
         weights: &SourceWeights,
         pixels: &[u32],
         progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 4]>, FieldError> {
+    ) -> Result<Option<Vec<[f32; 4]>>, FieldError> {
         self.encode(weights, progress)?;
-        let views = &self.views(weights);
-        self.prepared.exact_pixels(&Request { camera, weights, views, early_termination: 0.0 }, pixels, progress)
-    }
-
-    /// The field's scalars that can be chosen for a scene.
-    pub fn tunables(&self) -> &'static [Tunable] {
-        self.prepared.tunables()
-    }
-
-    /// Sets the field's scalars for what follows; see [`Prepared::tune`].
-    pub fn tune(&mut self, settings: &[Setting]) {
-        self.prepared.tune(settings);
-    }
-
-    /// See [`Prepared::simplify`].
-    pub fn simplify(&mut self) {
-        self.prepared.simplify();
-    }
-
-    /// See [`Prepared::surfaces`].
-    pub fn surfaces(&self) -> Surfaces {
-        self.prepared.surfaces()
-    }
-
-    /// See [`Prepared::source_depths`].
-    ///
-    /// # Errors
-    /// [`FieldError`].
-    pub fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        self.prepared.source_depths()
+        let request = Request { camera, weights, views: &self.views(weights), early_termination: 0.0 };
+        match self.check() {
+            Check::Pixels(exact) => exact.exact_pixels(&request, pixels, progress).map(Some),
+            Check::Steps(_) | Check::Comparison => Ok(None),
+        }
     }
 
     /// The record of the work so far.
-    pub fn record(&self) -> Record {
+    pub(crate) fn record(&self) -> Record {
         let mut record = self.prepared.record();
         let skips_unused = self.prepared.encoding() == Encoding::Used;
-        if !skips_unused && self.prepared.depends_on_weighting() {
+        if !skips_unused && self.is_weighted {
             return record;
         }
-        let count = |views: usize| views as u64;
-        let line = LeftOut {
-            what: "encoded views",
-            switch: skips_unused,
-            left_out: count(self.encoded.iter().filter(|encoded| !**encoded).count()),
-            of: count(self.encoded.len()),
-            cost: "nothing",
-        };
+        let count = self.encoded.iter().filter(|encoded| !**encoded).count();
+        let line = VIEWS.left_out(skips_unused, count as u64, self.encoded.len() as u64);
         record.left_out.insert(0, line);
         record
     }

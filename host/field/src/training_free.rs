@@ -5,22 +5,23 @@
 //! sweep    any sources: planes through the frusta of sources and target
 //! space    near and far bounds, for the planes
 //! exposure gains that equalise the sources' exposure
+//! presets  settings to compare
 //! ```
 
 mod exposure;
 pub mod hull;
+mod presets;
 mod space;
 mod sweep;
 
-use super::{About, Field, FieldError, Prepared, SourceSide};
-use viewfuse_core::camera::Camera;
+use super::row::{Origin, Row};
+use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
-use viewfuse_scene::rig::Rig;
 
-pub use hull::{NoObject, find_object};
-pub use sweep::{Sweep, TargetPlanes};
+pub use hull::NoObject;
+pub use sweep::Sweep;
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
 #[derive(Clone, Copy, Debug)]
@@ -40,18 +41,16 @@ impl Default for TrainingFree {
     }
 }
 
-/// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
-/// photographs.
-const MAX_GAP_DEGREES: f32 = 15.0;
-
-/// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
-pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
-    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MAX_GAP_DEGREES)?;
-    Some(format!(
-        "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
-         reliably up to about {MAX_GAP_DEGREES:.0} degrees; take photographs between them"
-    ))
-}
+/// The training-free field's row.
+pub(crate) const ROW: Row = Row {
+    name: "training-free",
+    title: "training-free field",
+    heading: "Options of the training-free field",
+    origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(TrainingFree::default())) },
+    flags: &[],
+    omissions: &[],
+    presets: presets::of,
+};
 
 impl Field for TrainingFree {
     fn about(&self) -> About {
@@ -60,7 +59,7 @@ impl Field for TrainingFree {
             least_sources: 2,
             source_side: SourceSide::Share(self.source_share),
             ends_rays: true,
-            ..About::new("training-free")
+            ..About::new(ROW.name)
         }
     }
 
@@ -73,9 +72,11 @@ impl Field for TrainingFree {
         if sources.has_silhouettes {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
-            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-            gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
-            Ok(Box::new(self.sweep.views(device, sources, progress)?))
+            self.sweep.prepare(device, sources, progress)
         }
+    }
+
+    fn preview(&self) -> Option<TrainingFree> {
+        Some(TrainingFree { sweep: self.sweep.preview(), ..*self })
     }
 }

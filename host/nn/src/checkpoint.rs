@@ -19,9 +19,9 @@ mod error;
 pub mod input;
 mod kind;
 mod legacy;
+mod location;
 mod modules;
 pub mod pickle;
-mod place;
 mod safe;
 mod sizes;
 mod snapshot;
@@ -31,13 +31,13 @@ mod write;
 pub use element::Element;
 pub use error::CheckpointError;
 pub use kind::Kind;
-pub use place::{MAX_TENSOR_BYTES, MAX_TOTAL_BYTES};
+pub use location::{MAX_TENSOR_BYTES, MAX_TOTAL_BYTES};
 pub use sizes::{MAX_SIZE, Sizes};
 pub use state_dict::PLACES;
 pub use write::{Precision, Written};
 
 use error::{Problem, shortened};
-use place::{CHUNK_BYTES, Place, Places, element_count};
+use location::{CHUNK_BYTES, TensorLocation, TensorLocations, element_count};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -71,7 +71,7 @@ enum Content {
     /// They are computed at each read.
     Computed(Formula),
     /// The file, behind a lock: readers move its cursor.
-    File(Mutex<File>, Places),
+    File(Mutex<File>, TensorLocations),
 }
 
 /// Computes the values of a tensor.
@@ -196,7 +196,7 @@ impl Checkpoint {
             kept = kept.saturating_add(count.saturating_mul(4));
             working = working.max(match &self.content {
                 Content::Computed(_) => count.saturating_mul(4),
-                Content::File(_, places) => places.get(name).map_or(0, Place::working_bytes),
+                Content::File(_, places) => places.get(name).map_or(0, TensorLocation::working_bytes),
             });
         }
         kept.saturating_add(working)

@@ -5,6 +5,7 @@
 //! ```text
 //! png      pictures as files
 //! canvas   text, lines and small pictures on a picture
+//! camera_map  the cameras of a scene, seen from above
 //! sheet    the contact sheet of a target
 //! record   the run record, as JSON
 //! exr      depth maps as OpenEXR (feature `exr`)
@@ -22,6 +23,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod camera_map;
 pub mod canvas;
 pub mod depth;
 #[cfg(feature = "exr")]

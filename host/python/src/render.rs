@@ -8,7 +8,7 @@ use viewfuse::device::choice::{self, DeviceChoice, DeviceOptions};
 use viewfuse::field::auto::{self, Chosen};
 use viewfuse::field::options::FieldOptions;
 use viewfuse::field::render::{DEFAULT_EARLY_TERMINATION, Frame, RenderOptions, render};
-use viewfuse::field::{AnyField, family};
+use viewfuse::field::{AnyField, rows};
 use viewfuse::job::progress::Progress;
 use viewfuse::nn::checkpoint::Checkpoint;
 use viewfuse::scene::Scene;
@@ -41,7 +41,7 @@ impl Order {
         let field = match &self.model {
             None => AnyField::default(),
             Some(path) => {
-                family::open(Checkpoint::open(path)?, &FieldOptions { seed: self.seed, ..FieldOptions::default() })?
+                rows::open(Checkpoint::open(path)?, &FieldOptions { seed: self.seed, ..FieldOptions::default() })?
             }
         };
         let about = field.about();

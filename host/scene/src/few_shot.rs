@@ -11,7 +11,7 @@ use std::collections::HashSet;
 use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
-use viewfuse_weighting::sources::MAX_SOURCES;
+use viewfuse_core::sources::MAX_SOURCES;
 
 /// Why a selection of views is invalid.
 #[derive(Debug, thiserror::Error)]

@@ -11,12 +11,14 @@
 //! path          cameras without photographs: from files, or generated
 //! few_shot      which views are sources, which cameras are targets: FewShot
 //! photographs   sources at working size without their background: SourceImages
+//! inspect       what a scene holds, and likely faults in it
 //! write         a scene written out, in each layout that can hold it: Layout
 //! ```
 #![forbid(unsafe_code)]
 
 pub mod dataset;
 pub mod few_shot;
+pub mod inspect;
 pub mod numpy;
 pub mod path;
 pub mod photographs;
@@ -25,8 +27,8 @@ mod scene;
 pub mod write;
 
 pub use scene::{
-    FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, Place, READERS, Scene, SceneError, SceneFrame,
-    ScenePoint, Split, View, looked_for, read_picture, reader,
+    FaultLocation, FileFault, IntrinsicsFault, MAX_SIDE, NumpyFault, Photograph, READERS, Scene, SceneError,
+    SceneFrame, ScenePoint, Split, View, looked_for, read_picture, reader,
 };
 
 /// The examples of the README, compiled and run.

@@ -2,6 +2,7 @@
 
 mod ground_truth;
 mod matte;
+pub mod object_box;
 mod resample;
 
 pub use ground_truth::GroundTruth;

@@ -65,6 +65,19 @@ impl Rig {
     }
 }
 
+/// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
+/// photographs.
+const MAX_GAP_DEGREES: f32 = 15.0;
+
+/// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
+pub fn gap_warning(cameras: &[Camera]) -> Option<String> {
+    let gap = Rig::of(cameras).median_gap(cameras).filter(|gap| *gap > MAX_GAP_DEGREES)?;
+    Some(format!(
+        "a view and the one nearest to it are {gap:.0} degrees apart (median): depths in whole photographs are found \
+         reliably up to about {MAX_GAP_DEGREES:.0} degrees; take photographs between them"
+    ))
+}
+
 /// `count` of the points, each next one as far from those before as possible (farthest-point sampling, starting with the
 /// first point; of equally far ones the first), as ascending indices. All of them if there are fewer.
 pub fn spread(points: &[Vec3], count: usize) -> Vec<usize> {

@@ -1,6 +1,6 @@
 //! Scenes: posed photographs on disk.
 //!
-//! [`Scene::open`] asks each reader whether it recognises a folder, reads every pose and every image *header* and
+//! [`Scene::open`] calls each reader, which says whether it recognises a folder, reads every pose and every image *header* and
 //! checks them all: counts, finite and rigid poses, sizes. The pixels of a view are read when they are first needed
 //! ([`Scene::photograph`]), so that a command that needs only poses decodes no image.
 
@@ -41,7 +41,7 @@ mod undistort;
 
 use check::Checked;
 pub use error::SceneError;
-pub use fault::{FileFault, IntrinsicsFault, NumpyFault, Place};
+pub use fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault};
 use images::Turn;
 pub use images::read_picture;
 use reader::Reader;

@@ -36,7 +36,7 @@ pub type SplitViews<'a> = (&'a str, Vec<(u32, Camera)>);
 
 /// Renders `object` from every camera and writes the scene to `folder`, which must not exist. All cameras share one pinhole with
 /// one focal length and its principal point in the centre: the layout states an opening angle alone. A pixel is the mean of
-/// `rays_per_side` squared rays. Between the views it asks `progress` whether to go on.
+/// `rays_per_side` squared rays. It checks `progress` between the views and stops if it says so.
 ///
 /// # Errors
 /// [`WriteError`], always with the path.

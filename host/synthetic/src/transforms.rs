@@ -45,7 +45,7 @@ struct Frame {
 }
 
 /// Takes all photographs of a shoot and writes them to `folder`, which must not exist. A pixel is the mean of
-/// `rays_per_side` squared rays. Between the views it asks `progress` whether to go on.
+/// `rays_per_side` squared rays. It checks `progress` between the views and stops if it says so.
 ///
 /// # Errors
 /// [`WriteError`], always with the path.

@@ -24,7 +24,7 @@ pub(crate) struct BatchSize {
 
 /// The sources of each object in a batch.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Shown {
+pub(crate) struct SourceDraw {
     /// How many.
     pub(crate) count: usize,
     /// Side of their pictures; `None`: that of the scenes'.
@@ -33,10 +33,10 @@ pub(crate) struct Shown {
     pub(crate) least_crop: f32,
 }
 
-impl Shown {
+impl SourceDraw {
     /// Whole photographs at their size.
-    pub(crate) fn whole(count: usize) -> Shown {
-        Shown { count, side: None, least_crop: 1.0 }
+    pub(crate) fn whole(count: usize) -> SourceDraw {
+        SourceDraw { count, side: None, least_crop: 1.0 }
     }
 
     /// What source number `index` of a batch shows of a photograph of this side: a square somewhere in it.
@@ -86,13 +86,13 @@ impl Batch {
         scenes: &[TrainingScene],
         draw: &Draw,
         size: BatchSize,
-        shown: Shown,
+        drawn: SourceDraw,
         targets: Targets,
         dtype: DType,
     ) -> Result<Batch> {
         let objects: Vec<usize> =
             (0..size.objects).map(|index| draw.below(Purpose::Objects, index, scenes.len())).collect();
-        Batch::of(scenes, &objects, draw, size.rays, shown, targets, dtype)
+        Batch::of(scenes, &objects, draw, size.rays, drawn, targets, dtype)
     }
 
     /// As [`Batch::draw`], of these objects.
@@ -101,7 +101,7 @@ impl Batch {
         objects: &[usize],
         draw: &Draw,
         ray_count: usize,
-        shown: Shown,
+        drawn: SourceDraw,
         targets: Targets,
         dtype: DType,
     ) -> Result<Batch> {
@@ -112,10 +112,10 @@ impl Batch {
             let scene = &scenes[object];
             let side = scene.pictures[0].width();
             let order = draw.choose(Purpose::Sources, index, scene.cameras.len(), scene.cameras.len());
-            let (views, others) = order.split_at(shown.count.min(order.len() - 1));
+            let (views, others) = order.split_at(drawn.count.min(order.len() - 1));
             let mut sources = Vec::with_capacity(views.len());
             for (place, &view) in views.iter().enumerate() {
-                let cut = shown.cut(draw, index * views.len() + place, side);
+                let cut = drawn.cut(draw, index * views.len() + place, side);
                 let (camera, picture) = scene.source(view, cut).map_err(Error::wrap)?;
                 pictures.extend(inputs(&picture));
                 source_side = picture.width() as usize;

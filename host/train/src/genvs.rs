@@ -12,7 +12,7 @@ pub(crate) use views::{ViewCounts, Views};
 
 use super::TrainError;
 use super::images::enlarge;
-use super::operations::{Apply, Look, LookSizes, Sight};
+use super::operations::{Apply, MarchSizes, MarchVolumes, SampledRays};
 use super::parameters::{Contents, Parameters, fan_in, random};
 use candle_core::{DType, Device, Result, Tensor};
 use layers::Layers;
@@ -109,29 +109,29 @@ impl Genvs {
         samples: &CoarseBlock,
     ) -> Result<Tensor> {
         let side = self.architecture.image_side;
-        let sizes = LookSizes {
+        let sizes = MarchSizes {
             volume: [side, side, self.architecture.encoder.volume_depth],
             features: self.architecture.encoder.feature_count,
             width: self.architecture.mlp_width,
         };
-        let sight = |object: usize| {
+        let object_rays = |object: usize| {
             let near_far @ [near, far] = views.near_far[object];
             let cast = |target| {
                 let cast = cast_block(target, near_far, samples.sample_count);
                 (0..cast.camera.width * cast.camera.height).map(move |pixel| cast_ray(&cast, pixel))
             };
-            Sight {
+            SampledRays {
                 cameras: views.cameras[object].clone(),
                 rays: views.targets[object].iter().flat_map(cast).collect(),
                 near_far,
                 length_scale: ray_length(&views.targets[object][0]) / (far - near),
             }
         };
-        let sights: Vec<Sight> = (0..views.cameras.len()).map(sight).collect();
-        let target_count = sights.len() * views.targets[0].len();
-        let operation = Look {
+        let objects_rays: Vec<SampledRays> = (0..views.cameras.len()).map(object_rays).collect();
+        let target_count = objects_rays.len() * views.targets[0].len();
+        let operation = MarchVolumes {
             sizes,
-            sights: Arc::new(sights),
+            objects_rays: Arc::new(objects_rays),
             samples: *samples,
             last_length: LAST_LENGTH,
             inclusive: true,
@@ -141,7 +141,7 @@ impl Genvs {
         enlarge(&seen.reshape((target_count, side / 2, side / 2, sizes.features))?, side, side)
     }
 
-    /// The parameters of the point network in the order of [`LookSizes::parameter_count`].
+    /// The parameters of the point network in the order of [`MarchSizes::parameter_count`].
     fn point_parameters(&self) -> Result<Tensor> {
         let layers = self.layers(MLP);
         let mut all = Vec::new();

@@ -8,14 +8,14 @@
 //! the minimum of the squared error.
 
 use super::TrainError;
-use super::batch::{Shown, Targets};
+use super::augmentation::Augmentation;
+use super::batch::{SourceDraw, Targets};
 use super::draw::{Draw, Purpose};
 use super::genvs::{Genvs, ViewCounts, Views, colours, each};
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf_learner::decibels;
 use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
-use super::variety::Variety;
 use candle_core::{DType, Device, Result, Tensor};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -35,7 +35,7 @@ pub struct GenvsSettings {
     pub side: u32,
     /// Objects of a step.
     pub objects: usize,
-    /// Targets of each. One in steps with another scheme than the mean, see [`Variety::schemes`].
+    /// Targets of each. One in steps with another scheme than the mean, see [`Augmentation::schemes`].
     pub targets: usize,
     /// Samples of a ray, as many as in renders: samples shade themselves, so another number changes the brightness.
     pub samples: u32,
@@ -45,8 +45,8 @@ pub struct GenvsSettings {
     pub estimate: Estimate,
     /// Whether a network that continues from a file begins with a new denoiser. Otherwise it keeps the file's.
     pub new_denoiser: bool,
-    /// What differs from step to step. Sides are those of the settings: [`Variety::sides`] is empty.
-    pub variety: Variety,
+    /// What differs from step to step. Sides are those of the settings: [`Augmentation::sides`] is empty.
+    pub augmentation: Augmentation,
 }
 
 /// Mean and deviation of the logarithm of noise levels, as published.
@@ -76,17 +76,17 @@ impl GenvsSettings {
         if !(0.0..=1.0).contains(&self.share_of_largest) {
             return refuse("share_of_largest", f64::from(self.share_of_largest), "it must be from 0 to 1");
         }
-        if let Some(side) = self.variety.sides.first() {
+        if let Some(side) = self.augmentation.sides.first() {
             return refuse("sides", f64::from(*side), "a GeNVS's volumes are made for pictures of one side");
         }
-        self.variety.check(self.side)
+        self.augmentation.check(self.side)
     }
 
     /// Refuses steps whose volumes alone take more than 4 GiB.
     fn check_volumes(&self, architecture: &Architecture) -> std::result::Result<(), TrainError> {
         let Architecture { image_side, ref encoder, .. } = *architecture;
         let factors =
-            [self.variety.most_sources(), image_side, image_side, encoder.volume_depth, encoder.feature_count];
+            [self.augmentation.most_sources(), image_side, image_side, encoder.volume_depth, encoder.feature_count];
         if factors.into_iter().fold(self.objects, usize::saturating_mul) > MAX_VOLUMES {
             let allowed = "objects times sources times the numbers of a volume must be at most 2^30";
             return Err(TrainError::Setting { name: "objects", value: self.objects as f64, allowed });
@@ -119,7 +119,7 @@ pub fn train_genvs(
         None => Genvs::new(architecture, DType::F32, schedule.seed)?,
     };
     settings.check_volumes(&network.architecture)?;
-    let least_views = settings.variety.most_sources() + settings.targets.max(1);
+    let least_views = settings.augmentation.most_sources() + settings.targets.max(1);
     let least_views = least_views.max(VALIDATION_SOURCES + 1);
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let denoiser = network.architecture.denoiser.as_ref();
@@ -215,8 +215,8 @@ impl Learner for GenvsLearner {
     }
 
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
-        let GenvsSettings { objects, targets, samples, share_of_largest, ref variety, .. } = self.settings;
-        let (sources, scheme) = variety.drawn(draw);
+        let GenvsSettings { objects, targets, samples, share_of_largest, ref augmentation, .. } = self.settings;
+        let (sources, scheme) = augmentation.drawn(draw);
         let targets = if Targets::of(scheme) == Targets::One { 1 } else { targets };
         let views = ViewCounts { sources, targets };
         let views = Views::draw(&self.scenes, draw, objects, views, self.network.parameters.dtype())?;
@@ -225,8 +225,8 @@ impl Learner for GenvsLearner {
     }
 
     fn validate(&self) -> Result<Validated> {
-        let views = ViewCounts { sources: Shown::whole(VALIDATION_SOURCES), targets: 1 };
-        let weigh = |views: &Views| views.weights(self.settings.variety.schemes[0]);
+        let views = ViewCounts { sources: SourceDraw::whole(VALIDATION_SOURCES), targets: 1 };
+        let weigh = |views: &Views| views.weights(self.settings.augmentation.schemes[0]);
         let [score, colour_score] = scores(&self.network, &self.validation, views, self.settings.samples, &weigh)?;
         Ok(Validated { score, remark: format!("features {colour_score:.3} dB") })
     }

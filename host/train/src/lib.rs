@@ -10,8 +10,8 @@
 //! draw         random numbers of a step                  Draw
 //! weights      of a batch's views, by a scheme           of_scheme
 //! batch        sources and target rays of a step         Batch
-//! variety      what differs from step to step            Variety
-//! operations   gradients of our own kernels              Convolution, PointNetwork, Look
+//! augmentation      what differs from step to step            Augmentation
+//! operations   gradients of our own kernels              Convolution, PointNetwork, MarchVolumes
 //! parameters   trained parameters                        Parameters
 //! images, compositing     parts of the graphs
 //! pixelnerf, genvs        networks as graphs             PixelNerf, Genvs
@@ -25,6 +25,7 @@
 
 mod adam;
 mod attention;
+mod augmentation;
 mod average;
 mod batch;
 mod compositing;
@@ -32,6 +33,8 @@ mod curve;
 mod draw;
 mod genvs;
 mod genvs_learner;
+#[cfg(test)]
+mod gradient_check;
 mod images;
 mod operations;
 mod parameters;
@@ -39,19 +42,16 @@ mod pixelnerf;
 mod pixelnerf_learner;
 mod run;
 mod scenes;
-#[cfg(test)]
-mod slopes;
 mod state;
-mod variety;
 mod weighting_learner;
 mod weights;
 
 pub use attention::Embedding;
+pub use augmentation::Augmentation;
 pub use genvs_learner::{GenvsSettings, MAX_LEVEL_SHARE, train_genvs};
 pub use pixelnerf_learner::{PixelNerfSettings, train_pixelnerf};
 pub use run::{Outcome, Schedule};
 pub use state::check_state;
-pub use variety::Variety;
 pub use weighting_learner::{WeightingSettings, train_weighting};
 
 use std::path::PathBuf;

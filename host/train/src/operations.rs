@@ -8,14 +8,14 @@ mod convolve;
 mod density;
 mod enlarge;
 mod linear;
-mod look;
+mod march_volumes;
 mod normalise;
 mod point_network;
 
 pub(crate) use convolve::{Convolution, DepthwiseConvolution, Window};
 pub(crate) use density::RectifiedDensity;
 pub(crate) use enlarge::AddEnlarged;
-pub(crate) use look::{Look, LookSizes, Sight};
+pub(crate) use march_volumes::{MarchSizes, MarchVolumes, SampledRays};
 pub(crate) use normalise::Normalise;
 pub(crate) use point_network::{PointNetwork, PointNetworkSizes, Points};
 

@@ -219,7 +219,7 @@ impl PixelNerf {
 
     /// Densities and colours at points `[object][point]`: `[object and point][4]`, without rectification and logistic
     /// function.
-    fn raw(&self, network: &Seen<'_>, points: &[Vec<RayPoint>]) -> Result<Tensor> {
+    fn raw(&self, network: &PointInputs<'_>, points: &[Vec<RayPoint>]) -> Result<Tensor> {
         let [_, height, width, _] = dims4(network.grids)?;
         let Architecture { frequency_count, frequency, pixel_centre, .. } = self.architecture;
         let embed = EmbedBlock { point_count: 0, frequency_count: frequency_count as u32, frequency };
@@ -236,7 +236,7 @@ impl PixelNerf {
         if self.is_frozen {
             (grids, parameters) = (grids.detach(), parameters.detach());
         }
-        let seen = Seen { cameras: &batch.cameras, grids: &grids, weights, parameters: &parameters };
+        let seen = PointInputs { cameras: &batch.cameras, grids: &grids, weights, parameters: &parameters };
         let rays = batch.rays[0].len();
         let share = |object: usize, purpose: Purpose| {
             move |ray: usize, sample: usize| draw.uniform(purpose, ((object * rays + ray) << 7) + sample)
@@ -273,7 +273,7 @@ impl PixelNerf {
     }
 
     /// The network's outputs at samples `[object and ray and sample][4]`, and their lengths `[object and ray][sample]`.
-    fn sampled(&self, seen: &Seen<'_>, batch: &Batch, depths: &[Vec<f32>]) -> Result<(Tensor, Tensor)> {
+    fn sampled(&self, seen: &PointInputs<'_>, batch: &Batch, depths: &[Vec<f32>]) -> Result<(Tensor, Tensor)> {
         let points: Vec<Vec<RayPoint>> =
             batch.rays.iter().zip(depths).map(|(rays, depths)| points(rays, depths)).collect();
         let raw = self.raw(seen, &points)?;
@@ -292,7 +292,7 @@ fn sample_lengths(batch: &Batch, depths: &[Vec<f32>], dtype: DType) -> Result<Te
 }
 
 /// The point network's inputs.
-struct Seen<'a> {
+struct PointInputs<'a> {
     cameras: &'a [Vec<viewfuse_core::camera::CameraBlock>],
     grids: &'a Tensor,
     weights: &'a Tensor,

@@ -1,13 +1,13 @@
 //! A small PixelNeRF. With equal weights of the views, as published, unless schemes are given.
 
 use super::TrainError;
-use super::batch::{Batch, BatchSize, Shown, Targets};
+use super::augmentation::Augmentation;
+use super::batch::{Batch, BatchSize, SourceDraw, Targets};
 use super::draw::Draw;
 use super::parameters::{Contents, Parameters};
 use super::pixelnerf::{PixelNerf, SampleCounts};
 use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
-use super::variety::Variety;
 use candle_core::{DType, Result, Tensor};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ pub struct PixelNerfSettings {
     /// Samples that the second pass adds.
     pub fine: usize,
     /// What differs from step to step.
-    pub variety: Variety,
+    pub augmentation: Augmentation,
 }
 
 /// Levels of a new network's trunk, and the most: those of the published trunk.
@@ -48,7 +48,7 @@ const MAX_LAYER: usize = 1 << 28;
 impl PixelNerfSettings {
     /// Refuses numbers with which nothing is computed, or that no memory holds.
     fn check(&self) -> std::result::Result<(), TrainError> {
-        let &PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, ref variety } = self;
+        let &PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, ref augmentation } = self;
         let levels = levels.unwrap_or(LEVELS);
         let numbers = [
             ("width", width, 1, "it must be from 1 to 1024"),
@@ -75,7 +75,7 @@ impl PixelNerfSettings {
             let allowed = "objects times rays times samples times width must be at most 2^28";
             return Err(TrainError::Setting { name: "objects", value: objects as f64, allowed });
         }
-        variety.check(side)
+        augmentation.check(side)
     }
 }
 
@@ -104,7 +104,7 @@ pub fn train_pixelnerf(
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
     settings.check()?;
-    let most_sources = settings.variety.most_sources();
+    let most_sources = settings.augmentation.most_sources();
     let data = Data::open([scenes, validation], settings.side, most_sources + 1, progress)?;
     let architecture = Architecture { has_fine: false, pixel_centre: 0.5, ..Architecture::small(settings.width) };
     let mut network = match from {
@@ -138,8 +138,8 @@ pub(super) fn score(
     for object in 0..count {
         let draw = Draw { seed: 0, step: u32::MAX - object as u32 };
         let dtype = network.parameters.dtype();
-        let shown = Shown::whole(source_count);
-        let batch = Batch::of(scenes, &[object], &draw, VALIDATION.rays, shown, targets, dtype)?;
+        let drawn = SourceDraw::whole(source_count);
+        let batch = Batch::of(scenes, &[object], &draw, VALIDATION.rays, drawn, targets, dtype)?;
         let colours = network.render(&batch, &weigh(&batch)?, &draw, VALIDATION_SAMPLES)?;
         sum += decibels(&(colours - &batch.truth)?.sqr()?.mean_all()?)?;
     }
@@ -153,16 +153,16 @@ impl Learner for PixelNerfLearner {
 
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
         let PixelNerfSettings { objects, rays, coarse, fine, .. } = self.settings;
-        let (shown, scheme) = self.settings.variety.drawn(draw);
+        let (drawn, scheme) = self.settings.augmentation.drawn(draw);
         let targets = Targets::of(scheme);
         let size = BatchSize { objects, rays };
-        let batch = Batch::draw(&self.scenes, draw, size, shown, targets, self.network.parameters.dtype())?;
+        let batch = Batch::draw(&self.scenes, draw, size, drawn, targets, self.network.parameters.dtype())?;
         let colours = self.network.render(&batch, &batch.weights(scheme)?, draw, SampleCounts { coarse, fine })?;
         (colours - &batch.truth)?.sqr()?.mean_all()
     }
 
     fn validate(&self) -> Result<Validated> {
-        let scheme = self.settings.variety.schemes[0];
+        let scheme = self.settings.augmentation.schemes[0];
         let weigh = |batch: &Batch| batch.weights(scheme);
         let score = score(&self.network, &self.validation, VALIDATION_SOURCES, Targets::of(scheme), &weigh)?;
         Ok(Validated { score, remark: String::new() })

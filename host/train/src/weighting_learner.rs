@@ -1,15 +1,15 @@
 //! The paper's learned weighting: the network is fixed, and only the weighting of its views is trained, with the network's
 //! own loss.
+//!
+//! A network whose weighting can be trained has a file here and a line in [`NETWORKS`].
+
+mod genvs;
+mod pixelnerf;
 
 use super::TrainError;
 use super::attention::{Attention, Embedding};
-use super::batch::{Batch, BatchSize, Shown, Targets};
 use super::draw::{Draw, Purpose};
-use super::genvs::{Genvs, ViewCounts, Views};
-use super::genvs_learner::{self, MAX_LEVEL_SHARE};
 use super::parameters::{Contents, Parameters};
-use super::pixelnerf::{PixelNerf, SampleCounts};
-use super::pixelnerf_learner;
 use super::run::{self, Learner, Outcome, Schedule, Validated};
 use super::scenes::{Data, TrainingScene};
 use candle_core::{DType, Result, Tensor};
@@ -17,10 +17,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use viewfuse_core::camera::Camera;
-use viewfuse_core::depths::CoarseBlock;
 use viewfuse_core::pose::Pose;
-use viewfuse_core::weighting::Scheme;
-use viewfuse_field::family::Family;
+use viewfuse_field::rows::row_of;
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::Checkpoint;
 
@@ -41,19 +39,40 @@ pub struct WeightingSettings {
 const SOURCE_COUNTS: [usize; 4] = [3, 4, 6, 8];
 /// Sources in validation.
 const VALIDATION_SOURCES: usize = 6;
-/// Samples of a ray: of a PixelNeRF's passes, and of a GeNVS.
-const SAMPLES: SampleCounts = SampleCounts { coarse: 32, fine: 16 };
-const GENVS_SAMPLES: u32 = 64;
-
 /// A fixed network.
-enum Frozen {
-    PixelNerf(PixelNerf),
-    Genvs(Genvs),
+trait Frozen {
+    /// The loss of a step from so many sources.
+    fn loss(&self, step: &Step<'_>, source_count: usize) -> Result<Tensor>;
+
+    /// The score on scenes from so many sources, by the learned weights or by equal ones.
+    fn score(&self, scenes: &[TrainingScene], source_count: usize, weights: ViewWeights<'_>) -> Result<f64>;
 }
+
+/// What a step's loss is computed from.
+struct Step<'a> {
+    scenes: &'a [TrainingScene],
+    draw: &'a Draw,
+    settings: &'a WeightingSettings,
+    weights: ViewWeights<'a>,
+    dtype: DType,
+}
+
+/// The weights of views.
+#[derive(Clone, Copy)]
+enum ViewWeights<'a> {
+    Learned(&'a Attention),
+    Equal,
+}
+
+/// Opens a network for pictures of a side.
+type Open = fn(&Checkpoint, u32) -> std::result::Result<Box<dyn Frozen>, TrainError>;
+
+/// The networks by the names of their fields.
+const NETWORKS: [(&str, Open); 2] = [("pixelnerf", pixelnerf::open), ("genvs", genvs::open)];
 
 struct WeightingLearner {
     attention: Attention,
-    network: Frozen,
+    network: Box<dyn Frozen>,
     scenes: Vec<TrainingScene>,
     validation: Vec<TrainingScene>,
     settings: WeightingSettings,
@@ -71,15 +90,12 @@ pub fn train_weighting(
     folder: &Path,
     progress: &dyn Progress,
 ) -> std::result::Result<Outcome, TrainError> {
-    let family = Family::of(checkpoint)?;
-    let network = if family == Family::PixelNerf {
-        Frozen::PixelNerf(PixelNerf::frozen(checkpoint, DType::F32)?)
-    } else if family == Family::Genvs {
-        Frozen::Genvs(Genvs::frozen(checkpoint, settings.side, DType::F32)?)
-    } else {
-        let reason = format!("a weighting cannot be trained for a {family}");
+    let row = row_of(checkpoint)?;
+    let Some((_, open)) = NETWORKS.into_iter().find(|(name, _)| *name == row.name) else {
+        let reason = format!("a weighting cannot be trained for a {}", row.title);
         return Err(TrainError::Checkpoint { path: checkpoint.path().to_path_buf(), reason });
     };
+    let network = open(checkpoint, settings.side)?;
     let least_views = SOURCE_COUNTS.into_iter().max().unwrap_or(1) + 1;
     let data = Data::open([scenes, validation], settings.side, least_views, progress)?;
     let attention = Attention::new(settings.embedding, DType::F32, schedule.seed)?;
@@ -94,15 +110,13 @@ pub fn train_weighting(
     run::run(&learner, schedule, &record, "PSNR dB", folder, progress)
 }
 
-impl WeightingLearner {
-    fn of_batch(&self, batch: &Batch) -> Result<Tensor> {
-        let targets: Vec<Pose> = batch.targets.iter().map(|camera| camera.pose).collect();
-        self.attention.weights(&poses(&batch.sources), &targets)
-    }
-
-    fn of_views(&self, views: &Views) -> Result<Tensor> {
-        let targets: Vec<Pose> = views.target_cameras.iter().map(|targets| targets[0].pose).collect();
-        self.attention.weights(&poses(&views.sources), &targets)
+impl ViewWeights<'_> {
+    /// Of views with these cameras, `[object][view]`, for a target each; otherwise the equal ones.
+    fn or(self, sources: &[Vec<Camera>], targets: &[Pose], equal: impl FnOnce() -> Result<Tensor>) -> Result<Tensor> {
+        match self {
+            ViewWeights::Learned(attention) => attention.weights(&poses(sources), targets),
+            ViewWeights::Equal => equal(),
+        }
     }
 }
 
@@ -116,43 +130,15 @@ impl Learner for WeightingLearner {
     }
 
     fn loss(&self, draw: &Draw) -> Result<Tensor> {
-        let WeightingSettings { objects, rays, .. } = self.settings;
-        let sources = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
-        let dtype = self.attention.parameters.dtype();
-        match &self.network {
-            Frozen::PixelNerf(network) => {
-                let size = BatchSize { objects, rays };
-                let batch = Batch::draw(&self.scenes, draw, size, Shown::whole(sources), Targets::One, dtype)?;
-                let colours = network.render(&batch, &self.of_batch(&batch)?, draw, SAMPLES)?;
-                (colours - &batch.truth)?.sqr()?.mean_all()
-            }
-            Frozen::Genvs(network) => {
-                let views = ViewCounts { sources: Shown::whole(sources), targets: 1 };
-                let views = Views::draw(&self.scenes, draw, objects, views, dtype)?;
-                let samples =
-                    CoarseBlock { seed: [draw.seed as u32, draw.step], sample_count: GENVS_SAMPLES, jitter: 1.0 };
-                let weights = self.of_views(&views)?;
-                genvs_learner::loss(network, &views, &weights, &samples, MAX_LEVEL_SHARE, draw)
-            }
-        }
+        let source_count = SOURCE_COUNTS[draw.below(Purpose::SourceCount, 0, SOURCE_COUNTS.len())];
+        let (dtype, weights) = (self.attention.parameters.dtype(), ViewWeights::Learned(&self.attention));
+        let step = Step { scenes: &self.scenes, draw, settings: &self.settings, weights, dtype };
+        self.network.loss(&step, source_count)
     }
 
     fn validate(&self) -> Result<Validated> {
-        let [own, mean] = match &self.network {
-            Frozen::PixelNerf(network) => {
-                let score = |weigh: &dyn Fn(&Batch) -> Result<Tensor>| {
-                    pixelnerf_learner::score(network, &self.validation, VALIDATION_SOURCES, Targets::One, weigh)
-                };
-                [score(&|batch| self.of_batch(batch))?, score(&|batch| batch.weights(Scheme::MEAN))?]
-            }
-            Frozen::Genvs(network) => {
-                let views = ViewCounts { sources: Shown::whole(VALIDATION_SOURCES), targets: 1 };
-                let score = |weigh: &dyn Fn(&Views) -> Result<Tensor>| -> Result<f64> {
-                    Ok(genvs_learner::scores(network, &self.validation, views, GENVS_SAMPLES, weigh)?[0])
-                };
-                [score(&|views| self.of_views(views))?, score(&|views| views.weights(Scheme::MEAN))?]
-            }
-        };
+        let score = |weights| self.network.score(&self.validation, VALIDATION_SOURCES, weights);
+        let (own, mean) = (score(ViewWeights::Learned(&self.attention))?, score(ViewWeights::Equal)?);
         Ok(Validated { score: own, remark: format!("{:+.3} dB against equal weights", own - mean) })
     }
 

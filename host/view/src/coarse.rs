@@ -1,32 +1,16 @@
-//! What makes a picture coarse: a cheaper form of the field, and smaller sources.
+//! What makes a picture coarse beside a cheaper form of the field: smaller sources.
 
 use std::sync::Arc;
 use viewfuse_field::render::{RenderError, RenderOptions, Stage};
-use viewfuse_field::training_free::{Sweep, TrainingFree};
-use viewfuse_field::{AnyField, Renderer, Surfaces};
+use viewfuse_field::{Renderer, Surfaces};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::photographs::{Album, SourceImages};
 
-/// Planes of a frustum.
-const PLANES: u32 = 32;
-/// Longest side at which views are compared, in pixels.
-const MATCH_SIDE: u32 = 80;
 /// Longest side of the sources in the search for the depth range, in pixels.
 const RANGE_SIDE: u32 = 48;
 /// Largest share of the weight that is left out, unless the person leaves out more.
 const LEAVE_OUT: f32 = 0.2;
-
-/// The field for coarse pictures, if the field has a cheaper form. Otherwise its own pictures are made smaller.
-pub(crate) fn cheaper(field: &AnyField) -> Option<AnyField> {
-    let field: &TrainingFree = field.downcast_ref()?;
-    let sweep = Sweep {
-        plane_count: field.sweep.plane_count.min(PLANES),
-        match_side: field.sweep.match_side.min(MATCH_SIDE),
-        ..field.sweep
-    };
-    Some(AnyField::new(TrainingFree { sweep, ..*field }))
-}
 
 /// The options of coarse pictures.
 pub(crate) fn options(options: &RenderOptions) -> RenderOptions {

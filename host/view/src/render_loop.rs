@@ -157,7 +157,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
     let about = field.about();
     let source_side = about.source_side.of(working_side(scene, options, about.longest_side)?);
     let renderer = field.on(device);
-    let cheaper = coarse::cheaper(field);
+    let cheaper = field.preview();
     let coarse_options = coarse::options(options);
     let cheap_renderer = cheaper.as_ref().map(|field| field.on(device));
     stopped((|| {

@@ -8,10 +8,10 @@ const MAX_WARNINGS: usize = 20;
 
 /// What is being done.
 #[derive(Debug, Default)]
-pub(crate) struct Status(Mutex<Shown>);
+pub(crate) struct Status(Mutex<StageStatus>);
 
 #[derive(Clone, Debug, Default, Serialize)]
-struct Shown {
+struct StageStatus {
     /// What is being done; empty while nothing is.
     stage: &'static str,
     done: usize,
@@ -22,7 +22,7 @@ struct Shown {
 
 impl Status {
     /// No work is done while it is held, so it cannot be poisoned.
-    fn shown(&self) -> MutexGuard<'_, Shown> {
+    fn shown(&self) -> MutexGuard<'_, StageStatus> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

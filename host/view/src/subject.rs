@@ -31,9 +31,9 @@ pub(crate) struct Subject {
     /// The world's place in the coordinates of the scene's files.
     origin: [f64; 3],
     scale: f64,
-    sources: Vec<Shown>,
+    sources: Vec<CameraRow>,
     /// The scene's other views.
-    others: Vec<Shown>,
+    others: Vec<CameraRow>,
     schemes: Vec<SchemeRow>,
     scheme: String,
     commands: Commands,
@@ -41,7 +41,7 @@ pub(crate) struct Subject {
 
 /// A camera.
 #[derive(Debug, Serialize)]
-struct Shown {
+struct CameraRow {
     name: String,
     pose: [[f32; 4]; 4],
     lens: Intrinsics,
@@ -118,8 +118,8 @@ impl Subject {
             distance: rig.distance,
             origin: scene.frame.origin.to_array(),
             scale: scene.frame.scale,
-            sources: sources.iter().map(|&view| Shown::of(&scene.views[view])).collect(),
-            others: others.map(|view| Shown::of(&scene.views[view])).collect(),
+            sources: sources.iter().map(|&view| CameraRow::of(&scene.views[view])).collect(),
+            others: others.map(|view| CameraRow::of(&scene.views[view])).collect(),
             schemes: scheme_rows(),
             scheme,
             commands,
@@ -127,9 +127,9 @@ impl Subject {
     }
 }
 
-impl Shown {
-    fn of(view: &View) -> Shown {
-        Shown { name: view.name.clone(), pose: view.camera.pose.to_opencv(), lens: Intrinsics::of(&view.camera) }
+impl CameraRow {
+    fn of(view: &View) -> CameraRow {
+        CameraRow { name: view.name.clone(), pose: view.camera.pose.to_opencv(), lens: Intrinsics::of(&view.camera) }
     }
 }
 

@@ -5,7 +5,6 @@
 
 use super::folders::finished;
 use crate::BINARY;
-use k8s_openapi::api::batch::v1::Job;
 use libtest_mimic::Trial;
 use serde_json::Value;
 use std::fs;
@@ -13,14 +12,14 @@ use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::TempDir;
 use viewfuse_tests::command::done;
+use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::repository;
 use viewfuse_tests::trials::{is_required, needing, trial};
 
 const REQUIRED: &str = "VIEWFUSE_REQUIRE_CLUSTER";
-const PATIENCE: Duration = Duration::from_secs(300);
 /// What the recipes do, made small.
 const SMALL: &str = "--protocol random --trials 4 --targets-per-trial 1 --size 24x24 --device cpu --weights mean";
 
@@ -123,15 +122,13 @@ impl Place {
 
     /// Kills one worker as soon as there is one.
     fn kill_one(&self, is_over: &mut dyn FnMut() -> bool) -> bool {
-        let start = Instant::now();
-        while !is_over() && start.elapsed() < PATIENCE {
-            if let Some(worker) = self.workers().first() {
-                let killed = Command::new("kill").args(["-KILL", &worker.to_string()]).status();
-                return killed.is_ok_and(|status| status.success());
-            }
-            sleep(Duration::from_millis(2));
-        }
-        false
+        let mut worker = None;
+        wait_until("no worker appeared", || {
+            worker = self.workers().first().copied();
+            worker.is_some() || is_over()
+        });
+        let kill = |worker: u32| Command::new("kill").args(["-KILL", &worker.to_string()]).status();
+        worker.is_some_and(|worker| kill(worker).is_ok_and(|status| status.success()))
     }
 }
 
@@ -186,16 +183,13 @@ impl Slurm {
             command.args(["-D", "-f"]).arg(&settings).stdout(Stdio::null()).stderr(log).spawn().expect("a daemon")
         };
         let slurm = Slurm { daemons: vec![daemon("slurmctld"), daemon("slurmd")], settings };
-        let start = Instant::now();
-        while !slurm.asked(place, "sinfo", &["-h", "-o", "%T"]).contains("idle") {
-            assert!(start.elapsed() < PATIENCE, "the node does not come up: {}", folder.display());
-            sleep(Duration::from_millis(100));
-        }
+        wait_until("the node does not come up", || slurm.asked(place, "sinfo", &["-h", "-o", "%T"]).contains("idle"));
         slurm
     }
 
-    /// What a program of Slurm prints.
+    /// What a program of Slurm prints. It is asked again and again: each time a moment later.
     fn asked(&self, place: &Place, program: &str, arguments: &[&str]) -> String {
+        sleep(Duration::from_millis(100));
         let output = place.command(program).args(arguments).env("SLURM_CONF", &self.settings).output().expect("Slurm");
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
@@ -213,11 +207,7 @@ impl Slurm {
 
     /// Waits for a job's end and returns how many of its tasks are in each state.
     fn ended(&self, place: &Place, job: &str) -> [usize; 2] {
-        let start = Instant::now();
-        while !self.is_over(place, job) {
-            assert!(start.elapsed() < PATIENCE, "the job does not end: {}", self.asked(place, "squeue", &[]));
-            sleep(Duration::from_millis(200));
-        }
+        wait_until("the job does not end", || self.is_over(place, job));
         let tasks = self.asked(place, "scontrol", &["show", "job", job]);
         ["JobState=COMPLETED", "JobState=FAILED"].map(|state| tasks.matches(state).count())
     }
@@ -247,49 +237,71 @@ fn slurm_on_one_node() {
     place.assert_whole("runs/slurm", &expected);
 }
 
-/// The keys of a value that another one lacks: what a reader of known fields passed over.
-fn lost(given: &Value, kept: &Value, path: &str, lost_keys: &mut Vec<String>) {
-    match (given, kept) {
-        (Value::Object(given), Value::Object(kept)) => given.iter().for_each(|(key, value)| match kept.get(key) {
-            Some(kept) => lost(value, kept, &format!("{path}.{key}"), lost_keys),
-            None => lost_keys.push(format!("{path}.{key}")),
-        }),
-        (Value::Array(given), Value::Array(kept)) if given.len() == kept.len() => {
-            given.iter().zip(kept).for_each(|(given, kept)| lost(given, kept, path, lost_keys));
-        }
-        _ if given == kept => {}
-        _ => lost_keys.push(path.to_owned()),
+/// The part of Kubernetes' API (`batch/v1`, Job) that the manifest uses, by its reference: no other field is accepted.
+mod kubernetes {
+    use serde::Deserialize;
+
+    macro_rules! objects {
+        ($($Object:ident { $($field:ident: $Type:ty),+ $(,)? })+) => {$(
+            #[derive(Debug, Deserialize)]
+            #[serde(deny_unknown_fields, rename_all = "camelCase")]
+            #[allow(dead_code, reason = "a field that is only required has no reader")]
+            pub(super) struct $Object { $(pub(super) $field: $Type),+ }
+        )+};
+    }
+
+    objects! {
+        Job { api_version: ApiVersion, kind: Kind, metadata: Metadata, spec: JobSpec }
+        Metadata { name: String }
+        JobSpec { completion_mode: String, completions: u32, parallelism: u32, template: Template }
+        Template { spec: PodSpec }
+        PodSpec { restart_policy: String, containers: Vec<Container>, volumes: Vec<Volume> }
+        Container { name: String, image: String, command: Vec<String>, volume_mounts: Vec<Mount> }
+        Volume { name: String, persistent_volume_claim: Claim }
+        Claim { claim_name: String }
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields, rename_all = "camelCase")]
+    #[allow(dead_code, reason = "a field that is only required has no reader")]
+    pub(super) struct Mount {
+        pub(super) name: String,
+        pub(super) mount_path: String,
+        #[serde(default)]
+        read_only: bool,
+    }
+
+    #[derive(Debug, Deserialize)]
+    pub(super) enum ApiVersion {
+        #[serde(rename = "batch/v1")]
+        Batch,
+    }
+
+    #[derive(Debug, Deserialize)]
+    pub(super) enum Kind {
+        Job,
     }
 }
 
-/// A manifest as the API's type, where every field is one that the API knows.
-fn manifest(text: &str) -> Result<Job, String> {
-    let given: Value = serde_norway::from_str(text).map_err(|error| error.to_string())?;
-    let job: Job = serde_json::from_value(given.clone()).map_err(|error| error.to_string())?;
-    let kept = serde_json::to_value(&job).map_err(|error| error.to_string())?;
-    let mut unknown = Vec::new();
-    lost(&given, &kept, "", &mut unknown);
-    if unknown.is_empty() { Ok(job) } else { Err(format!("unknown fields: {unknown:?}")) }
+/// A manifest, where every field is one that the API knows.
+fn manifest(text: &str) -> Result<kubernetes::Job, String> {
+    serde_norway::from_str(text).map_err(|error| error.to_string())
 }
 
 fn the_manifest_is_a_job_of_kubernetes() {
     let text = recipe("# Kubernetes");
     let job = manifest(&text).unwrap_or_else(|error| panic!("{error}"));
-    let spec = job.spec.expect("a spec");
     // What the API's server checks beyond the types.
-    assert_eq!(spec.completion_mode.as_deref(), Some("Indexed"));
-    let pod = spec.template.spec.expect("a pod");
-    assert!(
-        matches!(pod.restart_policy.as_deref(), Some("OnFailure" | "Never")),
-        "a Job's pods are not always restarted"
-    );
+    assert_eq!(job.spec.completion_mode, "Indexed");
+    let pod = job.spec.template.spec;
+    assert!(["OnFailure", "Never"].contains(&pod.restart_policy.as_str()), "a Job's pods are not always restarted");
     let container = &pod.containers[0];
-    let command = container.command.as_ref().expect("a command").join(" ");
-    let count = spec.completions.expect("how many shards");
+    let command = container.command.join(" ");
+    let count = job.spec.completions;
     assert!(command.contains(&format!("--shard \"$JOB_COMPLETION_INDEX/{count}\"")), "{command}");
-    let volumes: Vec<String> = pod.volumes.unwrap_or_default().into_iter().map(|volume| volume.name).collect();
-    let mounts = container.volume_mounts.as_ref().expect("mounts");
-    assert!(mounts.iter().all(|mount| volumes.contains(&mount.name)) && mounts.len() == 2, "{volumes:?}");
+    let volumes: Vec<&str> = pod.volumes.iter().map(|volume| volume.name.as_str()).collect();
+    let mounts = &container.volume_mounts;
+    assert!(mounts.iter().all(|mount| volumes.contains(&mount.name.as_str())) && mounts.len() == 2, "{volumes:?}");
     assert!(mounts.iter().all(|mount| command.contains(&mount.mount_path)), "{command}");
 }
 

@@ -4,12 +4,9 @@ use crate::BINARY;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::Stdio;
-use std::thread::sleep;
-use std::time::{Duration, Instant};
 use viewfuse_core::attention::POSE_FEATURES;
 use viewfuse_tests::command::{
-    Outcome, assert_refused, assert_wrong_arguments, command, done, f32_bytes, names_in, run, safetensors, toy,
+    Outcome, assert_refused, assert_wrong_arguments, done, f32_bytes, killed_when, names_in, run, safetensors, toy,
 };
 
 viewfuse_tests::trials![
@@ -105,16 +102,8 @@ fn a_killed_run_ends_in_the_same_numbers() {
     let line_count = || fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
     let mut kept = Vec::new();
     for kill in 1..=3 {
-        let mut child = command(BINARY, folder, &format!("{run} -o killed"));
-        let mut child = child.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
-        let (start, least) = (Instant::now(), line_count() + 2);
-        while line_count() < least {
-            assert!(child.try_wait().expect("a process").is_none(), "it ended before it could be killed");
-            assert!(start.elapsed() < Duration::from_secs(120), "nothing appeared");
-            sleep(Duration::from_millis(1));
-        }
-        child.kill().expect("a process to end");
-        child.wait().expect("an end");
+        let least = line_count() + 2;
+        killed_when(BINARY, folder, &format!("{run} -o killed"), || line_count() >= least);
         let text = fs::read(&journal).expect("a journal");
         assert!(text.starts_with(&kept), "kill {kill} changed what was done");
         kept = text[..=text.iter().rposition(|byte| *byte == b'\n').expect("a line")].to_vec();

@@ -10,8 +10,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread::{sleep, spawn};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
-
-const PATIENCE: Duration = Duration::from_secs(120);
+use viewfuse_tests::patience::PATIENCE;
 
 /// A running browser.
 pub(super) struct Chromium {
@@ -60,10 +59,6 @@ impl Chromium {
             }
         });
         Chromium { process, input, messages, events: RefCell::default(), calls: Cell::new(0), profile }
-    }
-
-    pub(super) fn id(&self) -> u32 {
-        self.process.id()
     }
 
     /// A folder of its own, for downloads.
@@ -154,24 +149,13 @@ impl Tab<'_> {
     /// Waits until an expression is true.
     #[track_caller]
     pub(super) fn wait_for(&self, expression: &str) {
-        self.wait(expression, Duration::from_millis(20));
-    }
-
-    /// The same for what is timed: looks more often.
-    #[track_caller]
-    pub(super) fn wait_often_for(&self, expression: &str) {
-        self.wait(expression, Duration::from_millis(5));
-    }
-
-    #[track_caller]
-    fn wait(&self, expression: &str, pause: Duration) {
         let start = Instant::now();
         while self.evaluate(&format!("Boolean({expression})")) != true {
             if start.elapsed() > PATIENCE {
                 let text = self.evaluate("document.body ? document.body.innerText : ''");
                 panic!("{expression} does not become true: {text}");
             }
-            sleep(pause);
+            sleep(Duration::from_millis(20));
         }
     }
 

@@ -3,16 +3,17 @@
 use super::super::browser::{self, Browser, InBrowser};
 use super::super::{assert_near, numbers};
 use super::devtools::{Chromium, Tab};
-use super::program::request;
 use super::{COARSE, COUNT, NOTE_COARSE, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
 use serde_json::json;
 use std::fs;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use viewfuse_tests::command::names_in;
+use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
+use viewfuse_tests::viewer::request;
 
 pub(super) fn trials() -> [Trial; 4] {
     let tests: [(&str, InBrowser); 4] = [
@@ -212,11 +213,7 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     let folder = Folder::new();
     tab.evaluate("document.getElementById('save').click()");
     let saved = chromium.folder().join("saved/view.json");
-    let start = Instant::now();
-    while !saved.exists() || names_in(saved.parent().expect("a folder")).len() != 1 {
-        assert!(start.elapsed() < Duration::from_secs(60), "nothing is saved");
-        std::thread::sleep(Duration::from_millis(20));
-    }
+    wait_until("nothing is saved", || saved.exists() && names_in(saved.parent().expect("a folder")).len() == 1);
     // With a photograph beside it, it is a scene of one view.
     fs::copy(&saved, folder.file("transforms.json")).expect("a copy");
     RgbImage::new(96, 72).save(folder.file("view.png")).expect("a picture");

@@ -1,8 +1,7 @@
 //! The server by requests alone: who may ask, what is answered, and that it ends.
 
 use super::super::{BINARY, assert_near, numbers};
-use super::program::{Program, request};
-use super::{done_with_warnings, room};
+use super::{done_with_warnings, room, start};
 use libtest_mimic::Trial;
 use serde_json::json;
 use std::time::Duration;
@@ -11,6 +10,7 @@ use viewfuse_tests::devices::vulkan_devices;
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::{is_required, needing, trial};
+use viewfuse_tests::viewer::{Program, request};
 
 pub(super) fn trials() -> Vec<Trial> {
     let has_vulkan = vulkan_devices().is_ok_and(|(_, adapters)| adapters.iter().any(|own| own.missing.is_empty()));
@@ -30,7 +30,7 @@ pub(super) fn trials() -> Vec<Trial> {
 }
 
 fn other_hosts_and_addresses_get_nothing() {
-    let program = Program::start(&repository(), &format!("{} --size 24x24", data("toy").display()));
+    let program = start(&repository(), &format!("{} --size 24x24", data("toy").display()));
     let own = ("Host", program.host.as_str());
     let status = |method: &str, path: &str, headers: &[(&str, &str)], body: &[u8]| {
         program.connect().ask(method, path, headers, body).status
@@ -78,7 +78,7 @@ fn full_pictures_are_those_of_render() {
             format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
         done_with_warnings(folder.path(), &arguments);
     }
-    let program = Program::start(folder.path(), &format!("{} {options}", scene.display()));
+    let program = start(folder.path(), &format!("{} {options}", scene.display()));
     let found = program.scene();
     let others = found["others"].as_array().expect("other views");
     let pose = &others.iter().find(|view| view["name"] == "005").expect("view 005")["pose"];
@@ -105,7 +105,7 @@ fn full_pictures_are_those_of_render() {
 fn the_scheme_can_be_chosen_for_the_scene() {
     let folder = toy();
     let options = "--sources 000000..000011 --size 48x48";
-    let program = Program::start(folder.path(), &format!("toy {options} --weights auto"));
+    let program = start(folder.path(), &format!("toy {options} --weights auto"));
     let found = program.scene();
     let pose = &found["others"][8]["pose"];
     assert_eq!(found["others"][8]["name"], "000020");
@@ -129,7 +129,7 @@ fn the_scheme_can_be_chosen_for_the_scene() {
 fn a_vulkan_device_shows_the_same() {
     let folder = toy();
     let pictures = ["cpu", "vulkan"].map(|device| {
-        let program = Program::start_on(device, folder.path(), "toy --sources 0..3 --size 32x32");
+        let program = Program::start(BINARY, device, folder.path(), "toy --sources 0..3 --size 32x32");
         let found = program.scene();
         assert_eq!(found["device"].as_str().is_some_and(|name| name.starts_with("cpu")), device == "cpu", "{found}");
         let mut connection = program.connect();
@@ -171,7 +171,7 @@ fn the_newest_request_wins() {
 /// Browsers open several connections at once and keep them.
 fn many_connections_at_once_are_answered() {
     let folder = toy();
-    let program = Program::start(folder.path(), "toy --size 24x24");
+    let program = start(folder.path(), "toy --size 24x24");
     let path = format!("{}status", program.path);
     let mut connections = Vec::new();
     for _ in 0..10 {
@@ -187,7 +187,7 @@ fn many_connections_at_once_are_answered() {
 fn ctrl_c_ends_it_and_nothing_is_written() {
     let folder = toy();
     let before = files_below(folder.path());
-    let mut program = Program::start(folder.path(), "toy --size 48x48");
+    let mut program = start(folder.path(), "toy --size 48x48");
     let start = program.scene()["start"].clone();
     program.connect().picture(&request("a", &start, true)).unpacked();
     // In the middle of a full picture.
@@ -215,7 +215,7 @@ fn learned_fields_are_shown() {
         [("formula:8 --samples 16,4,4", json!(["depth"])), ("genvs:small --steps 2 --samples 8", json!([]))]
     {
         let arguments = format!("toy --sources 000000,000008,000016 --size 32x32 --model {model}");
-        let program = Program::start(folder.path(), &arguments);
+        let program = start(folder.path(), &arguments);
         let start = program.scene()["start"].clone();
         let mut connection = program.connect();
         let (coarse, picture) = connection.picture(&request("a", &start, true)).unpacked();

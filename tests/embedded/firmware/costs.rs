@@ -1,5 +1,5 @@
-//! What calls take on each board: instructions, stack and code, counted in the emulators' traces, and the tables of core's
-//! README, which this test writes with `VIEWFUSE_WRITE_TABLES=1` and compares otherwise.
+//! What calls take on each board: instructions, stack and code, counted in the emulators' traces, and the tables of
+//! `host/research/results/firmware.md`, which this test writes with `VIEWFUSE_WRITE_TABLES=1` and compares otherwise.
 
 use super::{Firmware, PROFILES};
 use libtest_mimic::Failed;
@@ -99,8 +99,8 @@ pub(super) fn what_the_calls_take(boards: &[Arc<Firmware>]) -> Result<(), Failed
 
     let processors: Vec<&str> = boards.iter().map(|board| board.board.processor).collect();
     let columns = processors.iter().map(|name| format!(" {name}: instructions | stack | code |")).collect::<String>();
-    the_readme_says_so(&format!("| for size |{columns}"), &three, is_small)?;
-    the_readme_says_so(&format!("| for speed | {}: instructions | stack |", processors[0]), &speed, is_small)
+    the_results_say_so(&format!("| for size |{columns}"), &three, is_small)?;
+    the_results_say_so(&format!("| for speed | {}: instructions | stack |", processors[0]), &speed, is_small)
 }
 
 /// The limits of the first board.
@@ -130,20 +130,20 @@ fn markdown(heading: &str, rows: &[Row]) -> String {
     [format!("{heading}\n"), line].into_iter().chain(rows.iter().map(row)).collect()
 }
 
-fn readme() -> PathBuf {
-    repository().join("core/README.md")
+fn results() -> PathBuf {
+    repository().join("host/research/results/firmware.md")
 }
 
-/// The table of core's README with this heading is this one, to a fifth: another compiler gives a few instructions more or
+/// The table of the results with this heading is this one, to a fifth: another compiler gives a few instructions more or
 /// less. The code (every third number) is as small as it says only where Rust's library is compiled for size as well.
-fn the_readme_says_so(heading: &str, rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
+fn the_results_say_so(heading: &str, rows: &[Row], library_is_small: bool) -> Result<(), Failed> {
     let table = markdown(heading, rows);
     println!("\n{table}");
-    let text = std::fs::read_to_string(readme())?;
+    let text = std::fs::read_to_string(results())?;
     let (before, behind) = text.split_once(&format!("{heading}\n")).ok_or_else(|| format!("no table {heading}"))?;
     let (old, rest) = behind.split_once("\n\n").ok_or("the table does not end")?;
     if std::env::var("VIEWFUSE_WRITE_TABLES").is_ok_and(|value| value == "1") {
-        std::fs::write(readme(), [before, table.trim_end(), "\n\n", rest].concat())?;
+        std::fs::write(results(), [before, table.trim_end(), "\n\n", rest].concat())?;
         return Ok(());
     }
     let lines: Vec<&str> = old.lines().skip(1).collect();

@@ -4,11 +4,13 @@ use super::{
     assert_sound, exact, largest_difference, leaving_out, made, picture_with, recorded, sources, target, weights,
     without_denoiser,
 };
+use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::genvs::reference::Reference;
 use viewfuse::field::genvs::sampling::{Plan, Steps};
 use viewfuse::field::genvs::{GenvsOptions, Omissions};
-use viewfuse::field::{LeftOut, On, Session};
+use viewfuse::field::render::{RenderOptions, Stage};
+use viewfuse::field::{LeftOut, On};
 use viewfuse::job::progress::Silent;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sampler::Sampler;
@@ -57,10 +59,12 @@ fn rows_that_no_ray_reaches_are_not_computed() {
     let with = |omissions| {
         let field = without_denoiser(leaving_out(omissions));
         let renderer = On { device: &Cpu, field: &field };
-        let mut session = Session::open(&renderer, &sources, &quiet).expect("sources on the device");
+        let options = RenderOptions::default();
+        let mut stage =
+            Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet).expect("sources on the device");
         let render = |target: &Camera| {
-            let picture = session.render(target, &Weights::mean(3), 0.0, &quiet);
-            (picture.expect("a picture"), line(&session.record(), "volume rows").left_out)
+            let picture = stage.picture(target, &Weights::mean(3), 0.0, &quiet);
+            (picture.expect("a picture"), line(&stage.record(), "volume rows").left_out)
         };
         targets.iter().map(render).collect::<Vec<_>>()
     };
@@ -89,13 +93,15 @@ fn an_earlier_frame_saves_calls() {
         let options = GenvsOptions { omissions: Omissions { reuse, ..Omissions::NONE }, ..exact() };
         let field = made(GenvsOptions { plan: Plan { early_termination: None, ..in_18_calls() }, ..options });
         let renderer = On { device: &Cpu, field: &field };
-        let mut session = Session::open(&renderer, &sources, &quiet).expect("sources on the device");
-        let mut render = |camera| session.render(camera, &Weights::mean(2), 0.0, &quiet);
+        let options = RenderOptions::default();
+        let mut stage =
+            Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet).expect("sources on the device");
+        let mut render = |camera| stage.picture(camera, &Weights::mean(2), 0.0, &quiet);
         let frames = cameras.each_ref().map(|camera| render(camera).expect("a picture"));
         // A frame of another size begins anew.
         let smaller = render(&target(8)).expect("a picture");
         assert_sound(&smaller);
-        (frames, line(&session.record(), "denoiser calls"))
+        (frames, line(&stage.record(), "denoiser calls"))
     };
     let (whole, all) = frames(None);
     assert_eq!((all.left_out, all.of, all.switch), (0, 3 * 18, false));

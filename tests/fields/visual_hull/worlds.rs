@@ -1,9 +1,11 @@
 //! Views of synthetic objects in memory, and the field run on them from end to end.
 
 use image::RgbaImage;
+use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
+use viewfuse::field::render::{RenderOptions, Stage};
 use viewfuse::field::training_free::TrainingFree;
-use viewfuse::field::{FieldError, On, Rendered, Session};
+use viewfuse::field::{FieldError, On, Rendered};
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::photographs::{SourceImage, SourceImages};
 use viewfuse::synthetic::toy::{lorry, training_cameras};
@@ -38,12 +40,13 @@ impl Run {
         let quiet = Silent;
         let weighting = Weighting::open(self.scheme).expect("a scheme");
         let renderer = On { device: &Cpu, field: &self.field };
-        let mut session = Session::open(&renderer, sources, &quiet)?;
-        session.weigh(&relevance(sources, &weighting), &quiet)?;
+        let options = RenderOptions::default();
+        let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &quiet)?;
+        stage.weigh_by(&relevance(sources, &weighting), &quiet)?;
         let all: Vec<_> = sources.images.iter().map(|image| image.camera.pose).collect();
         let all = Sources::<MAX_SOURCES>::new(&all).expect("sources");
         let weights = weighting.weigh(&all, &target.pose);
-        session.render(target, &weights, self.early_termination, &quiet)
+        stage.picture(target, &weights, self.early_termination, &quiet)
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use viewfuse::scene::reader::{
     ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader, number_lines, read_text,
 };
-use viewfuse::scene::{Place, SceneError};
+use viewfuse::scene::{FaultLocation, SceneError};
 
 /// `cameras.list`: of `photograph_0.png` and so on a line each, the focal length, then the pose's upper three rows.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ impl Reader for Lines {
 }
 
 fn view(list: &Path, index: usize, line: usize, numbers: &[f64]) -> Result<RawView, SceneError> {
-    let (path, place) = (list.to_path_buf(), Place::Line(line));
+    let (path, place) = (list.to_path_buf(), FaultLocation::Line(line));
     let Ok([focal, pose @ ..]) = <[f64; 13]>::try_from(numbers) else {
         return Err(SceneError::WrongCount { path, place, of: "numbers", expected: 13, found: numbers.len() });
     };

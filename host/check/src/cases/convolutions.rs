@@ -2,17 +2,9 @@
 //! some of the channels of wider images, every parameter of a convolution. Behind the inputs there is NaN, and beside the
 //! outputs no number may change.
 
-use super::linear::{Counts, Job, Linear, LoadedJob, read, spoil};
-use crate::agreement::Limits;
-use crate::bounded::Bounded;
-use crate::case::{Case, Spoiler};
-use crate::network_oracle;
-use crate::poses::{Random, random};
-use viewfuse_device::Device;
-use viewfuse_device::DeviceError;
-use viewfuse_kernels::network::convolve::ConvolveBlock;
-use viewfuse_kernels::network::transpose::TransposedBlock;
-use viewfuse_vulkan::kernel::{Kernel, tile_elements};
+use super::linear::{Counts, LayerArrays, expected};
+use super::*;
+use crate::network_oracle::{self, LayerInputs};
 
 /// A layer of convolutions.
 #[derive(Clone, Copy)]
@@ -71,31 +63,24 @@ fn place(index: usize, first: u32, pitch: u32, channels: u32) -> Option<[usize; 
     (channel < channels as usize).then_some([pixel, channel])
 }
 
-/// See the module.
-pub enum Convolve {}
-
 impl Case for Convolve {
-    const KERNEL: Kernel = Kernel::Convolve;
     // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = true;
     const LIMITS: Limits = Limits { tolerance: 1.0e-2, least: 1.0e-2 };
     const REASON: &'static str = "n units (2^-24) of the sum of magnitudes of n summands, in whatever order; of layers for \
         large images channels + 14 units of the magnitudes in Winograd's transforms, whose factors come to about 10^2";
-    const SPOILERS: &'static [Spoiler<Vec<Job<ConvolveBlock>>>] = &[
-        ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
-        ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
-        ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
-        ("residual", |jobs| spoil(jobs, |job| job.residual.as_deref_mut().unwrap_or_default())),
-        ("parameters", |jobs| jobs.iter_mut().for_each(|job| job.block.scale *= 1.01)),
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
+        ("inputs", |own| increase(&mut own.inputs)),
+        ("weights", |own| increase(&mut own.weights.values)),
+        ("bias", |own| increase(&mut own.bias)),
+        ("residual", |own| increase(own.residual.iter_mut().flatten())),
+        ("parameters", |own| own.block.scale *= 1.01),
     ];
 
-    type Inputs = Vec<Job<ConvolveBlock>>;
-    type Loaded<D: Device> = Vec<LoadedJob<D>>;
-
-    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+    fn inputs(seed: u64, size: u32) -> Vec<Convolve> {
         let random = &mut random(18, seed, size);
-        let job = |(index, window): (usize, Window)| {
+        let dispatch = |(index, window): (usize, Window)| {
             let Window { size: side, stride, padding, dilation, enlarge, channels, is_part, is_wide } = window;
             let [in_channels, out_channels] = channels;
             // About as many output numbers as requested; the window is never larger than image and border.
@@ -141,67 +126,43 @@ impl Case for Convolve {
                 bias: out_channels as usize,
                 residual: (flags >> 1 & 1 == 1).then_some(residual_count as usize),
                 outputs: (block.pixel_count() * block.out_pitch) as usize,
+                has_wide_images: is_wide,
             };
-            Job { has_wide_images: is_wide, ..Job::new(random, block, counts) }
+            let LayerArrays { inputs, weights, bias, residual, outputs } = LayerArrays::new(random, counts);
+            Convolve { block, inputs, weights, bias, residual, outputs }
         };
-        WINDOWS.into_iter().enumerate().map(job).collect()
+        WINDOWS.into_iter().enumerate().map(dispatch).collect()
     }
 
-    fn element_count(jobs: &Self::Inputs) -> usize {
-        jobs.iter().map(|job| tile_elements(job.block.pixel_count(), job.block.out_channels) as usize).sum()
-    }
-
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
-        jobs.iter().map(|job| job.load(device, job.block.out_channels)).collect()
-    }
-
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, residual, outputs })| {
-            device.convolve(&job.block, inputs, &layer.weights, &layer.bias, residual.as_ref(), outputs)
-        })
-    }
-
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
-        read(device, loaded)
-    }
-
-    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
-        let outputs = |job: &Job<ConvolveBlock>| {
-            let block = &job.block;
-            job.expected(|layer, index| {
-                let [pixel, channel] = place(index, block.out_first, block.out_pitch, block.out_channels)?;
-                Some(match job.has_wide_images {
-                    true => network_oracle::convolve_wide(layer, block, pixel, channel),
-                    false => network_oracle::convolve(layer, block, pixel, channel),
-                })
+    fn expected(&self) -> Vec<Option<Bounded>> {
+        let Convolve { block, inputs, weights: LayerWeights { shape, values: weights }, bias, residual, outputs } =
+            self;
+        let layer = LayerInputs { inputs, weights, bias, residual: residual.as_deref() };
+        expected(outputs, |index| {
+            let [pixel, channel] = place(index, block.out_first, block.out_pitch, block.out_channels)?;
+            Some(match shape.has_wide_images {
+                true => network_oracle::convolve_wide(&layer, block, pixel, channel),
+                false => network_oracle::convolve(&layer, block, pixel, channel),
             })
-        };
-        jobs.iter().flat_map(outputs).collect()
+        })
     }
 }
 
-/// See the module.
-pub enum ConvolveTransposed {}
-
 impl Case for ConvolveTransposed {
-    const KERNEL: Kernel = Kernel::ConvolveTransposed;
     // As many as give every shape every combination of residual and rectification.
     const SEED_COUNT: u64 = 8;
     const HAS_REAL_PARAMETERS: bool = false;
     const LIMITS: Limits = Limits { tolerance: 5.0e-4, least: 1.0e-2 };
     const REASON: &'static str = Linear::REASON;
-    const SPOILERS: &'static [Spoiler<Vec<Job<TransposedBlock>>>] = &[
-        ("inputs", |jobs| spoil(jobs, |job| &mut job.inputs)),
-        ("weights", |jobs| spoil(jobs, |job| &mut job.weights)),
-        ("bias", |jobs| spoil(jobs, |job| &mut job.bias)),
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] = &[
+        ("inputs", |own| increase(&mut own.inputs)),
+        ("weights", |own| increase(&mut own.weights.values)),
+        ("bias", |own| increase(&mut own.bias)),
     ];
 
-    type Inputs = Vec<Job<TransposedBlock>>;
-    type Loaded<D: Device> = Vec<LoadedJob<D>>;
-
-    fn inputs(seed: u64, size: u32) -> Self::Inputs {
+    fn inputs(seed: u64, size: u32) -> Vec<ConvolveTransposed> {
         let random = &mut random(21, seed, size);
-        let job = |(index, [size_of_square, in_channels, out_channels, part]): (usize, [u32; 4])| {
+        let dispatch = |(index, [size_of_square, in_channels, out_channels, part]): (usize, [u32; 4])| {
             let pixel_count = f64::from(size) / f64::from(size_of_square * size_of_square * out_channels);
             let in_width = pixel_count.sqrt() as u32 + 1 + random.below(3) as u32;
             let in_height = (pixel_count / f64::from(in_width)) as u32 + 1 + random.below(3) as u32;
@@ -226,44 +187,26 @@ impl Case for ConvolveTransposed {
                 bias: out_channels as usize,
                 residual: None,
                 outputs: (out_pixels * block.out_pitch) as usize,
+                has_wide_images: false,
             };
-            Job::new(random, block, counts)
+            let LayerArrays { inputs, weights, bias, outputs, .. } = LayerArrays::new(random, counts);
+            ConvolveTransposed { block, inputs, weights, bias, outputs }
         };
         // Side of the square, channels, whether images are parts of wider ones.
         [[2, 5, 3, 0], [2, 64, 17, 1], [1, 3, 70, 0], [3, 130, 8, 1], [2, 1, 1, 0]]
             .into_iter()
             .enumerate()
-            .map(job)
+            .map(dispatch)
             .collect()
     }
 
-    fn element_count(jobs: &Self::Inputs) -> usize {
-        jobs.iter().map(|job| tile_elements(job.block.pixel_count(), job.block.column_count()) as usize).sum()
-    }
-
-    fn load<D: Device>(device: &D, jobs: &Self::Inputs) -> Result<Self::Loaded<D>, DeviceError> {
-        jobs.iter().map(|job| job.load(device, job.block.column_count())).collect()
-    }
-
-    fn run<D: Device>(device: &D, jobs: &Self::Inputs, loaded: &mut Self::Loaded<D>) -> Result<(), DeviceError> {
-        jobs.iter().zip(loaded).try_for_each(|(job, LoadedJob { inputs, layer, outputs, .. })| {
-            device.convolve_transposed(&job.block, inputs, &layer.weights, &layer.bias, outputs)
+    fn expected(&self) -> Vec<Option<Bounded>> {
+        let ConvolveTransposed { block, inputs, weights, bias, outputs } = self;
+        let layer = LayerInputs { inputs, weights: &weights.values, bias, residual: None };
+        let out_width = (block.in_width * block.size) as usize;
+        expected(outputs, |index| {
+            let [pixel, channel] = place(index, block.out_first, block.out_pitch, block.out_channels)?;
+            Some(network_oracle::transposed(&layer, block, [pixel / out_width, pixel % out_width], channel))
         })
-    }
-
-    fn read<D: Device>(device: &D, loaded: &Self::Loaded<D>) -> Result<Vec<f32>, DeviceError> {
-        read(device, loaded)
-    }
-
-    fn expected(jobs: &Self::Inputs) -> Vec<Option<Bounded>> {
-        let outputs = |job: &Job<TransposedBlock>| {
-            let block = &job.block;
-            job.expected(|layer, index| {
-                let [pixel, channel] = place(index, block.out_first, block.out_pitch, block.out_channels)?;
-                let out_width = (block.in_width * block.size) as usize;
-                Some(network_oracle::transposed(layer, block, [pixel / out_width, pixel % out_width], channel))
-            })
-        };
-        jobs.iter().flat_map(outputs).collect()
     }
 }

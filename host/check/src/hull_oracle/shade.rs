@@ -1,6 +1,8 @@
 //! Occupancy and colour at a point, and a ray through them.
 
-use super::{NOWHERE, Scene, Seen, Vector, along, centre, interval, look_up, project, radius, tents, towards};
+use super::{
+    BoundedProjection, NOWHERE, Scene, Vector, along, centre, interval, look_up, project, radius, tents, towards,
+};
 use crate::bounded::{Bounded, ROUNDING};
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_kernels::visual_hull::NO_SURFACE;
@@ -69,7 +71,7 @@ pub fn depth_at(camera: &CameraBlock, depths: &[f32], x: Bounded, y: Bounded, ju
 }
 
 /// Views by index, with the projection of a point and their depth and colour there.
-type Witnesses = Vec<(usize, Seen, [Bounded; 4])>;
+type Witnesses = Vec<(usize, BoundedProjection, [Bounded; 4])>;
 
 /// The views that contain a point, and the least alpha over all views that have it in front of them; the inner `None` if it
 /// projects to the background of one of them.

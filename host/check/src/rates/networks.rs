@@ -2,16 +2,16 @@
 //! look-ups in its grids, fusion, compositing; a convolution and an attention's product of a GeNVS.
 
 use super::Work;
+use crate::dispatch::*;
 use crate::poses::{numbers, random};
-use crate::sights::{camera, point};
+use crate::ray_inputs::{camera, point};
 use viewfuse_core::composite::CompositeBlock;
 use viewfuse_core::fuse::FuseBlock;
-use viewfuse_device::{Device, DeviceError, Layer, LayerShape};
+use viewfuse_device::{Device, DeviceError, LayerShape};
 use viewfuse_kernels::network::attend::MatrixBlock;
 use viewfuse_kernels::network::convolve::ConvolveBlock;
 use viewfuse_kernels::network::linear::LinearBlock;
 use viewfuse_kernels::pixelnerf::GatherBlock;
-use viewfuse_vulkan::kernel::Kernel;
 
 const F32: f64 = size_of::<f32>() as f64;
 
@@ -36,18 +36,18 @@ fn values(seed: u64, count: usize) -> Vec<f32> {
 fn linear<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceError> {
     let [row_count, inner_count, column_count] = sizes;
     let [rows, inner, columns] = sizes.map(|size| size as usize);
-    let block = LinearBlock { row_count, inner_count, column_count, relu_inputs: 1, ..LinearBlock::default() };
     let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: false };
-    let layer = Layer::new(device, &shape, &values(1, inner * columns), &values(2, columns))?;
-    let inputs = device.upload(&values(3, rows * inner))?;
-    let mut outputs = device.zeros::<f32>(rows * columns)?;
-    Ok(Work {
-        kernel: Kernel::Linear,
-        size: format!("{row_count}x{inner_count}x{column_count}"),
-        operations: Some(2.0 * (rows * inner * columns) as f64),
-        bytes: F32 * (rows * inner + inner * columns + rows * columns) as f64,
-        run: Box::new(move || device.linear(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs)),
-    })
+    let linear = Linear {
+        block: LinearBlock { row_count, inner_count, column_count, relu_inputs: 1, ..LinearBlock::default() },
+        weights: LayerWeights { shape, values: values(1, inner * columns) },
+        bias: values(2, columns),
+        inputs: values(3, rows * inner),
+        residual: None,
+        outputs: Output::Zeros(rows * columns),
+    };
+    let size = format!("{row_count}x{inner_count}x{column_count}");
+    let bytes = F32 * (rows * inner + inner * columns + rows * columns) as f64;
+    Work::new(device, linear, size, Some(2.0 * (rows * inner * columns) as f64), bytes)
 }
 
 fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>, DeviceError> {
@@ -71,17 +71,18 @@ fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>,
     let (inner, columns) = (block.patch_len() as usize, channels as usize);
     let image = (side * side * channels) as usize;
     let shape = LayerShape { inner_count: inner, column_count: columns, has_wide_images: side >= 32 };
-    let layer = Layer::new(device, &shape, &values(4, inner * columns), &values(5, columns))?;
-    let inputs = device.upload(&values(6, image))?;
-    let mut outputs = device.zeros::<f32>(image)?;
-    Ok(Work {
-        kernel: Kernel::Convolve,
-        size: format!("{side}x{side}, {channels} channels, 3x3"),
-        // Of the definition: an algorithm with fewer products may have a share above 1.
-        operations: Some(2.0 * (image * inner) as f64),
-        bytes: F32 * (2 * image + inner * columns) as f64,
-        run: Box::new(move || device.convolve(&block, &inputs, &layer.weights, &layer.bias, None, &mut outputs)),
-    })
+    let convolve = Convolve {
+        block,
+        weights: LayerWeights { shape, values: values(4, inner * columns) },
+        bias: values(5, columns),
+        inputs: values(6, image),
+        residual: None,
+        outputs: Output::Zeros(image),
+    };
+    let size = format!("{side}x{side}, {channels} channels, 3x3");
+    // Of the definition: an algorithm with fewer products may have a share above 1.
+    let operations = 2.0 * (image * inner) as f64;
+    Work::new(device, convolve, size, Some(operations), F32 * (2 * image + inner * columns) as f64)
 }
 
 fn matrix_product<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceError> {
@@ -98,15 +99,11 @@ fn matrix_product<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, De
         scale: 0.125,
         ..MatrixBlock::default()
     };
-    let (left, right) = (device.upload(&values(7, rows * inner))?, device.upload(&values(8, inner * columns))?);
-    let mut outputs = device.zeros::<f32>(rows * columns)?;
-    Ok(Work {
-        kernel: Kernel::MatrixProduct,
-        size: format!("{row_count}x{inner_count}x{column_count}"),
-        operations: Some(2.0 * (rows * inner * columns) as f64),
-        bytes: F32 * (rows * inner + inner * columns + rows * columns) as f64,
-        run: Box::new(move || device.matrix_product(&block, &left, &right, &mut outputs)),
-    })
+    let (left, right) = (values(7, rows * inner), values(8, inner * columns));
+    let product = MatrixProduct { block, left, right, outputs: Output::Zeros(rows * columns) };
+    let size = format!("{row_count}x{inner_count}x{column_count}");
+    let bytes = F32 * (rows * inner + inner * columns + rows * columns) as f64;
+    Work::new(device, product, size, Some(2.0 * (rows * inner * columns) as f64), bytes)
 }
 
 fn gather<D: Device>(device: &D, point_count: u32, channels: u32, side: u32) -> Result<Work<'_>, DeviceError> {
@@ -122,47 +119,39 @@ fn gather<D: Device>(device: &D, point_count: u32, channels: u32, side: u32) -> 
         ..GatherBlock::default()
     };
     let (count, nodes) = ((point_count * channels) as usize, (side * side * channels) as usize);
-    let (views, points) = (device.upload(&views)?, device.upload(&points)?);
-    let (grid, residual) = (device.upload(&values(9, nodes))?, device.upload(&values(10, count))?);
-    let mut gathered = device.zeros::<f32>(count)?;
-    Ok(Work {
-        kernel: Kernel::GatherLatents,
-        size: format!("{point_count} points, {channels} channels of {side}x{side}"),
-        operations: None,
-        bytes: F32 * (2 * count + nodes) as f64 + 32.0 * f64::from(point_count),
-        run: Box::new(move || device.gather_latents(&block, &views, &points, &grid, Some(&residual), &mut gathered)),
-    })
+    let (grid, residual) = (values(9, nodes), Some(values(10, count)));
+    let gather = GatherLatents { block, views, points, grid, residual, gathered: Output::Zeros(count) };
+    let size = format!("{point_count} points, {channels} channels of {side}x{side}");
+    Work::new(device, gather, size, None, F32 * (2 * count + nodes) as f64 + 32.0 * f64::from(point_count))
 }
 
 fn fuse<D: Device>(device: &D, view_count: u32, point_count: u32, channel_count: u32) -> Result<Work<'_>, DeviceError> {
     let count = point_count * channel_count;
     let block = FuseBlock { view_count, stride: count, channel_count, weight_stride: view_count };
-    let weights = device.upload(&values(11, (point_count * view_count) as usize))?;
-    let latents = device.upload(&values(12, (view_count * count) as usize))?;
-    let mut fused = device.zeros::<f32>(count as usize)?;
-    Ok(Work {
-        kernel: Kernel::FuseViews,
-        size: format!("{view_count} views, {point_count} points, {channel_count} channels"),
-        operations: Some(2.0 * f64::from(view_count * count)),
-        bytes: F32 * f64::from((view_count + 1) * count + point_count * view_count),
-        run: Box::new(move || device.fuse_views(&block, count, &weights, &latents, &mut fused)),
-    })
+    let fuse = FuseViews {
+        block,
+        element_count: count,
+        weights: values(11, (point_count * view_count) as usize),
+        latents: values(12, (view_count * count) as usize),
+        fused: Output::Zeros(count as usize),
+    };
+    let size = format!("{view_count} views, {point_count} points, {channel_count} channels");
+    let bytes = F32 * f64::from((view_count + 1) * count + point_count * view_count);
+    Work::new(device, fuse, size, Some(2.0 * f64::from(view_count * count)), bytes)
 }
 
 fn composite<D: Device>(device: &D, ray_count: u32, sample_count: u32) -> Result<Work<'_>, DeviceError> {
     let block = CompositeBlock { background: [1.0; 3], empty_depth: 2.0, sample_count };
     let count = (ray_count * sample_count) as usize;
     let random = &mut random(92, 1, 1);
-    let samples: Vec<[f32; 4]> = (0..count).map(|_| [0; 4].map(|_| 0.1 * random.unit() as f32)).collect();
-    let depths: Vec<f32> = (0..count as u32).map(|at| 1.0 + (at % sample_count) as f32 / sample_count as f32).collect();
-    let (samples, depths) = (device.upload(&samples)?, device.upload(&depths)?);
-    let (mut colours, mut pixel_depths) =
-        (device.zeros::<[f32; 4]>(ray_count as usize)?, device.zeros::<f32>(ray_count as usize)?);
-    Ok(Work {
-        kernel: Kernel::Composite,
-        size: format!("{ray_count} rays, {sample_count} samples"),
-        operations: None,
-        bytes: F32 * f64::from(ray_count) * (5.0 * f64::from(sample_count) + 5.0),
-        run: Box::new(move || device.composite(&block, ray_count, &samples, &depths, &mut colours, &mut pixel_depths)),
-    })
+    let composite = Composite {
+        block,
+        ray_count,
+        samples: (0..count).map(|_| [0; 4].map(|_| 0.1 * random.unit() as f32)).collect(),
+        sample_depths: (0..count as u32).map(|at| 1.0 + (at % sample_count) as f32 / sample_count as f32).collect(),
+        colours: Output::Zeros(ray_count as usize),
+        depths: Output::Zeros(ray_count as usize),
+    };
+    let bytes = F32 * f64::from(ray_count) * (5.0 * f64::from(sample_count) + 5.0);
+    Work::new(device, composite, format!("{ray_count} rays, {sample_count} samples"), None, bytes)
 }

@@ -1,91 +1,58 @@
 //! Kernels of the plane sweep, on a frustum about as large as the training-free field's.
 
 use super::Work;
+use crate::dispatch::*;
 use crate::swept::{Swept, band, costs};
 use crate::world::Numbers;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::path::DIRECTIONS;
 use viewfuse_kernels::plane_sweep::window::WindowBlock;
-use viewfuse_vulkan::kernel::Kernel;
 
 /// Groups of planes of all pixels together.
 const GROUPS: u32 = 24_000;
 /// A seed whose frustum has photographs and three groups of planes.
 const SEED: u64 = 2;
-/// Bytes of a group.
-const GROUP: f64 = size_of::<Planes>() as f64;
 
 pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError> {
     let swept = Swept::new(SEED, GROUPS);
     let volume = swept.volume();
     let group_count = (volume.width * volume.height * volume.group_count) as usize;
-    let (band_len, view_count) = (swept.band_len(), swept.views.len());
-    let (frustum, views) = (swept.frustum, swept.views.len());
-    let size = format!("{}x{}, {} planes", volume.width, volume.height, 16 * volume.group_count);
-    let seen = format!("{size}, {views} views");
+    let band_len = swept.band_len();
     let numbers = &mut Numbers::new(SEED);
     let (grey, evidence) = band(numbers, &swept);
-    let loaded = swept.load(device)?;
-    let texel_bytes = 16.0 * swept.texels.len() as f64 + 8.0 * swept.disparities.len() as f64;
-    let (mut grey_out, mut evidence_out) =
-        (device.zeros::<Planes>(view_count * band_len)?, device.zeros::<Planes>(4 * band_len)?);
-    let compare = Work {
-        kernel: Kernel::CompareViews,
-        size: seen.clone(),
-        operations: None,
-        bytes: texel_bytes + GROUP * ((view_count + 4) * band_len) as f64,
-        run: Box::new(move || {
-            device.compare_views(
-                &frustum,
-                &loaded.views,
-                &loaded.pairs,
-                &loaded.texels,
-                &loaded.disparities,
-                &mut grey_out,
-                &mut evidence_out,
-            )
-        }),
-    };
-    let (grey, evidence, pairs) = (device.upload(&grey)?, device.upload(&evidence)?, device.upload(&swept.pairs)?);
-    let mut weighted = device.zeros::<Planes>(2 * group_count)?;
-    let census = Work {
-        kernel: Kernel::CensusCost,
-        size: seen,
-        operations: None,
-        bytes: GROUP * ((view_count + 4 + 2) * band_len) as f64,
-        run: Box::new(move || {
-            device.census_cost(&frustum, 0, frustum.row_count, &pairs, &grey, &evidence, &mut weighted)
-        }),
-    };
     let single = costs(numbers, &volume);
-    let doubled: Vec<Planes> = single.iter().flat_map(|cost| [*cost, *cost]).collect();
-    let windows = WindowBlock::new(&frustum, 0.01);
-    let (given, mut sums) = (device.upload(&doubled)?, device.zeros::<Planes>(6 * group_count)?);
-    let rows = Work {
-        kernel: Kernel::RowSums,
-        size: size.clone(),
-        operations: None,
-        bytes: GROUP * (8 * group_count) as f64,
-        run: Box::new(move || device.row_sums(&windows, &given, &mut sums)),
+    let Swept { frustum, views, pairs, texels, disparities } = swept;
+    let size = format!("{}x{}, {} planes", volume.width, volume.height, 16 * volume.group_count);
+    let of_views = format!("{size}, {} views", views.len());
+    let texel_bytes = 16.0 * texels.len() as f64 + 8.0 * disparities.len() as f64;
+    let bytes = |group_count: usize| (size_of::<Planes>() * group_count) as f64;
+    let census = CensusCost {
+        block: frustum,
+        first_row: 0,
+        row_count: frustum.row_count,
+        pairs: pairs.clone(),
+        grey,
+        evidence,
+        costs: Output::Zeros(2 * group_count),
     };
-    let sixfold: Vec<Planes> = single.iter().flat_map(|cost| [*cost; 6]).collect();
-    let (sums, mut means) = (device.upload(&sixfold)?, device.zeros::<Planes>(group_count)?);
-    let window = Work {
-        kernel: Kernel::WindowCost,
-        size: size.clone(),
-        operations: None,
-        bytes: GROUP * (7 * group_count) as f64,
-        run: Box::new(move || device.window_cost(&windows, &sums, &mut means)),
-    };
+    let census_bytes = bytes((views.len() + 4 + 2) * band_len);
+    let compare_bytes = texel_bytes + bytes((views.len() + 4) * band_len);
+    let grey = Output::Zeros(views.len() * band_len);
+    let evidence = Output::Zeros(4 * band_len);
+    let compare = CompareViews { block: frustum, views, pairs, texels, disparities, grey, evidence };
+    let block = WindowBlock::new(&frustum, 0.01);
+    let costs = single.iter().flat_map(|cost| [*cost; 2]).collect();
+    let rows = RowSums { block, costs, sums: Output::Zeros(6 * group_count) };
+    let sums = single.iter().flat_map(|cost| [*cost; 6]).collect();
+    let window = WindowCost { block, sums, means: Output::Zeros(group_count) };
     let directions = DIRECTIONS as usize;
-    let (means, mut paths) = (device.upload(&single)?, device.zeros::<Planes>(directions * group_count)?);
-    let follow = Work {
-        kernel: Kernel::FollowPaths,
-        size,
-        operations: None,
-        bytes: GROUP * ((1 + directions) * group_count) as f64,
-        run: Box::new(move || device.follow_paths(&volume, &means, &mut paths)),
-    };
-    Ok(vec![compare, census, rows, window, follow])
+    let follow = FollowPaths { block: volume, means: single, paths: Output::Zeros(directions * group_count) };
+    Ok(vec![
+        Work::new(device, compare, of_views.clone(), None, compare_bytes)?,
+        Work::new(device, census, of_views, None, census_bytes)?,
+        Work::new(device, rows, size.clone(), None, bytes(8 * group_count))?,
+        Work::new(device, window, size.clone(), None, bytes(7 * group_count))?,
+        Work::new(device, follow, size, None, bytes((1 + directions) * group_count))?,
+    ])
 }

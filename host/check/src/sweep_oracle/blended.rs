@@ -1,7 +1,7 @@
 //! A target's pixel.
 
 use super::picked::logistic;
-use super::{BEHIND, Sight, disparity, look_up, mixed, sight};
+use super::{BEHIND, PlaneProjection, disparity, look_up, mixed, project_plane};
 use crate::bounded::Bounded;
 use crate::camera_oracle::tents;
 use crate::hull_oracle::bell;
@@ -37,7 +37,7 @@ fn costs_at(block: &BlendBlock, costs: &[Planes], at: [f32; 2]) -> Vec<Bounded> 
 }
 
 /// How far a view sees a point, by its own map.
-fn visibility(view: &SweptView, disparities: &[[f32; 2]], seen: &Sight, disparity: Bounded) -> Bounded {
+fn visibility(view: &SweptView, disparities: &[[f32; 2]], seen: &PlaneProjection, disparity: Bounded) -> Bounded {
     if !(view.disparity_step > 0.0) {
         return Bounded::ONE;
     }
@@ -56,25 +56,25 @@ fn visibility(view: &SweptView, disparities: &[[f32; 2]], seen: &Sight, disparit
 
 /// What the views show at a plane: the mean colour, the sum of their parts, the weight of those that have it in the image,
 /// and how far the silhouettes contain it.
-struct Shown {
+struct PlaneColour {
     colour: [Bounded; 3],
     weight: Bounded,
     in_images: Bounded,
     hull: Bounded,
 }
 
-fn shown(
+fn plane_colour(
     block: &BlendBlock,
     views: &[SweptView],
     texels: &[[f32; 4]],
     disparities: &[[f32; 2]],
     at: [f32; 2],
     disparity: Bounded,
-) -> Option<Shown> {
+) -> Option<PlaneColour> {
     let mut sum = [Bounded::ZERO; 3];
     let (mut weight, mut in_images, mut hull) = (Bounded::ZERO, Bounded::ZERO, Bounded::ONE);
     for view in views {
-        let seen = sight(&block.target, &view.camera, at, disparity);
+        let seen = project_plane(&block.target, &view.camera, at, disparity);
         let in_image = seen.in_image?;
         let texel = look_up(&view.camera, texels, seen.x, seen.y);
         let own = Bounded::from(view.weight);
@@ -91,7 +91,7 @@ fn shown(
         }
         weight = weight + part * texel[3];
     }
-    Some(Shown { colour: sum.map(|sum| sum / weight.greater(1.0e-12.into())), weight, in_images, hull })
+    Some(PlaneColour { colour: sum.map(|sum| sum / weight.greater(1.0e-12.into())), weight, in_images, hull })
 }
 
 /// The pixel at the image coordinate `at`.
@@ -115,7 +115,7 @@ pub fn blend(
         }
         let share = (-excess).exp();
         let disparity = disparity(block.far_disparity, block.disparity_step, plane);
-        let shown = shown(block, views, texels, disparities, at, disparity)?;
+        let shown = plane_colour(block, views, texels, disparities, at, disparity)?;
         for (sum, shown) in colour.iter_mut().zip(shown.colour) {
             *sum = *sum + share * shown;
         }

@@ -1,6 +1,6 @@
 //! What views show on planes.
 
-use super::{BEHIND, disparity, look_up, sight};
+use super::{BEHIND, disparity, look_up, project_plane};
 use crate::bounded::Bounded;
 use crate::hull_oracle::bell;
 use viewfuse_kernels::plane_sweep::PLANES;
@@ -20,7 +20,7 @@ pub struct Found {
 }
 
 /// What a view shows at a point: a colour, or nothing.
-type Shown = Option<[Bounded; 3]>;
+type ViewColour = Option<[Bounded; 3]>;
 
 /// Looks at a group of planes of a pixel of the whole image.
 pub fn evidence(
@@ -35,56 +35,56 @@ pub fn evidence(
     let mut found = Found { grey: vec![[None; PLANES]; views.len()], evidence: [[None; PLANES]; 4] };
     for plane in 0..PLANES {
         let number = group as usize * PLANES + plane;
-        let looks: Vec<Look> =
-            views.iter().map(|view| look(frustum, view, texels, disparities, pixel, number)).collect();
-        for (grey, look) in found.grey.iter_mut().zip(&looks) {
-            grey[plane] = look.shown.map(|shown| shown.map_or(UNSEEN.into(), mean));
+        let parts: Vec<ViewEvidence> =
+            views.iter().map(|view| view_evidence(frustum, view, texels, disparities, pixel, number)).collect();
+        for (grey, part) in found.grey.iter_mut().zip(&parts) {
+            grey[plane] = part.colour.map(|colour| colour.map_or(UNSEEN.into(), mean));
         }
-        let [difference, weight] = compared(pairs, &looks);
-        let hull = looks.iter().try_fold(Bounded::ONE, |hull, look| Some(hull * look.inside?));
-        let nowhere = looks.iter().any(|look| look.inside == Some(Bounded::ZERO));
+        let [difference, weight] = compared(pairs, &parts);
+        let hull = parts.iter().try_fold(Bounded::ONE, |hull, part| Some(hull * part.inside?));
+        let nowhere = parts.iter().any(|part| part.inside == Some(Bounded::ZERO));
         found.evidence[0][plane] = difference;
         found.evidence[1][plane] = weight;
-        found.evidence[2][plane] = dissent(views, &looks);
+        found.evidence[2][plane] = dissent(views, &parts);
         found.evidence[3][plane] = if nowhere { Some(Bounded::ZERO) } else { hull };
     }
     found
 }
 
 /// One view's part.
-struct Look {
+struct ViewEvidence {
     /// `None`: undecided.
-    shown: Option<Shown>,
+    colour: Option<ViewColour>,
     /// How far its silhouette contains the point.
     inside: Option<Bounded>,
     /// How far the point contradicts its disparities, times the confidence; the inner `None` if it has none there.
     doubt: Option<Option<Bounded>>,
 }
 
-fn look(
+fn view_evidence(
     frustum: &FrustumBlock,
     view: &SweptView,
     texels: &[[f32; 4]],
     disparities: &[[f32; 2]],
     pixel: u32,
     plane: usize,
-) -> Look {
+) -> ViewEvidence {
     let camera = &view.camera;
     let width = frustum.camera.width;
     let at = [(pixel % width) as f32 + 0.5, (pixel / width) as f32 + 0.5];
     let disparity = disparity(frustum.far_disparity, frustum.disparity_step, plane);
-    let seen = sight(&frustum.camera, camera, at, disparity);
+    let seen = project_plane(&frustum.camera, camera, at, disparity);
     let has_silhouettes = frustum.has_silhouettes != 0;
     match seen.in_image {
-        None => return Look { shown: None, inside: (!has_silhouettes).then_some(Bounded::ONE), doubt: None },
+        None => return ViewEvidence { colour: None, inside: (!has_silhouettes).then_some(Bounded::ONE), doubt: None },
         Some(false) => {
             let inside = if has_silhouettes { Bounded::ZERO } else { Bounded::ONE };
-            return Look { shown: Some(None), inside: Some(inside), doubt: Some(None) };
+            return ViewEvidence { colour: Some(None), inside: Some(inside), doubt: Some(None) };
         }
         Some(true) => {}
     }
     let texel = look_up(camera, texels, seen.x, seen.y);
-    let shown = texel[3].below(MIN_ALPHA.into()).map(|transparent| {
+    let colour = texel[3].below(MIN_ALPHA.into()).map(|transparent| {
         (!transparent).then(|| [0, 1, 2].map(|channel| texel[channel] / texel[3] * Bounded::from(view.gain[channel])))
     });
     let inside = if has_silhouettes { texel[3] } else { Bounded::ONE };
@@ -98,7 +98,7 @@ fn look(
     } else {
         Some(None)
     };
-    Look { shown, inside: Some(inside), doubt }
+    ViewEvidence { colour, inside: Some(inside), doubt }
 }
 
 /// The pixel of a coordinate inside the image, if it does not depend on rounding.
@@ -113,10 +113,10 @@ fn mean([red, green, blue]: [Bounded; 3]) -> Bounded {
 }
 
 /// Differences of the pairs that see the point, weighted and summed, and their weights.
-fn compared(pairs: &[ViewPair], looks: &[Look]) -> [Option<Bounded>; 2] {
+fn compared(pairs: &[ViewPair], parts: &[ViewEvidence]) -> [Option<Bounded>; 2] {
     let (mut difference, mut weight) = (Bounded::ZERO, Bounded::ZERO);
     for pair in pairs.iter().filter(|pair| pair.weight > 0.0) {
-        match (looks[pair.first as usize].shown, looks[pair.second as usize].shown) {
+        match (parts[pair.first as usize].colour, parts[pair.second as usize].colour) {
             (Some(None), _) | (_, Some(None)) => {}
             (Some(Some(a)), Some(Some(b))) => {
                 let differences = [0, 1, 2].map(|channel| (a[channel] - b[channel]).magnitude());
@@ -131,11 +131,11 @@ fn compared(pairs: &[ViewPair], looks: &[Look]) -> [Option<Bounded>; 2] {
 }
 
 /// How far the point contradicts the views' own disparities.
-fn dissent(views: &[SweptView], looks: &[Look]) -> Option<Bounded> {
+fn dissent(views: &[SweptView], parts: &[ViewEvidence]) -> Option<Bounded> {
     let (mut sum, mut informed) = (Bounded::ZERO, Bounded::ZERO);
-    for (view, look) in views.iter().zip(looks) {
+    for (view, part) in views.iter().zip(parts) {
         if view.disparity_step > 0.0
-            && let Some(doubt) = look.doubt?
+            && let Some(doubt) = part.doubt?
         {
             sum = sum + Bounded::from(view.weight) * doubt;
             informed = informed + Bounded::from(view.weight);

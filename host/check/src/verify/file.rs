@@ -3,6 +3,7 @@
 use super::{Measure, Quantity, VerifyError};
 use safetensors::tensor::Dtype;
 use safetensors::{SafeTensors, tensor::TensorView};
+use std::collections::HashMap;
 use std::path::Path;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::Pose;
@@ -21,9 +22,15 @@ pub(super) fn full(error: &FieldError) -> String {
 pub(super) struct File<'a> {
     pub(super) path: &'a Path,
     pub(super) tensors: &'a SafeTensors<'a>,
+    pub(super) metadata: HashMap<String, String>,
 }
 
 impl File<'_> {
+    /// A text of the file's metadata.
+    pub(super) fn metadata(&self, key: &str) -> Option<&str> {
+        self.metadata.get(key).map(String::as_str)
+    }
+
     /// The error of an invalid tensor.
     pub(super) fn wrong(&self, name: &str, message: impl Into<String>) -> VerifyError {
         VerifyError::Content { path: self.path.to_path_buf(), place: name.to_owned(), message: message.into() }

@@ -5,8 +5,7 @@
 use super::file::{File, compared, full};
 use super::{Measure, Quantity, Report, VerifyError};
 use half::f16;
-use safetensors::{Dtype, SafeTensors};
-use std::path::Path;
+use safetensors::Dtype;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::sampler::Sampler;
 use viewfuse_core::schedule::NoiseSchedule;
@@ -27,20 +26,17 @@ const WHOLE: &str = "error_alpha1_half";
 const WEIGHTINGS: [(&str, &str); 2] =
     [("baseline_mean", "mean"), ("error_weighing_alpha=1.0", "error:alpha=1,angle=full")];
 
-/// Compares everything in the file. Returns the names of the known tensors; none if the file has another content.
+/// Compares everything in the file.
 pub(super) fn verify<D: Device>(
-    path: &Path,
-    tensors: &SafeTensors<'_>,
-    member: Option<&str>,
+    file: &File<'_>,
     device: &D,
     report: &mut Report,
     progress: &dyn Progress,
 ) -> Result<Vec<String>, VerifyError> {
-    if tensors.tensor("volume_value").is_err() || tensors.tensor("denoise_sigma").is_err() {
+    if file.tensors.tensor("volume_value").is_err() || file.tensors.tensor("denoise_sigma").is_err() {
         return Ok(Vec::new());
     }
-    let file = File { path, tensors };
-    let architecture = match member {
+    let architecture = match file.metadata("member") {
         None => Architecture::published(),
         Some("small") => Architecture::small(),
         Some(other) => return Err(file.wrong("metadata", format!("'member' is '{other}'; there is 'small'"))),
@@ -55,14 +51,14 @@ pub(super) fn verify<D: Device>(
         return Err(file.wrong("images", format!("are not {side}x{side}")));
     }
     let mut reference = Reference::new(&field, device, &sources, progress).map_err(|error| failed(full(&error)))?;
-    let mut comparison = Comparison { file: &file, reference: &mut reference, side };
+    let mut comparison = Comparison { file, reference: &mut reference, side };
     let mut known: Vec<String> = ["images", "src_poses", "tgt_pose", "focal_normalized"].map(str::to_owned).to_vec();
     known.extend(comparison.volumes(report)?);
     known.extend(comparison.points(report)?);
     known.extend(comparison.features(&sources.images.iter().map(|image| image.camera).collect::<Vec<_>>(), report)?);
     known.extend(comparison.denoiser(report)?);
     known.extend(comparison.sample(report)?);
-    known.extend(levels(&file, report)?);
+    known.extend(levels(file, report)?);
     Ok(known)
 }
 

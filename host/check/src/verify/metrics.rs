@@ -4,9 +4,8 @@
 use super::file::File;
 use super::{Measure, Quantity, Report, VerifyError};
 use image::RgbImage;
-use safetensors::{Dtype, SafeTensors};
+use safetensors::Dtype;
 use std::collections::BTreeMap;
-use std::path::Path;
 use viewfuse_core::metrics::{psnr, ssim};
 use viewfuse_device::Device;
 use viewfuse_evaluate::metrics::MetricError;
@@ -35,20 +34,15 @@ const FRECHET: [(&str, &str); 2] =
     [("frechet", "Frechet distance"), ("frechet_lowrank", "Frechet distance, few points")];
 
 /// Compares the file's quantities; returns the names of the used tensors.
-pub(super) fn verify<D: Device>(
-    path: &Path,
-    tensors: &SafeTensors<'_>,
-    device: &D,
-    report: &mut Report,
-) -> Result<Vec<String>, VerifyError> {
-    let file = File { path, tensors };
+pub(super) fn verify<D: Device>(file: &File<'_>, device: &D, report: &mut Report) -> Result<Vec<String>, VerifyError> {
+    let tensors = file.tensors;
     let mut covered = Vec::new();
     if tensors.tensor("pred").is_ok() && tensors.tensor("truth").is_ok() {
-        covered.extend(Pairs::read(&file)?.verify(device, report)?);
+        covered.extend(Pairs::read(file)?.verify(device, report)?);
     }
     for (name, title) in FRECHET {
         if tensors.tensor(name).is_ok() {
-            covered.extend(frechet(&file, name, title, report)?);
+            covered.extend(frechet(file, name, title, report)?);
         }
     }
     Ok(covered)

@@ -3,13 +3,12 @@
 
 use super::file::{File, compared, full};
 use super::{Quantity, Report, VerifyError};
-use safetensors::SafeTensors;
-use std::path::Path;
 use viewfuse_core::depths::FineBlock;
 use viewfuse_core::rays::{RayPoint, TargetRay};
 use viewfuse_device::Device;
-use viewfuse_field::pixelnerf::reference::{Reference, SeenRays};
+use viewfuse_field::pixelnerf::reference::{Reference, RenderedRays};
 use viewfuse_field::pixelnerf::{Architecture, Omissions, Pass, PixelNerf, PixelNerfOptions, test_networks};
+use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 
 /// Weights of the views by the names of the file.
@@ -18,31 +17,28 @@ const WEIGHTS: [&str; 3] = ["mean", "tilted", "one_hot"];
 const RAY_WEIGHTS: &str = "tilted";
 const PASSES: [(Pass, &str); 2] = [(Pass::Coarse, "coarse"), (Pass::Fine, "fine")];
 
-/// Compares everything in the file. Returns the names of the known tensors; none if the file has another content.
+/// Compares everything in the file.
 pub(super) fn verify<D: Device>(
-    path: &Path,
-    tensors: &SafeTensors<'_>,
-    width: Option<&str>,
+    file: &File<'_>,
     device: &D,
     report: &mut Report,
+    _progress: &dyn Progress,
 ) -> Result<Vec<String>, VerifyError> {
-    if tensors.tensor("latent_value").is_err() || tensors.tensor("z_coarse").is_err() {
+    if file.tensors.tensor("latent_value").is_err() || file.tensors.tensor("z_coarse").is_err() {
         return Ok(Vec::new());
     }
-    let file = File { path, tensors };
-    let architecture = match width.map(str::parse) {
+    let architecture = match file.metadata("width").map(str::parse) {
         None => Architecture::published(),
         Some(Ok(width @ 1..=4096)) => Architecture::small(width),
         Some(_) => return Err(file.wrong("metadata", "'width' is no whole number from 1 to 4096")),
     };
     let checkpoint = test_networks::deterministic(&architecture);
-    let failed =
-        |message: String| VerifyError::Content { path: path.to_path_buf(), place: "pixelnerf".to_owned(), message };
+    let failed = |message: String| file.wrong("pixelnerf", message);
     let options = |omissions| PixelNerfOptions { omissions, ..PixelNerfOptions::default() };
     let sources = file.sources("focal", |_| 1.0)?;
     let latent_layers = Omissions { latent_layers: true, ..Omissions::NONE };
     let field = PixelNerf::new(&checkpoint, options(Omissions::NONE)).map_err(|error| failed(error.to_string()))?;
-    let exact = Comparison { file: &file, suffix: "" };
+    let exact = Comparison { file, suffix: "" };
     let mut reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
     exact.latents(&reference, &sources, report)?;
     exact.points(&mut reference, report)?;
@@ -51,7 +47,7 @@ pub(super) fn verify<D: Device>(
     // The same with the latent layers moved to the grids: exact up to rounding, and held to the same tolerances.
     let field = field.with_options(options(latent_layers));
     let mut reference = Reference::new(&field, device, &sources).map_err(|error| failed(full(&error)))?;
-    let mapped = Comparison { file: &file, suffix: ", latent layers on the grid" };
+    let mapped = Comparison { file, suffix: ", latent layers on the grid" };
     mapped.points(&mut reference, report)?;
     mapped.rays(&mut reference, report)?;
     Ok(NAMES.map(str::to_owned).to_vec())
@@ -182,8 +178,8 @@ impl Comparison<'_> {
         let weights = file.many(&format!("weights.{RAY_WEIGHTS}"), reference.view_count())?;
         for (pass, name, depths) in [(Pass::Coarse, "coarse", "z_coarse"), (Pass::Fine, "fine", "z_all")] {
             let depths = file.many_a_row(depths, rays.len())?;
-            let SeenRays { weights: ours, colours, depths: seen } =
-                reference.look(pass, &weights, &rays, &depths).map_err(|error| self.failed(error))?;
+            let RenderedRays { weights: ours, colours, depths: seen } =
+                reference.render_rays(pass, &weights, &rays, &depths).map_err(|error| self.failed(error))?;
             let compare = |what: &str, ours: &[f32]| -> Result<Quantity, VerifyError> {
                 let key = format!("{name}_{what}");
                 Ok(self.compare(&format!("{what} of rays, {name}"), ours, &file.floats(&key)?, 2.0e-4, false))

@@ -7,10 +7,11 @@ use clap::Args;
 use image::DynamicImage;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use viewfuse_evaluate::inspect::{Inspection, camera_map, inspect};
 use viewfuse_job::files::check_writable;
+use viewfuse_output::camera_map::camera_map;
 use viewfuse_output::png::write_png;
 use viewfuse_scene::Scene;
+use viewfuse_scene::inspect::{Inspection, inspect};
 use viewfuse_scene::photographs::BackgroundChoice;
 
 #[derive(Args)]

@@ -11,9 +11,13 @@ use viewfuse_device::choice::{self, Chosen, DeviceChoice};
 use viewfuse_field::About;
 use viewfuse_field::budget::Bound;
 use viewfuse_field::render::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions};
+use viewfuse_field::rows;
 use viewfuse_scene::few_shot::{PathChoice, Selection};
 use viewfuse_scene::photographs::BackgroundChoice;
 use viewfuse_vulkan::{GpuOptions, VulkanError};
+
+/// Heading of the options that say what is left out.
+pub(crate) const EFFORTS: &str = "Efforts: what is left out, for which time and error";
 
 /// Options of pictures.
 #[derive(Args)]
@@ -26,11 +30,11 @@ pub(crate) struct PictureOptions {
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
     /// Leave out the least relevant sources while their weights together stay at or below this
-    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share)]
+    #[arg(long, value_name = "TOTAL", default_value_t = DEFAULT_LEAVE_OUT, value_parser = parse_share, help_heading = EFFORTS)]
     leave_out: f32,
     /// Early termination: leave out samples behind the point where a ray's transmittance falls below this; not with a GeNVS
     /// [default: 1/256]
-    #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share)]
+    #[arg(long, alias = "settled", value_name = "SHARE", value_parser = parse_share, help_heading = EFFORTS)]
     early_termination: Option<f32>,
     /// Work on this many threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -41,7 +45,10 @@ impl PictureOptions {
     /// With `exact`, nothing is left out. Options that the field does not have are rejected.
     pub(crate) fn to_render_options(&self, exact: bool, field: &About) -> anyhow::Result<RenderOptions> {
         if self.early_termination.is_some() && !field.ends_rays {
-            return Err(wrong("--early-termination cannot be used with a GeNVS, which has no early termination"));
+            let title = rows::named(field.name).map_or(field.name, |row| row.title);
+            return Err(wrong(format_args!(
+                "--early-termination cannot be used with a {title}, which has no early termination"
+            )));
         }
         let early_termination =
             if exact || !field.ends_rays { 0.0 } else { self.early_termination.unwrap_or(DEFAULT_EARLY_TERMINATION) };
@@ -51,19 +58,18 @@ impl PictureOptions {
     }
 }
 
-/// Options that a bound replaces: it chooses what is left out.
-const CHOSEN_BY_A_BOUND: [&str; 9] =
-    ["exact", "compute", "probe_step", "probe_error", "half_latents", "sampler", "steps", "tolerance", "half_volumes"];
+/// Options that a bound replaces, beside efforts of the fields' rows: it chooses what is left out.
+const CHOSEN_BY_A_BOUND: [&str; 2] = ["exact", "compute"];
 
 /// A bound on the error or the time of each picture.
 #[derive(Args)]
 pub(crate) struct BoundOptions {
-    /// Leave out what the pictures do not need for this root mean square difference from the exact ones, in decibels (40dB)
+    /// Choose the effort: leave out what the pictures do not need for this root mean square difference from the exact ones, in decibels (40dB)
     /// or with colours from 0 to 1 (0.01)
-    #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND)]
+    #[arg(long, value_name = "ERROR", value_parser = parse_error, conflicts_with_all = CHOSEN_BY_A_BOUND, help_heading = EFFORTS)]
     max_error: Option<f32>,
-    /// Leave out what does not fit into this time for each picture: seconds, or milliseconds as 250ms
-    #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error")]
+    /// Choose the effort: leave out what does not fit into this time for each picture: seconds, or milliseconds as 250ms
+    #[arg(long, value_name = "TIME", value_parser = parse_seconds, conflicts_with_all = CHOSEN_BY_A_BOUND, conflicts_with = "max_error", help_heading = EFFORTS)]
     max_time: Option<Duration>,
 }
 

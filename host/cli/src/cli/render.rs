@@ -4,7 +4,7 @@ mod identity;
 mod outputs;
 mod stream;
 
-use super::model::{GENVS, ModelOptions, parse_level};
+use super::model::{ModelOptions, SequenceFlags};
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::outputs::keep_folder_apart;
 use super::path::PathOptions;
@@ -63,10 +63,8 @@ pub(crate) struct Arguments {
     bound: BoundOptions,
     #[command(flatten)]
     model: ModelOptions,
-    /// Start each frame from the one before with noise of this level, about the size of the differences between frames: for
-    /// orbits
-    #[arg(long, value_name = "LEVEL", value_parser = parse_level, requires = "model", conflicts_with_all = ["exact", "max_error", "max_time"], help_heading = GENVS)]
-    reuse: Option<f32>,
+    #[command(flatten)]
+    sequence: SequenceFlags,
     #[command(flatten)]
     device: DeviceOptions,
     /// Seed of every random draw (the training-free field makes none)
@@ -98,7 +96,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         keep_folder_apart([&scene], &arguments.output)?;
     }
     let open_time = start.elapsed();
-    let field = arguments.model.open(arguments.seed, arguments.reuse)?;
+    let field = arguments.model.open(arguments.seed, Some(&arguments.sequence))?;
     let about = field.about();
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, about.least_sources)?;
@@ -122,15 +120,14 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &before);
     writer.set_outputs(arguments.outputs.outputs());
     let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).collect();
-    // With `reuse` a frame depends on the one before.
-    let job = match arguments.reuse {
-        None => {
-            let run = run_identity(values, &device.name(), &scene, &job, &files)?;
-            let finished = writer.resume(&run)?;
-            let is_left = |target: &Target| !finished.contains(&target.name);
-            FewShot { targets: job.targets.into_iter().filter(is_left).collect(), ..job }
-        }
-        Some(_) => job,
+    // Frames that follow from one another are not continued.
+    let job = if arguments.sequence.are_given() {
+        job
+    } else {
+        let run = run_identity(values, &device.name(), &scene, &job, &files)?;
+        let finished = writer.resume(&run)?;
+        let is_left = |target: &Target| !finished.contains(&target.name);
+        FewShot { targets: job.targets.into_iter().filter(is_left).collect(), ..job }
     };
     // A frame of a video takes a part of the time that it took to render.
     let (frames, formats) = (10 * job.targets.len().max(1), &arguments.outputs.video);

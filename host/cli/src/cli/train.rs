@@ -12,7 +12,7 @@ use viewfuse_job::files::check_writable;
 use viewfuse_nn::checkpoint::Checkpoint;
 use viewfuse_scene::dataset::{Dataset, Split};
 use viewfuse_train::{
-    Embedding, GenvsSettings, MAX_LEVEL_SHARE, Outcome, PixelNerfSettings, Schedule, Variety, WeightingSettings,
+    Augmentation, Embedding, GenvsSettings, MAX_LEVEL_SHARE, Outcome, PixelNerfSettings, Schedule, WeightingSettings,
     train_genvs, train_pixelnerf, train_weighting,
 };
 use viewfuse_weighting::{WeightingError, WeightingSpec};
@@ -111,12 +111,12 @@ struct PixelNerfArguments {
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = side)]
     sides: Vec<u32>,
     #[command(flatten)]
-    variety: VarietyOptions,
+    augmentation: AugmentationOptions,
 }
 
 /// What differs from step to step.
 #[derive(Args)]
-struct VarietyOptions {
+struct AugmentationOptions {
     /// Numbers of sources; each step draws one of the list [default: 1,2,3,3,3,3,4,6 for a PixelNeRF, 1,2,3,3 for a GeNVS]
     #[arg(long, value_name = "N,N", value_delimiter = ',', value_parser = clap::value_parser!(u16).range(1..=256))]
     sources: Vec<u16>,
@@ -129,10 +129,10 @@ struct VarietyOptions {
     weights: Vec<Scheme>,
 }
 
-impl VarietyOptions {
-    fn variety(&self, default: Variety) -> Variety {
-        let VarietyOptions { sources, least_crop, weights } = self;
-        Variety {
+impl AugmentationOptions {
+    fn augmentation(&self, default: Augmentation) -> Augmentation {
+        let AugmentationOptions { sources, least_crop, weights } = self;
+        Augmentation {
             sources: if sources.is_empty() {
                 default.sources
             } else {
@@ -190,7 +190,7 @@ struct GenvsArguments {
     #[arg(long, requires = "from")]
     new_denoiser: bool,
     #[command(flatten)]
-    variety: VarietyOptions,
+    augmentation: AugmentationOptions,
 }
 
 /// See [`Estimate`].
@@ -297,8 +297,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
 fn pixelnerf(arguments: &PixelNerfArguments) -> anyhow::Result<ExitCode> {
     let &PixelNerfArguments { ref run, ref from, width, levels, side, objects, rays, coarse, fine, .. } = arguments;
-    let variety = Variety { sides: arguments.sides.clone(), ..arguments.variety.variety(Variety::pixelnerf()) };
-    let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, variety };
+    let augmentation = Augmentation {
+        sides: arguments.sides.clone(),
+        ..arguments.augmentation.augmentation(Augmentation::pixelnerf())
+    };
+    let settings = PixelNerfSettings { width, levels, side, objects, rays, coarse, fine, augmentation };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;
@@ -316,9 +319,18 @@ fn genvs(arguments: &GenvsArguments) -> anyhow::Result<ExitCode> {
         EstimateName::Colours => Estimate::FromColours,
         EstimateName::Published => Estimate::Published,
     };
-    let variety = arguments.variety.variety(Variety::genvs());
-    let settings =
-        GenvsSettings { width, side, objects, targets, samples, share_of_largest, estimate, new_denoiser, variety };
+    let augmentation = arguments.augmentation.augmentation(Augmentation::genvs());
+    let settings = GenvsSettings {
+        width,
+        side,
+        objects,
+        targets,
+        samples,
+        share_of_largest,
+        estimate,
+        new_denoiser,
+        augmentation,
+    };
     let [train, validation] = scenes(run, from.as_deref())?;
     let progress = Terminal::new("reading the scenes");
     let from = from.as_deref().map(Checkpoint::open).transpose()?;

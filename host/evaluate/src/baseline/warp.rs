@@ -12,7 +12,7 @@ use viewfuse_core::pose::Pose;
 
 /// A sample of a photograph.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct WarpedSample {
     /// Levels of red, green and blue from 0 to 255, interpolated.
     pub levels: [f64; 3],
     /// Whether the place is inside the photograph; outside, the levels are those of its nearest pixel.
@@ -39,7 +39,7 @@ impl Homography {
 
     /// The source's sample at the target's pixel. A point behind the source's camera is outside, at the border that its
     /// direction points to.
-    pub(super) fn look(&self, picture: &RgbImage, column: u32, row: u32) -> Look {
+    pub(super) fn look(&self, picture: &RgbImage, column: u32, row: u32) -> WarpedSample {
         let [fx, fy] = self.target.focal().map(f64::from);
         let [cx, cy] = self.target.principal().map(f64::from);
         let direction = DVec3::new((f64::from(column) + 0.5 - cx) / fx, (f64::from(row) + 0.5 - cy) / fy, 1.0);
@@ -51,7 +51,7 @@ impl Homography {
         let (x, y) = (fx * seen.x / depth + cx, fy * seen.y / depth + cy);
         let (width, height) = (f64::from(picture.width()), f64::from(picture.height()));
         let inside = seen.z > 0.0 && x >= 0.0 && y >= 0.0 && x <= width && y <= height;
-        Look { levels: bilinear(picture, x, y), inside }
+        WarpedSample { levels: bilinear(picture, x, y), inside }
     }
 }
 

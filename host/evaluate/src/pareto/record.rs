@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn another_programs_row_has_all_columns() {
         let mut own = DeviceRecord::beside("CPU", 1.0, 2.0);
-        let left_out = LeftOut { what: "volume rows", switch: true, left_out: 3, of: 4, cost: "nothing" };
+        let left_out = LeftOut { what: "volume rows", switch: true, left_out: 3, of: 4, typical_error: "nothing" };
         own.points[0].left_out = vec![left_out];
         own.points[0].denoising = Some(Denoising {
             sampler: "heun",

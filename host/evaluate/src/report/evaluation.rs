@@ -1,7 +1,7 @@
 //! A folder of `evaluate --protocol` on the page.
 
 use super::{ReportError, counted, figure, pictures, table};
-use crate::gallery::{Shown, shown};
+use crate::gallery::{TargetPictures, shown};
 use crate::protocol::{Benchmark, Protocol};
 use crate::run_folder::{RunFolder, Settings, missing};
 use crate::summary::{REFERENCE, Row, Table, tables};
@@ -17,7 +17,7 @@ pub struct Evaluation {
     devices: BTreeSet<String>,
     missing: Vec<usize>,
     tables: Vec<Table>,
-    shown: Vec<Shown>,
+    shown: Vec<TargetPictures>,
 }
 
 impl Evaluation {

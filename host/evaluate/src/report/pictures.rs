@@ -2,7 +2,7 @@
 
 use super::{ReportError, counted, data_address};
 use crate::PSNR;
-use crate::gallery::{self, Shown, ShownScheme};
+use crate::gallery::{self, SchemePicture, TargetPictures};
 use crate::summary::Metric;
 use image::{ImageFormat, RgbImage};
 use maud::{Markup, html};
@@ -41,7 +41,7 @@ fn error_address(folder: &Path, file: &str, truth: &RgbImage) -> Result<Option<S
 }
 
 /// The pictures of a target.
-pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportError> {
+pub(super) fn comparison(folder: &Path, shown: &TargetPictures) -> Result<Markup, ReportError> {
     let picture =
         |file: &str| -> Result<String, ReportError> { Ok(data_address("image/png", &gallery::picture(folder, file)?)) };
     let sources: Vec<String> = shown.sources.iter().map(|source| picture(&source.file)).collect::<Result<_, _>>()?;
@@ -58,7 +58,7 @@ pub(super) fn comparison(folder: &Path, shown: &Shown) -> Result<Markup, ReportE
     };
     let heaviest = shown.schemes.iter().flat_map(|scheme| &scheme.weights).copied().fold(0.0, f32::max);
     let metric = Metric::named(PSNR);
-    let psnr = |scheme: &ShownScheme| {
+    let psnr = |scheme: &SchemePicture| {
         scheme.values.iter().find(|(name, _)| name == PSNR).map(|(_, value)| value.unwrap_or(f64::INFINITY))
     };
     // The best as it is written.
@@ -131,7 +131,7 @@ fn bars(weights: &[f32], heaviest: f32) -> Markup {
 }
 
 /// The weights as numbers, collapsed.
-fn weights(shown: &Shown) -> Markup {
+fn weights(shown: &TargetPictures) -> Markup {
     html! {
         details {
             summary { "Weights" }

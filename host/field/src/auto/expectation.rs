@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// torcs_cars; the room and the sample scene of the repository, three generated rooms and three gardens) from 3 to 9 sources,
 /// at longest sides of 128 and 288 pixels, each scene with the same weight in all. With constants that were fitted to the
 /// other scenes: correlation 0.88, root mean square error 2.07 dB, 57 % of the targets within 1.5 dB, four of five within
-/// 2.55 dB. The example `self_knowledge` of `viewfuse-evaluate` prints the data and the fit.
+/// 2.55 dB. The experiment `self_knowledge` of `viewfuse-research` prints the data and the fit.
 const CONSTANTS: [f64; TERMS] = [1.72, 2.91, 9.7, 9.4, 0.39, -0.27, -3.4, 0.53];
 /// Root mean square error for scenes that the fit has not seen, decibels.
 const DEVIATION: f64 = 2.05;

@@ -3,9 +3,10 @@
 use super::geometry::{Measure, Standing};
 use crate::Setting;
 use crate::budget::Bound;
-use crate::render::{RenderError, RenderOptions, Stage};
+use crate::render::{RenderError, RenderOptions, SceneSources, Stage};
 use crate::renderer::Renderer;
 use crate::scores::psnr_of_seen;
+use crate::session::Judge;
 use image::imageops::{self, FilterType};
 use image::{GrayImage, RgbImage};
 use std::borrow::Cow;
@@ -39,8 +40,6 @@ pub(super) struct Trials<'a> {
 
 /// A source that is left out.
 struct Trial<'a> {
-    /// As an index into the run's sources.
-    source: usize,
     stage: Stage<'a>,
     target: Target,
     truth: RgbImage,
@@ -54,8 +53,6 @@ struct Trial<'a> {
 /// The result of a source that was left out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Outcome {
-    /// As an index into the run's sources.
-    pub(super) source: usize,
     /// Peak signal to noise ratio, decibels.
     pub(super) psnr: f64,
     /// Mean confidence of its pixels; `None` if the field does not estimate it.
@@ -69,9 +66,9 @@ pub(super) struct Outcome {
 /// The options of pictures of sources that are left out. Where a field can check single pixels, these pictures are within
 /// [`MAX_ERROR`] of the exact ones; elsewhere a check would take a second picture, and they are not bounded.
 pub(super) fn coarse(options: &RenderOptions, stage: &Stage<'_>) -> RenderOptions {
-    let camera = stage.scene().views.first().map(|view| view.camera);
+    let camera = stage.scene().and_then(|of| of.scene.views.first()).map(|view| view.camera);
     let size = camera.map(|camera| scaled_size(&camera, SIDE.min(stage.side())).into());
-    let bound = stage.renders_pixels().then_some(Bound::Error(MAX_ERROR));
+    let bound = (stage.session.judge == Judge::Pixels).then_some(Bound::Error(MAX_ERROR));
     RenderOptions { size, settings: Vec::new(), bound, ..options.clone() }
 }
 
@@ -86,9 +83,9 @@ impl<'a> Trials<'a> {
         progress: &dyn Progress,
     ) -> Result<Trials<'a>, RenderError> {
         let about = renderer.about();
-        let (scene, album) = (stage.scene(), stage.album());
-        let poses: Vec<Pose> = stage.views.iter().map(|&view| scene.views[view].camera.pose).collect();
         let mut trials = Vec::new();
+        let Some(&SceneSources { scene, album, ref views }) = stage.scene() else { return Ok(Trials { trials }) };
+        let poses: Vec<Pose> = views.iter().map(|&view| scene.views[view].camera.pose).collect();
         if poses.len() <= about.least_sources {
             return Ok(Trials { trials });
         }
@@ -108,7 +105,7 @@ impl<'a> Trials<'a> {
         for source in chosen {
             progress.check().map_err(stopped)?;
             let others = nearest(&poses, source, MAX_NEIGHBOURS);
-            let views: Vec<usize> = others.iter().map(|&other| stage.views[other]).collect();
+            let other_views: Vec<usize> = others.iter().map(|&other| views[other]).collect();
             let images = Arc::new(SourceImages {
                 images: others.iter().map(|&other| reduced[other].clone()).collect(),
                 background: stage.images.background,
@@ -119,8 +116,8 @@ impl<'a> Trials<'a> {
             });
             let quiet = &Quiet(progress);
             let prepared =
-                Stage::of_images(scene, album, &views, images, renderer, options, quiet).and_then(|mut own| {
-                    own.simplify();
+                Stage::of_images(scene, album, &other_views, images, renderer, options, quiet).and_then(|mut own| {
+                    own.set_trial();
                     own.weigh(weighting, quiet)?;
                     own.encode_all(quiet)?;
                     Ok(own)
@@ -131,7 +128,7 @@ impl<'a> Trials<'a> {
                 own => own?,
             };
             let shown = small(&stage.images.images[source], side, scene)?;
-            let name = scene.views[stage.views[source]].name.clone();
+            let name = scene.views[views[source]].name.clone();
             let target = Target { name, camera: shown.camera, truth: None };
             let seen = if stage.images.has_silhouettes { None } else { shown_part(&shown) };
             let truth = SourceImages { images: vec![shown], ..own.images.as_ref().clone() }.picture(0);
@@ -144,7 +141,7 @@ impl<'a> Trials<'a> {
                 distance(a).total_cmp(&distance(b))
             });
             let copy = nearest.map_or(0.0, |nearest| copy_score(&own.images.picture(nearest), &truth, seen.as_ref()));
-            trials.push(Trial { source, stage: own, target, truth, seen, standing, copy });
+            trials.push(Trial { stage: own, target, truth, seen, standing, copy });
         }
         Ok(Trials { trials })
     }
@@ -159,6 +156,11 @@ impl<'a> Trials<'a> {
         self.trials.len()
     }
 
+    /// The names of the sources that are left out.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.trials.iter().map(|trial| trial.target.name.as_str())
+    }
+
     /// Renders each source that is left out with this weighting and these settings.
     pub(super) fn outcomes(
         &mut self,
@@ -167,12 +169,11 @@ impl<'a> Trials<'a> {
         progress: &dyn Progress,
     ) -> Result<Vec<Outcome>, RenderError> {
         let mut outcomes = Vec::with_capacity(self.trials.len());
-        for Trial { source, stage, target, truth, seen, standing, copy } in &mut self.trials {
+        for Trial { stage, target, truth, seen, standing, copy } in &mut self.trials {
             progress.check().map_err(stopped)?;
             stage.tune(settings);
             let frame = stage.frame(weighting, target, &Quiet(progress))?;
             outcomes.push(Outcome {
-                source: *source,
                 psnr: psnr_of_seen(&frame.picture, truth, seen.as_ref()).min(MAX_PSNR),
                 confidence: mean(&frame.confidences),
                 standing: *standing,

@@ -4,7 +4,8 @@ use super::check::{Sample, draw};
 use super::deadline::Deadline;
 use super::expected::Expected;
 use super::{Bound, Estimate, Kept, Tried, embedded};
-use crate::{Effort, FieldError, Rendered, Session};
+use crate::session::{Judge, Session};
+use crate::{Check, Effort, FieldError, Rendered};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_job::progress::Progress;
@@ -27,17 +28,6 @@ const FAR_LESS: f64 = 1.6;
 const EXACT_PICTURES: u64 = 8;
 /// The share of the time that must be left for estimating the error of a picture with a bounded time.
 const CHECK_SHARE: f64 = 0.25;
-
-/// How errors are estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Judge {
-    /// From exact pixels.
-    Pixels,
-    /// By the field, from its own steps.
-    Steps,
-    /// By comparing two pictures.
-    Comparison,
-}
 
 /// What a picture is rendered from.
 #[derive(Clone, Copy)]
@@ -79,13 +69,13 @@ struct Search<'s, 'a> {
 impl Controller {
     /// For the efforts of a session's field. Without any, the field has a single way to render.
     pub(crate) fn new(bound: Bound, session: &Session<'_>) -> Controller {
-        let (judge, safety) = match (session.renders_pixels(), session.estimates_errors()) {
-            (true, _) => (Judge::Pixels, 1.0),
-            (false, true) => (Judge::Steps, embedded::SAFETY),
-            (false, false) => (Judge::Comparison, OTHER_PICTURES * embedded::SAFETY),
+        let safety = match session.judge {
+            Judge::Pixels => 1.0,
+            Judge::Steps => embedded::SAFETY,
+            Judge::Comparison => OTHER_PICTURES * embedded::SAFETY,
         };
-        let expected = Expected::new(session.efforts(), safety);
-        Controller { bound, expected, judge, compared: None, last: None, pictures: 0 }
+        let expected = Expected::new(session.efforts.clone(), safety);
+        Controller { bound, expected, judge: session.judge, compared: None, last: None, pictures: 0 }
     }
 
     /// The effort that the first picture begins with, so that sources that are encoded before are encoded for it.
@@ -176,7 +166,7 @@ impl Controller {
         let exact = self.expected.efforts.len() - 1;
         let mut effort = self.expected.cheapest_within(most).clamp(1.min(exact), exact);
         let mut below = self.expected.below(effort);
-        let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_work).sum();
+        let work: f32 = [below, effort].iter().map(|effort| self.expected.efforts[*effort].typical_share).sum();
         if effort == exact || work > MAX_COMPARED {
             let rendered = self.picture(search, exact, termination, progress)?;
             self.compared = Some((exact, Estimate::EXACT));
@@ -288,8 +278,8 @@ impl Controller {
         most: f64,
         progress: &dyn Progress,
     ) -> Result<Estimate, FieldError> {
-        let Effort { typical_error, typical_work, .. } = self.expected.efforts[effort];
-        let affordable = CHECK_WORK * f64::from(typical_work) * rendered.colours.len() as f64;
+        let Effort { typical_error, typical_share, .. } = self.expected.efforts[effort];
+        let affordable = CHECK_WORK * f64::from(typical_share) * rendered.colours.len() as f64;
         let count = (affordable as usize).clamp(ROUND[0], ROUND[1]);
         let mut sample = Sample::default();
         sample.expect(f64::from(typical_error), EXPECTED_DRAWS);
@@ -298,7 +288,7 @@ impl Controller {
             let draws = draw(rendered, count, self.pictures * ROUNDS as u64 + round as u64);
             let pixels: Vec<u32> = draws.iter().map(|draw| draw.pixel).collect();
             let Search { session, view, .. } = search;
-            let exact = session.exact_pixels(view.camera, view.all, &pixels, progress)?;
+            let Some(exact) = session.exact_pixels(view.camera, view.all, &pixels, progress)? else { break };
             sample.add(rendered, &draws, &exact);
             estimate = sample.estimate();
             if estimate.upper <= most || estimate.value > most {
@@ -328,7 +318,10 @@ impl Controller {
 }
 
 /// The error of the last picture by the field's own steps. `termination` is what early termination may cost.
-fn by_steps(session: &Session<'_>, termination: f32) -> Estimate {
-    let value = f64::from(session.estimated_error());
+fn by_steps(session: &mut Session<'_>, termination: f32) -> Estimate {
+    let value = match session.check() {
+        Check::Steps(error) => f64::from(error),
+        Check::Pixels(_) | Check::Comparison => f64::INFINITY,
+    };
     Estimate { value, upper: embedded::SAFETY * value + f64::from(termination), pixels: 0 }
 }

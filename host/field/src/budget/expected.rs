@@ -52,7 +52,7 @@ impl Expected {
     pub(super) fn after(&self, effort: usize, most: f64) -> usize {
         let next = self.cheapest_within(most).max(effort + 1);
         let mut near = (effort + 1..=effort + MAX_SKIPPED).rev();
-        let cheap = near.find(|near| self.efforts.get(*near).is_some_and(|own| own.typical_work <= CHEAP));
+        let cheap = near.find(|near| self.efforts.get(*near).is_some_and(|own| own.typical_share <= CHEAP));
         cheap.map_or(next, |cheap| next.min(cheap))
     }
 
@@ -65,10 +65,10 @@ impl Expected {
     /// The best effort that is expected to take less than the time that is left; none before a time was measured.
     pub(super) fn best_within(&self, left: f64) -> Option<usize> {
         let index = self.seconds.iter().rposition(Option::is_some)?;
-        let rate = self.seconds[index]? / f64::from(self.efforts[index].typical_work);
+        let rate = self.seconds[index]? / f64::from(self.efforts[index].typical_share);
         let expected = |effort: usize| match self.seconds[effort] {
             Some(seconds) => seconds,
-            None => rate * f64::from(self.efforts[effort].typical_work),
+            None => rate * f64::from(self.efforts[effort].typical_share),
         };
         (0..self.efforts.len()).rev().find(|effort| expected(*effort) <= TIME_SHARE * left)
     }

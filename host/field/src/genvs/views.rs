@@ -3,13 +3,14 @@
 use super::efforts;
 use super::encoder::SIDE_STEP;
 use super::feature_image;
+use super::open::{CALLS, ROWS};
 use super::parts::Parts;
 use super::ray_sampling::RaySampling;
 use super::sampling::{Plan, Start};
 use super::volume::Volume;
 use super::{COLOUR_CHANNELS, Genvs, GenvsOptions, Omissions, Rays};
 use crate::learned::over_white;
-use crate::{Effort, Encoding, Encodings, FieldError, LeftOut, Prepared, Record, Rendered, Request};
+use crate::{Check, Effort, Efforts, Encoding, Encodings, FieldError, LeftOut, Prepared, Record, Rendered, Request};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, DeviceError};
@@ -36,13 +37,13 @@ pub(super) struct Views<'a, D: Device> {
     pub(super) effort: Option<usize>,
     pub(super) error: f32,
     /// The last frame's feature image: another effort for the same frame uses it again.
-    pub(super) features: Option<(Seen, Image<D>)>,
+    pub(super) features: Option<(FeatureKey, Image<D>)>,
     pub(super) counts: Counts,
 }
 
 /// What a feature image depends on, for encoded views.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Seen {
+pub(super) struct FeatureKey {
     camera: CameraBlock,
     views: Vec<usize>,
     weights: Vec<f32>,
@@ -125,6 +126,12 @@ impl<D: Device> Views<'_, D> {
         })
     }
 
+    /// The efforts, with the denoiser's run of each.
+    fn runs(&self) -> Vec<(Effort, Plan)> {
+        let denoiser = self.field.architecture.denoiser.as_ref();
+        denoiser.map_or_else(Vec::new, |denoiser| efforts::of(&self.field.options.plan, denoiser.estimate))
+    }
+
     /// The sampling of rays for a target.
     fn ray_sampling(&self, target: &Camera) -> RaySampling {
         let Rays { sample_count, jitter, length, inclusive, .. } = self.field.options.rays;
@@ -155,12 +162,12 @@ impl<D: Device> Prepared for Views<'_, D> {
         };
         let camera = CameraBlock { height: size.height, width: size.width, ..target.block(0) };
         let mut scratch = Scratch::new(device);
-        let seen = Seen { camera, views: request.views.to_vec(), weights: request.view_weights() };
+        let key = FeatureKey { camera, views: request.views.to_vec(), weights: request.view_weights() };
         let features = match self.features.take() {
-            Some((of, features)) if of == seen => features,
+            Some((of, features)) if of == key => features,
             _ => {
                 self.fill_seen(request.views, &camera, &ray_sampling)?;
-                let views = self.used(request.views, &seen.weights)?;
+                let views = self.used(request.views, &key.weights)?;
                 self.parts.features(device, &mut scratch, &views, &camera, &ray_sampling, progress)?
             }
         };
@@ -169,7 +176,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             _ => Start::Noise,
         };
         let sampled = self.parts.picture(device, &mut scratch, &features, &self.plan, start, progress)?;
-        self.features = Some((seen, features));
+        self.features = Some((key, features));
         self.error = self.effort.map_or(f32::INFINITY, |effort| efforts::error_of(effort, sampled.accuracy));
         self.counts.calls += u64::from(sampled.call_count());
         self.counts.planned_calls += u64::from(sampled.call_count() + sampled.left_out);
@@ -180,67 +187,50 @@ impl<D: Device> Prepared for Views<'_, D> {
         Ok(cropped(&values, size, target))
     }
 
-    fn efforts(&self) -> Vec<Effort> {
-        match &self.field.architecture.denoiser {
-            Some(denoiser) => {
-                let all = efforts::of(&self.field.options.plan, denoiser.estimate);
-                all.into_iter().map(|(effort, _)| effort).collect()
-            }
-            None => Vec::new(),
-        }
-    }
-
-    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        if let Some(denoiser) = &self.field.architecture.denoiser
-            && let Some((_, plan)) = efforts::of(&self.field.options.plan, denoiser.estimate).into_iter().nth(effort)
-        {
-            (self.plan, self.effort) = (plan, Some(effort));
-        }
-        Ok(Encodings::Kept)
-    }
-
-    fn estimates_errors(&self) -> bool {
-        self.field.architecture.denoiser.is_some()
-    }
-
-    fn estimated_error(&self) -> f32 {
-        self.error
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        // Efforts differ in the calls of the denoiser.
+        if self.field.architecture.denoiser.is_some() { Some(self) } else { None }
     }
 
     fn record(&self) -> Record {
         let Counts { volume_rows, filled_rows, volume_bytes, kept_bytes, planned_calls, calls } = self.counts;
         let Genvs { architecture, options, .. } = self.field;
         let Omissions { unseen_rows, reuse, half_volumes, .. } = options.omissions;
-        let line = |what, switch, left_out, of, cost| LeftOut { what, switch, left_out, of, cost };
         let ends = options.plan.early_termination.is_some();
+        let halves = LeftOut {
+            what: "volume bytes",
+            switch: half_volumes,
+            left_out: volume_bytes - kept_bytes.min(volume_bytes),
+            of: volume_bytes,
+            typical_error: "2^-11 of a feature",
+        };
         let left_out = vec![
-            line(
-                "volume rows",
-                unseen_rows && !half_volumes,
-                volume_rows - filled_rows.min(volume_rows),
-                volume_rows,
-                "nothing",
-            ),
-            line(
-                "volume bytes",
-                half_volumes,
-                volume_bytes - kept_bytes.min(volume_bytes),
-                volume_bytes,
-                "2^-11 of a feature",
-            ),
-            line(
-                "denoiser calls",
-                ends || reuse.is_some(),
-                planned_calls - calls,
-                planned_calls,
-                "invisible changes of a pixel; the error of starting from the frame before must be measured",
-            ),
+            ROWS.left_out(unseen_rows && !half_volumes, volume_rows - filled_rows.min(volume_rows), volume_rows),
+            halves,
+            CALLS.left_out(ends || reuse.is_some(), planned_calls - calls, planned_calls),
         ];
         let has_denoiser = architecture.denoiser.is_some();
         let run = GenvsOptions { plan: self.plan, ..*options };
         let denoising = has_denoiser.then(|| run.denoising(calls, planned_calls.saturating_sub(calls)));
         let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
         Record { left_out, denoising, memory_estimate, near_far }
+    }
+}
+
+impl<D: Device> Efforts for Views<'_, D> {
+    fn list(&self) -> Vec<Effort> {
+        self.runs().into_iter().map(|(effort, _)| effort).collect()
+    }
+
+    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        if let Some((_, plan)) = self.runs().into_iter().nth(effort) {
+            (self.plan, self.effort) = (plan, Some(effort));
+        }
+        Ok(Encodings::Kept)
+    }
+
+    fn check(&mut self) -> Check<'_> {
+        Check::Steps(self.error)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::architecture::Architecture;
 use super::encoder::ViewLatents;
 use super::parameters::PointNetwork;
-use super::sight::Sight;
+use super::visibility::Visibility;
 use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
@@ -28,7 +28,7 @@ pub(super) struct Views<'a, D: Device> {
     /// Their encodings.
     pub(super) latents: Vec<&'a ViewLatents<D>>,
     /// The same cameras and weights on the host, where a view has weight 0 at some points and is left out there.
-    pub(super) sight: Option<Sight>,
+    pub(super) visibility: Option<Visibility>,
 }
 
 /// Buffers for activations, reused for every chunk of points.
@@ -113,7 +113,7 @@ pub(super) struct Network<'a, D: Device> {
 
 impl<D: Device> Network<'_, D> {
     /// Computes the four raw outputs of the first `point_count` points of a workspace.
-    pub(super) fn ask(
+    pub(super) fn evaluate(
         &self,
         workspace: &mut Workspace<D>,
         views: &Views<'_, D>,

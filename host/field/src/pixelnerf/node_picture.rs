@@ -217,9 +217,9 @@ impl<D: Device> Renderer<'_, D> {
     ) -> Result<Vec<f32>, FieldError> {
         self.progress.check()?;
         let own = replace(&mut workspace.points, self.device.upload(points)?);
-        let asked = self.fine.ask_seeing(workspace, self.views, points.len() as u32);
+        let left_out = self.fine.evaluate_visible(workspace, self.views, points.len() as u32);
         workspace.points = own;
-        evaluated.unseen += asked?;
+        evaluated.unseen += left_out?;
         Ok(self.device.download(&workspace.raw)?)
     }
 

@@ -39,7 +39,7 @@ pub(super) struct Evaluated {
 }
 
 /// The weights of a first pass along some rays.
-pub(super) struct Seen<D: Device> {
+pub(super) struct Probes<D: Device> {
     /// `[ray][part]` of weight and transmittance in front.
     pub(super) values: D::Buffer<[f32; 2]>,
     pub(super) part_count: u32,
@@ -92,13 +92,13 @@ impl<D: Device> Renderer<'_, D> {
         &self,
         workspace: &mut Workspace<D>,
         pixels: &[u32],
-        seen: Option<&Seen<D>>,
+        probes: Option<&Probes<D>>,
         evaluated: &mut [Evaluated; 2],
     ) -> Result<Pixels<D>, FieldError> {
         let device = self.device;
         let rays = self.rays(pixels)?;
         let count = self.sampling.coarse_count;
-        let coarse = self.first_pass(workspace, &rays, count, seen, &mut evaluated[0])?;
+        let coarse = self.first_pass(workspace, &rays, count, probes, &mut evaluated[0])?;
         let mut found = self.pixels(pixels.len())?;
         self.composite(&coarse, rays.count, &mut found)?;
         let block = self.fine_block();
@@ -120,14 +120,14 @@ impl<D: Device> Renderer<'_, D> {
         let mask = (empty_rays || empty_parts || hidden_samples).then_some(SampleMaskBlock {
             sample_count: count,
             part_count: coarse.count,
-            least_share: if empty_parts { seen.map_or(MIN_SHARE, |seen| seen.least_share) } else { 0.0 },
+            least_share: if empty_parts { probes.map_or(MIN_SHARE, |probes| probes.least_share) } else { 0.0 },
             termination: if hidden_samples { self.early_termination } else { -1.0 },
             least_opacity: if empty_rays { MIN_OPACITY } else { 0.0 },
             width: self.cast.camera.width,
             ..SampleMaskBlock::default()
         });
         let list = self.list(&rays, &fine, mask.as_ref().map(|block| (block, &parts)))?;
-        self.ask(&self.fine, workspace, &rays, &mut fine, &list, &mut evaluated[1])?;
+        self.evaluate(&self.fine, workspace, &rays, &mut fine, &list, &mut evaluated[1])?;
         self.composite(&fine, rays.count, &mut found)?;
         Ok(found)
     }
@@ -138,30 +138,30 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         rays: &Rays<D>,
         sample_count: u32,
-        seen: Option<&Seen<D>>,
+        probes: Option<&Probes<D>>,
         evaluated: &mut Evaluated,
     ) -> Result<Samples<D>, FieldError> {
         let Sampling { seed, jitter, .. } = self.sampling;
         let block = CoarseBlock { seed: words(seed), sample_count, jitter };
         let mut samples = self.samples(rays.count as usize, block.sample_count)?;
         self.device.coarse_depths(&block, rays.count, &rays.rays, &rays.pixels, &mut samples.depths)?;
-        let mask = seen.map(|seen| {
+        let mask = probes.map(|probes| {
             let block = SampleMaskBlock {
                 sample_count: block.sample_count,
-                part_count: seen.part_count,
-                least_share: seen.least_share,
+                part_count: probes.part_count,
+                least_share: probes.least_share,
                 // Samples that are hidden on the probes' rays may be visible on a ray beside their surfaces.
                 termination: -1.0,
                 least_opacity: 0.0,
                 step: self.omissions.empty_space,
-                seen_columns: seen.columns,
-                seen_rows: seen.rows,
+                seen_columns: probes.columns,
+                seen_rows: probes.rows,
                 width: self.cast.camera.width,
             };
-            (block, &seen.values)
+            (block, &probes.values)
         });
-        let list = self.list(rays, &samples, mask.as_ref().map(|(block, seen)| (block, *seen)))?;
-        self.ask(&self.coarse, workspace, rays, &mut samples, &list, evaluated)?;
+        let list = self.list(rays, &samples, mask.as_ref().map(|(block, probes)| (block, *probes)))?;
+        self.evaluate(&self.coarse, workspace, rays, &mut samples, &list, evaluated)?;
         Ok(samples)
     }
 
@@ -174,9 +174,9 @@ impl<D: Device> Renderer<'_, D> {
         mask: Option<(&SampleMaskBlock, &D::Buffer<[f32; 2]>)>,
     ) -> Result<List<D>, FieldError> {
         let (device, all) = (self.device, rays.count * samples.count);
-        let Some((block, seen)) = mask else { return Ok(List { samples: None, count: all }) };
+        let Some((block, probes)) = mask else { return Ok(List { samples: None, count: all }) };
         let mut mask = self.zeros(all as usize)?;
-        device.sample_mask(block, rays.count, seen, &rays.rays, &rays.pixels, &samples.depths, &mut mask)?;
+        device.sample_mask(block, rays.count, probes, &rays.rays, &rays.pixels, &samples.depths, &mut mask)?;
         let run_count = all.div_ceil(RUN);
         let (mut counts, mut offsets) = (self.zeros(run_count as usize)?, self.zeros(run_count as usize + 1)?);
         let (mut total, mut list) = (self.zeros(1)?, self.zeros(all as usize)?);
@@ -188,7 +188,7 @@ impl<D: Device> Renderer<'_, D> {
     }
 
     /// Evaluates a network at samples, as many at a time as the workspace holds. The others stay empty.
-    fn ask(
+    fn evaluate(
         &self,
         network: &Network<'_, D>,
         workspace: &mut Workspace<D>,
@@ -206,7 +206,7 @@ impl<D: Device> Renderer<'_, D> {
             let block = PlaceBlock { sample_count: samples.count, first, ..PlaceBlock::default() };
             let all = list.samples.as_ref();
             device.place_points(&block, count, all, &rays.rays, &samples.depths, &mut workspace.points)?;
-            evaluated.unseen += network.ask_seeing(workspace, self.views, count)?;
+            evaluated.unseen += network.evaluate_visible(workspace, self.views, count)?;
             device.radiance(count, &workspace.raw, &workspace.points, &mut samples.values)?;
         }
         Ok(())

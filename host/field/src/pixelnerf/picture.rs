@@ -1,7 +1,7 @@
 //! A target's picture from rays: which pixels have a ray of their own, and which are interpolated.
 
 use super::network::Workspace;
-use super::pass::{Evaluated, Renderer, Seen, rays_at_once};
+use super::pass::{Evaluated, Probes, Renderer, rays_at_once};
 use crate::{FieldError, Rendered};
 use viewfuse_device::Device;
 
@@ -17,7 +17,7 @@ impl<D: Device> Renderer<'_, D> {
     pub(super) fn picture(
         &self,
         workspace: &mut Workspace<D>,
-        seen: Option<&Seen<D>>,
+        probes: Option<&Probes<D>>,
         evaluated: &mut [Evaluated; 2],
     ) -> Result<Rendered, FieldError> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
@@ -25,10 +25,10 @@ impl<D: Device> Renderer<'_, D> {
         let (colours, depths) = (vec![[0.0; 4]; count], vec![0.0; count]);
         let mut picture = Rendered { colours, depths, confidences: Vec::new(), width, height };
         if self.omissions.interpolation > 0.0 {
-            self.render_grids(workspace, seen, evaluated, &mut picture)?;
+            self.render_grids(workspace, probes, evaluated, &mut picture)?;
         } else {
             let all: Vec<u32> = (0..width * height).collect();
-            self.render_into(workspace, &all, seen, evaluated, &mut picture)?;
+            self.render_into(workspace, &all, probes, evaluated, &mut picture)?;
         }
         Ok(picture)
     }
@@ -37,7 +37,7 @@ impl<D: Device> Renderer<'_, D> {
     fn render_grids(
         &self,
         workspace: &mut Workspace<D>,
-        seen: Option<&Seen<D>>,
+        probes: Option<&Probes<D>>,
         evaluated: &mut [Evaluated; 2],
         picture: &mut Rendered,
     ) -> Result<(), FieldError> {
@@ -50,7 +50,7 @@ impl<D: Device> Renderer<'_, D> {
         };
         let first: Vec<u32> = grid(step).map(|[column, row]| row * width + column).collect();
         let mut ray_count = first.len();
-        self.render_into(workspace, &first, seen, evaluated, picture)?;
+        self.render_into(workspace, &first, probes, evaluated, picture)?;
         while step > 1 {
             let half = step / 2;
             let mut rays = Vec::new();
@@ -67,7 +67,7 @@ impl<D: Device> Renderer<'_, D> {
                 }
             }
             ray_count += rays.len();
-            self.render_into(workspace, &rays, seen, evaluated, picture)?;
+            self.render_into(workspace, &rays, probes, evaluated, picture)?;
             step = half;
         }
         let interpolated = picture.colours.len().saturating_sub(ray_count) as u64;
@@ -87,11 +87,11 @@ impl<D: Device> Renderer<'_, D> {
         &self,
         workspace: &mut Workspace<D>,
         pixels: &[u32],
-        seen: Option<&Seen<D>>,
+        probes: Option<&Probes<D>>,
         evaluated: &mut [Evaluated; 2],
         picture: &mut Rendered,
     ) -> Result<(), FieldError> {
-        let (colours, depths) = self.pixels_at(workspace, pixels, seen, evaluated)?;
+        let (colours, depths) = self.pixels_at(workspace, pixels, probes, evaluated)?;
         for ((pixel, colour), depth) in pixels.iter().zip(colours).zip(depths) {
             picture.colours[*pixel as usize] = colour;
             picture.depths[*pixel as usize] = depth;
@@ -104,7 +104,7 @@ impl<D: Device> Renderer<'_, D> {
         &self,
         workspace: &mut Workspace<D>,
         pixels: &[u32],
-        seen: Option<&Seen<D>>,
+        probes: Option<&Probes<D>>,
         evaluated: &mut [Evaluated; 2],
     ) -> Result<(Vec<[f32; 4]>, Vec<f32>), FieldError> {
         let device = self.device;
@@ -113,7 +113,7 @@ impl<D: Device> Renderer<'_, D> {
         // Nothing is downloaded before all rays are dispatched.
         let mut tiles = Vec::new();
         for some in pixels.chunks(at_once) {
-            tiles.push(self.render(workspace, some, seen, evaluated)?);
+            tiles.push(self.render(workspace, some, probes, evaluated)?);
             self.progress.step();
         }
         let (mut colours, mut depths) = (Vec::with_capacity(pixels.len()), Vec::with_capacity(pixels.len()));

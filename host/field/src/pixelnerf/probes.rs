@@ -2,7 +2,7 @@
 
 use super::network::Workspace;
 use super::options::MIN_SHARE;
-use super::pass::{Evaluated, Renderer, Seen, rays_at_once};
+use super::pass::{Evaluated, Probes, Renderer, rays_at_once};
 use crate::FieldError;
 use viewfuse_core::composite::Compositor;
 use viewfuse_device::Device;
@@ -18,7 +18,7 @@ impl<D: Device> Renderer<'_, D> {
         workspace: &mut Workspace<D>,
         step: u32,
         evaluated: &mut Evaluated,
-    ) -> Result<Seen<D>, FieldError> {
+    ) -> Result<Probes<D>, FieldError> {
         let (width, height) = (self.cast.camera.width, self.cast.camera.height);
         let [columns, rows] = [width, height].map(|side| (side - 1).div_ceil(step) + 1);
         let place = |index: u32, side: u32| (index * step).min(side - 1);
@@ -45,7 +45,7 @@ impl<D: Device> Renderer<'_, D> {
         let most = f64::from(self.omissions.probe_error).powi(2) * pixels.len() as f64;
         let harmless = changes.iter().position(|change| *change < most);
         let least_share = harmless.map_or(MIN_SHARE, |index| SHARES[index]);
-        Ok(Seen { values, part_count: count, columns, rows, least_share })
+        Ok(Probes { values, part_count: count, columns, rows, least_share })
     }
 }
 

@@ -19,7 +19,7 @@ pub struct Reference<'a, D: Device> {
 
 /// The result of compositing rays.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SeenRays {
+pub struct RenderedRays {
     /// `[ray][sample]`.
     pub weights: Vec<f32>,
     /// `[ray]`: red, green, blue over white.
@@ -80,7 +80,7 @@ impl<'a, D: Device> Reference<'a, D> {
         let mut samples = device.zeros(points.len())?;
         for some in points.chunks(workspace.point_count as usize) {
             workspace.points = device.upload(some)?;
-            network.ask(&mut workspace, &views, some.len() as u32)?;
+            network.evaluate(&mut workspace, &views, some.len() as u32)?;
             device.radiance(some.len() as u32, &workspace.raw, &workspace.points, &mut samples)?;
         }
         device.download(&samples)
@@ -90,13 +90,13 @@ impl<'a, D: Device> Reference<'a, D> {
     ///
     /// # Errors
     /// If the device fails.
-    pub fn look(
+    pub fn render_rays(
         &mut self,
         pass: Pass,
         weights: &[f32],
         rays: &[TargetRay],
         depths: &[f32],
-    ) -> Result<SeenRays, DeviceError> {
+    ) -> Result<RenderedRays, DeviceError> {
         let device = self.views.device;
         let sample_count = (depths.len() / rays.len()) as u32;
         let rays = self.load(rays)?;
@@ -121,7 +121,7 @@ impl<'a, D: Device> Reference<'a, D> {
         device.composite(&block, rays.count, &samples, &depths, &mut pixels.colours, &mut pixels.depths)?;
         let colours = device.download(&pixels.colours)?;
         let mean_depths = device.download(&pixels.depths)?;
-        Ok(SeenRays {
+        Ok(RenderedRays {
             weights: device.download(&seen)?.iter().map(|[weight, _]| *weight).collect(),
             depths: colours.iter().zip(mean_depths).map(|(colour, depth)| colour[3] * depth).collect(),
             colours: colours.iter().map(|colour| [colour[0], colour[1], colour[2]]).collect(),

@@ -21,7 +21,7 @@ pub struct RenderOptions {
     pub early_termination: f32,
     /// Values of the field's scalars ([`Tunable`](crate::Tunable)); those that are not named take their defaults.
     pub settings: Vec<Setting>,
-    /// A bound on each picture's error or time, which chooses what else to leave out.
+    /// A bound on each picture's error or time, which chooses the effort.
     pub bound: Option<Bound>,
 }
 

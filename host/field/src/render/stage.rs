@@ -2,7 +2,8 @@
 
 use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
-use crate::{DepthMap, Effort, Record, Rendered, Renderer, Session, Setting, Surfaces, Tunable};
+use crate::session::Session;
+use crate::{DepthMap, Effort, FieldError, Geometry, Record, Rendered, Renderer, Setting, Surfaces, Tunable};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
@@ -10,7 +11,7 @@ use viewfuse_core::weights::Weights;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::Target;
-use viewfuse_scene::photographs::{Album, GroundTruth, SourceImages, reduced_size, scaled_size, to_rgb8};
+use viewfuse_scene::photographs::{Album, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8};
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MAX_SOURCES, SourcePoses, SourceWeights};
 
@@ -25,22 +26,29 @@ pub struct StageCosts {
     pub encode: Duration,
 }
 
-/// A set of sources on a device: the state that depends on no weighting and no target.
+/// Sources on a device: what is encoded of them, and the pictures that are rendered from them.
 pub struct Stage<'a> {
-    scene: &'a Scene,
-    album: &'a Album<'a>,
+    scene: Option<SceneSources<'a>>,
     options: &'a RenderOptions,
     side: u32,
-    /// The source views, as indices into the scene's views.
-    pub views: Vec<usize>,
+    /// A camera whose pictures have the options' size: the scene's first, or the first source's.
+    first: Option<Camera>,
     sources: SourcePoses,
     /// The sources at working size.
     pub images: Arc<SourceImages>,
-    session: Session<'a>,
+    pub(crate) session: Session<'a>,
     /// Keeps the options' bound.
     controller: Option<Controller>,
     /// Times of the stages so far.
     pub costs: StageCosts,
+}
+
+/// The scene that sources are of.
+pub(crate) struct SceneSources<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) album: &'a Album<'a>,
+    /// The source views, as indices into the scene's views.
+    pub(crate) views: Vec<usize>,
 }
 
 impl<'a> Stage<'a> {
@@ -87,13 +95,43 @@ impl<'a> Stage<'a> {
         let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options, renderer.about().longest_side)?;
+        let stage = Stage::new(images, source_poses, renderer, options, progress);
+        let sources = Some(SceneSources { scene, album, views: sources.to_vec() });
+        let first = scene.views.first().map(|view| view.camera);
+        Ok(Stage { scene: sources, first, side, ..stage.map_err(|error| RenderError::of(error, scene))? })
+    }
+
+    /// The same for images of no scene: frames have no truth.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn of_sources(
+        images: Arc<SourceImages>,
+        renderer: &'a dyn Renderer,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Stage<'a>, FieldError> {
+        let poses: Vec<_> = images.images.iter().map(|image| image.camera.pose).collect();
+        let sources = SourcePoses::new(&poses).map_err(FieldError::unsuitable)?;
+        Stage::new(images, sources, renderer, options, progress)
+    }
+
+    fn new(
+        images: Arc<SourceImages>,
+        sources: SourcePoses,
+        renderer: &'a dyn Renderer,
+        options: &'a RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Stage<'a>, FieldError> {
         let mut costs = StageCosts::default();
-        let mut session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))
-            .map_err(|error| RenderError::of(error, scene))?;
-        session.tune(&options.settings);
-        let views = sources.to_vec();
+        let session = timed(&mut costs.prepare, || Session::open(renderer, &images, progress))?;
         let controller = options.bound.map(|bound| Controller::new(bound, &session));
-        Ok(Stage { scene, album, options, side, views, sources: source_poses, images, session, controller, costs })
+        let first = images.images.first().map(|image| image.camera);
+        let largest = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
+        let side = options.size.map_or(largest, |[width, height]| width.max(height));
+        let mut stage = Stage { scene: None, options, side, first, sources, images, session, controller, costs };
+        stage.tune(&options.settings);
+        Ok(stage)
     }
 
     /// Begins a weighting for the following frames: encodes the sources if the field does so before the frames, each
@@ -103,14 +141,21 @@ impl<'a> Stage<'a> {
     /// [`RenderError`].
     pub fn weigh(&mut self, weighting: &Weighting, progress: &dyn Progress) -> Result<(), RenderError> {
         let relevance = self.relevance(weighting);
+        self.weigh_by(&relevance, progress).map_err(|error| self.error(error))
+    }
+
+    /// The same with the weights of all sources for each source as a target, its own 0.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn weigh_by(&mut self, relevance: &[SourceWeights], progress: &dyn Progress) -> Result<(), FieldError> {
         let (session, first) = (&mut self.session, self.controller.as_ref().map(Controller::first));
-        let weigh = || {
+        timed(&mut self.costs.encode, || {
             if let Some(first) = first {
                 session.set_effort(first, progress)?;
             }
-            session.weigh(&relevance, progress)
-        };
-        timed(&mut self.costs.encode, weigh).map_err(|error| RenderError::of(error, self.scene))
+            session.weigh(relevance, progress)
+        })
     }
 
     /// Encodes all sources that are not encoded yet, so that what follows does not change how they are.
@@ -119,13 +164,28 @@ impl<'a> Stage<'a> {
     /// [`RenderError`].
     pub fn encode_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
         let session = &mut self.session;
-        timed(&mut self.costs.encode, || session.encode_all(progress))
-            .map_err(|error| RenderError::of(error, self.scene))
+        timed(&mut self.costs.encode, || session.encode_all(progress)).map_err(|error| self.error(error))
     }
 
-    /// The ways in which the field can render; see [`Prepared::efforts`](crate::Prepared::efforts).
-    pub fn efforts(&self) -> Vec<Effort> {
-        self.session.efforts()
+    /// Renders a target with these weights of the sources, all of which are used, whatever the options say. Sources with a
+    /// weight that are not encoded yet are encoded; if their encoding depends on a weighting and none has begun, all
+    /// weights are equal.
+    ///
+    /// # Errors
+    /// [`FieldError`].
+    pub fn picture(
+        &mut self,
+        camera: &Camera,
+        weights: &SourceWeights,
+        early_termination: f32,
+        progress: &dyn Progress,
+    ) -> Result<Rendered, FieldError> {
+        self.session.render(camera, weights, early_termination, progress)
+    }
+
+    /// The efforts of the field, the cheapest first, the exact one last; none for a field with one way to render.
+    pub fn efforts(&self) -> &[Effort] {
+        &self.session.efforts
     }
 
     /// Renders what follows with one of [`Stage::efforts`]; without effect where the options have a bound, which chooses.
@@ -133,41 +193,40 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`RenderError`].
     pub fn set_effort(&mut self, effort: usize, progress: &dyn Progress) -> Result<(), RenderError> {
-        let set = self.session.set_effort(effort, progress);
-        set.map(|_| ()).map_err(|error| RenderError::of(error, self.scene))
+        self.session.set_effort(effort, progress).map_err(|error| self.error(error))
     }
 
-    /// Whether the field can render single pixels, with which a bounded picture is checked.
-    pub fn renders_pixels(&self) -> bool {
-        self.session.renders_pixels()
+    /// Renders what follows with the effort of trials; see [`Efforts::set_trial`](crate::Efforts::set_trial).
+    pub(crate) fn set_trial(&mut self) {
+        if let Some(efforts) = self.session.prepared.efforts() {
+            efforts.set_trial();
+        }
     }
 
     /// The field's scalars that can be chosen for a scene.
     pub fn tunables(&self) -> &'static [Tunable] {
-        self.session.tunables()
+        self.session.tunables
     }
 
     /// Sets the field's scalars for what follows; views that are encoded stay as they are.
     pub fn tune(&mut self, settings: &[Setting]) {
-        self.session.tune(settings);
-    }
-
-    /// What follows is only compared with one another; see [`Prepared::simplify`](crate::Prepared::simplify).
-    pub fn simplify(&mut self) {
-        self.session.simplify();
+        if let Some(tuned) = self.session.prepared.tuned() {
+            tuned.tune(settings);
+        }
     }
 
     /// What the field knows of where the surfaces are.
     pub fn surfaces(&self) -> Surfaces {
-        self.session.surfaces()
+        self.session.prepared.geometry().map_or_else(Surfaces::default, Geometry::surfaces)
     }
 
-    /// The depth maps of the sources, under the weighting that began; see [`Prepared::source_depths`](crate::Prepared::source_depths).
+    /// The depth maps of the sources, under the weighting that began; none for fields without them.
     ///
     /// # Errors
     /// [`RenderError`].
     pub fn source_depths(&self) -> Result<Vec<DepthMap>, RenderError> {
-        self.session.source_depths().map_err(|error| RenderError::of(error, self.scene))
+        let depths = self.session.prepared.geometry().map_or(Ok(Vec::new()), Geometry::source_depths);
+        depths.map_err(|error| self.error(error))
     }
 
     /// The weights of all sources for each source as a target; a source's weight for itself is 0.
@@ -180,14 +239,14 @@ impl<'a> Stage<'a> {
         self.side
     }
 
-    /// The scene.
-    pub fn scene(&self) -> &'a Scene {
-        self.scene
+    /// The scene that the sources are of.
+    pub(crate) fn scene(&self) -> Option<&SceneSources<'a>> {
+        self.scene.as_ref()
     }
 
-    /// Its photographs.
-    pub fn album(&self) -> &'a Album<'a> {
-        self.album
+    /// What a photograph of the scene must have behind its object to be compared with a frame; `None` if it is shown whole.
+    pub fn background(&self) -> Option<[f32; 3]> {
+        self.images.has_silhouettes.then_some(self.images.background)
     }
 
     /// The record of the field's work so far.
@@ -251,33 +310,18 @@ impl<'a> Stage<'a> {
                     .map(|rendered| (rendered, None, encode))
             }
         }
-        .map_err(|error| RenderError::of(error, self.scene))?;
+        .map_err(|error| self.error(error))?;
         let time = start.elapsed();
         let Rendered { colours, depths, confidences, width, height } = rendered;
         let picture = to_rgb8(&colours, [width, height]);
-        let truth = match target.truth {
-            Some(view) => Some(Truth::compare(&picture, self.truth_at(view, [width, height])?)),
-            None => None,
+        let truth = match (target.truth, &self.scene) {
+            (Some(view), Some(SceneSources { album, .. })) => {
+                Some(Truth::compare(&picture, album.truth(view, [width, height], self.background())?))
+            }
+            _ => None,
         };
         let target = target.clone();
         Ok(Frame { target, weights, omission, colours, picture, depths, confidences, truth, time, encode, kept })
-    }
-
-    /// A view's photograph at a size, over the run's background.
-    ///
-    /// # Errors
-    /// [`RenderError::Scene`] if it cannot be read.
-    pub fn truth_at(&self, view: usize, size: [u32; 2]) -> Result<GroundTruth, RenderError> {
-        let background = self.images.has_silhouettes.then_some(self.images.background);
-        Ok(self.album.truth(view, size, background)?)
-    }
-
-    /// Width and height of the picture that is rendered at a view's camera.
-    ///
-    /// # Errors
-    /// [`RenderError::Size`].
-    pub fn picture_size(&self, view: usize) -> Result<[u32; 2], RenderError> {
-        self.size_at(&self.scene.views[view].camera)
     }
 
     /// Width and height of the picture that is rendered at a camera.
@@ -289,15 +333,26 @@ impl<'a> Stage<'a> {
         Ok([camera.pinhole.width(), camera.pinhole.height()])
     }
 
-    fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError> {
-        let (width, height) = match (self.options.size, self.scene.views.first()) {
-            (Some([width, height]), Some(view)) if same_size(&view.camera, camera) => (width, height),
+    /// A camera with the size of the picture that is rendered at it.
+    ///
+    /// # Errors
+    /// [`RenderError::Size`].
+    pub fn at_working_size(&self, camera: &Camera) -> Result<Camera, RenderError> {
+        let (width, height) = match (self.options.size, &self.first) {
+            (Some([width, height]), Some(first)) if same_size(first, camera) => (width, height),
             (Some(_), _) => scaled_size(camera, self.side),
             (None, _) => reduced_size(camera, self.side),
         };
         let pinhole =
             camera.pinhole.resized(width, height).map_err(|error| RenderError::Size { width, height, error })?;
         Ok(Camera { pinhole, ..*camera })
+    }
+
+    fn error(&self, error: FieldError) -> RenderError {
+        match &self.scene {
+            Some(SceneSources { scene, .. }) => RenderError::of(error, scene),
+            None => error.into(),
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! Sources that show a silhouette: a visual hull from silhouettes, depths by plane sweep, colours by weighted
 //! fusion; the mathematics is in [`viewfuse_kernels::visual_hull`].
 
-mod bounds;
-
-use crate::{DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request};
+use crate::{
+    DepthMap, Effort, Efforts, Encoding, Encodings, FieldError, Geometry, Prepared, Rendered, Request, Weighted,
+};
 use std::ops::Range;
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::{Device, HullScene, Pixels};
@@ -11,6 +11,7 @@ use viewfuse_job::progress::{Progress, Silent};
 use viewfuse_kernels::visual_hull::ray_marching::MarchBlock;
 use viewfuse_kernels::visual_hull::sweep::{NEIGHBOUR_REACH, SweepBlock, WINDOW_REACH};
 use viewfuse_kernels::visual_hull::{NO_SURFACE, ObjectBlock};
+use viewfuse_scene::photographs::object_box::{bounding_box, joined};
 use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -18,8 +19,8 @@ use viewfuse_weighting::sources::SourceWeights;
 const BAND_ROWS: u32 = 16;
 /// Rows around a band that its depths depend on: the window's and the neighbours' reach.
 const HALO_ROWS: u32 = WINDOW_REACH + NEIGHBOUR_REACH;
-/// Shares of the sources' side, with the error and the work that are typical of them (the example `efforts` of
-/// `viewfuse-evaluate`).
+/// Shares of the sources' side, with the error and the work that are typical of them (the experiment `efforts` of
+/// `viewfuse-research`).
 const EFFORTS: [(f32, f32, f32); 2] = [(0.25, 0.065, 0.2), (0.5, 0.04, 0.4)];
 /// Sources with a longer side than this take most of the time; smaller ones take less than the picture.
 const MIN_REDUCED: u32 = 256;
@@ -129,7 +130,7 @@ impl<D: Device> Silhouettes<D> {
     /// Uploads images and finds the object.
     fn upload(device: &D, images: &[SourceImage], progress: &dyn Progress) -> Result<Silhouettes<D>, FieldError> {
         let (cameras, texels) = joined(images);
-        let object = bounds::find(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
+        let object = bounding_box(&cameras, &texels).ok_or_else(|| FieldError::unsuitable(NoObject))?;
         let footprints: Vec<f32> = cameras.iter().map(|camera| footprint(&object, camera)).collect();
         let scene = HullScene {
             object,
@@ -159,31 +160,16 @@ impl<D: Device> Views<'_, D> {
     fn silhouettes(&self) -> &Silhouettes<D> {
         self.reduced.as_ref().unwrap_or(&self.whole)
     }
+
+    /// Longest side of the sources.
+    fn side(&self) -> u32 {
+        self.cameras.iter().map(longest_side).max().unwrap_or(1)
+    }
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
     fn encoding(&self) -> Encoding {
         Encoding::All
-    }
-
-    fn depends_on_weighting(&self) -> bool {
-        true
-    }
-
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        let Silhouettes { scene, texel_count, .. } = self.silhouettes();
-        let (device, texel_count, view_count) = (self.device, *texel_count, scene.object.view_count as usize);
-        // The last weighting's buffers are freed before new ones are allocated.
-        self.depths = None;
-        let pair_weights: Vec<f32> =
-            relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
-        let sweep = Sweep {
-            pair_weights: device.upload(&pair_weights)?,
-            nothing: device.upload(&vec![NO_SURFACE; texel_count])?,
-            first_guess: device.zeros(texel_count)?,
-        };
-        self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
-        Ok(())
     }
 
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
@@ -212,49 +198,6 @@ impl<D: Device> Prepared for Views<'_, D> {
             device.pick_depth(&sweep, first, kept, object, views, &means, entries, first_guess, maps)?;
         }
         Ok(())
-    }
-
-    fn efforts(&self) -> Vec<Effort> {
-        let side = self.cameras.iter().map(longest_side).max().unwrap_or(1);
-        if side < MIN_REDUCED {
-            return Vec::new();
-        }
-        let side = side as f32;
-        let named = |(share, error, work): (f32, f32, f32)| {
-            Effort::new(format!("sources at {} pixels", (share * side).round()), error, work)
-        };
-        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
-    }
-
-    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        let device = self.device;
-        self.depths = None;
-        self.reduced = match EFFORTS.get(effort) {
-            None => None,
-            Some((share, ..)) => {
-                let HullScene { texels, cameras, .. } = &self.whole.scene;
-                let texels = device.download(texels)?;
-                let reduced = |(camera, block): (&Camera, &CameraBlock)| {
-                    let own = texels[block.first_texel as usize..].iter().take((block.width * block.height) as usize);
-                    let side = (share * longest_side(camera) as f32).round().max(1.0) as u32;
-                    SourceImage { camera: *camera, texels: own.copied().collect() }.reduced(side)
-                };
-                let images: Result<Vec<SourceImage>, _> = self.cameras.iter().zip(cameras).map(reduced).collect();
-                Some(Silhouettes::upload(device, &images.map_err(FieldError::unsuitable)?, &Silent)?)
-            }
-        };
-        Ok(Encodings::Dropped)
-    }
-
-    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        let depths = self.depths.as_ref().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
-        let maps = self.device.download(&depths.maps)?;
-        let map = |camera: &CameraBlock| {
-            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
-            let depths = own.map(|depth| if *depth < NO_SURFACE { *depth } else { 0.0 }).collect();
-            DepthMap { camera: CameraBlock { first_texel: 0, ..*camera }, depths, confidences: Vec::new() }
-        };
-        Ok(self.silhouettes().scene.cameras.iter().map(map).collect())
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
@@ -293,23 +236,79 @@ impl<D: Device> Prepared for Views<'_, D> {
         let (colours, depths) = (device.download(&pixels.colours)?, device.download(&pixels.depths)?);
         Ok(Rendered { colours, depths, confidences: Vec::new(), width, height })
     }
-}
 
-/// The bounding box of the visual hull of the sources' silhouettes, or `None` if it is empty.
-pub fn find_object(sources: &SourceImages) -> Option<ObjectBlock> {
-    let (cameras, texels) = joined(&sources.images);
-    bounds::find(&cameras, &texels)
-}
-
-/// All sources' texels, concatenated, and the cameras with the offsets of their texels.
-pub(super) fn joined(images: &[SourceImage]) -> (Vec<CameraBlock>, Vec<[f32; 4]>) {
-    let mut cameras = Vec::with_capacity(images.len());
-    let mut texels = Vec::new();
-    for image in images {
-        cameras.push(image.camera.block(texels.len() as u32));
-        texels.extend_from_slice(&image.texels);
+    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
+        Some(self)
     }
-    (cameras, texels)
+
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        if self.side() >= MIN_REDUCED { Some(self) } else { None }
+    }
+
+    fn geometry(&self) -> Option<&dyn Geometry> {
+        Some(self)
+    }
+}
+
+impl<D: Device> Weighted for Views<'_, D> {
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        let Silhouettes { scene, texel_count, .. } = self.silhouettes();
+        let (device, texel_count, view_count) = (self.device, *texel_count, scene.object.view_count as usize);
+        // The last weighting's buffers are freed before new ones are allocated.
+        self.depths = None;
+        let pair_weights: Vec<f32> =
+            relevance.iter().flat_map(|weights| weights.values()[..view_count].iter().copied()).collect();
+        let sweep = Sweep {
+            pair_weights: device.upload(&pair_weights)?,
+            nothing: device.upload(&vec![NO_SURFACE; texel_count])?,
+            first_guess: device.zeros(texel_count)?,
+        };
+        self.depths = Some(Depths { maps: device.zeros(texel_count)?, sweep: Some(sweep) });
+        Ok(())
+    }
+}
+
+impl<D: Device> Efforts for Views<'_, D> {
+    fn list(&self) -> Vec<Effort> {
+        let side = self.side() as f32;
+        let named = |(share, error, work): (f32, f32, f32)| {
+            Effort::new(format!("sources at {} pixels", (share * side).round()), error, work)
+        };
+        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
+    }
+
+    fn set(&mut self, effort: usize) -> Result<Encodings, FieldError> {
+        let device = self.device;
+        self.depths = None;
+        self.reduced = match EFFORTS.get(effort) {
+            None => None,
+            Some((share, ..)) => {
+                let HullScene { texels, cameras, .. } = &self.whole.scene;
+                let texels = device.download(texels)?;
+                let reduced = |(camera, block): (&Camera, &CameraBlock)| {
+                    let own = texels[block.first_texel as usize..].iter().take((block.width * block.height) as usize);
+                    let side = (share * longest_side(camera) as f32).round().max(1.0) as u32;
+                    SourceImage { camera: *camera, texels: own.copied().collect() }.reduced(side)
+                };
+                let images: Result<Vec<SourceImage>, _> = self.cameras.iter().zip(cameras).map(reduced).collect();
+                Some(Silhouettes::upload(device, &images.map_err(FieldError::unsuitable)?, &Silent)?)
+            }
+        };
+        Ok(Encodings::Dropped)
+    }
+}
+
+impl<D: Device> Geometry for Views<'_, D> {
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        let depths = self.depths.as_ref().ok_or_else(|| FieldError::unsuitable(NotWeighed))?;
+        let maps = self.device.download(&depths.maps)?;
+        let map = |camera: &CameraBlock| {
+            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+            let depths = own.map(|depth| if *depth < NO_SURFACE { *depth } else { 0.0 }).collect();
+            DepthMap { camera: CameraBlock { first_texel: 0, ..*camera }, depths, confidences: Vec::new() }
+        };
+        Ok(self.silhouettes().scene.cameras.iter().map(map).collect())
+    }
 }
 
 /// A pixel's side at the middle of the object.

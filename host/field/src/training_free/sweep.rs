@@ -5,18 +5,19 @@
 //! matching    costs of the planes in a frustum
 //! search      surface points of a scene whose files do not tell its depths
 //! unseen      parts of a picture that its photograph does not show
-//! planes      a target's planes on the host, to be examined
+//! efforts     coarser comparisons, from the cheapest to the exact one
 //! ```
 
+mod efforts;
 mod matching;
-mod planes;
 mod search;
 mod unseen;
 
 use super::exposure;
 use super::space::Space;
 use crate::{
-    DepthMap, Effort, Encoding, Encodings, FieldError, Prepared, Rendered, Request, Setting, Surfaces, Tunable,
+    About, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces, Tunable,
+    Tuned, Weighted,
 };
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -26,24 +27,8 @@ use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::blend::BlendBlock;
 use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
 use viewfuse_kernels::plane_sweep::frustum::SweptView;
-use viewfuse_scene::photographs::{SourceImage, SourceImages, longest_side, reduced_size};
+use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
-
-pub use planes::TargetPlanes;
-
-/// Most planes of a frustum in pictures that are only compared with one another.
-const TRIAL_PLANES: u32 = 32;
-
-/// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
-/// work that are typical of them (the example `efforts` of `viewfuse-evaluate`, on the sample room and on herz_jesus_p8).
-const EFFORTS: [(f32, f32, usize, f32, f32); 6] = [
-    (0.25, 0.5, 4, 0.055, 0.09),
-    (0.5, 1.0, 1, 0.029, 0.2),
-    (0.75, 1.0, 1, 0.0185, 0.38),
-    (1.0, 1.0, 1, 0.014, 0.62),
-    (1.0, 1.0, 2, 0.0085, 0.74),
-    (1.0, 1.0, 3, 0.0045, 0.86),
-];
 
 const NEAR_COST: &str = "near cost";
 const DISSENT_SHARE: &str = "dissent share";
@@ -218,18 +203,27 @@ fn swept(
     order.into_iter().map(view).collect()
 }
 
-impl<D: Device> Views<'_, D> {
-    /// The settings with shares of the side at which the sources are compared and of the planes, and with at most so many
-    /// neighbours.
-    fn at(&self, share: f32, planes: f32, neighbours: usize) -> Sweep {
-        let side = self.small.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
-        let reduced = (share * side as f32).round().max(1.0) as u32;
-        // The whole side is the settings' own: targets may be larger than the sources.
-        let match_side = if share < 1.0 { reduced } else { self.defaults.match_side };
-        let plane_count = (self.defaults.plane_count as f32 * planes).round() as u32;
-        Sweep { plane_count, match_side, neighbours: neighbours.min(self.defaults.neighbours), ..self.settings }
+impl Field for Sweep {
+    /// Sources at the size of the pictures.
+    fn about(&self) -> About {
+        About { least_sources: 2, ..About::new("plane sweep") }
     }
 
+    fn prepare<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        progress: &dyn Progress,
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        if !sources.has_silhouettes {
+            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+            viewfuse_scene::rig::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
+        }
+        Ok(Box::new(self.views(device, sources, progress)?))
+    }
+}
+
+impl<D: Device> Views<'_, D> {
     /// Planes for a camera.
     fn range(&self, camera: &CameraBlock) -> Range {
         Range::new(self.space.disparities(camera), self.settings.plane_count)
@@ -277,21 +271,6 @@ impl<D: Device> Views<'_, D> {
 }
 
 impl<D: Device> Prepared for Views<'_, D> {
-    fn encoding(&self) -> Encoding {
-        Encoding::Used
-    }
-
-    fn depends_on_weighting(&self) -> bool {
-        true
-    }
-
-    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
-        self.relevance = relevance.to_vec();
-        self.steps.fill(0.0);
-        self.gains = None;
-        Ok(())
-    }
-
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
         let cameras = &self.matched.cameras;
         let camera = cameras[view];
@@ -309,72 +288,6 @@ impl<D: Device> Prepared for Views<'_, D> {
         self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
         self.steps[view] = range.step;
         Ok(())
-    }
-
-    fn tunables(&self) -> &'static [Tunable] {
-        TUNABLES
-    }
-
-    fn tune(&mut self, settings: &[Setting]) {
-        let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
-        self.settings = Sweep { plane_count, match_side, neighbours, ..self.defaults };
-        for Setting { name, value } in settings {
-            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
-                *scalar = *value;
-            }
-        }
-    }
-
-    fn simplify(&mut self) {
-        self.settings.plane_count = self.settings.plane_count.min(TRIAL_PLANES);
-    }
-
-    fn efforts(&self) -> Vec<Effort> {
-        let named = |(share, planes, neighbours, error, work): (f32, f32, usize, f32, f32)| {
-            let Sweep { plane_count, match_side, neighbours, .. } = self.at(share, planes, neighbours);
-            let name =
-                format!("matching at {match_side} pixels, {plane_count} planes, {neighbours} neighbours a source");
-            Effort::new(name, error, work)
-        };
-        EFFORTS.into_iter().map(named).chain([Effort::exact()]).collect()
-    }
-
-    fn set_effort(&mut self, effort: usize) -> Result<Encodings, FieldError> {
-        let settings = match EFFORTS.get(effort) {
-            Some((share, planes, neighbours, ..)) => self.at(*share, *planes, *neighbours),
-            None => self.at(1.0, 1.0, self.defaults.neighbours),
-        };
-        if settings == self.settings {
-            return Ok(Encodings::Kept);
-        }
-        self.settings = settings;
-        let images = self.small.iter().map(|image| image.reduced(settings.match_side));
-        let images: Vec<SourceImage> = images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)?;
-        self.matched = Images::upload(self.device, &images)?;
-        self.texels = joined_texels(&images);
-        self.disparities = self.device.zeros(self.texels.len())?;
-        self.steps.fill(0.0);
-        self.gains = None;
-        Ok(Encodings::Dropped)
-    }
-
-    fn surfaces(&self) -> Surfaces {
-        self.space.surfaces()
-    }
-
-    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        let maps = self.device.download(&self.disparities)?;
-        let map = |(camera, step): (&CameraBlock, &f32)| {
-            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
-            // Below half a step a disparity is that of the farthest plane: it bounds nothing.
-            let depth = |disparity: f32| if *step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
-            DepthMap {
-                camera: CameraBlock { first_texel: 0, ..*camera },
-                depths: own.clone().map(|[disparity, _]| depth(*disparity)).collect(),
-                confidences: own.map(|[_, confidence]| *confidence).collect(),
-            }
-        };
-        Ok(self.matched.cameras.iter().zip(&self.steps).map(map).collect())
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
@@ -404,5 +317,67 @@ impl<D: Device> Prepared for Views<'_, D> {
         }
         let (depths, confidences) = (device.download(&depths)?, device.download(&confidences)?);
         Ok(Rendered { colours, depths, confidences, width, height })
+    }
+
+    fn weighted(&mut self) -> Option<&mut dyn Weighted> {
+        Some(self)
+    }
+
+    fn efforts(&mut self) -> Option<&mut dyn Efforts> {
+        Some(self)
+    }
+
+    fn tuned(&mut self) -> Option<&mut dyn Tuned> {
+        Some(self)
+    }
+
+    fn geometry(&self) -> Option<&dyn Geometry> {
+        Some(self)
+    }
+}
+
+impl<D: Device> Weighted for Views<'_, D> {
+    fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
+        self.relevance = relevance.to_vec();
+        self.steps.fill(0.0);
+        self.gains = None;
+        Ok(())
+    }
+}
+
+impl<D: Device> Tuned for Views<'_, D> {
+    fn tunables(&self) -> &'static [Tunable] {
+        TUNABLES
+    }
+
+    fn tune(&mut self, settings: &[Setting]) {
+        let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
+        self.settings = Sweep { plane_count, match_side, neighbours, ..self.defaults };
+        for Setting { name, value } in settings {
+            if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
+                *scalar = *value;
+            }
+        }
+    }
+}
+
+impl<D: Device> Geometry for Views<'_, D> {
+    fn surfaces(&self) -> Surfaces {
+        self.space.surfaces()
+    }
+
+    fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
+        let maps = self.device.download(&self.disparities)?;
+        let map = |(camera, step): (&CameraBlock, &f32)| {
+            let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
+            // Below half a step a disparity is that of the farthest plane: it bounds nothing.
+            let depth = |disparity: f32| if *step > 0.0 && disparity > 0.5 * step { 1.0 / disparity } else { 0.0 };
+            DepthMap {
+                camera: CameraBlock { first_texel: 0, ..*camera },
+                depths: own.clone().map(|[disparity, _]| depth(*disparity)).collect(),
+                confidences: own.map(|[_, confidence]| *confidence).collect(),
+            }
+        };
+        Ok(self.matched.cameras.iter().zip(&self.steps).map(map).collect())
     }
 }

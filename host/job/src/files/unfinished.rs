@@ -1,8 +1,8 @@
 //! Temporary files and folders of outputs that are not finished.
 //!
 //! Each is locked by its process. A process that ends at once removes its own ([`remove_all`]). What a kill leaves is
-//! removed by the next process that writes to the same folder: what nobody has locked belongs to nobody. On file systems
-//! without locks it stays.
+//! removed by the next process that writes to the same folder, which finds it without a lock. On file systems without locks
+//! it stays.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};

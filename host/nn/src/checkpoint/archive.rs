@@ -5,8 +5,8 @@
 
 use super::error::{Problem, shortened};
 use super::input::Input;
+use super::location::{TensorLocation, TensorLocations};
 use super::pickle::Pickle;
-use super::place::{Place, Places};
 use super::state_dict::{self, StateDict};
 use std::fs::File;
 use std::io::BufReader;
@@ -22,7 +22,7 @@ struct Archive<'a> {
 }
 
 /// Opens the archive.
-pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Problem> {
+pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, TensorLocations), Problem> {
     let zip = ZipArchive::new(BufReader::new(file)).map_err(damaged)?;
     if zip.has_duplicate_names() {
         return Err(Problem::Content("is a zip archive with two entries of one name; PyTorch writes none".to_owned()));
@@ -48,7 +48,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Prob
     };
     let pickle = Pickle::read(&mut Input::new(file, start, start + length)?)?;
     let found = state_dict::find(&pickle, &|id| state_dict::storage(&pickle, id)).map_err(Problem::Content)?;
-    let mut places = Places::new();
+    let mut places = TensorLocations::new();
     for (name, claim) in &found.claims {
         let wrong = |what: String| Problem::Content(format!("tensor '{}': {what}", shortened(name)));
         let storage = state_dict::storage(&pickle, claim.storage).map_err(wrong)?;
@@ -59,7 +59,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Prob
         let Some((start, available)) = entry else {
             return Err(wrong(format!("the archive has no entry {folder}data/{}", shortened(storage.key))));
         };
-        places.insert(name.clone(), Place::of(&shortened(name), claim, storage, start, available)?);
+        places.insert(name.clone(), TensorLocation::of(&shortened(name), claim, storage, start, available)?);
     }
     Ok((found, places))
 }

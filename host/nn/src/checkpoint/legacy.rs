@@ -3,8 +3,8 @@
 
 use super::error::{Problem, shortened};
 use super::input::Input;
+use super::location::{TensorLocation, TensorLocations};
 use super::pickle::{Pickle, Value};
-use super::place::{Place, Places};
 use super::state_dict::{self, StateDict};
 use std::collections::HashMap;
 use std::fs::File;
@@ -15,19 +15,19 @@ pub(super) const MAGIC: [u8; 10] = [0x6c, 0xfc, 0x9c, 0x46, 0xf9, 0x20, 0x6a, 0x
 const VERSION: i64 = 1001;
 
 /// Opens the file.
-pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Problem> {
+pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, TensorLocations), Problem> {
     let mut input = Input::new(file, 0, length)?;
     let pickle = description(&mut input)?;
     let storages = lay_out(&pickle, &mut input, length)?;
     let found = state_dict::find(&pickle, &|id| state_dict::storage(&pickle, id)).map_err(Problem::Content)?;
-    let mut places = Places::new();
+    let mut places = TensorLocations::new();
     for (name, claim) in &found.claims {
         let wrong = |what: String| Problem::Content(format!("tensor '{}': {what}", shortened(name)));
         let storage = state_dict::storage(&pickle, claim.storage).map_err(wrong)?;
         let &(start, available) = storages
             .get(storage.key)
             .ok_or_else(|| wrong(format!("the file does not hold its storage '{}'", shortened(storage.key))))?;
-        places.insert(name.clone(), Place::of(&shortened(name), claim, storage, start, available)?);
+        places.insert(name.clone(), TensorLocation::of(&shortened(name), claim, storage, start, available)?);
     }
     Ok((found, places))
 }

@@ -4,7 +4,7 @@
 use super::element::Element;
 use super::error::{Problem, shortened};
 use super::input::Input;
-use super::place::{Place, Places, check_size};
+use super::location::{TensorLocation, TensorLocations, check_size};
 use super::state_dict::{MAX_AXES, MAX_TENSORS};
 use safetensors::tensor::Metadata;
 use std::collections::BTreeMap;
@@ -14,7 +14,7 @@ use std::fs::File;
 const LONGEST_HEADER: u64 = 16 << 20;
 
 /// Opens the file: its tensors and its metadata.
-pub(super) fn open(file: &File, length: u64) -> Result<(Places, BTreeMap<String, String>), Problem> {
+pub(super) fn open(file: &File, length: u64) -> Result<(TensorLocations, BTreeMap<String, String>), Problem> {
     let mut input = Input::new(file, 0, length)?;
     let header_length = input.length(8)?;
     if input.check(header_length).is_err() {
@@ -40,7 +40,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(Places, BTreeMap<String,
             header.data_len()
         )));
     }
-    let mut places = Places::new();
+    let mut places = TensorLocations::new();
     for (name, info) in header.tensors() {
         let short = shortened(&name);
         let wrong = |what: String| Problem::Content(format!("tensor '{short}': {what}"));
@@ -51,7 +51,7 @@ pub(super) fn open(file: &File, length: u64) -> Result<(Places, BTreeMap<String,
         }
         let extent = check_size(&short, &info.shape)?;
         let start = start + info.data_offsets.0 as u64;
-        places.insert(name, Place { element, start, shape: info.shape.clone(), strides: None, extent });
+        places.insert(name, TensorLocation { element, start, shape: info.shape.clone(), strides: None, extent });
     }
     Ok((places, header.metadata().clone().unwrap_or_default().into_iter().collect()))
 }

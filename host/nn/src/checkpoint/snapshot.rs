@@ -7,8 +7,8 @@ use super::Element;
 use super::error::{Problem, shortened};
 use super::input::Input;
 use super::legacy;
+use super::location::{TensorLocation, TensorLocations};
 use super::pickle::{Id, Pickle, Value};
-use super::place::{Place, Places};
 use super::state_dict::{self, NO_STORAGE, StateDict, Storage};
 use std::collections::HashMap;
 use std::fs::File;
@@ -25,7 +25,7 @@ struct Stored {
 }
 
 /// Opens the file.
-pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Problem> {
+pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, TensorLocations), Problem> {
     let pickle = Pickle::read(&mut Input::new(file, 0, length)?)?;
     let mut storages = HashMap::new();
     for value in pickle.values() {
@@ -49,13 +49,13 @@ pub(super) fn open(file: &File, length: u64) -> Result<(StateDict, Places), Prob
         Ok(Storage { key, element: *element, count: *count })
     });
     let found = found.map_err(Problem::Content)?;
-    let mut places = Places::new();
+    let mut places = TensorLocations::new();
     for (name, claim) in &found.claims {
         let name_short = shortened(name);
         let Stored { key, element, count, start, available } =
             stored(claim.storage).map_err(|what| Problem::Content(format!("tensor '{name_short}': {what}")))?;
         let storage = Storage { key, element: *element, count: *count };
-        places.insert(name.clone(), Place::of(&name_short, claim, storage, *start, *available)?);
+        places.insert(name.clone(), TensorLocation::of(&name_short, claim, storage, *start, *available)?);
     }
     Ok((found, places))
 }

@@ -4,7 +4,7 @@
 //! their names, as the crate of that name writes them, so that every element is aligned.
 
 use super::error::shortened;
-use super::place::element_count;
+use super::location::element_count;
 use super::{Checkpoint, CheckpointError, Element};
 use half::f16;
 use safetensors::tensor::TensorInfo;

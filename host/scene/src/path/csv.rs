@@ -21,7 +21,7 @@ use crate::rig::Rig;
 use crate::scene::check::size;
 use crate::scene::files::number;
 use crate::scene::reader::{PoseForm, RawIntrinsics, RawPose, RawView};
-use crate::scene::{Place, SceneError};
+use crate::scene::{FaultLocation, SceneError};
 
 /// For the error of a wrong column.
 const COLUMNS: &str =
@@ -105,8 +105,8 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    fn place(&self) -> Place {
-        Place::Line(self.line)
+    fn place(&self) -> FaultLocation {
+        FaultLocation::Line(self.line)
     }
 
     /// The numbers of these columns, which are there.
@@ -160,11 +160,12 @@ impl Row<'_> {
 pub(super) fn read(path: &Path, text: &str, scene: &Scene) -> Result<RawPath, SceneError> {
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
     let not_a_table = |error: csv::Error| {
-        let place = error.position().map_or(Place::File, |position| Place::Line(position.line() as usize));
+        let place =
+            error.position().map_or(FaultLocation::File, |position| FaultLocation::Line(position.line() as usize));
         SceneError::Table { path: path.to_path_buf(), place, reason: error.to_string() }
     };
     let names = reader.headers().map_err(not_a_table)?;
-    let place = Place::Line(names.position().map_or(1, |position| position.line() as usize));
+    let place = FaultLocation::Line(names.position().map_or(1, |position| position.line() as usize));
     let wrong =
         |problem| SceneError::Columns { path: path.to_path_buf(), place: place.clone(), problem, columns: COLUMNS };
     let columns = Columns::of(names).map_err(wrong)?;

@@ -20,7 +20,7 @@ use crate::scene::check::size;
 use crate::scene::files::read_text;
 use crate::scene::json::{self, Object};
 use crate::scene::reader::{PoseForm, RawIntrinsics, RawPose, RawView};
-use crate::scene::{IntrinsicsFault, Place, SceneError};
+use crate::scene::{FaultLocation, IntrinsicsFault, SceneError};
 
 /// The key by which such a file is recognised.
 pub(super) const KEY: &str = "camera_path";
@@ -29,7 +29,7 @@ pub(super) const KEY: &str = "camera_path";
 const PARSER: &str = "dataparser_transforms.json";
 
 pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPath, SceneError> {
-    let place = |key: &str| Place::Key(key.to_owned());
+    let place = |key: &str| FaultLocation::Key(key.to_owned());
     let required = |key: &str| {
         top.number(key)?.ok_or_else(|| SceneError::MissingKey { path: path.to_path_buf(), key: key.to_owned() })
     };
@@ -54,7 +54,7 @@ pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPa
         let angle = frame.number("fov")?.ok_or_else(missing)? * PI / 180.0;
         if !(angle > 0.0 && angle < PI) {
             let (path, place, fault) =
-                (path.to_path_buf(), Place::Key(frame.full("fov")), IntrinsicsFault::Angle { angle });
+                (path.to_path_buf(), FaultLocation::Key(frame.full("fov")), IntrinsicsFault::Angle { angle });
             return Err(SceneError::Intrinsics { path, place, fault });
         }
         let focal = 0.5 * f64::from(height) / (0.5 * angle).tan();
@@ -64,11 +64,15 @@ pub(super) fn read(path: &Path, top: &Object<'_>, scene: &Scene) -> Result<RawPa
             size: Some([width, height]),
             lens: None,
             path: path.to_path_buf(),
-            place: Place::Key(key),
+            place: FaultLocation::Key(key),
             size_place: place("render_width"),
         };
-        let pose =
-            RawPose { matrix, form: PoseForm::WorldFromOpenGl, path: path.to_path_buf(), place: Place::Key(pose_key) };
+        let pose = RawPose {
+            matrix,
+            form: PoseForm::WorldFromOpenGl,
+            path: path.to_path_buf(),
+            place: FaultLocation::Key(pose_key),
+        };
         views.push(RawView::new(String::new(), None, pose, Some(intrinsics)));
     }
     Ok(RawPath { views, frames_per_second: top.number("fps")? })

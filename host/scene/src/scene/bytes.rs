@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::SceneError;
-use super::fault::{FileFault, Place};
+use super::fault::{FaultLocation, FileFault};
 use super::files::{LONGEST_FILE, unreadable};
 use viewfuse_job::files::read_at_most;
 
@@ -26,16 +26,16 @@ impl<'a> Bytes<'a> {
     }
 
     /// The offset of the next byte in the file.
-    pub(super) fn place(&self) -> Place {
-        Place::Byte(self.at)
+    pub(super) fn place(&self) -> FaultLocation {
+        FaultLocation::Byte(self.at)
     }
 
-    fn damaged(&self, place: Place, fault: FileFault) -> SceneError {
+    fn damaged(&self, place: FaultLocation, fault: FileFault) -> SceneError {
         SceneError::Damaged { path: self.path(), place, fault }
     }
 
     fn truncated(&self, of: &'static str) -> SceneError {
-        self.damaged(Place::File, FileFault::Truncated { length: self.bytes.len(), of })
+        self.damaged(FaultLocation::File, FileFault::Truncated { length: self.bytes.len(), of })
     }
 
     pub(super) fn path(&self) -> PathBuf {

@@ -10,7 +10,7 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::pose::{MAX_COORDINATE, Pose, PoseError};
 
 use super::error::SceneError;
-use super::fault::{IntrinsicsFault, Place};
+use super::fault::{FaultLocation, IntrinsicsFault};
 use super::frame;
 use super::images;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView};
@@ -220,7 +220,7 @@ fn upright_size(image: &ImageFile, stated: Option<[u32; 2]>) -> Result<[u32; 2],
 /// The pinhole of images of this size, if the numbers are a pinhole camera.
 fn pinhole(
     path: &Path,
-    place: &Place,
+    place: &FaultLocation,
     focal: [f64; 2],
     principal: [f64; 2],
     size: [u32; 2],
@@ -233,7 +233,7 @@ fn pinhole(
 }
 
 /// A width and a height from numbers of a file.
-pub(crate) fn size(path: &Path, place: Place, width: f64, height: f64) -> Result<[u32; 2], SceneError> {
+pub(crate) fn size(path: &Path, place: FaultLocation, width: f64, height: f64) -> Result<[u32; 2], SceneError> {
     let whole = |side: f64| (1.0..=f64::from(1u32 << 20)).contains(&side) && side.fract() == 0.0;
     if whole(width) && whole(height) {
         return Ok([width as u32, height as u32]);

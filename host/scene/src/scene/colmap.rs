@@ -20,7 +20,7 @@ use glam::DQuat;
 use super::camera_models::{CameraModel, Parameters, camera_model_names};
 use super::check;
 use super::error::SceneError;
-use super::fault::{FileFault, Place};
+use super::fault::{FaultLocation, FileFault};
 use super::files;
 use super::missing::Missing;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
@@ -40,7 +40,7 @@ pub(super) struct Colmap;
 struct ModelCamera {
     size: [u32; 2],
     parameters: Parameters,
-    place: Place,
+    place: FaultLocation,
 }
 
 /// An image of a model.
@@ -53,7 +53,7 @@ struct ModelImage {
     camera: u32,
     /// Relative to the folder of photographs.
     name: String,
-    place: Place,
+    place: FaultLocation,
 }
 
 /// A point of a model; its views are numbers of images.
@@ -63,7 +63,7 @@ struct ModelPoint {
     colour: [u8; 3],
     error: f64,
     images: Vec<u32>,
-    place: Place,
+    place: FaultLocation,
 }
 
 /// The two forms of a model's files.
@@ -297,7 +297,7 @@ fn camera_from_world(image: &ModelImage) -> [f64; 16] {
 /// A camera from its model's name or number, its size and its parameters.
 fn camera(
     path: &Path,
-    place: Place,
+    place: FaultLocation,
     model: Result<CameraModel, String>,
     size: [f64; 2],
     parameters: &[f64],
@@ -318,7 +318,7 @@ fn camera(
 }
 
 /// The model, if it is supported.
-fn known(path: &Path, place: &Place, model: Result<CameraModel, String>) -> Result<CameraModel, SceneError> {
+fn known(path: &Path, place: &FaultLocation, model: Result<CameraModel, String>) -> Result<CameraModel, SceneError> {
     model.map_err(|model| SceneError::CameraModel {
         path: path.to_path_buf(),
         place: place.clone(),

@@ -11,7 +11,7 @@ use viewfuse_job::panics::Panicked;
 use viewfuse_job::text::in_line;
 
 use super::MAX_SIDE;
-use super::fault::{FileFault, IntrinsicsFault, NumpyFault, Place, Short};
+use super::fault::{FaultLocation, FileFault, IntrinsicsFault, NumpyFault, Short};
 
 /// Why a scene could not be read.
 #[derive(Debug, Error)]
@@ -58,7 +58,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The line with the columns' names.
-        place: Place,
+        place: FaultLocation,
         /// What is wrong.
         problem: String,
         /// The columns that there can be.
@@ -70,7 +70,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The line.
-        place: Place,
+        place: FaultLocation,
         /// What the parser said.
         reason: String,
     },
@@ -104,7 +104,7 @@ pub enum SceneError {
         /// The file with the pose.
         path: PathBuf,
         /// The pose's place in it.
-        place: Place,
+        place: FaultLocation,
         /// The expected photograph (if the name has no extension: with any supported one).
         image: PathBuf,
     },
@@ -114,7 +114,7 @@ pub enum SceneError {
         /// The file that names it.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The expected mask.
         mask: PathBuf,
     },
@@ -148,7 +148,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The word, shortened if it is long.
         word: String,
     },
@@ -158,7 +158,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The word.
         word: String,
     },
@@ -168,7 +168,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The counted items.
         of: &'static str,
         /// The expected count.
@@ -182,7 +182,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The message of core's check.
         reason: PoseError,
     },
@@ -192,7 +192,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// What is wrong with them.
         fault: IntrinsicsFault,
     },
@@ -299,7 +299,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// What is wrong.
         fault: FileFault,
     },
@@ -309,7 +309,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// Its name or number.
         model: String,
         /// The names of the supported ones.
@@ -321,7 +321,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The message of core's check.
         reason: LensError,
     },
@@ -364,7 +364,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// The near depth.
         near: f64,
         /// The far depth.
@@ -379,7 +379,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
         /// The place in it.
-        place: Place,
+        place: FaultLocation,
         /// Its first coordinate.
         x: f64,
         /// Its second.

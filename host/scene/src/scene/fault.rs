@@ -7,7 +7,7 @@ use viewfuse_core::camera::{LONGEST_FOCAL, PinholeError, SHORTEST_FOCAL};
 
 /// The place of a fault in a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum FaultLocation {
     /// The file as a whole.
     File,
     /// A line, counted from 1.
@@ -18,14 +18,14 @@ pub enum Place {
     Key(String),
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for FaultLocation {
     /// The text after the path: nothing, `:12`, or `: frames[3].fl_x`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::File => Ok(()),
-            Place::Line(line) => write!(f, ":{line}"),
-            Place::Byte(at) => write!(f, ": byte {at}"),
-            Place::Key(key) => write!(f, ": {key}"),
+            FaultLocation::File => Ok(()),
+            FaultLocation::Line(line) => write!(f, ":{line}"),
+            FaultLocation::Byte(at) => write!(f, ": byte {at}"),
+            FaultLocation::Key(key) => write!(f, ": {key}"),
         }
     }
 }

@@ -8,7 +8,7 @@ use std::{fs, io};
 use viewfuse_job::files::read_at_most;
 
 use super::error::SceneError;
-use super::fault::{FileFault, Place};
+use super::fault::{FaultLocation, FileFault};
 
 /// Extensions of photographs, compared without regard to case.
 pub(super) const IMAGE_EXTENSIONS: [&str; 9] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "JPG", "JPEG", "PNG"];
@@ -42,7 +42,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     let bytes = read_at_most(path, LONGEST_FILE).map_err(|cause| unreadable(path, cause))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
-        let place = Place::Line(1 + before.iter().filter(|byte| **byte == b'\n').count());
+        let place = FaultLocation::Line(1 + before.iter().filter(|byte| **byte == b'\n').count());
         SceneError::Damaged { path: path.to_path_buf(), place, fault: FileFault::NotText { of: "this line" } }
     })?;
     Ok(match text.strip_prefix('\u{feff}') {
@@ -155,7 +155,7 @@ pub(super) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 /// A finite number from a word of a line.
 pub(crate) fn number(path: &Path, line: usize, word: &str) -> Result<f64, SceneError> {
-    let (path, place) = (path.to_path_buf(), Place::Line(line));
+    let (path, place) = (path.to_path_buf(), FaultLocation::Line(line));
     let Ok(value) = word.parse::<f64>() else {
         return Err(SceneError::NotANumber { path, place, word: excerpt(word) });
     };

@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor}
 use serde_json::{Map, Value};
 
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::FaultLocation;
 
 /// An object of a JSON file and its place.
 #[derive(Clone, Debug)]
@@ -123,7 +123,7 @@ fn of_length<'a, const N: usize>(
 ) -> Result<&'a [Value; N], SceneError> {
     values.try_into().map_err(|_| SceneError::WrongCount {
         path: path.to_path_buf(),
-        place: Place::Key(key.to_string()),
+        place: FaultLocation::Key(key.to_string()),
         of,
         expected: N,
         found: values.len(),

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use super::check;
 use super::colmap::{self, Origin};
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::FaultLocation;
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::numpy;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPoint, RawPose, RawScene, RawView, Reader};
@@ -52,7 +52,7 @@ impl Reader for Llff {
         let rows: Vec<&[f64]> = match array.shape[..] {
             [_, ROW] => array.values.chunks_exact(ROW).collect(),
             _ => {
-                let (path, place) = (file.to_path_buf(), Place::File);
+                let (path, place) = (file.to_path_buf(), FaultLocation::File);
                 let found = array.shape.get(1).copied().unwrap_or(array.values.len());
                 return Err(SceneError::WrongCount { path, place, of: "numbers in a row", expected: ROW, found });
             }
@@ -103,14 +103,14 @@ fn photographs(file: &Path, row_count: usize) -> Result<Vec<PathBuf>, SceneError
     Err(match wrong {
         Some((path, found)) => {
             let of = "photographs (rows of poses_bounds.npy)";
-            SceneError::WrongCount { path, place: Place::File, of, expected: row_count, found }
+            SceneError::WrongCount { path, place: FaultLocation::File, of, expected: row_count, found }
         }
         None => SceneError::NoViews { path: root, looked_for: "images/, images_2/, images_4/, images_8/" },
     })
 }
 
 fn view(file: &Path, row: usize, numbers: &[f64], image: &Path) -> Result<RawView, SceneError> {
-    let (path, place) = (file.to_path_buf(), Place::Key(format!("row {row}")));
+    let (path, place) = (file.to_path_buf(), FaultLocation::Key(format!("row {row}")));
     let at = |line: usize, column: usize| numbers[5 * line + column];
     let mut matrix = [0.0; 16];
     for line in 0..3 {

@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::SceneError;
-use super::fault::{IntrinsicsFault, Place};
+use super::fault::{FaultLocation, IntrinsicsFault};
 use super::files;
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
@@ -62,12 +62,12 @@ fn read(list: &Path) -> Result<Vec<RawView>, SceneError> {
     let no_views = || SceneError::NoViews { path: list.to_path_buf(), looked_for: "a count, then a line each" };
     let (count_line, count) = lines.next().ok_or_else(no_views)?;
     let Ok(declared) = count.trim().parse::<usize>() else {
-        let (path, place) = (list.to_path_buf(), Place::Line(count_line));
+        let (path, place) = (list.to_path_buf(), FaultLocation::Line(count_line));
         return Err(SceneError::NotANumber { path, place, word: files::excerpt(count.trim()) });
     };
     let views = lines.map(|(line, content)| read_view(list, line, content)).collect::<Result<Vec<_>, _>>()?;
     if views.len() != declared {
-        let (path, place, found) = (list.to_path_buf(), Place::Line(count_line), views.len());
+        let (path, place, found) = (list.to_path_buf(), FaultLocation::Line(count_line), views.len());
         return Err(SceneError::WrongCount { path, place, of: "lines of cameras", expected: declared, found });
     }
     if views.is_empty() { Err(no_views()) } else { Ok(views) }
@@ -75,7 +75,7 @@ fn read(list: &Path) -> Result<Vec<RawView>, SceneError> {
 
 fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneError> {
     let path = || list.to_path_buf();
-    let place = Place::Line(line);
+    let place = FaultLocation::Line(line);
     let mut words = content.split_whitespace();
     let file_name = words.next().unwrap_or_default();
     let numbers = words.map(|word| files::number(list, line, word)).collect::<Result<Vec<_>, _>>()?;
@@ -85,7 +85,7 @@ fn read_view(list: &Path, line: usize, content: &str) -> Result<RawView, SceneEr
     }
     let (k, r, t) = (&numbers[..9], &numbers[9..18], &numbers[18..]);
 
-    let intrinsics_fault = |fault| SceneError::Intrinsics { path: path(), place: Place::Line(line), fault };
+    let intrinsics_fault = |fault| SceneError::Intrinsics { path: path(), place: FaultLocation::Line(line), fault };
     if k[1].abs() > MAX_ROUNDING {
         return Err(intrinsics_fault(IntrinsicsFault::Skew { skew: k[1] }));
     }

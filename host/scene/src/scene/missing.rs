@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::FaultLocation;
 
 /// The photographs of a list that are missing.
 #[derive(Debug, Default)]
 pub(super) struct Missing {
     listed: usize,
     count: usize,
-    first: Option<(Place, PathBuf)>,
+    first: Option<(FaultLocation, PathBuf)>,
 }
 
 impl Missing {
@@ -20,7 +20,7 @@ impl Missing {
     }
 
     /// Counts a photograph of the list that does not exist; `place` is its place in the list.
-    pub(super) fn missed(&mut self, place: Place, image: PathBuf) {
+    pub(super) fn missed(&mut self, place: FaultLocation, image: PathBuf) {
         self.listed += 1;
         self.count += 1;
         self.first.get_or_insert((place, image));

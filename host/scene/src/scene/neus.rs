@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use glam::{DMat3, DVec3};
 
 use super::error::SceneError;
-use super::fault::{IntrinsicsFault, Place};
+use super::fault::{FaultLocation, IntrinsicsFault};
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::missing::Missing;
 use super::numpy::{self, Array};
@@ -82,9 +82,8 @@ impl Reader for Neus {
         for number in worlds.keys() {
             match numbers.contains(number) {
                 true => missing.found(),
-                false => {
-                    missing.missed(Place::Key(format!("{WORLD}{number}")), folder.join(format!("{number:06}.png")))
-                }
+                false => missing
+                    .missed(FaultLocation::Key(format!("{WORLD}{number}")), folder.join(format!("{number:06}.png"))),
             }
         }
         let mut views = Vec::new();
@@ -115,7 +114,7 @@ fn numbers_of(file: &Path, images: &[PathBuf], worlds: &BTreeMap<u64, &Array>) -
     if images.len() == worlds.len() {
         return Ok(worlds.keys().copied().collect());
     }
-    let (path, place, of) = (file.to_path_buf(), Place::File, "matrices world_mat_N (one a photograph)");
+    let (path, place, of) = (file.to_path_buf(), FaultLocation::File, "matrices world_mat_N (one a photograph)");
     Err(SceneError::WrongCount { path, place, of, expected: images.len(), found: worlds.len() })
 }
 
@@ -137,7 +136,7 @@ fn matrix(file: &Path, name: &str, matrices: &BTreeMap<String, Array>) -> Result
         [4, 4] => 4,
         [3, 4] => 3,
         _ => {
-            let (path, place, found) = (file.to_path_buf(), Place::Key(name.to_string()), array.values.len());
+            let (path, place, found) = (file.to_path_buf(), FaultLocation::Key(name.to_string()), array.values.len());
             return Err(SceneError::WrongCount { path, place, of: "numbers (4 x 4)", expected: 16, found });
         }
     };
@@ -149,7 +148,7 @@ fn matrix(file: &Path, name: &str, matrices: &BTreeMap<String, Array>) -> Result
 }
 
 fn view(file: &Path, number: u64, matrices: &BTreeMap<String, Array>, image: &Path) -> Result<RawView, SceneError> {
-    let (path, place) = (file.to_path_buf(), Place::Key(format!("{WORLD}{number}")));
+    let (path, place) = (file.to_path_buf(), FaultLocation::Key(format!("{WORLD}{number}")));
     let world = matrix(file, &format!("{WORLD}{number}"), matrices)?.unwrap_or_default();
     let scale = matrix(file, &format!("{SCALE}{number}"), matrices)?;
     let projection = match scale {

@@ -10,7 +10,7 @@ use image::metadata::Orientation;
 use viewfuse_core::lens::Lens;
 
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::FaultLocation;
 use super::images;
 use super::split::Split;
 
@@ -70,7 +70,7 @@ pub struct RawPoint {
     /// The views that saw it, as indices into [`RawScene::views`].
     pub views: Vec<u32>,
     /// Its place in [`RawScene::points_path`].
-    pub place: Place,
+    pub place: FaultLocation,
 }
 
 /// An unchecked view, as on disk. Only the photograph's header has been checked.
@@ -154,7 +154,7 @@ pub struct RawPose {
     /// The file that contains it.
     pub path: PathBuf,
     /// The place in the file.
-    pub place: Place,
+    pub place: FaultLocation,
 }
 
 /// Intrinsics as numbers of a file, in our image coordinates: the top left pixel's centre is at (0.5, 0.5).
@@ -172,14 +172,14 @@ pub struct RawIntrinsics {
     /// The file that contains them.
     pub path: PathBuf,
     /// The place of focal lengths and principal point in the file.
-    pub place: Place,
+    pub place: FaultLocation,
     /// The place of the size in the file.
-    pub size_place: Place,
+    pub size_place: FaultLocation,
 }
 
 impl RawIntrinsics {
     /// One focal length for both axes, the principal point in the centre of images of this size, no lens distortion.
-    pub fn centred(focal: f64, size: [u32; 2], path: PathBuf, place: Place) -> RawIntrinsics {
+    pub fn centred(focal: f64, size: [u32; 2], path: PathBuf, place: FaultLocation) -> RawIntrinsics {
         RawIntrinsics {
             focal: [focal; 2],
             principal: size.map(|side| f64::from(side) / 2.0),

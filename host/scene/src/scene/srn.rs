@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use super::check;
 use super::error::SceneError;
-use super::fault::Place;
+use super::fault::FaultLocation;
 use super::files::{self, IMAGE_EXTENSIONS};
 use super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawScene, RawView, Reader};
 
@@ -101,7 +101,7 @@ fn check_partners(
     }
     if let Some(path) = poses.iter().find(|path| lacks(&pictured, path)) {
         let image = partner(path, image_folder, "png");
-        return Err(SceneError::PoseWithoutImage { path: path.clone(), place: Place::File, image });
+        return Err(SceneError::PoseWithoutImage { path: path.clone(), place: FaultLocation::File, image });
     }
     Ok(())
 }
@@ -115,10 +115,10 @@ fn read_pose(path: &Path, form: PoseForm) -> Result<RawPose, SceneError> {
     let lines = files::number_lines(path, &files::read_text(path)?)?;
     let numbers: Vec<f64> = lines.into_iter().flat_map(|(_, numbers)| numbers).collect();
     let Ok(matrix) = <[f64; 16]>::try_from(numbers.as_slice()) else {
-        let (path, place, found) = (path.to_path_buf(), Place::File, numbers.len());
+        let (path, place, found) = (path.to_path_buf(), FaultLocation::File, numbers.len());
         return Err(SceneError::WrongCount { path, place, of: "numbers", expected: 16, found });
     };
-    Ok(RawPose { matrix, form, path: path.to_path_buf(), place: Place::File })
+    Ok(RawPose { matrix, form, path: path.to_path_buf(), place: FaultLocation::File })
 }
 
 /// The contents of `intrinsics.txt`.
@@ -134,14 +134,14 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
         Err(SceneError::WrongCount { path: path.to_path_buf(), place, of, expected, found })
     };
     let Some(((focal_line, first), rest)) = lines.split_first() else {
-        return wrong_count(Place::File, "lines of numbers", 4, 0);
+        return wrong_count(FaultLocation::File, "lines of numbers", 4, 0);
     };
     let ([focal, x, y] | [focal, x, y, _]) = first[..] else {
-        return wrong_count(Place::Line(*focal_line), "numbers (focal cx cy 0)", 4, first.len());
+        return wrong_count(FaultLocation::Line(*focal_line), "numbers (focal cx cy 0)", 4, first.len());
     };
     // The number of lines before the size differs between files, its shape does not: the only line of two numbers.
     let Some(at) = rest.iter().rposition(|(_, numbers)| numbers.len() == 2) else {
-        return wrong_count(Place::File, "lines with an image size (height width)", 1, 0);
+        return wrong_count(FaultLocation::File, "lines with an image size (height width)", 1, 0);
     };
     let (size_line, height, width) = (rest[at].0, rest[at].1[0], rest[at].1[1]);
     let form = match &rest[at + 1..] {
@@ -149,10 +149,10 @@ fn read_intrinsics(path: &Path) -> Result<IntrinsicsFile, SceneError> {
         [] => PoseForm::WorldFromOpenCv,
         [(_, flag)] if flag[..] == [0.0] => PoseForm::WorldFromOpenCv,
         [(line, _), ..] => {
-            return wrong_count(Place::Line(*line), "lines after the size that are not a lone 0 or 1", 0, 1);
+            return wrong_count(FaultLocation::Line(*line), "lines after the size that are not a lone 0 or 1", 0, 1);
         }
     };
-    let (place, size_place) = (Place::Line(*focal_line), Place::Line(size_line));
+    let (place, size_place) = (FaultLocation::Line(*focal_line), FaultLocation::Line(size_line));
     let size = Some(check::size(path, size_place.clone(), width, height)?);
     let (focal, principal, path) = ([focal, focal], [x, y], path.to_path_buf());
     Ok(IntrinsicsFile {

@@ -1,7 +1,7 @@
 //! Sources show what their cameras say.
 
-use super::super::slopes::scene;
-use super::{Batch, Cut, Shown, Targets};
+use super::super::gradient_check::scene;
+use super::{Batch, Cut, SourceDraw, Targets};
 use crate::draw::Draw;
 use candle_core::DType;
 use viewfuse_core::pose::Pose;
@@ -10,9 +10,9 @@ use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
 
 /// Three sources of each of two objects of 32 pixels.
-fn batch(step: u32, shown: Shown) -> Batch {
+fn batch(step: u32, drawn: SourceDraw) -> Batch {
     let scenes = [scene(32, 6), scene(32, 7)];
-    Batch::of(&scenes, &[0, 1], &Draw { seed: 5, step }, 4, shown, Targets::One, DType::F32).expect("a batch")
+    Batch::of(&scenes, &[0, 1], &Draw { seed: 5, step }, 4, drawn, Targets::One, DType::F32).expect("a batch")
 }
 
 fn pictures(batch: &Batch) -> Vec<f32> {
@@ -41,10 +41,10 @@ fn a_part_of_a_picture_has_its_camera() {
 
 #[test]
 fn parts_lie_within_pictures_and_have_all_allowed_sizes() {
-    let shown = Shown { count: 3, side: Some(16), least_crop: 0.5 };
+    let drawn = SourceDraw { count: 3, side: Some(16), least_crop: 0.5 };
     let (mut sizes, mut places) = (Vec::new(), Vec::new());
     for index in 0..2000 {
-        let cut = shown.cut(&Draw { seed: 1, step: 2 }, index, 32);
+        let cut = drawn.cut(&Draw { seed: 1, step: 2 }, index, 32);
         assert!(cut.left + cut.size <= 32 && cut.top + cut.size <= 32 && cut.side == 16, "{cut:?}");
         sizes.push(cut.size);
         places.extend([cut.left, cut.top]);
@@ -55,24 +55,24 @@ fn parts_lie_within_pictures_and_have_all_allowed_sizes() {
 
 #[test]
 fn whole_sources_are_the_photographs_and_others_have_their_size() {
-    let whole = batch(1, Shown::whole(3));
+    let whole = batch(1, SourceDraw::whole(3));
     assert_eq!(whole.pictures.dims(), [6, 32, 32, 3]);
     assert!(whole.sources.iter().flatten().all(|camera| camera.pinhole.width() == 32));
-    let small = batch(1, Shown { side: Some(16), ..Shown::whole(3) });
+    let small = batch(1, SourceDraw { side: Some(16), ..SourceDraw::whole(3) });
     assert_eq!(small.pictures.dims(), [6, 16, 16, 3]);
     assert!(small.cameras.iter().flatten().all(|camera| [camera.width, camera.height] == [16, 16]));
     // Whole photographs, twice as small: about the same brightness. The truth and its rays are the same.
     let mean = |batch: &Batch| pictures(batch).iter().sum::<f32>() / pictures(batch).len() as f32;
     assert!((mean(&whole) - mean(&small)).abs() < 0.01);
     assert_eq!((&whole.rays, &whole.targets), (&small.rays, &small.targets));
-    let cropped = batch(1, Shown { least_crop: 0.5, ..Shown::whole(3) });
+    let cropped = batch(1, SourceDraw { least_crop: 0.5, ..SourceDraw::whole(3) });
     assert_ne!(pictures(&cropped), pictures(&whole));
-    assert_eq!(pictures(&cropped), pictures(&batch(1, Shown { least_crop: 0.5, ..Shown::whole(3) })));
+    assert_eq!(pictures(&cropped), pictures(&batch(1, SourceDraw { least_crop: 0.5, ..SourceDraw::whole(3) })));
 }
 
 #[test]
 fn weights_are_those_of_the_scheme_for_the_target() {
-    let batch = batch(3, Shown { least_crop: 0.5, ..Shown::whole(3) });
+    let batch = batch(3, SourceDraw { least_crop: 0.5, ..SourceDraw::whole(3) });
     let rows = |scheme| batch.weights(scheme).and_then(|weights| weights.to_vec2::<f32>()).expect("weights");
     assert_eq!(rows(Scheme::MEAN), vec![vec![1.0 / 3.0; 3]; 2]);
     let scheme = Weighting::from(Scheme::ERROR);

@@ -1,11 +1,15 @@
-//! The graph says what the renderer says, and its gradients are slopes.
+//! The graph says what the renderer says, and its gradients are difference quotients.
 
 use super::super::average::Average;
 use super::super::draw::Draw;
 use super::super::genvs_learner::loss;
-use super::super::operations::{Apply, Convolution, Look, LookSizes, Normalise, Operation, Sight, Window};
+use super::super::gradient_check::{
+    assert_close, assert_gradients, mixed, noise, orbit, photographs, tensor, variable,
+};
+use super::super::operations::{
+    Apply, Convolution, MarchSizes, MarchVolumes, Normalise, Operation, SampledRays, Window,
+};
 use super::super::parameters::Parameters;
-use super::super::slopes::{assert_close, assert_slopes, mixed, noise, orbit, photographs, tensor, variable};
 use super::{Genvs, Views, colours, each};
 use candle_core::{DType, Result, Tensor, Var};
 use std::sync::Arc;
@@ -99,7 +103,7 @@ fn assert_graph_is_the_renderers(estimate: Estimate) {
 }
 
 #[test]
-fn convolutions_and_norms_have_their_slopes() {
+fn convolutions_and_norms_have_their_gradients() {
     let input = [2, 3, 4, 8];
     let images = variable(&input, 10);
     let (filters, shared, own) = (variable(&[5, 9, 8], 9), variable(&[5], 11), variable(&[2, 5], 12));
@@ -108,36 +112,36 @@ fn convolutions_and_norms_have_their_slopes() {
             let (window, out_channels) = (Window::same(3), 5);
             Apply(Convolution { input, out_channels, window, has_own_biases, rectifies, differentiates_input: true })
         };
-        assert_slopes(&[("images", &images), ("filters", &filters), ("biases", biases)], 1.0e-6, 1.0e-6, || {
+        assert_gradients(&[("images", &images), ("filters", &filters), ("biases", biases)], 1.0e-6, 1.0e-6, || {
             mixed(&images.apply_op3(&filters, biases, operation())?)
         });
     }
     let (weights, biases) = (variable(&[8], 13), variable(&[8], 14));
     for silu in [false, true] {
         let operation = || Apply(Normalise { input, group_count: 2, variance_floor: 1.0e-6, silu });
-        assert_slopes(&[("images", &images), ("weights", &weights), ("biases", &biases)], 1.0e-6, 1.0e-6, || {
+        assert_gradients(&[("images", &images), ("weights", &weights), ("biases", &biases)], 1.0e-6, 1.0e-6, || {
             mixed(&images.apply_op3(&weights, &biases, operation())?)
         });
     }
 }
 
-fn look(inclusive: bool, is_frozen: bool) -> Look {
+fn march_volumes(inclusive: bool, is_frozen: bool) -> MarchVolumes {
     let sources = photographs(2, 8);
     let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
     let near_far @ [near, far] = default_near_far(&cameras);
-    let sight = |angle: f32| {
+    let object_rays = |angle: f32| {
         let target = target(8, angle);
         let cast = cast_block(&target, near_far, 6);
-        Sight {
+        SampledRays {
             cameras: cameras.iter().map(|camera| camera.block(0)).collect(),
             rays: (0..16).map(|pixel| cast_ray(&cast, pixel)).collect(),
             near_far,
             length_scale: ray_length(&target) / (far - near),
         }
     };
-    Look {
-        sizes: LookSizes { volume: [8, 8, 4], features: 3, width: 5 },
-        sights: Arc::new(vec![sight(2.0), sight(1.0)]),
+    MarchVolumes {
+        sizes: MarchSizes { volume: [8, 8, 4], features: 3, width: 5 },
+        objects_rays: Arc::new(vec![object_rays(2.0), object_rays(1.0)]),
         samples: CoarseBlock { seed: [1, 2], sample_count: 6, jitter: 1.0 },
         last_length: LAST_LENGTH,
         inclusive,
@@ -146,29 +150,29 @@ fn look(inclusive: bool, is_frozen: bool) -> Look {
 }
 
 #[test]
-fn looking_has_its_slopes() {
+fn marching_has_its_gradient() {
     for inclusive in [true, false] {
-        let operation = look(inclusive, false);
+        let operation = march_volumes(inclusive, false);
         assert_eq!(operation.shape(), [32, 3]);
         let volumes = variable(&[4, 8, 8, 4 * 3], 20);
         let (weights, parameters) = (variable(&[2, 2], 21), variable(&[operation.sizes.parameter_count()], 22));
         let all = [("volumes", &volumes), ("weights", &weights), ("parameters", &parameters)];
-        assert_slopes(&all, 1.0e-7, 1.0e-5, || {
+        assert_gradients(&all, 1.0e-7, 1.0e-5, || {
             mixed(&volumes.apply_op3(&weights, &parameters, Apply(operation.clone()))?)
         });
         // With the network left as it is, the weights' gradient is the same.
-        let of_weights = |operation: Look| -> Result<Vec<f64>> {
+        let of_weights = |operation: MarchVolumes| -> Result<Vec<f64>> {
             let seen = volumes.apply_op3(&weights, &parameters, Apply(operation))?;
             let gradients = mixed(&seen)?.backward()?;
             gradients.get(&weights).expect("a gradient").flatten_all()?.to_vec1()
         };
         let whole = of_weights(operation.clone()).expect("gradients");
-        assert_eq!(of_weights(look(inclusive, true)).expect("gradients"), whole);
+        assert_eq!(of_weights(march_volumes(inclusive, true)).expect("gradients"), whole);
     }
 }
 
 #[test]
-fn the_loss_has_its_slopes() {
+fn the_loss_has_its_gradient() {
     let mut architecture = Architecture::narrow(32, 4);
     architecture.denoiser.iter_mut().for_each(|denoiser| denoiser.estimate = Estimate::FromColours);
     let made = test_networks::deterministic(&architecture);
@@ -181,7 +185,7 @@ fn the_loss_has_its_slopes() {
     let mut all: Vec<(&str, &Var)> = network.parameters.iter().step_by(7).collect();
     all.push(("weights", &weights));
     // A short step: between its ends no rectification may turn.
-    assert_slopes(&all, 1.0e-8, 1.0e-3, value);
+    assert_gradients(&all, 1.0e-8, 1.0e-3, value);
 }
 
 #[test]

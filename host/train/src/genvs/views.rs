@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use super::super::batch::Shown;
+use super::super::batch::SourceDraw;
 use super::super::draw::{Draw, Purpose};
 use super::super::scenes::{TrainingScene, inputs};
 use super::super::weights;
@@ -16,7 +16,7 @@ use viewfuse_field::learned::default_near_far;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ViewCounts {
     /// Their pictures have the scenes' side.
-    pub(crate) sources: Shown,
+    pub(crate) sources: SourceDraw,
     pub(crate) targets: usize,
 }
 

@@ -73,12 +73,12 @@ pub(crate) struct Points {
     pub(crate) point_count: usize,
     embedded_len: usize,
     embedded: Vec<f32>,
-    places: Vec<Place>,
+    places: Vec<GridNodes>,
 }
 
 /// Nodes of a view's grid around a point with their shares, and whether the point is in front of the view.
 #[derive(Clone, Copy)]
-struct Place {
+struct GridNodes {
     nodes: [u32; 4],
     shares: [f32; 4],
     is_visible: bool,
@@ -113,10 +113,10 @@ impl Points {
             let (x, y) = (place.share_x, place.share_y);
             let shares = [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y];
             let is_visible = camera.project(point.position.into()).in_front;
-            (row, Place { nodes: place.nodes.map(|node| node as u32), shares, is_visible })
+            (row, GridNodes { nodes: place.nodes.map(|node| node as u32), shares, is_visible })
         };
         let row_count = cameras.len() * view_count * point_count;
-        let (embedded, places): (Vec<Vec<f32>>, Vec<Place>) = (0..row_count)
+        let (embedded, places): (Vec<Vec<f32>>, Vec<GridNodes>) = (0..row_count)
             .into_par_iter()
             .map(|index| {
                 let (object, rest) = (index / (view_count * point_count), index % (view_count * point_count));

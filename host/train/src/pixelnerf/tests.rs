@@ -1,13 +1,15 @@
-//! The graph says what the renderer says, and its gradients are slopes.
+//! The graph says what the renderer says, and its gradients are difference quotients.
 
 use super::super::attention::{Attention, Embedding};
-use super::super::batch::{Batch, Shown, Targets};
+use super::super::batch::{Batch, SourceDraw, Targets};
 use super::super::compositing::{coarse_depths, fine_depths, merged, points, weights as sample_weights};
 use super::super::draw::Draw;
+use super::super::gradient_check::{
+    assert_close, assert_gradients, mixed, noise, orbit, photographs, scene, tensor, variable,
+};
 use super::super::images::{enlarge, max_pool};
 use super::super::operations::{Apply, PointNetwork, PointNetworkSizes, Points, RectifiedDensity};
-use super::super::slopes::{assert_close, assert_slopes, mixed, noise, orbit, photographs, scene, tensor, variable};
-use super::{PixelNerf, SampleCounts, Seen};
+use super::{PixelNerf, PointInputs, SampleCounts};
 use candle_core::{DType, Result, Tensor, Var};
 use std::sync::Arc;
 use viewfuse_core::camera::{Camera, CameraBlock};
@@ -68,7 +70,7 @@ fn the_graph_is_the_renderers() {
     let grids = network.grids(&pictures).expect("grids");
     let parameters = network.point_parameters().expect("parameters");
     let view_weights = tensor(weights.to_vec(), &[1, 3], DType::F64);
-    let seen = Seen { cameras: &blocks, grids: &grids, weights: &view_weights, parameters: &parameters };
+    let seen = PointInputs { cameras: &blocks, grids: &grids, weights: &view_weights, parameters: &parameters };
     let raw = network.raw(&seen, std::slice::from_ref(&places)).expect("samples");
     let colours = super::logistic(&raw.narrow(1, 0, 3).expect("colours")).expect("colours");
     let densities = raw.narrow(1, 3, 1).and_then(|raw| raw.relu()).expect("densities");
@@ -79,8 +81,8 @@ fn the_graph_is_the_renderers() {
     // And what is seen of the rays: exponentials are good to a few roundings more.
     let lengths = tensor(places.iter().map(|point| point.length).collect(), &[40, 24], DType::F64);
     let shares = sample_weights(&super::density(&raw, &lengths).expect("densities"), &lengths).expect("weights");
-    let looked = reference.look(Pass::Coarse, &weights, &rays, &depths).expect("rays");
-    assert_close(&looked.weights, &shares, 1.0e-4);
+    let rendered = reference.render_rays(Pass::Coarse, &weights, &rays, &depths).expect("rays");
+    assert_close(&rendered.weights, &shares, 1.0e-4);
 }
 
 #[test]
@@ -122,14 +124,14 @@ fn point_network(is_frozen: bool) -> PointNetwork {
 }
 
 #[test]
-fn the_point_network_has_its_slopes() {
+fn the_point_network_has_its_gradient() {
     let sizes = point_network(false).sizes;
     let grids = variable(&[4, 4, 4, 14], 20);
     let weights = Var::from_tensor(&tensor(vec![0.7, 0.3, 0.4, 0.6], &[2, 2], DType::F64)).expect("weights");
     let parameters = (noise(&[sizes.parameter_count()], 22) * 0.5).expect("numbers");
     let parameters = Var::from_tensor(&parameters).expect("parameters");
     let all = [("grids", &grids), ("weights", &weights), ("parameters", &parameters)];
-    assert_slopes(&all, 1.0e-7, 1.0e-5, || {
+    assert_gradients(&all, 1.0e-7, 1.0e-5, || {
         mixed(&grids.apply_op3(&weights, &parameters, Apply(point_network(false)))?)
     });
     // With the network left as it is, the weights' gradient is the same.
@@ -148,15 +150,15 @@ fn the_point_network_has_its_slopes() {
 }
 
 #[test]
-fn images_have_their_slopes() {
+fn images_have_their_gradients() {
     for sides in [[4, 6], [5, 3]] {
         let [height, width] = sides;
         // Rectified, as in the trunk; away from zero, where there is no slope.
         let images =
             Var::from_tensor(&(noise(&[2, height, width, 3], 4).abs().expect("numbers") + 0.1).expect("numbers"));
         let images = images.expect("images");
-        assert_slopes(&[("images", &images)], 1.0e-7, 1.0e-6, || mixed(&max_pool(&images)?));
-        assert_slopes(&[("images", &images)], 1.0e-6, 1.0e-6, || mixed(&enlarge(&images, 9, 7)?));
+        assert_gradients(&[("images", &images)], 1.0e-7, 1.0e-6, || mixed(&max_pool(&images)?));
+        assert_gradients(&[("images", &images)], 1.0e-6, 1.0e-6, || mixed(&enlarge(&images, 9, 7)?));
         let pooled = max_pool(&images).expect("images");
         assert_eq!(pooled.dims(), [2, height.div_ceil(2), width.div_ceil(2), 3]);
     }
@@ -175,11 +177,11 @@ fn a_density_at_zero_can_only_rise() {
 }
 
 #[test]
-fn weights_of_samples_have_their_slopes_and_sum_up() {
+fn weights_of_samples_have_their_gradients_and_sum_up() {
     let densities =
         Var::from_tensor(&(noise(&[3, 5], 8).abs().expect("numbers") + 0.1).expect("numbers")).expect("densities");
     let lengths = (noise(&[3, 5], 9).abs().expect("numbers") * 0.2).expect("numbers");
-    assert_slopes(&[("densities", &densities)], 1.0e-7, 1.0e-6, || mixed(&sample_weights(&densities, &lengths)?));
+    assert_gradients(&[("densities", &densities)], 1.0e-7, 1.0e-6, || mixed(&sample_weights(&densities, &lengths)?));
     let weights = sample_weights(&densities, &lengths).and_then(|all| all.sum(1)?.to_vec1::<f64>()).expect("sums");
     let depths = (densities.as_tensor() * &lengths).and_then(|all| all.sum(1)?.to_vec1::<f64>()).expect("depths");
     for (sum, depth) in weights.iter().zip(depths) {
@@ -227,14 +229,14 @@ fn points_without_a_gradient_are_left_out_of_the_backward_pass() {
 }
 
 #[test]
-fn the_loss_has_its_slopes() {
+fn the_loss_has_its_gradient() {
     let network = network(8);
     // No density at zero, where part of the gradient passes against the slope.
     let bias = network.parameters.iter().find(|(name, _)| name.ends_with("lin_out.bias")).expect("a bias").1;
     bias.set(&tensor(vec![0.1, -0.2, 0.3, 4.0], &[4], DType::F64)).expect("the same shape");
     let scenes = [scene(16, 5)];
     let draw = Draw { seed: 1, step: 2 };
-    let batch = Batch::of(&scenes, &[0, 0], &draw, 9, Shown::whole(2), Targets::One, DType::F64).expect("a batch");
+    let batch = Batch::of(&scenes, &[0, 0], &draw, 9, SourceDraw::whole(2), Targets::One, DType::F64).expect("a batch");
     let weights = Var::from_tensor(&tensor(vec![0.7, 0.3, 0.4, 0.6], &[2, 2], DType::F64)).expect("weights");
     let value = || {
         let colours = network.render(&batch, &weights, &draw, SampleCounts { coarse: 6, fine: 0 })?;
@@ -242,7 +244,7 @@ fn the_loss_has_its_slopes() {
     };
     let mut all: Vec<(&str, &Var)> = network.parameters.iter().collect();
     all.push(("weights", &weights));
-    assert_slopes(&all, 1.0e-6, 1.0e-3, value);
+    assert_gradients(&all, 1.0e-6, 1.0e-3, value);
 }
 
 #[test]
@@ -250,7 +252,7 @@ fn a_batch_is_a_function_of_seed_and_step() {
     let scenes = [scene(16, 6), scene(16, 7)];
     let batch = |step: u32| {
         let draw = Draw { seed: 5, step };
-        Batch::of(&scenes, &[0, 1], &draw, 20, Shown::whole(3), Targets::Many, DType::F32).expect("a batch")
+        Batch::of(&scenes, &[0, 1], &draw, 20, SourceDraw::whole(3), Targets::Many, DType::F32).expect("a batch")
     };
     let numbers = |batch: &Batch| batch.truth.flatten_all().and_then(|all| all.to_vec1::<f32>()).expect("numbers");
     assert_eq!(numbers(&batch(1)), numbers(&batch(1)));
@@ -267,7 +269,7 @@ fn a_batch_is_a_function_of_seed_and_step() {
 }
 
 #[test]
-fn attention_is_the_cores_and_has_its_slopes() {
+fn attention_is_the_cores_and_has_its_gradient() {
     let cameras: Vec<Pose> = photographs(5, 8).images.iter().map(|image| image.camera.pose).collect();
     for embedding in [Embedding::Fourier, Embedding::Flat] {
         let attention = Attention::new(embedding, DType::F64, 3).expect("parameters");
@@ -293,6 +295,6 @@ fn attention_is_the_cores_and_has_its_slopes() {
         // Logits of some 10 are off by roundings of their products' sizes: 10 * 2^-20.
         assert_close(&expected.values()[..4], &weights, 1.0e-5);
         let all: Vec<(&str, &Var)> = attention.parameters.iter().collect();
-        assert_slopes(&all, 1.0e-6, 1.0e-4, || mixed(&attention.weights(&[sources.to_vec()], &[target])?));
+        assert_gradients(&all, 1.0e-6, 1.0e-4, || mixed(&attention.weights(&[sources.to_vec()], &[target])?));
     }
 }

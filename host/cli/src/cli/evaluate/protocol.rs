@@ -74,25 +74,9 @@ pub(super) fn run(
         target_count: arguments.protocol.targets_per_trial.into(),
     };
     let plan = protocol.plan(&scenes, draws, about.least_sources)?;
-    let of_scene = |scene: &Scene| {
-        let size = render_options.size.or_else(|| protocol.picture_size(scene, about.longest_side));
-        RenderOptions { size, ..render_options.clone() }
-    };
-    let scene_options: Vec<RenderOptions> = scenes.iter().map(of_scene).collect();
-    let sizes: Vec<[u32; 2]> = scenes
-        .iter()
-        .zip(&scene_options)
-        .map(|(scene, options)| size_of(scene, options, about.longest_side))
-        .collect::<Result<_, _>>()?;
-    NO_SETTINGS.iter().for_each(|option| {
-        options.remove(*option);
-    });
-    let mut files = BTreeMap::new();
-    let networks = arguments.model.file().into_iter().chain(arguments.metrics.files());
-    for path in networks.chain(weightings.iter().filter_map(OpenedChoice::file)) {
-        let digest = sha256_of(path).with_context(|| path.display().to_string())?;
-        files.insert(path.display().to_string(), digest);
-    }
+    let (scene_options, sizes) = options_of(&scenes, protocol, &render_options, about.longest_side)?;
+    options.retain(|option, _| !NO_SETTINGS.contains(&option.as_str()));
+    let files = digests(arguments, weightings)?;
     let settings = Settings {
         viewfuse: env!("CARGO_PKG_VERSION").to_owned(),
         protocol: protocol.to_string(),
@@ -134,36 +118,47 @@ pub(super) fn run(
     }
     let outcome = Outcome { protocol, scenes: &scenes, sizes: &sizes, plan: &plan, results: &results };
     if arguments.json {
-        let json = json!({
-            "settings": settings,
-            "device": device.name(),
-            "jobs": plan.jobs.iter().map(|job| outcome.job(job)).collect::<Vec<_>>(),
-            "tables": outcome.json_tables()?,
-            "published": outcome.published(),
-            "missing": missing,
-        });
+        let json = outcome.json(&settings, &device.name(), &missing)?;
         say(format_args!("{json:#}"))?;
         return Ok(ExitCode::SUCCESS);
     }
     if arguments.latex {
-        let mut tables = results.iter();
-        tables.try_for_each(|table| say(table.latex(&outcome.title(table))))?;
+        results.iter().try_for_each(|table| say(table.latex(&outcome.title(table))))?;
         return Ok(ExitCode::SUCCESS);
     }
     outcome.print()?;
     if let Some(folder) = folder {
-        let (there, all) = (finished.len(), plan.jobs.len());
-        let part = if shard == Shard::ALL { String::new() } else { format!("shard {shard}: ") };
-        say(format_args!("{part}{done} jobs done; {there} of {all} are in {}", folder.display()))?;
+        print_done(shard, [done, finished.len(), plan.jobs.len()], folder)?;
     }
-    if !missing.is_empty() {
-        let named: Vec<String> = missing.iter().take(NAMED).map(usize::to_string).collect();
-        let more = missing.len().saturating_sub(NAMED);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        say(format_args!("missing: {}{more}; the tables come with the last of them", named.join(", ")))?;
-    }
+    print_missing(&missing)?;
     say(format_args!("device: {}, {reason}", device.name()))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The digests of the files that a run's figures depend on, by path.
+fn digests(arguments: &Arguments, weightings: &[OpenedChoice]) -> anyhow::Result<BTreeMap<String, String>> {
+    let networks = arguments.model.file().into_iter().chain(arguments.metrics.files());
+    let files = networks.chain(weightings.iter().filter_map(OpenedChoice::file));
+    let digest =
+        |path: &Path| Ok((path.display().to_string(), sha256_of(path).with_context(|| path.display().to_string())?));
+    files.map(digest).collect()
+}
+
+/// Says how many jobs this process did, how many are in the folder, and how many there are.
+fn print_done(shard: Shard, [done, there, all]: [usize; 3], folder: &Path) -> anyhow::Result<()> {
+    let part = if shard == Shard::ALL { String::new() } else { format!("shard {shard}: ") };
+    Ok(say(format_args!("{part}{done} jobs done; {there} of {all} are in {}", folder.display()))?)
+}
+
+/// Says which jobs are missing, if any are.
+fn print_missing(missing: &[usize]) -> anyhow::Result<()> {
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let named: Vec<String> = missing.iter().take(NAMED).map(usize::to_string).collect();
+    let more = missing.len().saturating_sub(NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    Ok(say(format_args!("missing: {}{more}; the tables come with the last of them", named.join(", ")))?)
 }
 
 /// The protocol with the targets that were given beside it.
@@ -177,6 +172,23 @@ fn with_targets(protocol: &Protocol, targets: Option<&str>) -> anyhow::Result<Pr
             "--targets cannot be used with --protocol {protocol}, which chooses its targets; with nearest:K it can"
         ))),
     }
+}
+
+/// The options of each scene, and width and height of its pictures.
+fn options_of(
+    scenes: &[Scene],
+    protocol: &Protocol,
+    options: &RenderOptions,
+    longest: u32,
+) -> Result<(Vec<RenderOptions>, Vec<[u32; 2]>), RenderError> {
+    let of_scene = |scene: &Scene| {
+        let size = options.size.or_else(|| protocol.picture_size(scene, longest));
+        let options = RenderOptions { size, ..options.clone() };
+        let size = size_of(scene, &options, longest)?;
+        Ok((options, size))
+    };
+    let both: Vec<_> = scenes.iter().map(of_scene).collect::<Result<_, RenderError>>()?;
+    Ok(both.into_iter().unzip())
 }
 
 /// Width and height of the pictures at a scene's first view.
@@ -219,6 +231,18 @@ impl Outcome<'_> {
         let sizes: Vec<[u32; 2]> = taken.iter().map(|&scene| self.sizes[scene]).collect();
         let has_masked = self.results.iter().flat_map(|table| &table.metrics).any(|metric| metric.name == PSNR_MASKED);
         Published::of(self.protocol, &scenes, &sizes, has_masked).filter(|_| !self.results.is_empty())
+    }
+
+    /// All of it for other programs.
+    fn json(&self, settings: &Settings, device: &str, missing: &[usize]) -> anyhow::Result<serde_json::Value> {
+        Ok(json!({
+            "settings": settings,
+            "device": device,
+            "jobs": self.plan.jobs.iter().map(|job| self.job(job)).collect::<Vec<_>>(),
+            "tables": self.json_tables()?,
+            "published": self.published(),
+            "missing": missing,
+        }))
     }
 
     fn job(&self, job: &Job) -> serde_json::Value {

@@ -3,33 +3,42 @@
 use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
-use viewfuse_field::family::{Family, Small, TestNetwork};
+use viewfuse_field::AnyField;
+use viewfuse_field::options::{FieldOptions, OpenError};
+use viewfuse_field::row::{Origin, Row, Small, TestNetwork};
+use viewfuse_field::rows::{self, ROWS};
 use viewfuse_nn::checkpoint::Checkpoint;
 
-/// Help of `--model`: the families with their test networks.
+/// Help of `--model`: the networks that checkpoints may hold, test networks, and fields without one.
 pub(crate) fn model_help() -> String {
-    let families = Family::ALL.map(|family| format!("a {family}")).join(" or ");
+    let learned = || ROWS.into_iter().filter(|row| matches!(row.origin, Origin::Learned { .. }));
+    let networks: Vec<String> = learned().map(|row| format!("a {}", row.title)).collect();
     let sizes = |network: &TestNetwork| match network.small {
         Small::Width => format!("{}[:WIDTH]", network.name),
         Small::One => format!("{}[:small]", network.name),
     };
-    let tests = Family::ALL.map(|family| {
-        format!("{} ({family})", family.test_networks().iter().map(sizes).collect::<Vec<_>>().join(", "))
-    });
+    let tests = learned()
+        .map(|row| format!("{} ({})", row.test_networks().iter().map(sizes).collect::<Vec<_>>().join(", "), row.title));
+    let others: Vec<&str> = ROWS.iter().filter(|row| row.prefix().is_none()).map(|row| row.name).collect();
     format!(
-        "Checkpoint of {families} (.pth, .pt, .safetensors, .pkl), or a test network with deterministic initialisation: \
-         {} [default: the training-free field]",
-        tests.join(", ")
+        "Checkpoint of {} (.pth, .pt, .safetensors, .pkl), or a test network with deterministic initialisation: {}, or a \
+         field without a network: {} [default: {}]",
+        networks.join(" or "),
+        tests.collect::<Vec<_>>().join(", "),
+        others.join(", "),
+        ROWS[0].name
     )
 }
 
-/// The source of a network's parameters.
+/// A field without a network, or the source of a network's parameters.
 #[derive(Clone)]
 pub(crate) enum Model {
     /// A checkpoint.
     File(PathBuf),
     /// A test network: the published size, or a small member of its family.
     Test(&'static TestNetwork, Option<u16>),
+    /// A field without a network.
+    TrainingFree(&'static Row),
 }
 
 impl FromStr for Model {
@@ -40,7 +49,10 @@ impl FromStr for Model {
             Some((name, size)) => (name, Some(size)),
             None => (text, None),
         };
-        let mut networks = Family::ALL.into_iter().flat_map(Family::test_networks);
+        if let Some(row) = ROWS.into_iter().find(|row| row.prefix().is_none() && row.name == text) {
+            return Ok(Model::TrainingFree(row));
+        }
+        let mut networks = ROWS.into_iter().flat_map(Row::test_networks);
         let Some(network) = networks.find(|network| network.name == name) else {
             return Ok(Model::File(PathBuf::from(text)));
         };
@@ -63,6 +75,7 @@ impl fmt::Display for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Model::File(path) => write!(f, "{}", path.display()),
+            Model::TrainingFree(row) => f.write_str(row.name),
             Model::Test(network, None) => f.write_str(network.name),
             Model::Test(TestNetwork { name, small: Small::One, .. }, Some(_)) => write!(f, "{name}:small"),
             Model::Test(TestNetwork { name, small: Small::Width, .. }, Some(width)) => write!(f, "{name}:{width}"),
@@ -71,12 +84,18 @@ impl fmt::Display for Model {
 }
 
 impl Model {
-    /// The parameters.
-    pub(crate) fn checkpoint(&self) -> anyhow::Result<Checkpoint> {
-        Ok(match self {
-            Model::File(path) => Checkpoint::open(path)?,
-            Model::Test(network, size) => (network.checkpoint)(*size),
-        })
+    /// Whether there are parameters.
+    pub(crate) fn is_network(&self) -> bool {
+        !matches!(self, Model::TrainingFree(_))
+    }
+
+    /// Opens the field.
+    pub(crate) fn open(&self, options: &FieldOptions) -> Result<AnyField, OpenError> {
+        match self {
+            Model::File(path) => rows::open(Checkpoint::open(path)?, options),
+            Model::Test(network, size) => rows::open((network.checkpoint)(*size), options),
+            Model::TrainingFree(row) => row.open(options),
+        }
     }
 }
 
@@ -89,14 +108,15 @@ mod tests {
         assert_eq!(
             super::model_help(),
             "Checkpoint of a PixelNeRF or a GeNVS (.pth, .pt, .safetensors, .pkl), or a test network with deterministic \
-             initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS) [default: the training-free \
-             field]"
+             initialisation: formula[:WIDTH], body[:WIDTH] (PixelNeRF), genvs[:small] (GeNVS), or a field without a network: \
+             training-free [default: training-free]"
         );
     }
 
     #[test]
     fn models_by_name() {
-        for text in ["formula", "formula:64", "body", "body:16", "genvs", "genvs:small", "network-snapshot-005000.pkl"]
+        for text in
+            ["formula", "formula:64", "body", "body:16", "genvs", "genvs:small", "training-free", "network-005000.pkl"]
         {
             let model: Model = text.parse().expect(text);
             assert_eq!(model.to_string(), text);

@@ -48,17 +48,16 @@ impl Drop for Clock {
 mod tests {
     use super::Clock;
     use std::sync::mpsc::channel;
-    use std::time::Duration;
 
     #[test]
     fn it_goes_until_it_is_dropped() {
         let (sender, beats) = channel();
         let clock = Clock::start(move || sender.send(()).expect("a receiver"));
         for _ in 0..2 {
-            beats.recv_timeout(Duration::from_secs(60)).expect("a beat");
+            beats.recv().expect("a beat");
         }
         drop(clock);
-        // The work is gone with its thread.
-        assert!(beats.into_iter().count() < 10);
+        // The work is gone with its thread: the beats come to an end.
+        beats.into_iter().for_each(drop);
     }
 }

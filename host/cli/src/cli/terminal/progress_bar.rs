@@ -67,16 +67,41 @@ impl Shown {
             self.bar.set_message(words);
             return;
         };
-        if now.duration_since(lines.last) < lines.between {
-            return;
-        }
-        let line = format!("progress: {} %, {words}", (100.0 * share) as u64);
-        // Without a time between lines each is one of its own.
-        if lines.between > Duration::ZERO || line != lines.said {
-            lines.last = now;
+        if let Some(line) = lines.due(now, share, &words) {
             // A closed pipe is ignored.
             writeln!(io::stderr().lock(), "{line}").ok();
-            lines.said = line;
         }
+    }
+}
+
+impl Lines {
+    /// The line that is to be written now, if it is time for one.
+    fn due(&mut self, now: Instant, share: f64, words: &str) -> Option<&str> {
+        let line = format!("progress: {} %, {words}", (100.0 * share) as u64);
+        // Without a time between lines each is one of its own.
+        if now.duration_since(self.last) < self.between || (self.between == Duration::ZERO && line == self.said) {
+            return None;
+        }
+        (self.last, self.said) = (now, line);
+        Some(&self.said)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Lines;
+    use std::time::{Duration, Instant};
+
+    #[test]
+    fn lines_come_at_even_times() {
+        let start = Instant::now();
+        let told = |between: u64, share: fn(u64) -> f64| {
+            let mut lines = Lines { between: Duration::from_millis(between), last: start, said: String::new() };
+            let is_due =
+                |tenth: &u64| lines.due(start + Duration::from_millis(100 * tenth), share(*tenth), "work").is_some();
+            (1..=20).filter(is_due).collect::<Vec<u64>>()
+        };
+        assert_eq!(told(500, |_| 0.5), [5, 10, 15, 20], "also where nothing goes on");
+        assert_eq!(told(0, |tenth| (tenth / 8) as f64 / 10.0), [1, 8, 16], "each change");
     }
 }

@@ -246,11 +246,11 @@ where
         &mut self,
         mix: &Mix,
         state: &D::Buffer<f32>,
-        said: Option<&D::Buffer<f32>>,
+        estimate: Option<&D::Buffer<f32>>,
     ) -> Result<D::Buffer<f32>, FieldError> {
         let mut mixed = self.buffer()?;
         // A missing result has coefficient 0.
-        let mut all = said.into_iter().chain(&self.results);
+        let mut all = estimate.into_iter().chain(&self.results);
         let [newest, second, third, fourth] = std::array::from_fn(|_| all.next().unwrap_or(state));
         let count = self.element_count as u32;
         self.device.mix_pictures(mix, count, state, newest, second, third, fourth, &mut mixed)?;

@@ -11,6 +11,7 @@ use viewfuse_kernels::plane_sweep::path::{CostBlock, DIRECTIONS};
 use viewfuse_kernels::plane_sweep::window::WindowBlock;
 use viewfuse_kernels::plane_sweep::{MAX_MATCHED, PLANES, Planes};
 use viewfuse_scene::photographs::SourceImage;
+use viewfuse_scene::photographs::object_box::joined;
 
 /// Most pairs that are compared, for each view.
 const PAIRS_PER_VIEW: usize = 3;
@@ -27,7 +28,7 @@ pub(super) struct Images<D: Device> {
 
 impl<D: Device> Images<D> {
     pub(super) fn upload(device: &D, images: &[SourceImage]) -> Result<Images<D>, FieldError> {
-        let (cameras, texels) = super::super::hull::joined(images);
+        let (cameras, texels) = joined(images);
         Ok(Images { cameras, texels: device.upload(&texels)? })
     }
 }

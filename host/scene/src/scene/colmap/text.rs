@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::camera_models::CameraModel;
 use super::super::error::SceneError;
-use super::super::fault::{FileFault, Place};
+use super::super::fault::{FaultLocation, FileFault};
 use super::super::files::{self, number, read_text};
 use super::{ModelCamera, ModelImage, ModelPoint, camera};
 
@@ -18,13 +18,13 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 fn whole(path: &Path, line: usize, word: &str) -> Result<u32, SceneError> {
     word.parse().map_err(|_| SceneError::Damaged {
         path: path.to_path_buf(),
-        place: Place::Line(line),
+        place: FaultLocation::Line(line),
         fault: FileFault::NotWhole { word: files::excerpt(word) },
     })
 }
 
 fn too_few(path: &Path, line: usize, of: &'static str, expected: usize, found: usize) -> SceneError {
-    SceneError::WrongCount { path: path.to_path_buf(), place: Place::Line(line), of, expected, found }
+    SceneError::WrongCount { path: path.to_path_buf(), place: FaultLocation::Line(line), of, expected, found }
 }
 
 /// `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
@@ -40,7 +40,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
         let size = [number(path, line, width)?, number(path, line, height)?];
         let parameters = parameters.iter().map(|word| number(path, line, word)).collect::<Result<Vec<_>, _>>()?;
         let model = CameraModel::named(name).ok_or_else(|| files::excerpt(name));
-        all.push((id, camera(path, Place::Line(line), model, size, &parameters)?));
+        all.push((id, camera(path, FaultLocation::Line(line), model, size, &parameters)?));
     }
     Ok(all)
 }
@@ -82,7 +82,7 @@ fn image(path: &Path, line: usize, content: &str) -> Result<ModelImage, SceneErr
         translation: std::array::from_fn(|index| translation[index]),
         camera: whole(path, line, words[8])?,
         name: behind(content, 9).to_string(),
-        place: Place::Line(line),
+        place: FaultLocation::Line(line),
     })
 }
 
@@ -116,7 +116,7 @@ pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
             *level = whole(path, line, word)?.min(255) as u8;
         }
         let images = track.iter().step_by(2).map(|word| whole(path, line, word)).collect::<Result<Vec<_>, _>>()?;
-        let (error, place) = (number(path, line, error)?, Place::Line(line));
+        let (error, place) = (number(path, line, error)?, FaultLocation::Line(line));
         all.push(ModelPoint { position, colour, error, images, place });
     }
     Ok(all)

@@ -9,7 +9,7 @@ use viewfuse_core::lens::{Lens, Projection};
 use super::super::camera_models::camera_model_names;
 use super::super::check;
 use super::super::error::SceneError;
-use super::super::fault::{IntrinsicsFault, Place};
+use super::super::fault::{FaultLocation, IntrinsicsFault};
 use super::super::files::{self, IMAGE_EXTENSIONS};
 use super::super::json::Object;
 use super::super::reader::{ImageFile, PoseForm, RawIntrinsics, RawPose, RawView};
@@ -40,7 +40,7 @@ pub(super) enum Listed {
     /// A view with its photograph.
     View(Box<RawView>),
     /// A photograph that does not exist, and the place that names it.
-    Missing(Place, PathBuf),
+    Missing(FaultLocation, PathBuf),
 }
 
 /// The splits of photographs by the lists at the top level of a file.
@@ -71,7 +71,7 @@ impl<'a> Frame<'a> {
         let file_path = frame.text("file_path")?;
         let given = self.beside(file_path);
         let Some(image) = photograph(&given).or_else(|| smaller(&given)) else {
-            return Ok(Listed::Missing(Place::Key(frame.full("file_path")), given));
+            return Ok(Listed::Missing(FaultLocation::Key(frame.full("file_path")), given));
         };
         let image = ImageFile::open(&image)?;
         let intrinsics = Some(self.intrinsics(image.size())?);
@@ -99,7 +99,7 @@ impl<'a> Frame<'a> {
             matrix: frame.matrix("transform_matrix")?,
             form: PoseForm::WorldFromOpenGl,
             path: self.path.to_path_buf(),
-            place: Place::Key(frame.full("transform_matrix")),
+            place: FaultLocation::Key(frame.full("transform_matrix")),
         })
     }
 
@@ -118,7 +118,7 @@ impl<'a> Frame<'a> {
         if mask.is_file() {
             return Ok(Some(mask));
         }
-        let (path, place) = (self.path.to_path_buf(), Place::Key(frame.full("mask_path")));
+        let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(frame.full("mask_path")));
         Err(SceneError::NoMask { path, place, mask })
     }
 
@@ -129,7 +129,7 @@ impl<'a> Frame<'a> {
     }
 
     fn intrinsics(&self, image_size: [u32; 2]) -> Result<RawIntrinsics, SceneError> {
-        let place = || Place::Key(self.key.clone());
+        let place = || FaultLocation::Key(self.key.clone());
         let stated = match (self.number("w")?, self.number("h")?) {
             (None, None) => None,
             (Some((width, _)), Some((height, _))) => Some(check::size(self.path, place(), width, height)?),
@@ -165,7 +165,7 @@ impl<'a> Frame<'a> {
             }
             if let Some(angle) = scope.number(angle_key)? {
                 if !(angle > 0.0 && angle < std::f64::consts::PI) {
-                    let (path, place) = (self.path.to_path_buf(), Place::Key(scope.full(angle_key)));
+                    let (path, place) = (self.path.to_path_buf(), FaultLocation::Key(scope.full(angle_key)));
                     let fault = IntrinsicsFault::Angle { angle };
                     return Err(SceneError::Intrinsics { path, place, fault });
                 }
@@ -192,7 +192,7 @@ impl<'a> Frame<'a> {
             } else if !is_one_of(&PERSPECTIVE_MODELS) {
                 return Err(SceneError::CameraModel {
                     path: self.path.to_path_buf(),
-                    place: Place::Key(key),
+                    place: FaultLocation::Key(key),
                     model: files::excerpt(&value.to_string()),
                     supported: camera_model_names(),
                 });
@@ -218,7 +218,7 @@ impl<'a> Frame<'a> {
         }
         let lens = Lens::new(projection, coefficients).map_err(|reason| SceneError::Lens {
             path: self.path.to_path_buf(),
-            place: Place::Key(self.key.clone()),
+            place: FaultLocation::Key(self.key.clone()),
             reason,
         })?;
         Ok((!lens.is_pinhole()).then_some(lens))

@@ -1,7 +1,7 @@
 //! Sources of a GeNVS show what their cameras say, and are weighted for their target.
 
-use super::super::super::slopes::scene;
-use super::{Draw, Shown, ViewCounts, Views};
+use super::super::super::gradient_check::scene;
+use super::{Draw, SourceDraw, ViewCounts, Views};
 use candle_core::{DType, Tensor};
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::Scheme;
@@ -10,7 +10,7 @@ use viewfuse_weighting::sources::SourcePoses;
 
 /// Three sources and a target of each of two objects of 32 pixels.
 fn views(least_crop: f32) -> Views {
-    let counts = ViewCounts { sources: Shown { least_crop, ..Shown::whole(3) }, targets: 1 };
+    let counts = ViewCounts { sources: SourceDraw { least_crop, ..SourceDraw::whole(3) }, targets: 1 };
     Views::of(&[&scene(32, 6), &scene(32, 7)], &Draw { seed: 5, step: 1 }, counts, DType::F32).expect("views")
 }
 

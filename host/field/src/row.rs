@@ -1,0 +1,139 @@
+//! A field's row: all that the command, `pareto` and training know of it beside its pictures. The table of rows is in
+//! [`rows`](crate::rows).
+
+use super::any::AnyField;
+use super::options::{FieldOptions, Flag, OpenError};
+use super::record::{Omission, VIEWS};
+use super::render::RenderOptions;
+use viewfuse_nn::checkpoint::Checkpoint;
+
+/// A field's row.
+#[derive(Clone, Copy)]
+pub struct Row {
+    /// Its name in the run record; that of a training-free field is also a value of `--model`.
+    pub name: &'static str,
+    /// Its name in messages, for example "PixelNeRF".
+    pub title: &'static str,
+    /// Heading of its own flags.
+    pub heading: &'static str,
+    /// How it is opened.
+    pub origin: Origin,
+    /// Its own flags.
+    pub flags: &'static [Flag],
+    /// What may be left out of its work, besides [`VIEWS`].
+    pub omissions: &'static [Omission],
+    /// Settings to compare for a field of this row, the exact one first; empty if it is of another. The options say what
+    /// is left out by default; the number is that of the targets.
+    pub presets: fn(&AnyField, &RenderOptions, usize) -> Vec<Preset>,
+}
+
+/// How a field is opened.
+#[derive(Clone, Copy)]
+pub enum Origin {
+    /// It has no learned parameters.
+    TrainingFree {
+        /// Opens it.
+        open: fn(&FieldOptions) -> Result<AnyField, OpenError>,
+    },
+    /// From a checkpoint.
+    Learned {
+        /// The prefix of its tensors' names, which no other row has.
+        prefix: &'static str,
+        /// Its test networks, with deterministic initialisation.
+        test_networks: &'static [TestNetwork],
+        /// Opens it.
+        open: fn(Checkpoint, &FieldOptions) -> Result<AnyField, OpenError>,
+    },
+}
+
+/// A setting to compare with others: a field with its options.
+#[derive(Clone)]
+pub struct Preset {
+    /// It in a few words.
+    pub words: String,
+    /// The field.
+    pub field: AnyField,
+    /// What the render loop leaves out.
+    pub options: RenderOptions,
+}
+
+/// Words of the preset that leaves nothing out.
+pub const EXACT: &str = "exact";
+/// Words of the preset that leaves out everything that is left out by default.
+pub const ALL: &str = "all";
+
+/// A network with deterministic initialisation: for measuring, and for checks against other implementations.
+#[derive(Clone, Copy)]
+pub struct TestNetwork {
+    /// Its name.
+    pub name: &'static str,
+    /// The small members of its family.
+    pub small: Small,
+    /// `None` gives the published size, a number the small member of that width (any number for [`Small::One`]).
+    pub checkpoint: fn(Option<u16>) -> Checkpoint,
+}
+
+/// Small members of a family of networks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Small {
+    /// One for each width.
+    Width,
+    /// A single one.
+    One,
+}
+
+impl Row {
+    /// The prefix of its tensors' names; `None` for a training-free field.
+    pub const fn prefix(&self) -> Option<&'static str> {
+        match self.origin {
+            Origin::TrainingFree { .. } => None,
+            Origin::Learned { prefix, .. } => Some(prefix),
+        }
+    }
+
+    /// Its test networks.
+    pub const fn test_networks(&self) -> &'static [TestNetwork] {
+        match self.origin {
+            Origin::TrainingFree { .. } => &[],
+            Origin::Learned { test_networks, .. } => test_networks,
+        }
+    }
+
+    /// Opens the field without a checkpoint.
+    ///
+    /// # Errors
+    /// [`OpenError`] if it is a learned one, or does not accept an option.
+    pub fn open(&self, options: &FieldOptions) -> Result<AnyField, OpenError> {
+        self.check(options)?;
+        match self.origin {
+            Origin::TrainingFree { open } => open(options),
+            Origin::Learned { .. } => Err(OpenError::Refused {
+                option: self.name.to_owned(),
+                problem: "needs a checkpoint".to_owned(),
+                reason: format!("is a {}", self.title),
+            }),
+        }
+    }
+
+    /// Refuses what the field does not have, and values that it does not take.
+    ///
+    /// # Errors
+    /// [`OpenError::Refused`].
+    pub(crate) fn check(&self, options: &FieldOptions) -> Result<(), OpenError> {
+        let is = || format!("is a {}", self.title);
+        let knows = |name: &str| name == VIEWS.name || self.omissions.iter().any(|own| own.name == name);
+        if let Some(unknown) = options.compute.iter().find(|name| !knows(name)) {
+            return Err(OpenError::cannot(format!("compute {unknown}"), is()));
+        }
+        for (name, value) in &options.flags {
+            let flag = self.flags.iter().find(|flag| flag.name == name.as_str());
+            let flag = flag.ok_or_else(|| OpenError::cannot(name.as_str(), is()))?;
+            (flag.check)(value).map_err(|form| OpenError::Refused {
+                option: name.clone(),
+                problem: format!("takes {form},"),
+                reason: is(),
+            })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,120 @@
+//! The table of fields: one row each. The names of a checkpoint's tensors tell its row.
+
+use super::any::AnyField;
+use super::options::{FieldOptions, OpenError};
+use super::row::{Origin, Row};
+use super::{genvs, pixelnerf, training_free};
+use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
+
+/// All of them; the first is the default.
+pub const ROWS: [&Row; 3] = [&training_free::ROW, &pixelnerf::ROW, &genvs::ROW];
+
+/// The row of a field of this name.
+pub fn named(name: &str) -> Option<&'static Row> {
+    ROWS.into_iter().find(|row| row.name == name)
+}
+
+/// The row of a checkpoint. Opening the network checks that no tensor is missing.
+///
+/// # Errors
+/// [`CheckpointError::Tensors`] if it is of none.
+pub fn row_of(checkpoint: &Checkpoint) -> Result<&'static Row, CheckpointError> {
+    let holds = |prefix: &str| checkpoint.shapes().keys().any(|name| name.starts_with(prefix));
+    ROWS.into_iter().find(|row| row.prefix().is_some_and(holds)).ok_or_else(|| {
+        let prefixes = ROWS.iter().filter_map(|row| Some(format!("'{}' ({})", row.prefix()?, row.title)));
+        CheckpointError::Tensors {
+            path: checkpoint.path().to_path_buf(),
+            detail: format!(
+                "holds no supported network: no tensor's name begins with {}",
+                prefixes.collect::<Vec<_>>().join(" or ")
+            ),
+        }
+    })
+}
+
+/// Opens the learned field of a checkpoint of any row.
+///
+/// # Errors
+/// [`OpenError`] if the checkpoint is of no row or cannot be read, or if the field does not accept an option.
+pub fn open(checkpoint: Checkpoint, options: &FieldOptions) -> Result<AnyField, OpenError> {
+    let row = row_of(&checkpoint)?;
+    row.check(options)?;
+    match row.origin {
+        Origin::Learned { open, .. } => open(checkpoint, options),
+        Origin::TrainingFree { open } => open(options),
+    }
+}
+
+impl Default for AnyField {
+    /// The training-free field.
+    fn default() -> AnyField {
+        AnyField::new(training_free::TrainingFree::default())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::RenderOptions;
+    use crate::row::{ALL, EXACT};
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn told_by_names() {
+        for row in ROWS {
+            for network in row.test_networks() {
+                let checkpoint = (network.checkpoint)(Some(8));
+                assert_eq!(row_of(&checkpoint).ok().map(|found| found.name), Some(row.name), "{}", network.name);
+            }
+        }
+    }
+
+    #[test]
+    fn neither() {
+        let other = Checkpoint::in_memory("other", [], BTreeMap::new());
+        let message = row_of(&other).err().expect("nothing").to_string();
+        let expected = "other: holds no supported network: no tensor's name begins with 'encoder.model.' (PixelNeRF) \
+             or 'pixel_nerf_net.' (GeNVS)";
+        assert_eq!(message, expected);
+    }
+
+    /// Opens a row's field with these options: a learned one is its first test network.
+    fn opened(row: &Row, options: &FieldOptions) -> Result<AnyField, OpenError> {
+        match row.test_networks().first() {
+            Some(network) => open((network.checkpoint)(Some(8)), options),
+            None => row.open(options),
+        }
+    }
+
+    #[test]
+    fn a_field_has_the_name_of_its_row_and_its_presets() {
+        for row in ROWS {
+            let field = opened(row, &FieldOptions::default()).expect(row.name);
+            assert_eq!((field.about().name, named(row.name).map(|row| row.title)), (row.name, Some(row.title)));
+            let presets = (row.presets)(&field, &RenderOptions::default(), 2);
+            let words: Vec<&str> = presets.iter().map(|preset| preset.words.as_str()).collect();
+            assert!(words[0] == EXACT && words.contains(&ALL), "{words:?}");
+        }
+    }
+
+    #[test]
+    fn options_of_another_field_are_refused() {
+        for row in ROWS {
+            let computing = FieldOptions { compute: vec!["everything".to_owned()], ..FieldOptions::default() };
+            let foreign = ROWS.iter().flat_map(|row| row.flags);
+            let foreign = foreign.filter(|flag| row.flags.iter().all(|own| own.name != flag.name));
+            let foreign = foreign.map(|flag| FieldOptions::default().with(flag.name, ""));
+            for options in foreign.chain([computing]) {
+                let refused = matches!(opened(row, &options), Err(OpenError::Refused { .. }));
+                assert!(refused, "{} takes {options:?}", row.name);
+            }
+        }
+    }
+
+    #[test]
+    fn values_are_checked() {
+        for flag in ROWS.iter().flat_map(|row| row.flags).filter(|flag| flag.value.is_some()) {
+            assert!((flag.check)("-1,x").is_err(), "--{} takes everything", flag.name);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Pictures that follow a hand that drags, and that memory does not grow.
+
+use super::super::browser::{self, Browser, InBrowser};
+use super::super::numbers;
+use super::devtools::{Chromium, Tab};
+use super::{COUNT, keep, room, start, weights};
+use libtest_mimic::Trial;
+use serde_json::{Value, json};
+use viewfuse_tests::patience::wait_until;
+use viewfuse_tests::places::repository;
+use viewfuse_tests::trials::{needing, trial};
+use viewfuse_tests::viewer::{Program, request};
+
+/// So many moves are sent in the tests of memory, unless `VIEWFUSE_VIEW_MOVES` says otherwise.
+const MOVES: usize = 400;
+
+/// Longest sides of coarse pictures as 16ths of the finest: late ones are coarser.
+const SIXTEENTHS: [f64; 6] = [16.0, 13.0, 10.0, 8.0, 6.0, 4.0];
+
+/// So many pictures are waited for while dragging.
+const PICTURES: f64 = 30.0;
+
+pub(super) fn trials() -> Vec<Trial> {
+    let mut trials = Vec::new();
+    let no_count = (!cfg!(target_os = "linux")).then(|| "the system does not say what a process takes".to_owned());
+    trials.push(needing(no_count, false, trial("commands::view::memory_does_not_grow", memory_does_not_grow)));
+    if cfg!(target_os = "linux") {
+        let tests: [(&str, InBrowser); 3] = [
+            ("view::browser::pictures_of_the_room_follow_the_hand", pictures_of_the_room_follow_the_hand),
+            ("view::browser::pictures_of_the_lorry_follow_the_hand", pictures_of_the_lorry_follow_the_hand),
+            ("view::browser::many_moves_of_a_hand_take_no_memory", many_moves_of_a_hand_take_no_memory),
+        ];
+        trials.extend(browser::trials(tests));
+    }
+    trials
+}
+
+fn moves() -> usize {
+    std::env::var("VIEWFUSE_VIEW_MOVES").map_or(MOVES, |text| text.parse().expect("a number of moves"))
+}
+
+fn pictures_of_the_room_follow_the_hand(browser: &Browser) {
+    pictures_follow_the_hand(browser, "tests/data/room", [160.0, 120.0], "room.png");
+}
+
+fn pictures_of_the_lorry_follow_the_hand(browser: &Browser) {
+    pictures_follow_the_hand(browser, "tests/data/toy", [128.0, 128.0], "lorry.png");
+}
+
+/// On the page, from now on: the sizes of the pictures and which requests they answer, and how often weights were drawn.
+const WATCH: &str = "(() => { drawnSizes = []; drawnNumbers = []; weightsTold = 0; \
+    const [drawing, telling] = [drawPicture, tellWeights]; \
+    drawPicture = () => { drawing(); drawnSizes.push(shown.size); drawnNumbers.push(drawn); }; \
+    tellWeights = (own, number) => { weightsTold += 1; telling(own, number); }; })()";
+
+/// While a hand drags, coarse pictures come: each answers a newer request than the one before, with its weights, in one of
+/// the sizes that there are, of which `finest` is the largest; once it lets go, the picture is that of the last view. How many
+/// come in a second is a figure of `cargo bench -p viewfuse-cli --bench view`.
+fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], kept: &str) {
+    let program = start(&repository(), scene);
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(COUNT_IS_SOME);
+    let place = tab.middle_of("#picture");
+    tab.evaluate(WATCH);
+    drag_around(&tab, place, PICTURES);
+    let seen = tab.evaluate("({sizes: drawnSizes, numbers: drawnNumbers, weights: weightsTold})");
+    weights(&tab);
+    keep(&tab, kept);
+    let (told, drawn) = (seen["weights"].as_f64().expect("a number"), numbers(&seen["numbers"]));
+    assert!(told >= drawn.len() as f64, "weights were drawn {told} times for {} pictures", drawn.len());
+    assert!(drawn.is_sorted(), "an older picture replaced a newer one: {drawn:?}");
+    for size in seen["sizes"].as_array().expect("sizes") {
+        let own = numbers(size);
+        let is_coarse = SIXTEENTHS.iter().any(|share| (0..2).all(|i| (own[i] - finest[i] * share / 16.0).abs() < 1.0));
+        assert!(is_coarse, "{own:?} while dragging");
+    }
+    tab.wait_for("shown.full && shown.pose === pose");
+    assert_eq!(tab.console(), [""; 0]);
+}
+
+const COUNT_IS_SOME: &str = "document.getElementById('picture')?.dataset.pictures > 0";
+
+/// Drags around a place until so many more pictures have come.
+fn drag_around(tab: &Tab<'_>, [x, y]: [f64; 2], pictures: f64) {
+    let enough = tab.number(COUNT) + pictures;
+    tab.mouse("mousePressed", [x, y], json!({}));
+    let mut step = 0;
+    wait_until("pictures do not follow the hand", || {
+        step += 1;
+        let angle = f64::from(step) / 40.0;
+        tab.mouse("mouseMoved", [x + 80.0 * angle.sin(), y + 30.0 * angle.cos()], json!({}));
+        tab.number(COUNT) >= enough
+    });
+    tab.mouse("mouseReleased", [x, y], json!({}));
+}
+
+/// The program's memory in KiB, and the bytes that the page's script and pictures hold.
+fn memory(program: &Program, tab: &Tab<'_>) -> [f64; 2] {
+    tab.call("HeapProfiler.collectGarbage", json!({}));
+    let heap = tab.call("Runtime.getHeapUsage", json!({}));
+    let number = |name: &str| heap[name].as_f64().unwrap_or(0.0);
+    [program.memory() as f64, number("usedSize") + number("backingStorageSize")]
+}
+
+fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
+    let program = room("--sources 003..006 --size 96x72");
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [900, 700], false);
+    tab.wait_for("typeof shown !== 'undefined' && shown && shown.full");
+    let ([x, y], moves) = (tab.middle_of("#picture"), moves());
+    let drag = |moves: usize| {
+        tab.mouse("mousePressed", [x, y], json!({}));
+        for step in 0..moves {
+            let angle = step as f64 / 40.0;
+            tab.mouse("mouseMoved", [x + 80.0 * angle.sin(), y + 30.0 * angle.cos()], json!({}));
+        }
+        tab.mouse("mouseReleased", [x, y], json!({}));
+        tab.wait_for("shown.full && shown.pose === pose");
+    };
+    // Events are kept by this test, not by the page.
+    tab.call("Log.disable", json!({}));
+    let tenth = moves / 10;
+    drag(tenth);
+    let (before, first) = (memory(&program, &tab), tab.number(COUNT));
+    drag(moves - tenth);
+    // A machine that is slow sees fewer pictures in a drag.
+    wait_until("pictures do not follow the hand", || {
+        let count = tab.number(COUNT) - first;
+        if count <= 10.0 {
+            drag(tenth);
+        }
+        count > 10.0
+    });
+    let after = memory(&program, &tab);
+    println!("{moves} moves: KiB of the program and bytes of the page, after a tenth {before:?}, at last {after:?}");
+    assert!(after[0] < before[0] + 4096.0, "{before:?} KiB became {after:?} over {moves} moves");
+    assert!(after[1] < before[1] + 4.0e6, "{before:?} bytes became {after:?} over {moves} moves");
+    assert_eq!(tab.console(), [""; 0]);
+}
+
+/// The same by requests alone, each of which gets a picture.
+fn memory_does_not_grow() {
+    let moves = moves();
+    let program = room("--sources 003..006");
+    let (scene, empty) = (program.scene(), program.memory());
+    let (start, focus): (&Value, _) = (&scene["start"], numbers(&scene["focus"]));
+    let mut connection = program.connect();
+    let mut move_on = |index: usize| {
+        // Around the focus, a bit further each time.
+        let mut pose = start.clone();
+        for (axis, own) in focus.iter().enumerate() {
+            let centre = start[axis][3].as_f64().expect("a number");
+            pose[axis][3] = json!(centre + 0.02 * ((index % 50) as f64 / 50.0) * (own - centre));
+        }
+        let mut request = request("a", &pose, true);
+        request["side"] = json!(32);
+        connection.picture(&request).unpacked();
+    };
+    let tenth = moves / 10;
+    (0..tenth).for_each(&mut move_on);
+    let before = program.memory();
+    (tenth..moves).for_each(&mut move_on);
+    let after = program.memory();
+    println!("{moves} moves: {empty} KiB at first, {before} KiB after a tenth, {after} KiB at last");
+    assert!(after < before + (4 << 10), "{before} KiB became {after} KiB over {moves} moves");
+}
