@@ -79,7 +79,7 @@ impl Memory for Cpu {
 
 /// Numbers as elements of several of them, as far as they are whole.
 fn whole_elements<H: Pod, E: Pod>(values: &mut [H]) -> &mut [E] {
-    let count = values.len() * size_of::<H>() / size_of::<E>();
+    let count = size_of_val(values) / size_of::<E>();
     cast_slice_mut(&mut values[..count * size_of::<E>() / size_of::<H>()])
 }
 
