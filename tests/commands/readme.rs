@@ -215,7 +215,7 @@ fn every_package_can_stand_alone() {
         serde_json::from_str(&cargo(&["metadata", "--no-deps", "--format-version", "1"])).expect("JSON");
     let licences = |folder: &Path| ["LICENSE-MIT", "LICENSE-APACHE"].map(|name| read(&folder.join(name)));
     let ours = licences(&repository().join("host"));
-    // The core's and the main README are compiled with the tests' library.
+    // The core's, the kernels' and the main README are compiled with the tests' library.
     let elsewhere = read(&repository().join("tests/src/lib.rs"));
     let mut count = 0;
     for package in metadata["packages"].as_array().expect("packages") {
@@ -241,7 +241,9 @@ fn every_package_can_stand_alone() {
         if is_there("lib") && !is_there("bin") {
             assert!(read(&folder.join("README.md")).contains("```rust"), "{name}: no example");
             let its_own = read(&folder.join("src/lib.rs")).contains("include_str!(\"../README.md\")");
-            let included = its_own || (name == "viewfuse-core" && elsewhere.contains("../../core/README.md"));
+            let theirs =
+                [("viewfuse-core", "../../core/README.md"), ("viewfuse-kernels", "../../core/kernels/README.md")];
+            let included = its_own || theirs.iter().any(|(own, path)| *own == name && elsewhere.contains(path));
             assert!(included, "{name}: the README is not compiled");
         }
     }

@@ -19,12 +19,14 @@ pub mod source;
 pub mod trials;
 pub mod viewer;
 
-/// The examples of the main README and of core's, compiled and run. Core's sources are what the compiled kernels were made
-/// from, so its README is not included there.
+/// The examples of the main README, and of core's and the kernels', compiled and run. These two crates are `no_std` and become
+/// shaders: they have no tests of their own.
 #[cfg(doctest)]
 mod readmes {
     #[doc = include_str!("../../README.md")]
     struct Main;
     #[doc = include_str!("../../core/README.md")]
     struct Core;
+    #[doc = include_str!("../../core/kernels/README.md")]
+    struct Kernels;
 }
