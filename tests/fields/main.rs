@@ -5,6 +5,7 @@ mod budget;
 mod genvs;
 mod pixelnerf;
 mod plane_sweep;
+mod rows;
 mod sampling;
 mod surveyed;
 mod visual_hull;

@@ -25,8 +25,9 @@ const FORBIDDEN: [&str; 14] = [
 ];
 
 /// The crates along the data: one uses only those before it.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
     "viewfuse-core",
+    "viewfuse-kernels",
     "viewfuse-vulkan",
     "viewfuse-job",
     "viewfuse-device",

@@ -48,9 +48,9 @@ flags! {
     noise: NoiseSchedule = "noise", "MAX,MIN", parse_noise, Picture, &[], "Largest and smallest noise level [default: \
         80,0.002]";
     sampler: Sampler = "sampler", "NAME", parse_sampler, Effort, BOUNDS, "Sampler: euler, heun, dpm++2m, dpm++3m, unipc, \
-        ipndm, ipndm-v [default: ipndm, with --exact heun]";
+        ipndm, ipndm-v [default: ipndm; heun where nothing is left out]";
     steps: u32 = "steps", "N", parse_steps, Effort, BOUNDS, "Noise levels. Each takes one call of the denoiser; with heun \
-        two, except the last [default: 10, with --exact 25]";
+        two, except the last [default: 10; 25 where nothing is left out]";
     tolerance: f32 = "tolerance", "ERROR", parse_tolerance, Effort, &["max_error", "max_time", "sampler", "steps"], "Choose \
         the levels adaptively, with each step's error below this (root mean square, of values between -1 and 1); 0.01 is \
         just visible";
