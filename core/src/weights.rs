@@ -41,7 +41,16 @@ impl<const S: usize> Omission<S> {
 impl<const S: usize> Weights<S> {
     /// Equal weights. `count` is limited to `[1, S]`.
     pub fn mean(count: u32) -> Weights<S> {
-        Weights::from_scores(&[1.0; S], count)
+        const { assert!(S > 0) };
+        let count = count.clamp(1, S as u32);
+        let mut values = [0.0; S];
+        let mut view = 0;
+        while view < count as usize {
+            values[view] = 1.0;
+            view += 1;
+        }
+        // A sum of ones is exact.
+        Weights::from_sum(values, count as f32, count)
     }
 
     /// Proportional to non-negative scores. A score that is NaN or negative counts as 0, an infinite one as the largest
