@@ -70,6 +70,7 @@ fn needs(lock: &Lock, name: &str) -> BTreeSet<(String, String)> {
 fn folder_of(package: &str) -> String {
     match package.trim_start_matches("viewfuse-") {
         own @ ("core" | "vulkan") => own.to_owned(),
+        "kernels" => "core/kernels".to_owned(),
         own => format!("host/{own}"),
     }
 }
