@@ -8,6 +8,7 @@
 //! evidence    what the views show there, compared by colour       Evidence
 //! census      ... and by its structure: soft census                census_cost
 //! window      means over windows of three sizes                    row_sums, window_cost
+//! front       the first opaque plane of each ray, by the sources' surfaces  FrontBlock, plane_opacity, front_cost
 //! path        semi-global regularisation along four directions     path_cost
 //! disparity   a source's disparity and its confidence              pick_disparity
 //! blend       a target's pixel: softmax over planes                blend
@@ -24,6 +25,7 @@ pub mod blend;
 pub mod census;
 pub mod disparity;
 pub mod evidence;
+pub mod front;
 pub mod frustum;
 pub mod path;
 pub mod window;

@@ -11,6 +11,7 @@ mod depthwise;
 mod embed_pose;
 mod feature_image;
 mod fine_depths;
+mod front;
 mod fuse_views;
 mod gather_latents;
 mod group_norm;

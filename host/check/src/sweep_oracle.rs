@@ -6,12 +6,14 @@
 mod blended;
 mod costs;
 mod evidence;
+mod front;
 mod paths;
 mod picked;
 
 pub use blended::{Pixel, blend};
 pub use costs::{census_cost, row_sums, window_cost};
 pub use evidence::{Found, evidence};
+pub use front::{front_cost, plane_opacity};
 pub use paths::{follow_path, joined_cost};
 pub use picked::pick_disparity;
 

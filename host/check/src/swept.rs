@@ -182,3 +182,19 @@ pub fn band(numbers: &mut Numbers, swept: &Swept) -> (Vec<Planes>, Vec<Planes>) 
     }
     (grey, evidence)
 }
+
+/// `[row][column][group]`: opacities of planes, half of them low, so that some hide nothing and some hide the most.
+pub fn opacities(numbers: &mut Numbers, volume: &CostBlock) -> Vec<Planes> {
+    let mut opacity =
+        || if numbers.between(0.0, 1.0) < 0.5 { numbers.between(0.0, 0.3) } else { numbers.between(0.2, 0.95) };
+    // Neighbouring pixels differ little: a mean of independent numbers would always be near a half.
+    let mut planes: Vec<Planes> = (0..volume.group_count).map(|_| [0; PLANES].map(|_| opacity())).collect();
+    let mut opacities = Vec::new();
+    for _ in 0..volume.width * volume.height {
+        for number in planes.as_flattened_mut() {
+            *number = 0.8 * *number + 0.2 * opacity();
+        }
+        opacities.extend_from_slice(&planes);
+    }
+    opacities
+}

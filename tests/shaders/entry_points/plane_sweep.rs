@@ -3,11 +3,12 @@
 use super::vectors::{arrays, fours, groups, planes as planes_of, swept_views, twos};
 use super::visual_hull::{page_shift, pages, pages_mut};
 use super::{UNTOUCHED, dispatch};
-use viewfuse::check::swept::{Swept, band, costs};
+use viewfuse::check::swept::{Swept, band, costs, opacities};
 use viewfuse::check::world::Numbers;
 use viewfuse_kernels::plane_sweep::blend::blend;
 use viewfuse_kernels::plane_sweep::disparity::pick_disparity;
 use viewfuse_kernels::plane_sweep::evidence::evidence;
+use viewfuse_kernels::plane_sweep::front::{FrontBlock, front_cost, plane_opacity};
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 use viewfuse_kernels::plane_sweep::path::{CostBlock, Line, joined_cost};
 use viewfuse_kernels::plane_sweep::window::{WindowBlock, row_sums, window_cost};
@@ -96,6 +97,33 @@ fn windows_are_core_s() {
     dispatch(block, count as u32, |id, push| viewfuse_shaders::window_cost(id, push, &sums, &mut means));
     let mean = |(pixel, group)| window_cost(&block, &sums[..], pixel, group);
     assert_eq!(means, elements(block.group_count, count).map(mean).collect::<Vec<Planes>>());
+}
+
+#[test]
+fn plane_opacity_is_core_s() {
+    let swept = swept();
+    let Swept { frustum, views, disparities, .. } = &swept;
+    let count = group_count(&swept.volume());
+    let (words, maps, mut found) = (swept_views(views), twos(disparities), groups(&vec![NOTHING; count]));
+    dispatch(*frustum, count as u32, |id, push| {
+        viewfuse_shaders::plane_opacity(id, push, &words, &maps, &mut found);
+    });
+    let opacity = |(pixel, group)| plane_opacity(frustum, &views[..], &disparities[..], pixel, group);
+    let expected: Vec<Planes> = elements(frustum.group_count, count).map(opacity).collect();
+    assert_eq!(planes_of(&found), expected);
+    assert!(expected.as_flattened().iter().any(|opacity| *opacity > 0.5));
+}
+
+#[test]
+fn front_cost_is_core_s() {
+    let (volume, means) = planes(7, &swept());
+    let CostBlock { width, height, group_count, .. } = volume;
+    let block = FrontBlock { width, height, group_count, front_share: 0.1 };
+    let opacities = opacities(&mut Numbers::new(8), &volume);
+    let (given, costs, mut joined) = (groups(&opacities), groups(&means), groups(&vec![NOTHING; means.len()]));
+    dispatch(block, width * height, |id, push| viewfuse_shaders::front_cost(id, push, &given, &costs, &mut joined));
+    let cost = |pixel| front_cost(&block, &opacities[..], &means[..], pixel).into_iter().take(group_count as usize);
+    assert_eq!(planes_of(&joined), (0..width * height).flat_map(cost).collect::<Vec<Planes>>());
 }
 
 #[test]

@@ -5,6 +5,7 @@ use crate::plane_sweep::blend::{self, BlendBlock};
 use crate::plane_sweep::census;
 use crate::plane_sweep::disparity;
 use crate::plane_sweep::evidence::{self, ViewPair};
+use crate::plane_sweep::front::{self, FrontBlock};
 use crate::plane_sweep::frustum::{FrustumBlock, SweptView};
 use crate::plane_sweep::path::{self, CostBlock, Line};
 use crate::plane_sweep::window::{self, WindowBlock};
@@ -75,6 +76,37 @@ pub fn row_sums(block: &WindowBlock, costs: &[Planes], sums: &mut (impl Store<Pl
 pub fn window_cost(block: &WindowBlock, sums: &[Planes], means: &mut (impl Store<Planes> + ?Sized), group: u32) {
     let mean = window::window_cost(block, sums, group / block.group_count, group % block.group_count);
     means.store(group as usize, mean);
+}
+
+/// How opaque a group of planes of a pixel is.
+#[inline]
+pub fn plane_opacity(
+    block: &FrustumBlock,
+    views: &(impl Fetch<SweptView> + ?Sized),
+    disparities: &(impl Fetch<[f32; 2]> + ?Sized),
+    opacities: &mut (impl Store<Planes> + ?Sized),
+    group: u32,
+) {
+    let (pixel, own) = (group / block.group_count, group % block.group_count);
+    opacities.store(group as usize, front::plane_opacity(block, views, disparities, pixel, own));
+}
+
+/// The costs of a pixel's planes, with the preference for the first opaque one.
+#[inline]
+pub fn front_cost(
+    block: &FrontBlock,
+    opacities: &(impl Fetch<Planes> + ?Sized),
+    means: &(impl Fetch<Planes> + ?Sized),
+    costs: &mut (impl Store<Planes> + ?Sized),
+    pixel: u32,
+) {
+    let groups = block.group_count as usize;
+    let joined = front::front_cost(block, opacities, means, pixel);
+    let mut group = 0;
+    while group < groups {
+        costs.store(pixel as usize * groups + group, joined[group]);
+        group += 1;
+    }
 }
 
 /// The joined costs of a line.

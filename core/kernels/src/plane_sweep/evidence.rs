@@ -93,10 +93,7 @@ pub fn evidence(
                     grey[slot][plane] = (red + green + blue) * (1.0 / 3.0);
                 }
                 if view.disparity_step > 0.0 {
-                    let column = min(seen.x, camera.width as f32 - 1.0) as usize;
-                    let row = min(seen.y, camera.height as f32 - 1.0) as usize;
-                    let at = view.first_disparity as usize + row * view.map_width as usize + column;
-                    let [surface, confidence] = disparities.fetch(at);
+                    let [surface, confidence] = disparities.fetch(view.map_texel(seen.x, seen.y));
                     let behind = planes_behind(surface, disparity / seen.depth_ratio, 2.0 * view.disparity_step);
                     let doubt = 1.0 - fade(0.707_106_77 * behind);
                     dissent[plane] += view.weight * confidence * doubt;

@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use viewfuse_core::camera::CameraBlock;
-use viewfuse_core::math::max;
+use viewfuse_core::math::{max, min};
 
 /// A point is in front of a view where its depth there is at least this share of its depth in the frustum.
 pub const MIN_DEPTH: f32 = 1.0e-4;
@@ -74,6 +74,16 @@ pub struct SweptView {
 }
 
 const _: () = assert!(size_of::<SweptView>() == 128);
+
+impl SweptView {
+    /// Where a point of the view's image lies in the view's map of disparities, of the same size as the image.
+    #[inline]
+    pub fn map_texel(&self, x: f32, y: f32) -> usize {
+        let column = min(x, self.camera.width as f32 - 1.0) as usize;
+        let row = min(y, self.camera.height as f32 - 1.0) as usize;
+        self.first_disparity as usize + row * self.map_width as usize + column
+    }
+}
 
 /// Where a ray's points lie in a view: a line through its camera coordinates, by disparity.
 #[derive(Clone, Copy, Debug)]

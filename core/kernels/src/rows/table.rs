@@ -391,6 +391,22 @@ macro_rules! for_each_kernel {
                 read sums: Planes,
                 write means: Planes,
             }
+            /// How opaque planes are by the views' own disparities: `opacities[row][column][group]`. An element is a group of
+            /// planes of a pixel.
+            PlaneOpacity plane_opacity(block: FrustumBlock)
+            for group in [0..block.camera.width * block.camera.height * block.group_count; 128 a core], wide {
+                read views: SweptView as vectors,
+                read disparities: [f32; 2] as vectors,
+                write opacities: Planes as vectors,
+            }
+            /// Costs with a preference for the first opaque plane of each ray: `costs[row][column][group]`. An element is a
+            /// pixel.
+            FrontCost front_cost(block: FrontBlock)
+            for pixel in [0..block.width * block.height; 64 a core], wide {
+                read opacities: Planes as vectors,
+                read means: Planes as vectors,
+                write costs[block.group_count * pixel]: Planes as vectors,
+            }
             /// Costs joined along lines in four directions: `paths[direction][line][step][group]`. An element is a line.
             FollowPaths follow_paths(block: CostBlock) for line in [0..block.line_count(); 1 a core], wide {
                 read means: Planes as vectors,

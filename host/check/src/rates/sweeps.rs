@@ -2,10 +2,11 @@
 
 use super::Work;
 use crate::dispatch::*;
-use crate::swept::{Swept, band, costs};
+use crate::swept::{Swept, band, costs, opacities};
 use crate::world::Numbers;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::front::FrontBlock;
 use viewfuse_kernels::plane_sweep::path::DIRECTIONS;
 use viewfuse_kernels::plane_sweep::window::WindowBlock;
 
@@ -40,6 +41,24 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
     let compare_bytes = texel_bytes + bytes((views.len() + 4) * band_len);
     let grey = Output::Zeros(views.len() * band_len);
     let evidence = Output::Zeros(4 * band_len);
+    let opacity = PlaneOpacity {
+        block: frustum,
+        views: views.clone(),
+        disparities: disparities.clone(),
+        opacities: Output::Zeros(group_count),
+    };
+    let front = FrontCost {
+        block: FrontBlock {
+            width: volume.width,
+            height: volume.height,
+            group_count: volume.group_count,
+            front_share: 0.1,
+        },
+        opacities: opacities(numbers, &volume),
+        means: single.clone(),
+        costs: Output::Zeros(group_count),
+    };
+    let opacity_bytes = 8.0 * disparities.len() as f64 + bytes(group_count);
     let compare = CompareViews { block: frustum, views, pairs, texels, disparities, grey, evidence };
     let block = WindowBlock::new(&frustum, 0.01);
     let costs = single.iter().flat_map(|cost| [*cost; 2]).collect();
@@ -50,7 +69,9 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
     let follow = FollowPaths { block: volume, means: single, paths: Output::Zeros(directions * group_count) };
     Ok(vec![
         Work::new(device, compare, of_views.clone(), None, compare_bytes)?,
-        Work::new(device, census, of_views, None, census_bytes)?,
+        Work::new(device, census, of_views.clone(), None, census_bytes)?,
+        Work::new(device, opacity, of_views, None, opacity_bytes)?,
+        Work::new(device, front, size.clone(), None, bytes(3 * group_count))?,
         Work::new(device, rows, size.clone(), None, bytes(8 * group_count))?,
         Work::new(device, window, size.clone(), None, bytes(7 * group_count))?,
         Work::new(device, follow, size, None, bytes((1 + directions) * group_count))?,

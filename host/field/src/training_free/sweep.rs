@@ -32,11 +32,13 @@ use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
 const NEAR_COST: &str = "near cost";
+const FRONT_SHARE: &str = "front share";
 const DISSENT_SHARE: &str = "dissent share";
 const TEMPERATURE_NAME: &str = "temperature";
 
 /// The scalars that differ most from scene to scene, the most effective ones first.
 const TUNABLES: &[Tunable] = &[
+    Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
     Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
     Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
     Tunable { name: TEMPERATURE_NAME, default: DEFAULT.temperature, others: &[0.005, 0.013] },
@@ -45,9 +47,10 @@ const TUNABLES: &[Tunable] = &[
 /// The settings that serve most scenes.
 const DEFAULT: Sweep = Sweep {
     plane_count: 64,
-    neighbours: 4,
+    neighbours: 2,
     match_side: 256,
     near_cost: 0.01,
+    front_share: 0.1,
     dissent_share: 0.0625,
     temperature: TEMPERATURE,
 };
@@ -63,6 +66,9 @@ pub struct Sweep {
     pub match_side: u32,
     /// Cost of the nearest plane relative to the farthest one: of equal matches the farther one is chosen.
     pub near_cost: f32,
+    /// Cost of a plane that is transparent, or hidden by a nearer one, by the sources' own disparities: the nearer of two
+    /// surfaces wins, whichever more sources see.
+    pub front_share: f32,
     /// Cost of contradicting the sources' own disparities.
     pub dissent_share: f32,
     /// Temperature of the softmax over planes.
@@ -112,8 +118,9 @@ struct Volume<D: Device> {
 
 impl Sweep {
     /// The scalars that can be chosen for a scene, by the names in [`TUNABLES`].
-    fn scalars(&mut self) -> [(&'static str, &mut f32); 3] {
+    fn scalars(&mut self) -> [(&'static str, &mut f32); 4] {
         [
+            (FRONT_SHARE, &mut self.front_share),
             (NEAR_COST, &mut self.near_cost),
             (DISSENT_SHARE, &mut self.dissent_share),
             (TEMPERATURE_NAME, &mut self.temperature),
@@ -121,8 +128,8 @@ impl Sweep {
     }
 
     fn matching<'d, D: Device>(&self, device: &'d D, has_silhouettes: bool) -> Matching<'d, D> {
-        let &Sweep { near_cost, dissent_share, .. } = self;
-        Matching { device, has_silhouettes, near_cost, dissent_share }
+        let &Sweep { near_cost, dissent_share, front_share, .. } = self;
+        Matching { device, has_silhouettes, near_cost, dissent_share, front_share }
     }
 
     pub(super) fn views<'a, D: Device>(

@@ -10,14 +10,8 @@ const TRIAL_PLANES: u32 = 32;
 
 /// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
 /// work that are typical of them (the experiment `efforts` of `viewfuse-research`, on the sample room and on herz_jesus_p8).
-const EFFORTS: [(f32, f32, usize, f32, f32); 6] = [
-    (0.25, 0.5, 4, 0.055, 0.09),
-    (0.5, 1.0, 1, 0.029, 0.2),
-    (0.75, 1.0, 1, 0.0185, 0.38),
-    (1.0, 1.0, 1, 0.014, 0.62),
-    (1.0, 1.0, 2, 0.0085, 0.74),
-    (1.0, 1.0, 3, 0.0045, 0.86),
-];
+const EFFORTS: [(f32, f32, usize, f32, f32); 4] =
+    [(0.25, 0.5, 2, 0.055, 0.1), (0.5, 1.0, 1, 0.029, 0.25), (0.75, 1.0, 1, 0.0185, 0.5), (1.0, 1.0, 1, 0.014, 0.8)];
 
 /// Most planes, and the longest side at which views are compared, in pictures for a moving camera.
 const PREVIEW: (u32, u32) = (32, 80);

@@ -6,6 +6,7 @@ use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::census::REACH;
 use viewfuse_kernels::plane_sweep::evidence::ViewPair;
+use viewfuse_kernels::plane_sweep::front::FrontBlock;
 use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_kernels::plane_sweep::path::{CostBlock, DIRECTIONS};
 use viewfuse_kernels::plane_sweep::window::WindowBlock;
@@ -62,6 +63,8 @@ pub(super) struct Matching<'d, D: Device> {
     pub(super) near_cost: f32,
     /// Cost of contradicting the views' own disparities.
     pub(super) dissent_share: f32,
+    /// Cost of a plane that is transparent or hidden by the views' own disparities.
+    pub(super) front_share: f32,
 }
 
 impl<D: Device> Matching<'_, D> {
@@ -117,6 +120,14 @@ impl<D: Device> Matching<'_, D> {
         let mut means = device.zeros::<Planes>(volume)?;
         device.window_cost(&window, &sums, &mut means)?;
         drop(sums);
+        if self.front_share > 0.0 && matched.iter().any(|view| view.disparity_step > 0.0) {
+            let mut opacities = device.zeros::<Planes>(volume)?;
+            device.plane_opacity(&whole, &views, maps, &mut opacities)?;
+            let block = FrontBlock { width, height, group_count, front_share: self.front_share };
+            let mut preferred = device.zeros::<Planes>(volume)?;
+            device.front_cost(&block, &opacities, &means, &mut preferred)?;
+            means = preferred;
+        }
         let block = CostBlock { width, height, group_count, padding: 0 };
         let mut paths = device.zeros::<Planes>(DIRECTIONS as usize * volume)?;
         device.follow_paths(&block, &means, &mut paths)?;
