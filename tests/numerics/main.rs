@@ -5,6 +5,7 @@ mod attention;
 mod camera;
 mod compare;
 mod compositing;
+mod front;
 mod group_norm;
 mod half_precision;
 mod layers;
