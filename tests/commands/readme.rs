@@ -109,7 +109,11 @@ fn every_command_runs() {
             continue;
         };
         count += 1;
-        let arguments: Vec<String> = arguments.split_whitespace().map(in_folder).collect();
+        let mut arguments: Vec<String> = arguments.split_whitespace().map(in_folder).collect();
+        // `parity` has all seeds of all cases on every device.
+        if arguments == ["check"] {
+            arguments.extend(["--seeds", "1"].map(str::to_owned));
+        }
         if features.split(',').all(is_built_with) {
             run(&arguments);
         } else {

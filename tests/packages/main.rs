@@ -1,5 +1,6 @@
 //! The packages as such: which depend on which, in which order their modules stand, what a library must not do, what a
-//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, how the tests are arranged, and what documents may say.
+//! crate outside can add, which kernels have a twin on the CPU, why unsafe code is sound, how long functions are, how the
+//! tests are arranged, and what documents may say.
 
 mod crates;
 mod documents;
@@ -9,6 +10,7 @@ mod outside;
 mod release;
 mod rooms;
 mod safety;
+mod sizes;
 mod summary;
 mod twins;
 

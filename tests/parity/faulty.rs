@@ -14,42 +14,41 @@ pub(crate) struct Faulty {
 }
 
 /// Results that can be wrong.
-trait Spoil {
+trait Perturb {
     /// Makes all of them too large by 1e-3.
-    fn spoil(values: &mut [Self])
+    fn perturb(values: &mut [Self])
     where
         Self: Sized;
 }
 
-impl Spoil for f32 {
-    fn spoil(values: &mut [f32]) {
+impl Perturb for f32 {
+    fn perturb(values: &mut [f32]) {
         values.iter_mut().for_each(|value| *value *= 1.001);
     }
 }
 
-impl<const N: usize> Spoil for [f32; N] {
-    fn spoil(values: &mut [[f32; N]]) {
-        f32::spoil(values.as_flattened_mut());
+impl<const N: usize> Perturb for [f32; N] {
+    fn perturb(values: &mut [[f32; N]]) {
+        f32::perturb(values.as_flattened_mut());
     }
 }
 
-/// There is no thousandth of a yes, nor one of a word: in one of a thousand, from the first on, the last bit is the other
-/// one.
-impl Spoil for u32 {
-    fn spoil(values: &mut [u32]) {
+/// Flags and packed words have no thousandth part: in every thousandth one, from the first on, the last bit is flipped.
+impl Perturb for u32 {
+    fn perturb(values: &mut [u32]) {
         values.iter_mut().step_by(1000).for_each(|value| *value ^= 1);
     }
 }
 
-impl Spoil for TargetRay {
-    fn spoil(values: &mut [TargetRay]) {
-        values.iter_mut().for_each(|ray| f32::spoil(&mut ray.direction));
+impl Perturb for TargetRay {
+    fn perturb(values: &mut [TargetRay]) {
+        values.iter_mut().for_each(|ray| f32::perturb(&mut ray.direction));
     }
 }
 
-impl Spoil for RayPoint {
-    fn spoil(values: &mut [RayPoint]) {
-        values.iter_mut().for_each(|point| f32::spoil(&mut point.position));
+impl Perturb for RayPoint {
+    fn perturb(values: &mut [RayPoint]) {
+        values.iter_mut().for_each(|point| f32::perturb(&mut point.position));
     }
 }
 
@@ -89,13 +88,13 @@ impl Memory for Faulty {
     }
 }
 
-/// Spoils what is written.
-macro_rules! spoil {
+/// Perturbs what is written.
+macro_rules! perturb {
     (write $array:ident) => {
-        Spoil::spoil(&mut $array[..])
+        Perturb::perturb(&mut $array[..])
     };
     (write_paged $array:ident) => {
-        Spoil::spoil(&mut $array[..])
+        Perturb::perturb(&mut $array[..])
     };
     ($kind:ident $array:ident) => {};
 }
@@ -125,7 +124,7 @@ macro_rules! forward {
                 ) -> Result<(), DeviceError> {
                     Cpu.$method($($block,)? $($count,)* $($array),+)?;
                     if self.kernel == Kernel::$Kernel {
-                        $(spoil!($kind $array);)+
+                        $(perturb!($kind $array);)+
                     }
                     Ok(())
                 }

@@ -184,11 +184,10 @@ fn an_entry_point_by_another_name_is_seen() {
 #[test]
 fn a_missing_or_moved_binding_is_seen() {
     // Each variable in turn; kernels share those that are declared alike.
+    let annotations = kernels().annotations;
+    let is_binding = |at: &usize| annotations[*at].operands.get(1) == Some(&Operand::Decoration(Decoration::Binding));
     let mut moved = 0;
-    for at in 0..kernels().annotations.len() {
-        if kernels().annotations[at].operands.get(1) != Some(&Operand::Decoration(Decoration::Binding)) {
-            continue;
-        }
+    for at in (0..annotations.len()).filter(is_binding) {
         let said = breaches_with(|module| module.annotations[at].operands[2] = Operand::LiteralBit32(99));
         let (missing, strange) = said.iter().partition::<Vec<_>, _>(|said| said.contains("is missing"));
         assert!(strange.iter().all(|said| said.contains("bindings [Some(99)] are not on the list")), "{said:?}");

@@ -5,6 +5,7 @@ use crate::instance::Instance;
 use crate::kernel::{Kernel, WORKGROUP};
 use crate::subgroups::fitting_size;
 use ash::{ext, khr, vk};
+use std::ffi::{CStr, FromBytesUntilNulError};
 use std::fmt;
 
 /// The kind of a device, the preferred kinds first.
@@ -23,6 +24,16 @@ pub enum AdapterKind {
 }
 
 impl AdapterKind {
+    fn of(kind: vk::PhysicalDeviceType) -> AdapterKind {
+        match kind {
+            vk::PhysicalDeviceType::DISCRETE_GPU => AdapterKind::Discrete,
+            vk::PhysicalDeviceType::INTEGRATED_GPU => AdapterKind::Integrated,
+            vk::PhysicalDeviceType::VIRTUAL_GPU => AdapterKind::Virtual,
+            vk::PhysicalDeviceType::CPU => AdapterKind::Software,
+            _ => AdapterKind::Other,
+        }
+    }
+
     /// Whether it is a GPU.
     pub fn is_gpu(self) -> bool {
         self <= AdapterKind::Virtual
@@ -82,7 +93,7 @@ pub struct Adapter {
     pub(crate) timestamp_bits: u32,
     pub(crate) timestamp_period: f32,
     pub(crate) offset_alignment: u64,
-    pub(crate) extensions: Vec<&'static std::ffi::CStr>,
+    pub(crate) extensions: Vec<&'static CStr>,
     pub(crate) has_memory_budget: bool,
     pub(crate) identity: Identity,
 }
@@ -134,7 +145,11 @@ impl Adapter {
                 instance.raw.enumerate_device_extension_properties(raw).unwrap_or_default(),
             )
         };
-        let has = |name| offered.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let has = |name: &CStr| offered.iter().any(|extension| extension.extension_name_as_c_str() == Ok(name));
+        let subgroup_size = match has(ext::subgroup_size_control::NAME) {
+            true if properties.api_version >= vk::API_VERSION_1_1 => fitting_size(instance, raw),
+            _ => None,
+        };
         let heaps = memory_types.memory_heaps_as_slice().iter();
         let memory = heaps
             .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
@@ -142,37 +157,13 @@ impl Adapter {
             .max()
             .unwrap_or(0);
         let family = best_family(&families);
-        let mut extensions = Vec::new();
-        if has(khr::portability_subset::NAME) {
-            extensions.push(khr::portability_subset::NAME);
-        }
-        if properties.api_version < vk::API_VERSION_1_2 && has(khr::vulkan_memory_model::NAME) {
-            extensions.push(khr::vulkan_memory_model::NAME);
-        }
-        let has_memory_budget = has(ext::memory_budget::NAME);
-        if has_memory_budget {
-            extensions.push(ext::memory_budget::NAME);
-        }
-        let mut subgroup_size = None;
-        if properties.api_version >= vk::API_VERSION_1_1 && has(ext::subgroup_size_control::NAME) {
-            subgroup_size = fitting_size(instance, raw);
-        }
-        if subgroup_size.is_some() {
-            extensions.push(ext::subgroup_size_control::NAME);
-        }
         let has_model = memory_model(instance, raw, properties.api_version, has(khr::vulkan_memory_model::NAME));
         Adapter {
             raw,
             instance_number: instance.number,
             index: 0,
             name: text(properties.device_name_as_c_str()),
-            kind: match properties.device_type {
-                vk::PhysicalDeviceType::DISCRETE_GPU => AdapterKind::Discrete,
-                vk::PhysicalDeviceType::INTEGRATED_GPU => AdapterKind::Integrated,
-                vk::PhysicalDeviceType::VIRTUAL_GPU => AdapterKind::Virtual,
-                vk::PhysicalDeviceType::CPU => AdapterKind::Software,
-                _ => AdapterKind::Other,
-            },
+            kind: AdapterKind::of(properties.device_type),
             driver: match text(driver.driver_name_as_c_str()) {
                 name if name.is_empty() => format!("version {:#x}", properties.driver_version),
                 name => format!("{name} {}", text(driver.driver_info_as_c_str())).trim_end().to_owned(),
@@ -195,8 +186,8 @@ impl Adapter {
             timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
             timestamp_period: own.timestamp_period,
             offset_alignment: own.min_storage_buffer_offset_alignment,
-            extensions,
-            has_memory_budget,
+            extensions: extensions(properties.api_version, subgroup_size.is_some(), has),
+            has_memory_budget: has(ext::memory_budget::NAME),
             identity: Identity {
                 vendor: properties.vendor_id,
                 device: properties.device_id,
@@ -235,7 +226,7 @@ impl Adapter {
     }
 }
 
-fn text(name: Result<&std::ffi::CStr, std::ffi::FromBytesUntilNulError>) -> String {
+fn text(name: Result<&CStr, FromBytesUntilNulError>) -> String {
     name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
@@ -245,6 +236,17 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
     let draws = |family: &vk::QueueFamilyProperties| family.queue_flags.contains(vk::QueueFlags::GRAPHICS);
     let alone = families.iter().position(|family| computes(family) && !draws(family));
     alone.or(families.iter().position(computes)).map(|index| index as u32)
+}
+
+/// Those to enable: what a device asks for, and what is used where it is offered.
+fn extensions(api_version: u32, has_subgroups: bool, has: impl Fn(&CStr) -> bool) -> Vec<&'static CStr> {
+    let wanted = [
+        (khr::portability_subset::NAME, true),
+        (khr::vulkan_memory_model::NAME, api_version < vk::API_VERSION_1_2),
+        (ext::memory_budget::NAME, true),
+        (ext::subgroup_size_control::NAME, has_subgroups),
+    ];
+    wanted.into_iter().filter(|(name, is_used)| *is_used && has(name)).map(|(name, _)| name).collect()
 }
 
 fn memory_model(instance: &Instance, raw: vk::PhysicalDevice, api_version: u32, has_extension: bool) -> bool {

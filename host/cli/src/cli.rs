@@ -23,6 +23,7 @@ mod pareto;
 mod parse;
 mod path;
 mod points;
+mod printing;
 mod render;
 #[cfg(feature = "report")]
 mod report;
@@ -57,7 +58,6 @@ use left_out::{bench, check, verify};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Display;
-use std::io::{self, Write};
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -116,7 +116,8 @@ enum Command {
 
 pub(crate) use ending::INTERRUPTED;
 pub(crate) use hints::{hint, is_of_arguments};
-pub(crate) use terminal::{complain, complain_of_arguments};
+use printing::say;
+pub(crate) use printing::{complain, complain_of_arguments};
 
 fn long_about() -> String {
     format!(
@@ -163,15 +164,6 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
 fn wrong(message: impl Display) -> anyhow::Error {
     clap::Error::raw(ErrorKind::ArgumentConflict, format_args!("{message}\n\nFor more information, try '--help'.\n"))
         .into()
-}
-
-/// Prints a line, in which nothing from a file controls the terminal. A closed pipe (`| head`) is ignored, because the files
-/// are still to be written.
-fn say(text: impl Display) -> io::Result<()> {
-    match writeln!(io::stdout().lock(), "{}", shown::shown(text)) {
-        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        outcome => outcome,
-    }
 }
 
 /// Runs `work` on this many threads instead of all cores.

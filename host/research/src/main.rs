@@ -21,7 +21,7 @@ mod rows;
 mod stamp;
 
 use anyhow::{Context, bail, ensure};
-use plan::Place;
+use plan::Folders;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -60,17 +60,17 @@ fn main() -> ExitCode {
 /// The commands `plan` and `run`.
 fn planned(is_run: bool, arguments: &[String]) -> anyhow::Result<()> {
     let is_quick = arguments.iter().any(|argument| argument == "--quick");
-    let mut place = Place::new(is_quick);
+    let mut folders = Folders::new(is_quick);
     let mut names = Vec::new();
     let mut arguments = arguments.iter().filter(|argument| *argument != "--quick");
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().with_context(|| format!("{argument} needs a value"));
         match argument.as_str() {
-            "--data" => place.data = Some(std::path::absolute(value()?)?),
-            "--work" => place.work = std::path::absolute(value()?)?,
-            "--out" => place.out = std::path::absolute(value()?)?,
-            "--command" => place.command = Some(std::path::absolute(value()?)?),
-            "--python" => place.python = value()?.clone(),
+            "--data" => folders.data = Some(std::path::absolute(value()?)?),
+            "--work" => folders.work = std::path::absolute(value()?)?,
+            "--out" => folders.out = std::path::absolute(value()?)?,
+            "--command" => folders.command = Some(std::path::absolute(value()?)?),
+            "--python" => folders.python = value()?.clone(),
             option if option.starts_with('-') => bail!("unknown option {option}\n{USAGE}"),
             name => names.push(name.to_owned()),
         }
@@ -80,7 +80,7 @@ fn planned(is_run: bool, arguments: &[String]) -> anyhow::Result<()> {
     ensure!(unknown.is_empty(), "no result is called {unknown:?}; `plan` lists them");
     let rows: Vec<_> =
         rows.into_iter().filter(|row| names.is_empty() || names.iter().any(|name| name == row.name)).collect();
-    if is_run { make::all(&rows, &place) } else { plan::show(&rows, &place) }
+    if is_run { make::all(&rows, &folders) } else { plan::show(&rows, &folders) }
 }
 
 /// The repository that this was built from: paths in command lines begin there.

@@ -1,6 +1,6 @@
 //! Makes results: each whole or not at all, and none that is up to date.
 
-use crate::plan::{Place, Row, State, Step};
+use crate::plan::{Folders, Row, State, Step};
 use crate::repository;
 use crate::stamp::{Stamp, Stamps, cpu_seconds, machine, today};
 use anyhow::{Context, bail, ensure};
@@ -13,18 +13,18 @@ use viewfuse_job::files::write_whole;
 const BUILD: [&str; 5] = ["build", "--release", "-p", "viewfuse-cli", "--all-features"];
 
 /// Makes all rows that are not up to date and lack nothing. One that fails does not stop the others.
-pub(crate) fn all(rows: &[Row], place: &Place) -> anyhow::Result<()> {
-    std::fs::create_dir_all(&place.out)?;
-    std::fs::create_dir_all(&place.work)?;
-    let mut stamps = Stamps::read(&place.out)?;
+pub(crate) fn all(rows: &[Row], folders: &Folders) -> anyhow::Result<()> {
+    std::fs::create_dir_all(&folders.out)?;
+    std::fs::create_dir_all(&folders.work)?;
+    let mut stamps = Stamps::read(&folders.out)?;
     let (mut made, mut failed, mut left_out, start) = (0, 0, 0, Instant::now());
-    let mut command = place.command.clone();
+    let mut command = folders.command.clone();
     for row in rows {
-        if row.state(place, &stamps)? == State::UpToDate {
+        if row.state(folders, &stamps)? == State::UpToDate {
             println!("{}: up to date", row.name);
             continue;
         }
-        let lacks = row.lacks(place);
+        let lacks = row.lacks(folders);
         if !lacks.is_empty() {
             println!("{}: left out, it lacks {}", row.name, lacks.join("; "));
             left_out += 1;
@@ -34,10 +34,10 @@ pub(crate) fn all(rows: &[Row], place: &Place) -> anyhow::Result<()> {
             command = Some(build()?);
         }
         println!("{}: {} steps", row.name, row.steps.len());
-        match result(row, place, command.as_deref().unwrap_or(Path::new("viewfuse"))) {
+        match result(row, folders, command.as_deref().unwrap_or(Path::new("viewfuse"))) {
             Ok(stamp) => {
                 println!("{}: made in {:.1} s, {:.1} CPU seconds", row.name, stamp.wall_seconds, stamp.cpu_seconds);
-                stamps.add(&place.out, row.name, stamp)?;
+                stamps.add(&folders.out, row.name, stamp)?;
                 made += 1;
             }
             Err(error) => {
@@ -67,23 +67,23 @@ fn cargo() -> PathBuf {
 }
 
 /// Makes a result. Its files appear when all steps are done.
-fn result(row: &Row, place: &Place, command: &Path) -> anyhow::Result<Stamp> {
+fn result(row: &Row, folders: &Folders, command: &Path) -> anyhow::Result<Stamp> {
     let (before, start, inputs) = (cpu_seconds(), Instant::now(), row.inputs()?);
     let mut printed = String::new();
     let mut kept = Vec::new();
     for step in &row.steps {
         match step {
-            Step::Once(folder, _) if Path::new(&place.path(folder)).exists() => {}
-            Step::Once(_, line) => drop(done(line, place, command, Stdio::null())?),
-            Step::Run(line) => drop(done(line, place, command, Stdio::null())?),
+            Step::Once(folder, _) if Path::new(&folders.path(folder)).exists() => {}
+            Step::Once(_, line) => drop(done(line, folders, command, Stdio::null())?),
+            Step::Run(line) => drop(done(line, folders, command, Stdio::null())?),
             Step::Print(line) => {
-                let text = done(line, place, command, Stdio::piped())?;
+                let text = done(line, folders, command, Stdio::piped())?;
                 let gap = if printed.is_empty() { "" } else { "\n" };
                 let lines: String = text.lines().map(|line| format!("{}\n", line.trim_end())).collect();
                 printed += &format!("{gap}$ {}\n{lines}", shown(line));
             }
             Step::Keep(from, name) => {
-                let from = repository().join(place.path(from));
+                let from = repository().join(folders.path(from));
                 kept.push((*name, std::fs::read(&from).with_context(|| from.display().to_string())?));
             }
         }
@@ -92,9 +92,9 @@ fn result(row: &Row, place: &Place, command: &Path) -> anyhow::Result<Stamp> {
         kept.push((row.files[0], printed.into_bytes()));
     }
     for (name, bytes) in kept {
-        write_whole(&place.out.join(name), &bytes)?;
+        write_whole(&folders.out.join(name), &bytes)?;
     }
-    let missing: Vec<_> = row.files.iter().filter(|file| !place.out.join(file).exists()).collect();
+    let missing: Vec<_> = row.files.iter().filter(|file| !folders.out.join(file).exists()).collect();
     ensure!(missing.is_empty(), "its steps made no {missing:?}");
     Ok(Stamp {
         inputs,
@@ -111,9 +111,9 @@ fn shown(line: &str) -> String {
 }
 
 /// Runs a command line in the repository; what it printed, if that is wanted.
-fn done(line: &str, place: &Place, viewfuse: &Path, output: Stdio) -> anyhow::Result<String> {
+fn done(line: &str, folders: &Folders, viewfuse: &Path, output: Stdio) -> anyhow::Result<String> {
     println!("  {line}");
-    let words = place.line(line)?;
+    let words = folders.line(line)?;
     let (environment, words) = words.split_at(words.iter().take_while(|word| is_assignment(word)).count());
     let [program, arguments @ ..] = words else { bail!("an empty command line") };
     let own = std::env::current_exe()?;

@@ -6,7 +6,7 @@ use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A part of making a result. Words in capitals in braces stand for places ([`Place::line`]), a last `/*` for the subfolders.
+/// A part of making a result. Words in capitals in braces stand for places ([`Folders::line`]), a last `/*` for the subfolders.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// A command line; what it prints goes into the result's first file, below the line.
@@ -56,7 +56,7 @@ pub(crate) struct Row {
 
 /// Where things are.
 #[derive(Clone, Debug)]
-pub(crate) struct Place {
+pub(crate) struct Folders {
     /// Given data sets.
     pub(crate) data: Option<PathBuf>,
     /// Generated data and unfinished work.
@@ -82,12 +82,12 @@ pub(crate) enum State {
     Missing,
 }
 
-impl Place {
+impl Folders {
     /// The default places.
-    pub(crate) fn new(is_quick: bool) -> Place {
+    pub(crate) fn new(is_quick: bool) -> Folders {
         let out = if is_quick { "out/quick" } else { "host/research/results" };
         let work = if is_quick { "out/quick/work" } else { "out/research" };
-        Place {
+        Folders {
             data: None,
             work: repository().join(work),
             out: repository().join(out),
@@ -141,14 +141,14 @@ fn split(text: &str) -> Vec<String> {
 
 impl Need {
     /// Whether it is there.
-    pub(crate) fn is_met(self, place: &Place) -> bool {
+    pub(crate) fn is_met(self, folders: &Folders) -> bool {
         let succeeds = |program: &str, argument: &[&str]| {
             let silent = Command::new(program).args(argument).stdout(Stdio::null()).stderr(Stdio::null()).status();
             silent.is_ok_and(|status| status.success())
         };
         match self {
-            Need::Data(name, _) => place.data.as_ref().is_some_and(|data| data.join(name).is_dir()),
-            Need::Python(module) => succeeds(&place.python, &["-c", &format!("import {module}")]),
+            Need::Data(name, _) => folders.data.as_ref().is_some_and(|data| data.join(name).is_dir()),
+            Need::Python(module) => succeeds(&folders.python, &["-c", &format!("import {module}")]),
             Need::Program(name) => succeeds(name, &["--version"]),
         }
     }
@@ -171,14 +171,14 @@ impl Row {
     }
 
     /// What it needs and is not there.
-    pub(crate) fn lacks(&self, place: &Place) -> Vec<String> {
-        self.needs.iter().filter(|need| !need.is_met(place)).map(|need| need.text()).collect()
+    pub(crate) fn lacks(&self, folders: &Folders) -> Vec<String> {
+        self.needs.iter().filter(|need| !need.is_met(folders)).map(|need| need.text()).collect()
     }
 
     /// How it stands in a folder with these stamps.
-    pub(crate) fn state(&self, place: &Place, stamps: &Stamps) -> anyhow::Result<State> {
+    pub(crate) fn state(&self, folders: &Folders, stamps: &Stamps) -> anyhow::Result<State> {
         Ok(match stamps.of(self.name) {
-            _ if self.files.iter().any(|file| !place.out.join(file).exists()) => State::Missing,
+            _ if self.files.iter().any(|file| !folders.out.join(file).exists()) => State::Missing,
             None => State::Undated,
             Some(stamp) if stamp.inputs == self.inputs()? => State::UpToDate,
             Some(stamp) => State::Older(stamp.made.clone()),
@@ -187,12 +187,12 @@ impl Row {
 }
 
 /// Prints the plan.
-pub(crate) fn show(rows: &[Row], place: &Place) -> anyhow::Result<()> {
-    let stamps = Stamps::read(&place.out)?;
+pub(crate) fn show(rows: &[Row], folders: &Folders) -> anyhow::Result<()> {
+    let stamps = Stamps::read(&folders.out)?;
     let (mut all, mut due) = (0.0, 0.0);
     println!("| result | what | state | CPU hours | lacks | files |\n|---|---|---|---|---|---|");
     for row in rows {
-        let state = row.state(place, &stamps)?;
+        let state = row.state(folders, &stamps)?;
         let (hours, how) = match (stamps.of(row.name), row.hours) {
             (Some(stamp), _) if stamp.cpu_seconds > 0.0 => (stamp.cpu_seconds / 3600.0, "measured"),
             (_, Hours::Measured(hours)) => (hours, "measured"),
@@ -208,7 +208,7 @@ pub(crate) fn show(rows: &[Row], place: &Place) -> anyhow::Result<()> {
         if state != State::UpToDate {
             due += hours;
         }
-        let lacks = row.lacks(place).join("; ");
+        let lacks = row.lacks(folders).join("; ");
         println!("| {} | {} | {said} | {hours:.3}, {how} | {lacks} | {} |", row.name, row.what, row.files.join(", "));
     }
     println!("\n{} results, {all:.1} CPU hours; {due:.1} for those that are not up to date", rows.len());

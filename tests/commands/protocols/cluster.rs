@@ -51,14 +51,14 @@ fn recipe(start: &str) -> String {
 }
 
 /// A folder with two scenes of cars, and the command under its name.
-struct Place {
+struct Workspace {
     folder: TempDir,
     /// Where programs are looked for.
     path: String,
 }
 
-impl Place {
-    fn new() -> Place {
+impl Workspace {
+    fn new() -> Workspace {
         let folder = tempfile::tempdir().expect("a folder");
         done(
             BINARY,
@@ -68,7 +68,7 @@ impl Place {
         fs::create_dir(folder.path().join("bin")).expect("a folder");
         std::os::unix::fs::symlink(BINARY, folder.path().join("bin/viewfuse")).expect("a link");
         let path = std::env::var("PATH").unwrap_or_default();
-        Place { path: format!("{}:{path}", folder.path().join("bin").display()), folder }
+        Workspace { path: format!("{}:{path}", folder.path().join("bin").display()), folder }
     }
 
     /// A recipe as a script: the same with small pictures, into another folder.
@@ -109,7 +109,7 @@ impl Place {
         assert_eq!(self.jobs(out), expected);
     }
 
-    /// Processes of the command that run in this place.
+    /// Processes of the command that run in this workspace.
     fn workers(&self) -> Vec<u32> {
         let own = |process: &u32| {
             let link = |name: &str| fs::read_link(format!("/proc/{process}/{name}")).unwrap_or_default();
@@ -133,20 +133,20 @@ impl Place {
 }
 
 fn gnu_parallel() {
-    let place = Place::new();
-    let expected = place.alone();
-    let script = place.script("# GNU parallel", "runs/parallel");
+    let workspace = Workspace::new();
+    let expected = workspace.alone();
+    let script = workspace.script("# GNU parallel", "runs/parallel");
     let run = || {
-        let mut command = place.command("sh");
+        let mut command = workspace.command("sh");
         command.arg(&script).stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("a shell")
     };
     // GNU parallel's exit code is how many of its jobs failed.
     let mut first = run();
-    assert!(place.kill_one(&mut || first.try_wait().expect("a process").is_some()), "there was no worker to kill");
+    assert!(workspace.kill_one(&mut || first.try_wait().expect("a process").is_some()), "there was no worker to kill");
     assert_eq!(first.wait().expect("an end").code(), Some(1));
-    assert!(place.jobs("runs/parallel").len() < expected.len(), "the killed worker's jobs are missing");
+    assert!(workspace.jobs("runs/parallel").len() < expected.len(), "the killed worker's jobs are missing");
     assert_eq!(run().wait().expect("an end").code(), Some(0));
-    place.assert_whole("runs/parallel", &expected);
+    workspace.assert_whole("runs/parallel", &expected);
 }
 
 /// Slurm's two daemons, which end with this value.
@@ -156,8 +156,8 @@ struct Slurm {
 }
 
 impl Slurm {
-    fn start(place: &Place) -> Slurm {
-        let folder = place.folder.path().join("slurm");
+    fn start(workspace: &Workspace) -> Slurm {
+        let folder = workspace.folder.path().join("slurm");
         ["state", "spool"].iter().for_each(|name| fs::create_dir_all(folder.join(name)).expect("a folder"));
         let host = Command::new("hostname").arg("-s").output().expect("a name").stdout;
         let host = String::from_utf8(host).expect("a name").trim().to_owned();
@@ -179,36 +179,39 @@ impl Slurm {
         fs::write(&settings, text).expect("settings");
         let daemon = |name: &str| {
             let log = fs::File::create(folder.join(format!("{name}.log"))).expect("a log");
-            let mut command = place.command(name);
+            let mut command = workspace.command(name);
             command.args(["-D", "-f"]).arg(&settings).stdout(Stdio::null()).stderr(log).spawn().expect("a daemon")
         };
         let slurm = Slurm { daemons: vec![daemon("slurmctld"), daemon("slurmd")], settings };
-        wait_until("the node does not come up", || slurm.asked(place, "sinfo", &["-h", "-o", "%T"]).contains("idle"));
+        wait_until("the node does not come up", || {
+            slurm.asked(workspace, "sinfo", &["-h", "-o", "%T"]).contains("idle")
+        });
         slurm
     }
 
     /// What a program of Slurm prints. It is asked again and again: each time a moment later.
-    fn asked(&self, place: &Place, program: &str, arguments: &[&str]) -> String {
+    fn asked(&self, workspace: &Workspace, program: &str, arguments: &[&str]) -> String {
         sleep(Duration::from_millis(100));
-        let output = place.command(program).args(arguments).env("SLURM_CONF", &self.settings).output().expect("Slurm");
+        let output =
+            workspace.command(program).args(arguments).env("SLURM_CONF", &self.settings).output().expect("Slurm");
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
     /// Hands a script in and returns the job's number.
-    fn submitted(&self, place: &Place, script: &Path) -> String {
-        let job = self.asked(place, "sbatch", &["--parsable", &script.display().to_string()]).trim().to_owned();
+    fn submitted(&self, workspace: &Workspace, script: &Path) -> String {
+        let job = self.asked(workspace, "sbatch", &["--parsable", &script.display().to_string()]).trim().to_owned();
         assert!(job.parse::<u32>().is_ok(), "sbatch says {job:?}");
         job
     }
 
-    fn is_over(&self, place: &Place, job: &str) -> bool {
-        self.asked(place, "squeue", &["-h", "-j", job]).is_empty()
+    fn is_over(&self, workspace: &Workspace, job: &str) -> bool {
+        self.asked(workspace, "squeue", &["-h", "-j", job]).is_empty()
     }
 
     /// Waits for a job's end and returns how many of its tasks are in each state.
-    fn ended(&self, place: &Place, job: &str) -> [usize; 2] {
-        wait_until("the job does not end", || self.is_over(place, job));
-        let tasks = self.asked(place, "scontrol", &["show", "job", job]);
+    fn ended(&self, workspace: &Workspace, job: &str) -> [usize; 2] {
+        wait_until("the job does not end", || self.is_over(workspace, job));
+        let tasks = self.asked(workspace, "scontrol", &["show", "job", job]);
         ["JobState=COMPLETED", "JobState=FAILED"].map(|state| tasks.matches(state).count())
     }
 }
@@ -224,17 +227,17 @@ impl Drop for Slurm {
 }
 
 fn slurm_on_one_node() {
-    let place = Place::new();
-    let expected = place.alone();
-    let slurm = Slurm::start(&place);
-    let script = place.script("#!/bin/sh\n# Slurm", "runs/slurm");
-    let job = slurm.submitted(&place, &script);
-    assert!(place.kill_one(&mut || slurm.is_over(&place, &job)), "there was no worker to kill");
-    assert_eq!(slurm.ended(&place, &job), [7, 1], "one of eight tasks failed");
-    assert!(place.jobs("runs/slurm").len() < expected.len(), "the killed worker's jobs are missing");
-    let again = slurm.submitted(&place, &script);
-    assert_eq!(slurm.ended(&place, &again), [8, 0]);
-    place.assert_whole("runs/slurm", &expected);
+    let workspace = Workspace::new();
+    let expected = workspace.alone();
+    let slurm = Slurm::start(&workspace);
+    let script = workspace.script("#!/bin/sh\n# Slurm", "runs/slurm");
+    let job = slurm.submitted(&workspace, &script);
+    assert!(workspace.kill_one(&mut || slurm.is_over(&workspace, &job)), "there was no worker to kill");
+    assert_eq!(slurm.ended(&workspace, &job), [7, 1], "one of eight tasks failed");
+    assert!(workspace.jobs("runs/slurm").len() < expected.len(), "the killed worker's jobs are missing");
+    let again = slurm.submitted(&workspace, &script);
+    assert_eq!(slurm.ended(&workspace, &again), [8, 0]);
+    workspace.assert_whole("runs/slurm", &expected);
 }
 
 /// The part of Kubernetes' API (`batch/v1`, Job) that the manifest uses, by its reference: no other field is accepted.

@@ -100,8 +100,12 @@ fn a_hand_turns_the_view(browser: &Browser) {
     tab.mouse("mouseWheel", [x, y], json!({"deltaX": 0, "deltaY": -300}));
     tab.wait_for(COARSE);
     assert_ne!(tab.text(matrix), place);
+    schemes_and_layers(&tab);
+    assert_eq!(tab.console(), [""; 0]);
+}
 
-    // Schemes by the menu, their parameter by the slider.
+/// Schemes by the menu, their parameter by the slider, layers over the picture, and a view from a source.
+fn schemes_and_layers(tab: &Tab<'_>) {
     let choose = |id: &str, value: &str, event: &str| {
         tab.evaluate(&format!(
             "(() => {{ const own = document.getElementById('{id}'); own.value = '{value}'; own.dispatchEvent(new Event('{event}', {{bubbles: true}})); }})()"
@@ -109,24 +113,22 @@ fn a_hand_turns_the_view(browser: &Browser) {
     };
     choose("scheme", "mean", "change");
     tab.wait_for(&format!("{WEIGHTS}.every((own) => Math.abs(own - 0.2) < 1e-6)"));
-    weights(&tab);
+    weights(tab);
     choose("scheme", "gaussian", "change");
     choose("parameter", "700", "input");
     tab.wait_for("document.getElementById('parameter-value').textContent === '6.31'");
     tab.wait_for(&format!("Math.max(...{WEIGHTS}) > 0.25"));
-    weights(&tab);
+    weights(tab);
     tab.wait_for(FULL);
-    // Layers over the picture.
-    let plain = canvas(&tab);
+    let plain = canvas(tab);
     for layer in ["depth", "confidence"] {
         tab.evaluate(&format!("document.querySelector('input[value={layer}]').click()"));
         tab.wait_for(&format!("shown.layer && shown.layer.kind === '{layer}' && shown.full"));
-        assert!(difference(&canvas(&tab), &plain) > 5.0, "{layer}");
-        keep(&tab, &format!("{layer}.png"));
+        assert!(difference(&canvas(tab), &plain) > 5.0, "{layer}");
+        keep(tab, &format!("{layer}.png"));
     }
     tab.evaluate("document.querySelector('#sources button').click()");
     tab.wait_for(&format!("{WEIGHTS}[0] > 0.8"));
-    assert_eq!(tab.console(), [""; 0]);
 }
 
 fn tabs_come_and_go(browser: &Browser) {

@@ -50,66 +50,35 @@ macro_rules! entry {
     // Pages.
     (
         $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
-        [{ paged $array:ident: $Host:ty } $($more:tt)*]
+        [{ paged $array:ident: $Host:ty $(, $entry:tt)? } $($more:tt)*]
         [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
     ) => {
         entry! {
             $row
             [$($parameters)*
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &[$Host],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &[$Host],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &[$Host],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &[$Host],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: bound!(paged $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: bound!(paged $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: bound!(paged $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: bound!(paged $Host $(, $entry)?),
             ]
-            [$($pages)* { Pages [] $array a b c d }] [$($arguments)* &$array,] [$($more)*] [$($bindings)*]
+            [$($pages)* { Pages [] $array a b c d }] [$($arguments)* lent!(paged $array $(, $entry)?),]
+            [$($more)*] [$($bindings)*]
         }
     };
     (
         $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
-        [{ paged $array:ident: $Host:ty, vectors } $($more:tt)*]
+        [{ write_paged $array:ident: $Host:ty $(, $entry:tt)? } $($more:tt)*]
         [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
     ) => {
         entry! {
             $row
             [$($parameters)*
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &[<$Host as InVectors>::Vectors],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &[<$Host as InVectors>::Vectors],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &[<$Host as InVectors>::Vectors],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &[<$Host as InVectors>::Vectors],
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: bound!(write $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: bound!(write $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: bound!(write $Host $(, $entry)?),
+                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: bound!(write $Host $(, $entry)?),
             ]
-            [$($pages)* { Pages [] $array a b c d }] [$($arguments)* &Vectors(&$array),] [$($more)*] [$($bindings)*]
-        }
-    };
-    (
-        $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
-        [{ write_paged $array:ident: $Host:ty } $($more:tt)*]
-        [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
-    ) => {
-        entry! {
-            $row
-            [$($parameters)*
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &mut [$Host],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &mut [$Host],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &mut [$Host],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &mut [$Host],
-            ]
-            [$($pages)* { PagesMut [mut] $array a b c d }] [$($arguments)* &mut $array,] [$($more)*] [$($bindings)*]
-        }
-    };
-    (
-        $row:tt [$($parameters:tt)*] [$($pages:tt)*] [$($arguments:tt)*]
-        [{ write_paged $array:ident: $Host:ty, vectors } $($more:tt)*]
-        [$first:literal $second:literal $third:literal $fourth:literal $($bindings:literal)*]
-    ) => {
-        entry! {
-            $row
-            [$($parameters)*
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $first)] a: &mut [<$Host as InVectors>::Vectors],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $second)] b: &mut [<$Host as InVectors>::Vectors],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $third)] c: &mut [<$Host as InVectors>::Vectors],
-                #[spirv(storage_buffer, descriptor_set = 0, binding = $fourth)] d: &mut [<$Host as InVectors>::Vectors],
-            ]
-            [$($pages)* { PagesMut [mut] $array a b c d }] [$($arguments)* &mut VectorsMut(&mut $array),]
+            [$($pages)* { PagesMut [mut] $array a b c d }] [$($arguments)* lent!(write_paged $array $(, $entry)?),]
             [$($more)*] [$($bindings)*]
         }
     };
@@ -187,75 +156,35 @@ macro_rules! entry {
         }
         [$($parameters:tt)*] [] [$($arguments:tt)*] [] $bindings:tt
     ) => {
-        $($doc)*
-        #[spirv(compute(threads(64)))]
-        #[allow(clippy::too_many_arguments)]
-        pub fn $method(
-            #[spirv(global_invocation_id)] id: UVec3,
-            #[spirv(push_constant)] push: &Push<$Block>,
-            $($parameters)*
-            #[spirv(workgroup)] rows: &mut Shared,
-            #[spirv(workgroup)] columns: &mut Shared,
-        ) {
-            let $block = &push.parameters;
-            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-            bodies::$method($block, shape, $($arguments)* Single { rows, columns }, push.piece.first + id.x);
+        form! {
+            [$($doc)*] $method: Single { rows: Shared, columns: Shared }
+            $method { $block: $Block } [$row_count, $inner_count, $column_count]
+            [$($parameters)*] [$($arguments)*]
         }
 
         /// The other forms.
         pub mod $method {
             use super::*;
 
-            /// Two tiles beside each other.
-            #[spirv(compute(threads(64)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn double(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] rows: &mut Shared,
-                #[spirv(workgroup)] columns: &mut Shared,
-                #[spirv(workgroup)] more_columns: &mut Shared,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = Double { rows, columns, more_columns };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            form! {
+                [#[doc = "Two tiles beside each other."]]
+                double: Double { rows: Shared, columns: Shared, more_columns: Shared }
+                $method { $block: $Block } [$row_count, $inner_count, $column_count]
+                [$($parameters)*] [$($arguments)*]
             }
-
-            /// Two by two tiles.
-            #[spirv(compute(threads(64)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn quadruple(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] rows: &mut ShortShared,
-                #[spirv(workgroup)] more_rows: &mut ShortShared,
-                #[spirv(workgroup)] columns: &mut ShortShared,
-                #[spirv(workgroup)] more_columns: &mut ShortShared,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = Quadruple { rows, more_rows, columns, more_columns };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            form! {
+                [#[doc = "Two by two tiles."]]
+                quadruple: Quadruple {
+                    rows: ShortShared, more_rows: ShortShared, columns: ShortShared, more_columns: ShortShared
+                }
+                $method { $block: $Block } [$row_count, $inner_count, $column_count]
+                [$($parameters)*] [$($arguments)*]
             }
-
-            /// Two tiles beside each other, double-buffered.
-            #[spirv(compute(threads(64)))]
-            #[allow(clippy::too_many_arguments)]
-            pub fn buffered(
-                #[spirv(global_invocation_id)] id: UVec3,
-                #[spirv(push_constant)] push: &Push<$Block>,
-                $($parameters)*
-                #[spirv(workgroup)] rows: &mut Shared,
-                #[spirv(workgroup)] columns: &mut Shared,
-                #[spirv(workgroup)] more_columns: &mut Shared,
-            ) {
-                let $block = &push.parameters;
-                let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
-                let tiles = Buffered { rows, columns, more_columns };
-                bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
+            form! {
+                [#[doc = "Two tiles beside each other, double-buffered."]]
+                buffered: Buffered { rows: Shared, columns: Shared, more_columns: Shared }
+                $method { $block: $Block } [$row_count, $inner_count, $column_count]
+                [$($parameters)*] [$($arguments)*]
             }
 
             /// One tile, by subgroups.
@@ -274,6 +203,29 @@ macro_rules! entry {
                 let tiles = Subgroup { size, subgroup, lane };
                 bodies::$method($block, shape, $($arguments)* tiles, push.piece.first + id.x);
             }
+        }
+    };
+}
+
+/// An entry point of a tiled kernel in a form that has these arrays in the workgroup's memory.
+macro_rules! form {
+    (
+        [$($doc:tt)*] $name:ident: $Form:ident { $($memory:ident: $Memory:ty),* }
+        $method:ident { $block:ident: $Block:ty } [$row_count:expr, $inner_count:expr, $column_count:expr]
+        [$($parameters:tt)*] [$($arguments:tt)*]
+    ) => {
+        $($doc)*
+        #[spirv(compute(threads(64)))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $name(
+            #[spirv(global_invocation_id)] id: UVec3,
+            #[spirv(push_constant)] push: &Push<$Block>,
+            $($parameters)*
+            $(#[spirv(workgroup)] $memory: &mut $Memory,)*
+        ) {
+            let $block = &push.parameters;
+            let shape = Shape { row_count: $row_count, inner_count: $inner_count, column_count: $column_count };
+            bodies::$method($block, shape, $($arguments)* $Form { $($memory),* }, push.piece.first + id.x);
         }
     };
 }
@@ -305,6 +257,18 @@ macro_rules! bound {
 
 /// How the body gets it.
 macro_rules! lent {
+    (paged $array:ident) => {
+        &$array
+    };
+    (paged $array:ident, vectors) => {
+        &Vectors(&$array)
+    };
+    (write_paged $array:ident) => {
+        &mut $array
+    };
+    (write_paged $array:ident, vectors) => {
+        &mut VectorsMut(&mut $array)
+    };
     (write $array:ident, vectors) => {
         &mut VectorsMut($array)
     };

@@ -32,9 +32,9 @@ pub(crate) type Shared = [Vec4; (STEP * STRIDE) as usize];
 /// The same for [`Form::Quadruple`].
 pub(crate) type ShortShared = [Vec4; (SHORT_STEP * STRIDE) as usize];
 
-/// An invocation's place.
+/// What an invocation computes of its workgroup's tiles.
 #[derive(Clone, Copy)]
-pub(crate) struct Place {
+pub(crate) struct InvocationTile {
     /// Its number in the workgroup.
     pub(crate) own: u32,
     /// First row and column of the workgroup's first tile.
@@ -45,18 +45,18 @@ pub(crate) struct Place {
     pub(crate) own_column: u32,
 }
 
-impl Place {
+impl InvocationTile {
     #[inline(always)]
-    fn new(invocation: u32, shape: Shape, form: Form) -> Place {
-        Place::of(invocation / TILE, invocation % TILE, shape, form)
+    fn new(invocation: u32, shape: Shape, form: Form) -> InvocationTile {
+        InvocationTile::of(invocation / TILE, invocation % TILE, shape, form)
     }
 
     /// That of invocation `own` in a workgroup.
     #[inline(always)]
-    pub(crate) fn of(group: u32, own: u32, shape: Shape, form: Form) -> Place {
+    pub(crate) fn of(group: u32, own: u32, shape: Shape, form: Form) -> InvocationTile {
         let [rows, columns] = form.tiles();
         let group_columns = shape.column_count.div_ceil(TILE * columns);
-        Place {
+        InvocationTile {
             own,
             first_row: group / group_columns * (TILE * rows),
             first_column: group % group_columns * (TILE * columns),
@@ -98,7 +98,7 @@ impl Tiles for Single<'_> {
         mut store: impl FnMut(u32, u32, f32),
     ) {
         let Single { rows, columns } = self;
-        let place = Place::new(invocation, shape, Form::Single);
+        let place = InvocationTile::new(invocation, shape, Form::Single);
         let mut sums = Sums::ZERO;
         let mut start = 0;
         while start < shape.inner_count {
@@ -129,7 +129,7 @@ impl Tiles for Double<'_> {
         mut store: impl FnMut(u32, u32, f32),
     ) {
         let Double { rows, columns, more_columns } = self;
-        let place = Place::new(invocation, shape, Form::Double);
+        let place = InvocationTile::new(invocation, shape, Form::Double);
         let second_column = place.first_column + TILE;
         let (mut sums, mut more) = (Sums::ZERO, Sums::ZERO);
         let mut start = 0;
@@ -165,7 +165,7 @@ impl Tiles for Quadruple<'_> {
         mut store: impl FnMut(u32, u32, f32),
     ) {
         let Quadruple { rows, more_rows, columns, more_columns } = self;
-        let place = Place::new(invocation, shape, Form::Quadruple);
+        let place = InvocationTile::new(invocation, shape, Form::Quadruple);
         let (second_row, second_column) = (place.first_row + TILE, place.first_column + TILE);
         let (mut sums, mut beside, mut below, mut across) = (Sums::ZERO, Sums::ZERO, Sums::ZERO, Sums::ZERO);
         let mut start = 0;
@@ -248,7 +248,7 @@ fn fetch_columns<const N: usize>(
 #[inline(always)]
 pub(crate) fn store_sums(
     mut sums: Sums,
-    place: Place,
+    place: InvocationTile,
     first_row: u32,
     first_column: u32,
     shape: Shape,

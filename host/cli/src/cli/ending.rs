@@ -37,7 +37,7 @@ pub(crate) fn watch() -> ! {
 /// Ends the process at once; unfinished files are removed.
 pub(crate) fn end() -> ! {
     remove_all();
-    super::terminal::complain(viewfuse_job::progress::Interrupted);
+    super::printing::complain(viewfuse_job::progress::Interrupted);
     exit(INTERRUPTED.into())
 }
 

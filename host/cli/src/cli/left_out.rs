@@ -23,13 +23,15 @@ pub(crate) fn told(what: impl Display, feature: &str) -> String {
 pub(crate) fn marked(mut commands: clap::Command) -> clap::Command {
     for (name, feature, is_built) in COMMANDS {
         if !is_built {
-            commands = commands.mut_subcommand(name, |command| {
-                let about = command.get_about().map(ToString::to_string).unwrap_or_default();
-                command.about(format!("{about} [not in this build: feature `{feature}`]"))
-            });
+            commands = commands.mut_subcommand(name, |command| mark(command, feature));
         }
     }
     commands
+}
+
+fn mark(command: clap::Command, feature: &str) -> clap::Command {
+    let about = command.get_about().map(ToString::to_string).unwrap_or_default();
+    command.about(format!("{about} [not in this build: feature `{feature}`]"))
 }
 
 /// A stand-in for each command, in a module of its name, if the build leaves it out.
@@ -39,7 +41,8 @@ macro_rules! commands {
         const COMMANDS: [(&str, &str, bool); [$($feature),*].len()] =
             [$((stringify!($command), $feature, cfg!(feature = $feature))),*];
         $(
-            #[cfg(not(feature = $feature))]
+            // Tests have all features, and try the stand-ins all the same.
+            #[cfg(any(test, not(feature = $feature)))]
             pub(crate) mod $command {
                 use clap::Args;
                 use std::ffi::OsString;
@@ -58,6 +61,18 @@ macro_rules! commands {
                 }
             }
         )*
+
+        /// What each stand-in says when it is called with these words.
+        #[cfg(test)]
+        fn answers(words: &[&str]) -> Vec<String> {
+            use clap::{Args, FromArgMatches};
+            vec![$({
+                let command = $command::Arguments::augment_args(clap::Command::new(stringify!($command)));
+                let matches = command.get_matches_from([&[stringify!($command)], words].concat());
+                let arguments = $command::Arguments::from_arg_matches(&matches).expect("any words");
+                $command::run(&arguments).expect_err("a command that is not built").to_string()
+            }),*]
+        }
     };
 }
 
@@ -65,3 +80,56 @@ commands!(
     bench "check", check "check", pareto "pareto", report "report", scenes "scenes", train "train", verify "check",
     view "view"
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// The features of the command's package, as its manifest declares them.
+    fn features() -> Vec<&'static str> {
+        let manifest = include_str!("../../Cargo.toml");
+        let section =
+            manifest.split("\n[features]\n").nth(1).expect("features").split("\n[").next().expect("a section");
+        section.lines().filter_map(|line| line.split_once(" = ")).map(|(name, _)| name).collect()
+    }
+
+    #[test]
+    fn a_command_that_is_left_out_says_how_to_get_it() {
+        for words in [[].as_slice(), &["--help"], &["a", "--device", "cpu", "-x"]] {
+            let answers = answers(words);
+            assert_eq!(answers.len(), COMMANDS.len());
+            for (answer, (name, feature, _)) in answers.iter().zip(COMMANDS) {
+                let line = answer.lines().next().expect("a line");
+                assert!(line.contains(&format!("this build has no command `{name}`; ")), "{line}");
+                for way in [
+                    "cargo run --release --features",
+                    "cargo install --path host/cli --features",
+                    concat!(
+                        "cargo install --git ",
+                        env!("CARGO_PKG_REPOSITORY"),
+                        " ",
+                        env!("CARGO_PKG_NAME"),
+                        " --features"
+                    ),
+                ] {
+                    assert!(line.contains(&format!("`{way} {feature}")), "{way}: {line}");
+                }
+                assert!(features().contains(&feature), "{name}: there is no feature {feature}");
+            }
+        }
+        assert!(env!("CARGO_MANIFEST_DIR").ends_with("host/cli"), "the path that is named");
+        assert!(!features().contains(&"report-all"), "a feature that does not exist");
+    }
+
+    #[test]
+    fn help_marks_what_is_left_out() {
+        let commands = crate::cli::Arguments::command();
+        for (name, feature, _) in COMMANDS {
+            let command = commands.find_subcommand(name).unwrap_or_else(|| panic!("no command {name}"));
+            let about = mark(command.clone(), feature).get_about().expect("what it does").to_string();
+            let plain = command.get_about().expect("what it does").to_string();
+            assert_eq!(about, format!("{plain} [not in this build: feature `{feature}`]"));
+        }
+    }
+}

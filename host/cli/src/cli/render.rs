@@ -81,15 +81,22 @@ fn scene_help() -> String {
     format!("The scene: {}", looked_for(&READERS))
 }
 
+impl Arguments {
+    /// The weighting; `None` where the scene is to decide.
+    fn weighting(&self) -> anyhow::Result<Option<Weighting>> {
+        Ok(match &self.weights {
+            Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
+            // A network's pictures take too long to try out schemes unasked.
+            None if self.model.label().is_some() => Some(Weighting::default_scheme()),
+            Some(WeightingChoice::Auto) | None => None,
+        })
+    }
+}
+
 /// `values` are all options and their values as a person would write them.
 pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> anyhow::Result<ExitCode> {
     let start = Instant::now();
-    let weighting = match &arguments.weights {
-        Some(WeightingChoice::Given(spec)) => Some(spec.open()?),
-        // A network's pictures take too long to try out schemes unasked.
-        None if arguments.model.label().is_some() => Some(Weighting::default_scheme()),
-        Some(WeightingChoice::Auto) | None => None,
-    };
+    let weighting = arguments.weighting()?;
     let scene = Scene::open(&arguments.scene)?;
     let is_stream = arguments.output == Path::new("-");
     if !is_stream {

@@ -12,11 +12,11 @@ mod progress_bar;
 
 use super::ending;
 use super::environment::time_between_lines;
-use super::shown::{shown, shown_in_line};
+use super::printing::complain;
+use super::shown::shown;
 use clock::Clock;
 use course::Course;
-use progress_bar::Shown;
-use std::fmt::Display;
+use progress_bar::ProgressDisplay;
 use std::io::{self, IsTerminal, Write};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -41,16 +41,6 @@ pub(crate) fn listen() -> Result<(), ctrlc::Error> {
     })
 }
 
-/// Prints an error in one line on standard error, which may be full or closed: what went wrong is in the exit code, too.
-pub(crate) fn complain(message: impl Display) {
-    let _ = writeln!(io::stderr().lock(), "viewfuse: {}", shown_in_line(message));
-}
-
-/// Prints what is wrong with the arguments, which takes several lines.
-pub(crate) fn complain_of_arguments(message: impl Display) {
-    let _ = write!(io::stderr().lock(), "{}", shown(message));
-}
-
 /// Keeps panics silent that become errors.
 pub(crate) fn silence_caught_panics() {
     let hook = std::panic::take_hook();
@@ -63,7 +53,7 @@ pub(crate) fn silence_caught_panics() {
 
 /// On standard error: a bar on a terminal, elsewhere a line every few seconds, and warnings. Messages on standard output.
 pub(crate) struct Terminal {
-    shown: Arc<Shown>,
+    display: Arc<ProgressDisplay>,
     /// Shows the time that is left also while nothing else changes. `None` where there is nothing to show it on.
     clock: Option<Clock>,
     /// Warnings that were shown.
@@ -73,35 +63,35 @@ pub(crate) struct Terminal {
 impl Terminal {
     /// Without progress; `label` is the stage until the work names one.
     pub(crate) fn new(label: &str) -> Terminal {
-        let shown = Arc::new(Shown::new(label, io::stderr().is_terminal(), time_between_lines()));
-        let own = Arc::clone(&shown);
+        let display = Arc::new(ProgressDisplay::new(label, io::stderr().is_terminal(), time_between_lines()));
+        let own = Arc::clone(&display);
         let clock = Clock::start(move || own.show());
-        Terminal { shown, clock: Some(clock), told: Mutex::default() }
+        Terminal { display, clock: Some(clock), told: Mutex::default() }
     }
 
     /// Without a bar: for work that shows its progress elsewhere.
     #[cfg(feature = "view")]
     pub(crate) fn without_bar() -> Terminal {
-        Terminal { shown: Arc::new(Shown::hidden()), clock: None, told: Mutex::default() }
+        Terminal { display: Arc::new(ProgressDisplay::hidden()), clock: None, told: Mutex::default() }
     }
 
     /// Runs what prints while the work goes on.
     pub(crate) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
-        self.shown.aside(print)
+        self.display.aside(print)
     }
 }
 
 impl Progress for Terminal {
     fn stage(&self, name: &str, place: Range<usize>, of: usize) {
-        self.shown.change(|course| course.begin(name, place, of));
+        self.display.change(|course| course.begin(name, place, of));
     }
 
     fn expect(&self, pieces: usize) {
-        self.shown.change(|course| course.expect(pieces));
+        self.display.change(|course| course.expect(pieces));
     }
 
     fn step(&self) {
-        self.shown.change(Course::step);
+        self.display.change(Course::step);
     }
 
     /// Shows each warning once.
@@ -126,6 +116,6 @@ impl Progress for Terminal {
 impl Drop for Terminal {
     fn drop(&mut self) {
         self.clock.take();
-        self.shown.end();
+        self.display.end();
     }
 }

@@ -189,8 +189,8 @@ impl Multiply<'_> {
                     let (vectors, _) = S::as_simd_f32s(cast_slice(lines));
                     let weights = &vectors.as_chunks::<2>().0[first..first + depth];
                     let sums = tile(simd, &inputs, weights);
-                    let place = Place { first_row, first_column: panel * width, columns, first, inner };
-                    write(simd, &sums, &mut rows, &place);
+                    let position = TilePosition { first_row, first_column: panel * width, columns, first, inner };
+                    write(simd, &sums, &mut rows, &position);
                 }
             }
         }
@@ -218,7 +218,7 @@ fn tile<S: Simd, const R: usize>(
 }
 
 /// The position of a tile.
-struct Place {
+struct TilePosition {
     first_row: usize,
     first_column: usize,
     columns: usize,
@@ -229,8 +229,8 @@ struct Place {
 
 /// Adds a tile's sums to bias and residual, or to the outputs so far; the last sums are scaled and rectified.
 #[inline(always)]
-fn write<S: Simd, const R: usize>(simd: S, sums: &[[S::f32s; 2]; R], rows: &mut Rows<'_>, place: &Place) {
-    let Place { first_row, first_column, columns, first, inner } = *place;
+fn write<S: Simd, const R: usize>(simd: S, sums: &[[S::f32s; 2]; R], rows: &mut Rows<'_>, position: &TilePosition) {
+    let TilePosition { first_row, first_column, columns, first, inner } = *position;
     let is_last = first + DEPTH >= inner;
     for (row, sums) in (first_row..rows.row_count).zip(sums) {
         for (half, sum) in sums.iter().enumerate() {

@@ -74,17 +74,23 @@ impl Winograd {
         let (tiles, per_row) = (rows * tiles_across, SIDE * width);
         let zeros = vec![0.0; self.columns];
         let run = |space: &mut [f32], chunk: usize, outputs: &mut [f32]| {
-            let (seen, products) = space.split_at_mut(PLACES * tiles * self.channels);
+            let (transformed, products) = space.split_at_mut(PLACES * tiles * self.channels);
             let first_row = chunk * rows * SIDE;
             let row_count = (rows * SIDE).min(block.out_height as usize - first_row);
             let count = row_count.div_ceil(SIDE) * tiles_across;
             let tile = |index: usize| [first_row + index / tiles_across * SIDE, index % tiles_across * SIDE];
-            Arch::new().dispatch(Look { block, inputs, tiles: (0..count).map(tile), stride: tiles, seen });
+            Arch::new().dispatch(InputTransform {
+                block,
+                inputs,
+                tiles: (0..count).map(tile),
+                stride: tiles,
+                transformed,
+            });
             for (place, panels) in self.places.iter().enumerate() {
                 let own = place * tiles;
                 panels.multiply(Rows {
                     row_count: count,
-                    inputs: &seen[own * self.channels..],
+                    inputs: &transformed[own * self.channels..],
                     in_pitch: self.channels,
                     relu_inputs: 0,
                     ending: Ending { bias: &zeros, residual: None, scale: 1.0, relu: 0 },
@@ -95,7 +101,7 @@ impl Winograd {
             let ending = ending.rows_from(first_row * width);
             let tile = |index: usize| [index / tiles_across * SIDE, index % tiles_across * SIDE];
             let size = [row_count, width];
-            Arch::new().dispatch(Put {
+            Arch::new().dispatch(OutputTransform {
                 products,
                 tiles: (0..count).map(tile),
                 stride: tiles,
@@ -123,23 +129,23 @@ fn tile_rows_at_once(row_count: usize, tiles_across: usize) -> usize {
     (1..=most).min_by_key(cost).unwrap_or(1)
 }
 
-/// `B^T d B` for tiles of the input: `seen[place][tile][channel]`.
-struct Look<'a, T: Iterator<Item = [usize; 2]>> {
+/// `B^T d B` for tiles of the input: `transformed[place][tile][channel]`.
+struct InputTransform<'a, T: Iterator<Item = [usize; 2]>> {
     block: &'a ConvolveBlock,
     inputs: &'a [f32],
     /// First output row and column of each.
     tiles: T,
     /// Tiles from a place to the next.
     stride: usize,
-    seen: &'a mut [f32],
+    transformed: &'a mut [f32],
 }
 
-impl<T: Iterator<Item = [usize; 2]>> WithSimd for Look<'_, T> {
+impl<T: Iterator<Item = [usize; 2]>> WithSimd for InputTransform<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Look { block, inputs, tiles, stride, seen } = self;
+        let InputTransform { block, inputs, tiles, stride, transformed } = self;
         let channels = block.in_channels as usize;
         let zero = simd.splat_f32s(0.0);
         for (tile, [first_row, first_column]) in tiles.enumerate() {
@@ -162,17 +168,17 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Look<'_, T> {
                             *value = load(simd, &pixel[start..end]);
                         }
                     }
-                    *values = look_along(simd, *values);
+                    *values = input_transform_along(simd, *values);
                 }
                 for column in 0..REACH {
                     let mut down = [zero; REACH];
                     for row in 0..REACH {
                         down[row] = values[row][column];
                     }
-                    let along = look_along(simd, down);
+                    let along = input_transform_along(simd, down);
                     for row in 0..REACH {
                         let place = ((row * REACH + column) * stride + tile) * channels;
-                        store(simd, &mut seen[place + start..place + end], along[row]);
+                        store(simd, &mut transformed[place + start..place + end], along[row]);
                     }
                 }
             }
@@ -183,7 +189,7 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Look<'_, T> {
 /// `B^T` times six numbers. No closures here and in what calls it: they would be functions of their own, without the wide
 /// instructions of the one around them.
 #[inline(always)]
-fn look_along<S: Simd>(simd: S, d: [S::f32s; REACH]) -> [S::f32s; REACH] {
+fn input_transform_along<S: Simd>(simd: S, d: [S::f32s; REACH]) -> [S::f32s; REACH] {
     let [d0, d1, d2, d3, d4, d5] = d;
     let far = times(simd, -4.0, d2, d4);
     let near = times(simd, -4.0, d1, d3);
@@ -206,7 +212,7 @@ fn times<S: Simd>(simd: S, factor: f32, x: S::f32s, y: S::f32s) -> S::f32s {
 }
 
 /// `A^T m A` for tiles of the products, with bias, residual, scale and rectification.
-struct Put<'a, T: Iterator<Item = [usize; 2]>> {
+struct OutputTransform<'a, T: Iterator<Item = [usize; 2]>> {
     /// `[place][tile][channel]`.
     products: &'a [f32],
     /// First row and column of each, counted from the first output.
@@ -219,12 +225,12 @@ struct Put<'a, T: Iterator<Item = [usize; 2]>> {
     pitch: usize,
 }
 
-impl<T: Iterator<Item = [usize; 2]>> WithSimd for Put<'_, T> {
+impl<T: Iterator<Item = [usize; 2]>> WithSimd for OutputTransform<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        let Put { products, tiles, stride, size: [height, width], ending, outputs, pitch } = self;
+        let OutputTransform { products, tiles, stride, size: [height, width], ending, outputs, pitch } = self;
         let channels = ending.bias.len();
         for (tile, [first_row, first_column]) in tiles.enumerate() {
             for start in (0..channels).step_by(S::F32_LANES) {
@@ -237,14 +243,14 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Put<'_, T> {
                         let place = ((row * REACH + column) * stride + tile) * channels;
                         across[column] = load(simd, &products[place + start..place + end]);
                     }
-                    rows[row] = put_along(simd, across);
+                    rows[row] = output_transform_along(simd, across);
                 }
                 for column in 0..SIDE.min(width - first_column) {
                     let mut down = [zero; REACH];
                     for row in 0..REACH {
                         down[row] = rows[row][column];
                     }
-                    let along = put_along(simd, down);
+                    let along = output_transform_along(simd, down);
                     for row in 0..SIDE.min(height - first_row) {
                         let pixel = (first_row + row) * width + first_column + column;
                         let value = ending.finish(simd, along[row], pixel, start, end);
@@ -258,7 +264,7 @@ impl<T: Iterator<Item = [usize; 2]>> WithSimd for Put<'_, T> {
 
 /// `A^T` times six numbers.
 #[inline(always)]
-fn put_along<S: Simd>(simd: S, m: [S::f32s; REACH]) -> [S::f32s; SIDE] {
+fn output_transform_along<S: Simd>(simd: S, m: [S::f32s; REACH]) -> [S::f32s; SIDE] {
     let [m0, m1, m2, m3, m4, m5] = m;
     let near = simd.add_f32s(m1, m2);
     let near_odd = simd.sub_f32s(m1, m2);

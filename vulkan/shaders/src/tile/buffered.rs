@@ -4,7 +4,7 @@
 //! multiplies the present one, and is then written into the half that nobody reads any more: all invocations have passed
 //! the barrier behind the step before.
 
-use super::{FOURS, Place, SHORT_STEP, Shared, read_fours, store_sums, wait_for_all, write};
+use super::{FOURS, InvocationTile, SHORT_STEP, Shared, read_fours, store_sums, wait_for_all, write};
 use spirv_std::glam::Vec4;
 use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
 use viewfuse_kernels::rows::Form;
@@ -32,7 +32,7 @@ impl Tiles for Buffered<'_> {
         mut store: impl FnMut(u32, u32, f32),
     ) {
         let Buffered { rows, columns, more_columns } = self;
-        let place = Place::new(invocation, shape, Form::Buffered);
+        let place = InvocationTile::new(invocation, shape, Form::Buffered);
         let second_column = place.first_column + TILE;
         let (mut sums, mut more) = (Sums::ZERO, Sums::ZERO);
         let (mut start, mut half) = (0, 0);
@@ -65,7 +65,7 @@ impl Tiles for Buffered<'_> {
 
 /// Neighbours fetch inner indices that lie next to one another in the buffers.
 #[inline(always)]
-fn fetch_rows(place: Place, start: u32, shape: Shape, left: impl Fn(u32, u32) -> f32 + Copy) -> Share {
+fn fetch_rows(place: InvocationTile, start: u32, shape: Shape, left: impl Fn(u32, u32) -> f32 + Copy) -> Share {
     let left = move |row: u32, inner: u32| left(row.min(shape.row_count - 1), inner.min(shape.inner_count - 1));
     let at = start + place.own % SHORT_STEP;
     let fetch_four = move |row: u32| Vec4::new(left(row, at), left(row + 1, at), left(row + 2, at), left(row + 3, at));

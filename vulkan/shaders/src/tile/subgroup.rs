@@ -7,7 +7,7 @@
 //! A subgroup has 8, 16, 32 or 64 invocations, all of which take part: the pipeline demands full subgroups of the size that
 //! its specialisation constant says.
 
-use super::{Place, store_sums};
+use super::{InvocationTile, store_sums};
 use spirv_std::arch::{subgroup_broadcast_const, subgroup_shuffle};
 use spirv_std::glam::Vec4;
 use viewfuse_kernels::network::tile::{Shape, Sums, TILE, Tiles};
@@ -39,7 +39,7 @@ impl Tiles for Subgroup {
     ) {
         // Which invocations are in a subgroup is the driver's choice: the number in the workgroup follows from that.
         let own = (self.subgroup * self.size + self.lane) % TILE;
-        let place = Place::of(invocation / TILE, own, shape, Form::Subgroup);
+        let place = InvocationTile::of(invocation / TILE, own, shape, Form::Subgroup);
         let row = (place.first_row + Sums::place(place.own_row, place.own_column)).min(shape.row_count - 1);
         let column = place.first_column + Sums::place(place.own_column, 0);
         let left = move |inner: u32| left(row, inner.min(shape.inner_count - 1));

@@ -12,17 +12,17 @@ const CLEAR: &str = "\r\u{1b}[2K";
 /// Columns of a terminal that does not tell.
 const WIDTH: u16 = 80;
 
-/// What shows a course.
-pub(super) struct Shown {
+/// Shows a course.
+pub(super) struct ProgressDisplay {
     course: Mutex<Course>,
     /// Who writes to the terminal holds it, so that what is shown is in order.
-    place: Mutex<Place>,
+    style: Mutex<ProgressStyle>,
 }
 
-/// Where a course is shown.
-enum Place {
+/// How a course is shown.
+enum ProgressStyle {
     #[cfg(feature = "view")]
-    Nowhere,
+    Hidden,
     /// The last line of a terminal, and what it says.
     Bar(String),
     Lines(Lines),
@@ -38,27 +38,30 @@ struct Lines {
     said: String,
 }
 
-impl Shown {
+impl ProgressDisplay {
     /// On a terminal a bar, elsewhere lines with this time between them; of 0 one for each change.
-    pub(super) fn new(label: &str, is_terminal: bool, between: Duration) -> Shown {
+    pub(super) fn new(label: &str, is_terminal: bool, between: Duration) -> ProgressDisplay {
         let now = Instant::now();
-        let place = match is_terminal {
-            true => Place::Bar(String::new()),
-            false => Place::Lines(Lines { between, last: now, said: String::new() }),
+        let style = match is_terminal {
+            true => ProgressStyle::Bar(String::new()),
+            false => ProgressStyle::Lines(Lines { between, last: now, said: String::new() }),
         };
-        Shown { course: Mutex::new(Course::new(label, now)), place: Mutex::new(place) }
+        ProgressDisplay { course: Mutex::new(Course::new(label, now)), style: Mutex::new(style) }
     }
 
     /// Shows nothing.
     #[cfg(feature = "view")]
-    pub(super) fn hidden() -> Shown {
-        Shown { course: Mutex::new(Course::new("", Instant::now())), place: Mutex::new(Place::Nowhere) }
+    pub(super) fn hidden() -> ProgressDisplay {
+        ProgressDisplay {
+            course: Mutex::new(Course::new("", Instant::now())),
+            style: Mutex::new(ProgressStyle::Hidden),
+        }
     }
 
     /// Runs what prints, without the bar.
     pub(super) fn aside<T>(&self, print: impl FnOnce() -> T) -> T {
-        let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
-        place.clear();
+        let mut style = self.style.lock().unwrap_or_else(PoisonError::into_inner);
+        style.clear();
         print()
     }
 
@@ -77,13 +80,13 @@ impl Shown {
 
     /// Shows the course as it is now.
     pub(super) fn show(&self) {
-        let Ok(mut place) = self.place.lock() else { return };
+        let Ok(mut style) = self.style.lock() else { return };
         let now = Instant::now();
         let Ok((share, words)) = self.course.lock().map(|course| (course.share(), course.words(now))) else { return };
-        match &mut *place {
+        match &mut *style {
             #[cfg(feature = "view")]
-            Place::Nowhere => {}
-            Place::Bar(shown) => {
+            ProgressStyle::Hidden => {}
+            ProgressStyle::Bar(shown) => {
                 let width = terminal_size_of(io::stderr()).map_or(WIDTH, |(Width(width), _)| width);
                 let bar = bar(&words, share, width.into());
                 if bar != *shown {
@@ -91,7 +94,7 @@ impl Shown {
                     *shown = bar;
                 }
             }
-            Place::Lines(lines) => {
+            ProgressStyle::Lines(lines) => {
                 if let Some(line) = lines.due(now, share, &words) {
                     // A closed pipe is ignored.
                     writeln!(io::stderr().lock(), "{line}").ok();
@@ -101,9 +104,9 @@ impl Shown {
     }
 }
 
-impl Place {
+impl ProgressStyle {
     fn clear(&mut self) {
-        if let Place::Bar(shown) = self
+        if let ProgressStyle::Bar(shown) = self
             && !shown.is_empty()
         {
             write!(io::stderr().lock(), "{CLEAR}").ok();
