@@ -53,7 +53,7 @@ const HEAVY: [(&str, &[&str]); 11] = [
     ("maud", &["viewfuse-evaluate?"]),
     ("base64", &["viewfuse-evaluate?"]),
     ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
-    ("tiny_http", &["viewfuse-view"]),
+    ("httparse", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),
     ("clap", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),
