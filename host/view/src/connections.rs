@@ -1,11 +1,11 @@
 //! The open connections: how many there may be, and which one is closed for a newer one.
 //!
-//! Each has a thread. A connection that never asked with the token makes way first, the oldest of them before the others;
-//! one that waits for a picture stays.
+//! Each has a thread. A connection that was refused makes way first, then one that never asked with the token, the oldest before
+//! the others; one that waits for a picture stays. A new one has a moment to ask for something before it makes way.
 
 use std::net::{Shutdown, TcpStream};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Most connections at a time. A browser opens six.
 pub(crate) const MAX_CONNECTIONS: usize = 64;
@@ -13,9 +13,14 @@ pub(crate) const MAX_CONNECTIONS: usize = 64;
 /// Most threads: those of connections that were closed for newer ones are about to end.
 const MAX_THREADS: usize = 2 * MAX_CONNECTIONS;
 
+/// Time that a new connection has to say what it wants. Until then a newer one waits with the system.
+const GRACE: Duration = Duration::from_millis(100);
+
 /// What a connection is known for; those that are less make way first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Standing {
+    /// What it sent was no request.
+    Refused,
     /// It never asked with the token.
     Stranger,
     /// It belongs to the page.
@@ -43,6 +48,7 @@ struct State {
 struct Open {
     number: u64,
     stream: Arc<TcpStream>,
+    since: Instant,
     standing: Standing,
 }
 
@@ -60,15 +66,29 @@ impl Connections {
 
     /// Takes a new connection; another one may be closed for it. `None` if all of them wait for pictures, or if it is over.
     pub(crate) fn admit(&self, stream: &Arc<TcpStream>) -> Option<Admission<'_>> {
-        let is_crowded = |state: &mut State| state.threads >= MAX_THREADS && !state.is_closed;
-        let mut state = self.ended.wait_while(self.state(), is_crowded).unwrap_or_else(PoisonError::into_inner);
-        if state.is_closed || (state.open.len() >= MAX_CONNECTIONS && !state.close_least()) {
-            return None;
+        let mut state = self.state();
+        loop {
+            if state.is_closed {
+                return None;
+            }
+            let wait = match state.wait_for_place() {
+                _ if state.threads >= MAX_THREADS => GRACE,
+                Some(wait) => wait,
+                None => return None,
+            };
+            if wait.is_zero() {
+                break;
+            }
+            state = self.ended.wait_timeout(state, wait).unwrap_or_else(PoisonError::into_inner).0;
+        }
+        if state.open.len() >= MAX_CONNECTIONS {
+            state.close_least();
         }
         let number = state.next_number;
         state.next_number += 1;
         state.threads += 1;
-        state.open.push(Open { number, stream: Arc::clone(stream), standing: Standing::Stranger });
+        let (stream, since) = (Arc::clone(stream), Instant::now());
+        state.open.push(Open { number, stream, since, standing: Standing::Stranger });
         Some(Admission { connections: self, number })
     }
 
@@ -92,12 +112,28 @@ impl Connections {
 }
 
 impl State {
-    /// Closes the connection that is known for the least, the oldest of those, unless all wait for pictures.
-    fn close_least(&mut self) -> bool {
+    /// The connection that is known for the least, the oldest of those, unless all wait for pictures.
+    fn least(&self) -> Option<usize> {
         let least = self.open.iter().enumerate().min_by_key(|(_, own)| own.standing);
-        let place = least.filter(|(_, own)| own.standing < Standing::Waits).map(|(place, _)| place);
-        let closed = place.map(|place| self.open.remove(place).stream.shutdown(Shutdown::Both));
-        closed.is_some()
+        least.filter(|(_, own)| own.standing < Standing::Waits).map(|(place, _)| place)
+    }
+
+    /// The time until there is a place for another one; `None` if all wait for pictures.
+    fn wait_for_place(&self) -> Option<Duration> {
+        if self.open.len() < MAX_CONNECTIONS {
+            return Some(Duration::ZERO);
+        }
+        let least = &self.open[self.least()?];
+        let is_new = least.standing == Standing::Stranger;
+        Some(if is_new { GRACE.saturating_sub(least.since.elapsed()) } else { Duration::ZERO })
+    }
+
+    /// Closes the connection that is known for the least.
+    fn close_least(&mut self) {
+        if let Some(place) = self.least() {
+            // One that is gone already cannot be shut down, which is no error.
+            self.open.remove(place).stream.shutdown(Shutdown::Both).ok();
+        }
     }
 }
 
@@ -157,10 +193,14 @@ mod tests {
         all[3].1 = None;
         all.push(open());
         assert_eq!(closed(&all), [2, 3]);
+        // One that was refused is the first.
+        known(&all, 9, Standing::Refused);
+        all.push(open());
+        assert_eq!(closed(&all), [2, 3, 9]);
         (4..all.len()).for_each(|own| known(&all, own, Standing::Waits));
         all.push(open());
-        assert_eq!(closed(&all), [0, 2, 3], "the page's own, before those that wait for pictures");
-        known(&all, MAX_CONNECTIONS + 2, Standing::Waits);
+        assert_eq!(closed(&all), [0, 2, 3, 9], "the page's own, before those that wait for pictures");
+        known(&all, MAX_CONNECTIONS + 3, Standing::Waits);
         let (client, refused) = open();
         assert!(refused.is_none());
         drop(client);
