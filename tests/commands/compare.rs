@@ -1,9 +1,14 @@
 //! `viewfuse compare`.
 
-use super::{BINARY, done};
+use super::{BINARY, assert_near, done};
 use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, f32_bytes, safetensors, toy};
 
-viewfuse_tests::trials![one_picture_and_folders, what_cannot_be_compared,];
+viewfuse_tests::trials![
+    one_picture_and_folders,
+    scores_are_those_of_render,
+    transparent_pictures_are_laid_over_a_background,
+    what_cannot_be_compared,
+];
 
 /// The columns of a metric's row.
 fn row<'a>(printed: &'a str, metric: &str) -> Vec<&'a str> {
@@ -33,11 +38,74 @@ fn one_picture_and_folders() {
     assert_eq!(plain.lines().count(), published.lines().count());
 }
 
+/// The number in a metric's row and column.
+#[track_caller]
+fn number(printed: &str, metric: &str, column: usize) -> f64 {
+    row(printed, metric)[column].parse().expect("a number")
+}
+
+/// The examples of the help, on what render writes: photographs with transparency that are larger than the pictures.
+fn scores_are_those_of_render() {
+    let folder = toy();
+    for (more, out) in [("", "out"), ("--alpha", "alpha"), ("--background 10,200,30", "green")] {
+        let render = format!(
+            "render toy --targets 20..23 --sources 0..7 --size 48x48 --weights mean --device cpu {more} -o {out}"
+        );
+        done(folder.path(), &render);
+        let record = std::fs::read(folder.path().join(out).join("run.json")).expect("a record");
+        let record: serde_json::Value = serde_json::from_slice(&record).expect("JSON");
+        let scores = |name: &str| -> Vec<f64> {
+            record["frames"]
+                .as_array()
+                .expect("frames")
+                .iter()
+                .map(|frame| frame[name].as_f64().expect("a score"))
+                .collect()
+        };
+        let printed = done(folder.path(), &format!("compare {out}/ toy/rgb/"));
+        assert!(printed.starts_with("4 pictures\n") && printed.contains(&format!("({out}/run.json)")), "{printed}");
+        assert!(printed.contains("4 of 4 photographs are larger: resampled by area averages"), "{printed}");
+        for metric in ["psnr", "ssim"] {
+            let own = scores(metric);
+            // A picture with an alpha channel was rounded once more.
+            let rounding = if more == "--alpha" { 0.05 } else { 0.0001 };
+            assert_near(number(&printed, metric, 1), own.iter().sum::<f64>() / 4.0, rounding);
+            assert_near(number(&printed, metric, 2), own.iter().copied().fold(f64::INFINITY, f64::min), rounding);
+        }
+        let printed = done(folder.path(), &format!("compare {out}/000020.png toy/rgb/000020.png"));
+        assert_near(number(&printed, "psnr", 1), scores("psnr")[0], 0.05);
+    }
+    // Another extension is the same picture's.
+    let photograph = image::open(folder.path().join("toy/rgb/000020.png")).expect("a picture").to_rgb8();
+    photograph.save(folder.file("photographs/000020.jpg")).expect("a picture");
+    folder.write("one/000020.png", std::fs::read(folder.path().join("out/000020.png")).expect("a picture"));
+    let printed = done(folder.path(), "compare one photographs");
+    assert!(number(&printed, "psnr", 1) > 10.0, "{printed}");
+}
+
+fn transparent_pictures_are_laid_over_a_background() {
+    let folder = toy();
+    let picture = |name: &str, pixel: [u8; 4]| {
+        image::RgbaImage::from_pixel(16, 16, image::Rgba(pixel)).save(folder.file(name)).expect("a picture");
+    };
+    picture("clear.png", [255, 0, 0, 0]);
+    picture("white.png", [255, 255, 255, 255]);
+    picture("green.png", [0, 255, 0, 255]);
+    picture("red.png", [255, 0, 0, 255]);
+    for (background, same) in [("", "white"), ("--background 0,255,0", "green"), ("--background none", "red")] {
+        let printed = done(folder.path(), &format!("compare clear.png {same}.png {background}"));
+        assert_eq!(row(&printed, "psnr")[1], "inf", "{background}: {printed}");
+    }
+    let printed = done(folder.path(), "compare clear.png green.png");
+    assert!(number(&printed, "psnr", 1) < 10.0 && printed.contains("over 255,255,255 (the default)"), "{printed}");
+}
+
 fn what_cannot_be_compared() {
     let folder = toy();
     folder.write("made/none.txt", "no picture");
     folder.write("broken.png", "no picture");
-    folder.image("small.png", 4, 4);
+    folder.image("small.png", 4, 3);
+    folder.image("large.png", 256, 256);
     folder.write("head.safetensors", safetensors(&[("mlp.weight", "F32", &[1], f32_bytes([1.0]))]));
     let refused = |arguments: &str, parts: &[&str]| {
         assert_refused(BINARY, folder.path(), &format!("compare {arguments} --device cpu"), parts);
@@ -46,7 +114,8 @@ fn what_cannot_be_compared() {
     refused("toy/rgb made", &["made/000000.png: is missing", "toy/rgb/000000.png"]);
     refused("broken.png toy/rgb/000000.png", &["broken.png: not a readable image"]);
     refused("toy/rgb/000000.png toy/rgb", &["toy/rgb: is a folder"]);
-    refused("small.png toy/rgb/000000.png", &["small.png", "4x4 cannot be compared with one of 128x128"]);
+    refused("large.png toy/rgb/000000.png", &["large.png", "256x256 cannot be compared with one of 128x128"]);
+    refused("small.png toy/rgb/000000.png", &["small.png", "4x3 cannot be compared with one of 128x128"]);
     let one = "toy/rgb/000000.png toy/rgb/000001.png";
     refused(&format!("{one} --lpips alex=none.pth"), &["none.pth: cannot be read"]);
     let parts = ["--lpips alex", "head.safetensors", "missing: features.0.weight", "unexpected: mlp.weight"];

@@ -134,7 +134,7 @@ fn sources_too_few() {
 fn views_that_do_not_fit() {
     let render = |sources: &str| format!("{RENDER} --sources {sources}");
     assert_refused(&render("3,20"), &["toy: view '000020' is a target and a source at once", "--sources"]);
-    assert_refused(&render("1,77"), &["toy: has no view '77'", "000000 .. 000023"]);
+    assert_refused(&render("1,77"), &["toy: has no view '77'", "24 views are 000000 .. 000023, or by index #0 .. #23"]);
     assert_refused("render toy --targets lorry -o out", &["toy: has no view 'lorry'"]);
     assert_refused("weights toy --target 24", &["toy: has no view '24'"]);
     assert_refused("evaluate toy --targets 24", &["toy: has no view '24'"]);
@@ -147,7 +147,10 @@ fn views_that_do_not_fit() {
 
 fn schemes_that_are_none() {
     let render = |scheme: &str| format!("{RENDER} --weights {scheme}");
-    assert_wrong(&render("nearest"), &["unknown weighting scheme 'nearest'", "there are: mean, l1,"]);
+    assert_wrong(
+        &render("nearest"),
+        &["unknown weighting scheme 'nearest'", "there are: auto (the best for the scene), mean, l1,"],
+    );
     assert_wrong(&render("gaussian:beta=-1"), &["'gaussian': beta must be finite and at least 0, not '-1'"]);
     assert_wrong(&render("gaussian:beta=inf"), &["beta must be finite", "'inf'"]);
     assert_wrong(&render("gaussian:beta=NaN"), &["beta must be finite", "'NaN'"]);
@@ -221,7 +224,10 @@ fn arguments_of_another_network() {
             &format!("--model formula:8 {option}"),
             &[&format!("{name} cannot be used with '--model formula:8'"), "a PixelNeRF"],
         );
-        assert_wrong(&format!("render toy {option} -o out"), &["required arguments were not provided"]);
+        assert_wrong(
+            &format!("render toy {option} -o out"),
+            &[&format!("{name} is an option of a GeNVS"), "--model FILE"],
+        );
     }
     for option in
         ["--published-depth", "--probe-step 8", "--half-latents", "--compute layers", "--compute views,hidden"]

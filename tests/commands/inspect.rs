@@ -14,6 +14,7 @@ viewfuse_tests::trials![
     a_scene_in_a_map,
     two_views_from_one_place,
     a_background_of_many_colours,
+    views_are_listed_with_their_neighbours,
 ];
 
 fn inspection(folder: &Folder) -> Value {
@@ -45,6 +46,47 @@ fn a_good_scene() {
     let corners = inspection["object"].as_array().expect("an object");
     assert!(numbers(&corners[0]).iter().all(|x| *x < 0.0) && numbers(&corners[1]).iter().all(|x| *x > 0.0));
     assert!(done(scene.path(), "inspect toy").contains("warnings   none"));
+}
+
+fn views_are_listed_with_their_neighbours() {
+    let scene = toy();
+    let printed = done(scene.path(), "inspect toy --views");
+    let lines: Vec<Vec<&str>> = printed.lines().map(|line| line.split_whitespace().collect()).collect();
+    let row = lines.iter().find(|words| words.first() == Some(&"#3")).unwrap_or_else(|| panic!("{printed}"));
+    assert_eq!(row[..3], ["#3", "000003", "128x128"], "{printed}");
+    let listed: Value = serde_json::from_str(&done(scene.path(), "inspect toy --views --json")).expect("JSON");
+    let listed = listed.as_array().expect("a list");
+    assert_eq!(listed.len(), 24);
+    for (index, view) in listed.iter().enumerate() {
+        assert_eq!((view["index"].as_u64(), view["has_photograph"].as_bool()), (Some(index as u64), Some(true)));
+        let angles =
+            numbers(&view["neighbours"].as_array().expect("a list").iter().map(|own| own["degrees"].clone()).collect());
+        assert!(angles.len() == 3 && angles.is_sorted() && angles[0] > 0.0 && angles[2] < 90.0, "{view}");
+        let others: Vec<u64> =
+            view["neighbours"].as_array().expect("a list").iter().filter_map(|own| own["index"].as_u64()).collect();
+        assert!(!others.contains(&(index as u64)), "{view}");
+    }
+    // By index, wherever views are named.
+    let weights = |target: &str| done(scene.path(), &format!("weights toy --target {target} --sources 0..7"));
+    assert_eq!(weights("#20"), weights("000020"));
+    for (arguments, names) in [
+        ("--targets #20,#22..#23 --sources #0..#7/2", vec!["000020.png", "000022.png", "000023.png"]),
+        ("--between #20 #23 --frames 2 --sources 0..7", vec!["between-000.png", "between-001.png"]),
+    ] {
+        let render =
+            format!("render toy {arguments} --size 16x16 --weights mean --device cpu --no-sheets --replace -o out");
+        done(scene.path(), &render);
+        let written = names_in(&scene.path().join("out"));
+        assert!(names.iter().all(|name| written.iter().any(|own| own == name)), "{written:?}");
+    }
+    let error = run(super::BINARY, scene.path(), "render toy --targets 0000020 --size 16x16 -o elsewhere");
+    assert_eq!(error.code, Some(0), "a number, however it is written");
+    for (target, parts) in
+        [("00002x", "the nearest names are '000020', '000021', '000022'"), ("#24", "by index #0 .. #23")]
+    {
+        let error = run(super::BINARY, scene.path(), &format!("weights toy --target {target}"));
+        assert!(error.code == Some(1) && error.stderr.contains(parts), "{}", error.stderr);
+    }
 }
 
 fn draws_the_cameras() {

@@ -9,11 +9,14 @@ mod compare;
 mod convert;
 mod devices;
 mod errors;
+mod folders;
 mod genvs;
+mod help;
 mod hostile;
 mod inspect;
 mod interrupt;
 mod kill;
+mod limits;
 mod lists;
 mod memory;
 mod moving;
@@ -54,11 +57,14 @@ fn main() -> ExitCode {
         convert::trials(),
         devices::trials(),
         errors::trials(),
+        folders::trials(),
         genvs::trials(),
+        help::trials(),
         hostile::trials(),
         inspect::trials(),
         interrupt::trials(),
         kill::trials(),
+        limits::trials(),
         lists::trials(),
         memory::trials(),
         moving::trials(),
@@ -119,6 +125,7 @@ fn help_fits_and_gives_examples() {
         "pareto",
         "report",
         "compare",
+        "completions",
         "train",
         "scenes make",
         "devices",

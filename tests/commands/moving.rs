@@ -141,13 +141,14 @@ fn a_run_that_was_killed_twice_ends_with_the_same_bytes() {
 fn another_run_begins_anew() {
     let scene = toy();
     let folder = scene.path();
-    let arguments = "render toy --orbit 60 --size 24x24 --device cpu --no-sheets -o cut";
+    let arguments = "render toy --orbit 60 --size 24x24 --device cpu --no-sheets --replace -o cut";
     killed(folder, arguments, 2);
-    let printed = done(folder, &format!("{PATH} -o cut"));
+    let printed = done(folder, &format!("{PATH} --replace -o cut"));
     assert!(!printed.contains("continued"), "{printed}");
     // Other weights make other pictures.
     killed(folder, arguments, 2);
-    let printed = done(folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean -o cut");
+    let printed =
+        done(folder, "render toy --orbit 4 --size 24x24 --device cpu --no-sheets --weights mean --replace -o cut");
     assert!(!printed.contains("continued"), "{printed}");
     assert!(!folder.join("cut/frames.jsonl").exists() && folder.join("cut/run.json").is_file());
 }

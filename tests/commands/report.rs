@@ -203,7 +203,7 @@ fn a_person_sees_what_was_measured(browser: &Browser) {
     let printed =
         done(BINARY, folder.path(), &format!("evaluate toy lorry --protocol random {SMALL} --pictures 1 -o random"));
     let row = printed.lines().find(|line| line.starts_with(" distance:power=2")).expect("a row");
-    let words = |text: &str| text.replace('*', "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let words = |text: &str| text.replace(['*', '~'], "").split_whitespace().map(str::to_owned).collect::<Vec<_>>();
     let rows = views[0]["tables"][3]["rows"].as_array().expect("rows");
     let own = rows.iter().filter_map(Value::as_array).find(|row| row[0]["text"] == "distance:power=2").expect("a row");
     let shown: Vec<String> = own.iter().flat_map(|cell| words(cell["text"].as_str().expect("a text"))).collect();

@@ -1,6 +1,7 @@
 //! `viewfuse view`: who may ask, what is answered, and the page in a browser that is driven as a hand does it.
 //!
 //! ```text
+//! attacks    the server, by programs that mean ill
 //! devtools   a browser that is driven
 //! requests   the server, by requests alone
 //! page       the page: what a person does and sees
@@ -11,6 +12,7 @@
 //! fail instead. Pictures of the page, to be looked at, are left in `tmp/view` of the target folder.
 #![cfg(unix)]
 
+mod attacks;
 mod devtools;
 mod moves;
 mod page;
@@ -26,7 +28,7 @@ use viewfuse_tests::places::repository;
 use viewfuse_tests::viewer::Program;
 
 pub(crate) fn trials() -> Vec<Trial> {
-    requests::trials().into_iter().chain(page::trials()).chain(moves::trials()).collect()
+    requests::trials().into_iter().chain(attacks::trials()).chain(page::trials()).chain(moves::trials()).collect()
 }
 
 /// The viewer on the CPU.

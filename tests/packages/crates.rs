@@ -7,11 +7,13 @@ use std::collections::BTreeSet;
 /// So many crates the command may take with its default features, procedural macros and what builds them included.
 const MAX_CRATES: usize = 120;
 /// Not one of these is among them: features that are off by default, and dependencies that cost more than they saved.
-const FORBIDDEN: [&str; 14] = [
+const FORBIDDEN: [&str; 16] = [
     "viewfuse-check",
     "viewfuse-synthetic",
     "viewfuse-train",
     "candle-core",
+    "clap_complete",
+    "clap_mangen",
     "faer",
     "maud",
     "plotters",
@@ -53,7 +55,7 @@ const HEAVY: [(&str, &[&str]); 11] = [
     ("maud", &["viewfuse-evaluate?"]),
     ("base64", &["viewfuse-evaluate?"]),
     ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
-    ("tiny_http", &["viewfuse-view"]),
+    ("httparse", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),
     ("clap", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),

@@ -68,8 +68,13 @@ pub fn killed_when(binary: &str, folder: &Path, arguments: &str, ready: impl FnM
 /// Starts the command, to be interrupted.
 #[track_caller]
 pub fn start(binary: &str, folder: &Path, arguments: &str) -> Child {
-    let mut run = command(binary, folder, arguments);
-    run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
+    spawn(command(binary, folder, arguments))
+}
+
+/// Starts a command whose output is kept.
+#[track_caller]
+pub fn spawn(mut command: Command) -> Child {
+    command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the command starts")
 }
 
 /// Resident memory of a process in KiB; 0 where the system does not say it, and after its end.

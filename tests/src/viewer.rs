@@ -1,12 +1,12 @@
 //! `viewfuse view` as a running program, and requests to it without a browser.
 
-use crate::command::{resident_kib, start};
+use crate::command::{command, resident_kib, spawn};
 use crate::patience::{PATIENCE, end, send};
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Child, ChildStderr};
+use std::process::{Child, ChildStderr, Command};
 
 /// A program that is ended with this value.
 pub struct Program {
@@ -37,7 +37,13 @@ impl Program {
     /// Starts `view` in a folder and waits until it tells its address.
     #[track_caller]
     pub fn start(binary: &str, device: &str, folder: &Path, arguments: &str) -> Program {
-        let mut process = start(binary, folder, &format!("view {arguments} --no-browser --device {device}"));
+        Program::of(command(binary, folder, &format!("view {arguments} --no-browser --device {device}")))
+    }
+
+    /// Starts a command and waits until it tells its address.
+    #[track_caller]
+    pub fn of(command: Command) -> Program {
+        let mut process = spawn(command);
         let mut lines = BufReader::new(process.stdout.take().expect("a pipe")).lines();
         let address = lines.find_map(|line| line.expect("text").strip_prefix("http://").map(str::to_owned));
         let Some(address) = address else {
@@ -86,6 +92,11 @@ impl Program {
     pub fn connect(&self) -> Connection<'_> {
         let stream = TcpStream::connect(&self.host).expect("a server");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time limit");
+        self.connection_of(stream)
+    }
+
+    /// A connection that was opened elsewhere.
+    pub fn connection_of(&self, stream: TcpStream) -> Connection<'_> {
         Connection { program: self, stream: BufReader::new(stream) }
     }
 

@@ -5,12 +5,15 @@ mod bench;
 #[cfg(feature = "check")]
 mod check;
 mod compare;
+#[cfg(feature = "completions")]
+mod completions;
 mod convert;
 mod devices;
 mod ending;
 mod environment;
 mod evaluate;
 mod export;
+mod help;
 mod hints;
 mod inspect;
 mod left_out;
@@ -42,6 +45,8 @@ mod view;
 mod weighting;
 mod weights;
 
+#[cfg(not(feature = "completions"))]
+use left_out::completions;
 #[cfg(not(feature = "pareto"))]
 use left_out::pareto;
 #[cfg(not(feature = "report"))]
@@ -57,6 +62,7 @@ use left_out::{bench, check, verify};
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::env::args_os;
 use std::fmt::Display;
 use std::process::ExitCode;
 
@@ -104,6 +110,8 @@ enum Command {
     Convert(convert::Arguments),
     /// Write a scene in another layout.
     Export(export::Arguments),
+    /// Print what a shell needs to complete commands and options, or write manual pages.
+    Completions(completions::Arguments),
     /// List the devices, and the missing requirements of those that cannot be used.
     Devices(devices::Arguments),
     /// Compare this build with files of reference values.
@@ -130,8 +138,11 @@ fn long_about() -> String {
 
 /// Runs the command that the process was started with.
 pub(crate) fn run() -> anyhow::Result<ExitCode> {
-    let mut command = left_out::marked(Arguments::command());
-    let matches = command.get_matches_mut();
+    let mut command = help::shortened(left_out::marked(Arguments::command()));
+    let matches = match command.try_get_matches_from_mut(args_os()) {
+        Ok(matches) => matches,
+        Err(error) => help::explained(error, args_os(), &mut command).exit(),
+    };
     let arguments = Arguments::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;
     terminal::silence_caught_panics();
     terminal::listen()?;
@@ -153,6 +164,10 @@ pub(crate) fn run() -> anyhow::Result<ExitCode> {
         Command::Report(arguments) => report::run(&arguments),
         Command::Convert(arguments) => convert::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
+        #[cfg(feature = "completions")]
+        Command::Completions(arguments) => completions::run(&arguments, command),
+        #[cfg(not(feature = "completions"))]
+        Command::Completions(arguments) => completions::run(&arguments),
         Command::Devices(arguments) => devices::run(&arguments),
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),

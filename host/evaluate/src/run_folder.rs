@@ -113,6 +113,9 @@ impl RunFolder {
             }
             return Ok(found);
         }
+        // Files of somebody else's are found before anything is written beside them.
+        let journals = if path.is_dir() { journal::journals(path)? } else { Vec::new() };
+        journals.iter().try_for_each(|journal| journal::check(journal).map(drop))?;
         let json = serde_json::to_vec_pretty(&settings);
         let json = json.map_err(|cause| FolderError::Json { path: file.clone(), line: None, cause })?;
         // Several shards may do this at once: they write the same content.

@@ -2,10 +2,14 @@
 
 mod bounded;
 mod folder;
+mod lock;
+mod ordinary;
 mod unfinished;
 
 pub use bounded::read_at_most;
 pub use folder::WholeFolder;
+pub use lock::FolderLock;
+pub use ordinary::{append_ordinary, is_ordinary, open_ordinary, read_line};
 pub use unfinished::remove_all;
 
 use std::io::{BufWriter, Write};
@@ -31,6 +35,18 @@ pub enum WriteError {
         path: PathBuf,
         /// The encoder's error.
         cause: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Another process writes to the folder.
+    #[error("{}: another process is writing to this folder", path.display())]
+    Busy {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file of this name is a person's own: it is neither continued nor removed.
+    #[error("{}: is not what this program keeps under this name; move it, or give another folder", path.display())]
+    NotOwn {
+        /// The file.
+        path: PathBuf,
     },
 }
 

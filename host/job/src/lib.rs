@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! text       text of files, in messages                    in_line
+//! shell      words as a shell takes them                  quoted
 //! progress   progress reports and cancellation                Progress, Silent, Interrupted
 //! panics     panics of other libraries as errors              caught
 //! files      output files, completely or not at all           write_whole, WholeFile, WholeFolder
@@ -17,6 +18,7 @@ pub mod digest;
 pub mod files;
 pub mod panics;
 pub mod progress;
+pub mod shell;
 pub mod text;
 
 /// The examples of the README, compiled and run.

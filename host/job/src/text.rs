@@ -1,4 +1,4 @@
-//! Text of files in messages.
+//! Text of files in messages, and names that were nearly written.
 
 use std::fmt::{Display, Write};
 
@@ -16,8 +16,35 @@ pub fn in_line(text: impl Display) -> String {
     line
 }
 
+/// Of the names that are known, those that a text most likely meant, the nearest first, at most `most`: at most half of its
+/// characters have to be changed, inserted, removed or swapped.
+pub fn nearest<'a>(text: &str, known: impl IntoIterator<Item = &'a str>, most: usize) -> Vec<&'a str> {
+    let length = |text: &str| text.chars().count();
+    let near = |name: &'a str| {
+        let edits = strsim::damerau_levenshtein(text, name);
+        (2 * edits <= length(text).max(length(name))).then_some((edits, name))
+    };
+    let mut near: Vec<(usize, &str)> = known.into_iter().filter_map(near).collect();
+    // Names of one distance stay in their order.
+    near.sort_by_key(|(edits, _)| *edits);
+    near.into_iter().map(|(_, name)| name).take(most).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use super::nearest;
+
+    #[test]
+    fn what_was_nearly_written_is_found() {
+        let known = ["auto", "mean", "error", "gaussian"];
+        for (text, expected) in [("eror", "error"), ("auot", "auto"), ("gausian", "gaussian"), ("mena", "mean")] {
+            assert_eq!(nearest(text, known, 1), [expected], "{text}");
+        }
+        assert_eq!(nearest("median", known, 3), ["mean"]);
+        assert!(nearest("xyz", known, 3).is_empty() && nearest("", known, 3).is_empty());
+        assert_eq!(nearest("im2", ["im0", "im1", "im20"], 2), ["im0", "im1"]);
+    }
+
     #[test]
     fn a_line_stays_one() {
         assert_eq!(super::in_line("a\nb\u{1b}[c é"), "a\\u000ab\\u001b[c é");

@@ -1,14 +1,10 @@
 //! Checks of an output folder before work begins: what a run would destroy there, and targets whose files have one name.
 
-use crate::run::{RECORD, SUFFIXES};
-use serde_json::Value;
-use std::collections::HashMap;
+use crate::earlier::{earlier_files, files_of, recorded_targets};
+use crate::record::{RECORD, SUFFIXES};
+use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
-use viewfuse_job::files::read_at_most;
 use viewfuse_scene::few_shot::Target;
-
-/// Most bytes of a run record. Larger ones are no records of this program.
-const LONGEST_RECORD: u64 = 256 << 20;
 
 /// Why pictures cannot be written to a folder.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +14,18 @@ pub enum OutputError {
     OtherRecord {
         /// The file in the way.
         path: PathBuf,
+    },
+    /// An earlier run wrote other pictures there.
+    #[error(
+        "{}: has {count} files of an earlier run, {example} for one, which are not of these targets", folder.display()
+    )]
+    OtherRun {
+        /// The folder.
+        folder: PathBuf,
+        /// How many files of the earlier run would stay.
+        count: usize,
+        /// One of them.
+        example: String,
     },
     /// Two targets have files of one name.
     #[error("the targets '{first}' and '{second}' would both be written to {file}; render them to different folders")]
@@ -31,12 +39,19 @@ pub enum OutputError {
     },
 }
 
-/// Checks that the pictures of these targets can be written to a folder: no two files have one name, and there is no record
-/// of anything but an earlier render.
+/// The background that the run of a folder used, red green blue in `[0, 1]`; `Some(None)` if it had none, `None` if the folder
+/// has no record.
+pub fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
+    crate::earlier::recorded_background(folder)
+}
+
+/// Checks that the pictures of these targets can be written to a folder: no two files have one name, there is no record
+/// of anything but an earlier render, and, unless `replaces` is set, no picture of an earlier render would stay beside the new
+/// ones. (With it, such pictures are removed when the first new one is written.)
 ///
 /// # Errors
 /// [`OutputError`].
-pub fn check_folder(folder: &Path, targets: &[Target]) -> Result<(), OutputError> {
+pub fn check_folder(folder: &Path, targets: &[Target], replaces: bool) -> Result<(), OutputError> {
     let mut owners: HashMap<String, &str> = HashMap::new();
     for Target { name, .. } in targets {
         for suffix in SUFFIXES {
@@ -47,12 +62,18 @@ pub fn check_folder(folder: &Path, targets: &[Target]) -> Result<(), OutputError
         }
     }
     let path = folder.join(RECORD);
-    if path.exists() && !is_record(&path) { Err(OutputError::OtherRecord { path }) } else { Ok(()) }
-}
-
-/// Whether a file is the record of a render. An empty one is: of a machine that lost its power.
-fn is_record(path: &Path) -> bool {
-    let Ok(bytes) = read_at_most(path, LONGEST_RECORD) else { return false };
-    let is_of_render = |record: &Value| record.get("viewfuse").is_some() && record.get("frames").is_some();
-    bytes.is_empty() || serde_json::from_slice(&bytes).is_ok_and(|record| is_of_render(&record))
+    if path.exists() && recorded_targets(folder).is_none() {
+        return Err(OutputError::OtherRecord { path });
+    }
+    let own: BTreeSet<String> = targets.iter().flat_map(|target| files_of(&target.name)).collect();
+    // A video is of the whole run, and goes with its record.
+    let mut others: Vec<String> = earlier_files(folder).difference(&own).cloned().collect();
+    others.retain(|name| !name.starts_with("video."));
+    match others.first() {
+        Some(example) if !replaces => {
+            let (folder, count, example) = (folder.to_path_buf(), others.len(), example.clone());
+            Err(OutputError::OtherRun { folder, count, example })
+        }
+        _ => Ok(()),
+    }
 }

@@ -5,16 +5,23 @@
 
 use crate::record::FrameRecord;
 use serde::{Deserialize, Serialize};
-use std::fs::{self, File, OpenOptions};
-use std::io::Write;
+use std::fs::{self, File};
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
-use viewfuse_job::files::{WriteError, remove_if_there};
+use viewfuse_job::files::{WriteError, append_ordinary, open_ordinary, read_line, remove_if_there};
 
 /// Name of the file.
 pub const JOURNAL: &str = "frames.jsonl";
 
+/// Most bytes of a line.
+const MAX_LINE: u64 = 16 << 20;
+
+/// What every journal begins with, as [`Head`] is written.
+const BEGINNING: &[u8] = b"{\"run\":\"";
+
 /// The first line.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Head {
     run: String,
 }
@@ -28,6 +35,12 @@ pub struct FinishedFrame {
     pub files: Vec<String>,
 }
 
+/// What is read of a line where only the files count.
+#[derive(Deserialize)]
+struct FinishedFiles {
+    files: Vec<String>,
+}
+
 /// The journal of a run.
 #[derive(Debug)]
 pub struct Journal {
@@ -38,29 +51,60 @@ pub struct Journal {
     file: Option<File>,
 }
 
+/// A journal that is there, behind its first line.
+struct Reading {
+    path: PathBuf,
+    reader: BufReader<File>,
+    /// Which run it is of, and how long the first line is; `None` if that is not whole.
+    head: Option<(Head, u64)>,
+}
+
+impl Reading {
+    /// `None` if there is none.
+    fn open(folder: &Path) -> Result<Option<Reading>, WriteError> {
+        let path = folder.join(JOURNAL);
+        let failed = |cause| WriteError::Io { path: path.clone(), cause };
+        let Some(file) = open_ordinary(&path).map_err(failed)? else { return Ok(None) };
+        let mut reader = BufReader::new(file);
+        // What has a longer line is not of this program.
+        let Ok(line) = read_line(&mut reader, MAX_LINE) else { return Err(WriteError::NotOwn { path }) };
+        if line.ends_with(b"\n") {
+            return match serde_json::from_slice(&line) {
+                Ok(head) => Ok(Some(Reading { path, reader, head: Some((head, line.len() as u64)) })),
+                Err(_) => Err(WriteError::NotOwn { path }),
+            };
+        }
+        // A kill in the middle of the first line.
+        let is_own = line.starts_with(BEGINNING) || BEGINNING.starts_with(&line);
+        if is_own { Ok(Some(Reading { path, reader, head: None })) } else { Err(WriteError::NotOwn { path }) }
+    }
+
+    /// The next line that is whole.
+    fn line(&mut self) -> Result<Option<Vec<u8>>, WriteError> {
+        let line = read_line(&mut self.reader, MAX_LINE);
+        let line = line.map_err(|cause| WriteError::Io { path: self.path.clone(), cause })?;
+        Ok(Some(line).filter(|line| line.ends_with(b"\n")))
+    }
+}
+
 impl Journal {
     /// The journal of a folder for a run, and the frames that an earlier start of the same run has finished: those whose
     /// files are all there. `run` is any text that differs for runs that would write different frames. Nothing is
     /// written yet.
     ///
     /// # Errors
-    /// [`WriteError::Io`] if there is a journal that cannot be read.
+    /// [`WriteError::Io`] if there is a journal that cannot be read, [`WriteError::NotOwn`] if what has its name is none.
     pub fn open(folder: &Path, run: &str) -> Result<(Journal, Vec<FinishedFrame>), WriteError> {
-        let path = folder.join(JOURNAL);
-        let bytes = match fs::read(&path) {
-            Err(cause) if cause.kind() == std::io::ErrorKind::NotFound => Vec::new(),
-            Err(cause) => return Err(WriteError::Io { path, cause }),
-            Ok(bytes) => bytes,
-        };
-        let mut journal = Journal { path, run: run.to_owned(), whole: 0, file: None };
-        let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n"));
-        let head = lines.next().and_then(|line| Some((line.len(), serde_json::from_slice::<Head>(line).ok()?)));
-        let Some((length, _)) = head.filter(|(_, head)| head.run == run) else { return Ok((journal, Vec::new())) };
-        journal.whole = length as u64;
+        let mut journal = Journal { path: folder.join(JOURNAL), run: run.to_owned(), whole: 0, file: None };
         let mut frames: Vec<FinishedFrame> = Vec::new();
-        for line in lines {
+        let Some(mut reading) = Reading::open(folder)? else { return Ok((journal, frames)) };
+        let Some((_, length)) = reading.head.take().filter(|(head, _)| head.run == run) else {
+            return Ok((journal, frames));
+        };
+        journal.whole = length;
+        while let Some(line) = reading.line()? {
             // What another program wrote ends it.
-            let Ok(finished) = serde_json::from_slice::<FinishedFrame>(line) else { break };
+            let Ok(finished) = serde_json::from_slice::<FinishedFrame>(&line) else { break };
             journal.whole += line.len() as u64;
             if finished.files.iter().all(|file| folder.join(file).is_file()) {
                 frames.retain(|earlier| earlier.frame.target != finished.frame.target);
@@ -68,6 +112,28 @@ impl Journal {
             }
         }
         Ok((journal, frames))
+    }
+
+    /// The files that the journal of a folder lists, whichever run it is of.
+    pub(crate) fn files_of_any_run(folder: &Path) -> Vec<String> {
+        let mut files = Vec::new();
+        let Ok(Some(mut reading)) = Reading::open(folder) else { return files };
+        while let Ok(Some(line)) = reading.line() {
+            let Ok(finished) = serde_json::from_slice::<FinishedFiles>(&line) else { break };
+            files.extend(finished.files);
+        }
+        files
+    }
+
+    /// Removes the journal of whichever run from a folder.
+    ///
+    /// # Errors
+    /// [`WriteError`]: above all [`WriteError::NotOwn`] if what has its name is none.
+    pub(crate) fn remove_any(folder: &Path) -> Result<(), WriteError> {
+        match Reading::open(folder)? {
+            Some(reading) => remove_if_there(&reading.path),
+            None => Ok(()),
+        }
     }
 
     /// Begins to write: before the first file of a frame, so that no journal of another run stays beside it.
@@ -81,8 +147,10 @@ impl Journal {
         let failed = |cause| WriteError::Io { path: self.path.clone(), cause };
         if let Some(folder) = self.path.parent() {
             fs::create_dir_all(folder).map_err(failed)?;
+            // Nothing is cut that appeared in the meantime and is not of this program.
+            Reading::open(folder)?;
         }
-        let mut file = OpenOptions::new().create(true).append(true).open(&self.path).map_err(failed)?;
+        let mut file = append_ordinary(&self.path).map_err(failed)?;
         file.set_len(self.whole).map_err(failed)?;
         if self.whole == 0 {
             let head = line_of(&self.path, &Head { run: self.run.clone() })?;

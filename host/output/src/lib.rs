@@ -18,6 +18,7 @@
 //! weights  the weights of many targets: JSON, NumPy's arrays
 //! selected  the few sources that targets need: JSON, lines
 //! journal  what an interrupted run continues from
+//! earlier  what an earlier run left in a folder
 //! run      all of it in a folder
 //! folder   checks of that folder before work begins
 //! ```
@@ -26,6 +27,7 @@
 pub mod camera_map;
 pub mod canvas;
 pub mod depth;
+mod earlier;
 #[cfg(feature = "exr")]
 pub mod exr;
 pub mod folder;

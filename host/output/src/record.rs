@@ -10,6 +10,12 @@ use viewfuse_field::{Denoising, LeftOut, Setting};
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::{Scene, SceneFrame};
 
+/// Name of the file.
+pub const RECORD: &str = "run.json";
+
+/// What stands behind a target's name in the names of its pictures.
+pub const SUFFIXES: [&str; 4] = ["", "_depth", "_confidence", "_sheet"];
+
 /// A run as written to `run.json`. Times are in seconds.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunRecord {

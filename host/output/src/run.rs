@@ -4,12 +4,14 @@
 //! A run that was interrupted continues: [`RunWriter::resume`] tells which targets are finished.
 
 use crate::depth::{DepthFormat, write_depth};
-use crate::journal::{FinishedFrame, JOURNAL, Journal};
+use crate::earlier::{earlier_files, files_of};
+use crate::journal::{FinishedFrame, Journal};
 use crate::png::{without_background, write_png};
 use crate::rate::FrameRate;
 use crate::record::{
     ChosenRecord, DepthUnits, FrameRecord, RunRecord, background_record, kernel_records, source_names, times_record,
 };
+pub use crate::record::{RECORD, SUFFIXES};
 use crate::sheet::{Sheet, SheetSource, depth_picture};
 use crate::video::{VideoError, VideoFormat, write_video};
 use image::{DynamicImage, ImageBuffer, Luma, RgbImage};
@@ -19,18 +21,13 @@ use std::time::Duration;
 use viewfuse_field::Renderer;
 use viewfuse_field::auto::Chosen;
 use viewfuse_field::render::{Finished, Frame, RenderOptions};
-use viewfuse_job::files::{WriteError, remove_if_there, write_whole};
+use viewfuse_job::files::{FolderLock, WriteError, remove_if_there, write_whole};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{Scene, SceneFrame};
 use viewfuse_weighting::Weighting;
 
-/// Name of the run record.
-pub const RECORD: &str = "run.json";
-
-/// What stands behind a target's name in the names of its pictures.
-pub const SUFFIXES: [&str; 4] = ["", "_depth", "_confidence", "_sheet"];
 /// What is written for each target beside `NAME.png`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outputs {
@@ -53,6 +50,8 @@ impl Default for Outputs {
 pub struct RunWriter {
     folder: PathBuf,
     outputs: Outputs,
+    /// From the beginning if the folder is there, otherwise from the first file.
+    lock: Option<FolderLock>,
     journal: Option<Journal>,
     continued: usize,
     /// The targets' names, in their order.
@@ -97,6 +96,7 @@ impl RunWriter {
         RunWriter {
             folder: folder.to_path_buf(),
             outputs: Outputs::default(),
+            lock: None,
             journal: None,
             continued: 0,
             target_names: job.targets.iter().map(|target| target.name.clone()).collect(),
@@ -118,6 +118,17 @@ impl RunWriter {
         self.outputs = outputs;
     }
 
+    /// Lets no other process write to the folder, as soon as it is there.
+    ///
+    /// # Errors
+    /// [`WriteError::Busy`] while another process writes to it.
+    pub fn lock(&mut self) -> Result<(), WriteError> {
+        if self.lock.is_none() && self.folder.is_dir() {
+            self.lock = Some(FolderLock::take(&self.folder)?);
+        }
+        Ok(())
+    }
+
     /// Keeps a journal of finished frames, and continues an earlier start of the same run in this folder: returns the
     /// names of the targets that need not be rendered again. One target always remains. `run` is any text that differs for
     /// runs that would write different frames. Nothing is written yet.
@@ -125,6 +136,7 @@ impl RunWriter {
     /// # Errors
     /// [`WriteError::Io`] if there is a journal that cannot be read.
     pub fn resume(&mut self, run: &str) -> Result<BTreeSet<String>, WriteError> {
+        self.lock()?;
         let (journal, mut finished) = Journal::open(&self.folder, run)?;
         finished.retain(|earlier| self.target_names.contains(&earlier.frame.target));
         if finished.len() == self.target_names.len() {
@@ -200,19 +212,20 @@ impl RunWriter {
         Ok(())
     }
 
-    /// Before the first file: what an earlier run left, and what would be wrong for the new pictures, goes.
+    /// Before the first file: what an earlier run left, which would be wrong beside the new pictures, goes.
     fn begin(&mut self) -> Result<(), WriteError> {
-        let record = self.folder.join(RECORD);
-        if record.is_file() {
-            for format in VideoFormat::ALL {
-                remove_if_there(&self.folder.join(format!("video.{format}")))?;
-            }
-            remove_if_there(&record)?;
-        }
+        let failed = |cause| WriteError::Io { path: self.folder.clone(), cause };
+        std::fs::create_dir_all(&self.folder).map_err(failed)?;
+        self.lock()?;
+        // A journal of this run lists files that stay.
+        let own: BTreeSet<String> = self.target_names.iter().flat_map(|target| files_of(target)).collect();
+        let earlier = earlier_files(&self.folder);
         match &mut self.journal {
-            Some(journal) => journal.begin(),
-            None => remove_if_there(&self.folder.join(JOURNAL)),
+            Some(journal) => journal.begin()?,
+            None => Journal::remove_any(&self.folder)?,
         }
+        earlier.difference(&own).try_for_each(|file| remove_if_there(&self.folder.join(file)))?;
+        remove_if_there(&self.folder.join(RECORD))
     }
 
     /// Writes the pictures of all targets, which are there, as `video.FORMAT`; returns its path. For before the record.

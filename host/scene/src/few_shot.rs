@@ -1,7 +1,7 @@
 //! The selection of source views and target cameras.
 //!
-//! Views are chosen by a list of items separated by commas: a view's name, a range `A..B` of names (both ends
-//! included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
+//! Views are chosen by a list of items separated by commas: a view's name or number, its index as `#3` (from
+//! 0, in any scene), a range `A..B` of these (both ends included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
 //! either to take every `STEP`-th.
 
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
@@ -12,21 +12,22 @@ use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
 use viewfuse_core::sources::MAX_SOURCES;
+use viewfuse_job::text::nearest;
 
 /// Why a selection of views is invalid.
 #[derive(Debug, thiserror::Error)]
 pub enum SelectionError {
     /// A name in a list is no view of the scene.
-    #[error("{scene}: has no view '{name}'; its views are {first} .. {last}")]
+    #[error("{scene}: has no view '{name}'{nearest}; its {views}")]
     NoSuchView {
         /// The scene's path.
         scene: String,
         /// The given name.
         name: String,
-        /// Name of the scene's first view.
-        first: String,
-        /// Name of its last view.
-        last: String,
+        /// The names that it may have meant, in words.
+        nearest: String,
+        /// The scene's views, in words.
+        views: String,
     },
     /// A step is not a positive whole number.
     #[error("view list '{item}': the step behind '/' must be a whole number of at least 1")]
@@ -118,6 +119,9 @@ pub enum SelectionError {
         name: String,
     },
 }
+
+/// Names that an error suggests at most.
+const NEAREST: usize = 3;
 
 /// A camera to render, with its truth if the scene has it.
 #[derive(Clone, Debug, PartialEq)]
@@ -257,13 +261,23 @@ pub fn target_of(scene: &Scene, view: usize) -> Target {
     Target { name: name.clone(), camera: *camera, truth: image.is_some().then_some(view) }
 }
 
-/// The view of a name or number.
+/// The view of a name, a number or an index.
 fn view_of(scene: &Scene, name: &str) -> Result<usize, SelectionError> {
-    scene.view_named(name).ok_or_else(|| SelectionError::NoSuchView {
-        scene: scene.path.display().to_string(),
-        name: name.to_owned(),
-        first: scene.views.first().map(|view| view.name.clone()).unwrap_or_default(),
-        last: scene.views.last().map(|view| view.name.clone()).unwrap_or_default(),
+    let names = || scene.views.iter().map(|view| view.name.as_str());
+    scene.view_named(name).ok_or_else(|| {
+        let near: Vec<String> = nearest(name, names(), NEAREST).iter().map(|own| format!("'{own}'")).collect();
+        let (first, last) = (names().next().unwrap_or_default(), names().next_back().unwrap_or_default());
+        let count = scene.views.len();
+        SelectionError::NoSuchView {
+            scene: scene.path.display().to_string(),
+            name: name.to_owned(),
+            nearest: if near.is_empty() {
+                String::new()
+            } else {
+                format!(", the nearest names are {}", near.join(", "))
+            },
+            views: format!("{count} views are {first} .. {last}, or by index #0 .. #{}", count.saturating_sub(1)),
+        }
     })
 }
 

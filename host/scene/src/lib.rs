@@ -9,6 +9,7 @@
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up
 //! path          cameras without photographs: from files, or generated
+//! listing       the views as a list, with their neighbours: ListedView
 //! few_shot      which views are sources, which cameras are targets: FewShot
 //! photographs   sources at working size without their background: SourceImages
 //! inspect       what a scene holds, and likely faults in it
@@ -19,6 +20,7 @@
 pub mod dataset;
 pub mod few_shot;
 pub mod inspect;
+pub mod listing;
 pub mod numpy;
 pub mod path;
 pub mod photographs;

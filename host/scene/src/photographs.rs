@@ -5,7 +5,7 @@ mod matte;
 pub mod object_box;
 mod resample;
 
-pub use ground_truth::GroundTruth;
+pub use ground_truth::{GroundTruth, read_over};
 pub use matte::BackgroundChoice;
 
 use crate::{Photograph, Scene, SceneError, View};

@@ -647,12 +647,14 @@ function transforms() {
 }
 
 function command() {
-  const weights = (scheme === scene.scheme && scene.commands.first_weights) || scheme;
-  const word = /^[\w@%+=:,./-]+$/.test(weights) ? weights : `'${weights.replaceAll("'", "'\\''")}'`;
+  const { render, options, first_weights: first } = scene.commands;
+  if (render === '') return '';
+  // Words for a shell come from the program; a scheme of the menu has none that needs quotes.
+  const weights = scheme === scene.scheme ? first : scheme;
   const matrix = JSON.stringify(matrixOf(pose));
   const own = scene.others.find((other) => JSON.stringify(matrixOf(other.pose)) === matrix);
-  const line = own ? scene.commands.view.replace('{view}', own.name) : scene.commands.pose.replace('{file}', FILE);
-  return line.replace('{weights}', word);
+  const target = own ? `--targets ${own.word}` : `--camera-path ${FILE}`;
+  return `${render} ${target}${options} --weights ${weights} -o out`;
 }
 
 function tellCommand() {

@@ -12,13 +12,19 @@
 //! response     answers of the server, with their headers
 //! coarse       a cheaper form of the field, and smaller sources
 //! render_loop  takes requests, renders, answers
+//! message      requests as HTTP writes them, within limits
+//! connection   one connection: requests in, answers out, within limits of time
+//! connections  how many there may be, and which one makes way
 //! server       who may ask, and for what
 //! ```
 #![forbid(unsafe_code)]
 
 mod answer;
 mod coarse;
+mod connection;
+mod connections;
 mod mailbox;
+mod message;
 mod pace;
 mod page;
 mod render_loop;
@@ -35,6 +41,8 @@ pub use subject::Commands;
 use render_loop::Shared;
 use server::Server;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 use subject::Subject;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::SourcesError;
@@ -45,6 +53,9 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
+
+/// Pause between two looks whether the server has ended.
+const PAUSE: Duration = Duration::from_millis(5);
 
 /// Why a viewer ended, or did not start.
 #[derive(Debug, thiserror::Error)]
@@ -131,18 +142,24 @@ impl<'a> Viewer<'a> {
         &self.device_name
     }
 
-    /// Renders and answers, on this thread and one more, until the progress says that it is cancelled. Pages may come and
-    /// go.
+    /// Renders on this thread and answers on others, one of each connection, until the progress says that it is cancelled.
+    /// Pages may come and go.
     ///
     /// # Errors
     /// [`ViewError::Render`] if the sources cannot be prepared, or if the device fails.
     pub fn serve(&self, progress: &dyn Progress) -> Result<(), ViewError> {
         let shared = Shared::new();
         let is_over = AtomicBool::new(false);
-        std::thread::scope(|scope| {
-            scope.spawn(|| self.server.serve(self, &shared, progress, || is_over.load(Ordering::Relaxed)));
+        thread::scope(|scope| {
+            let serving = scope.spawn(|| self.server.serve(self, &shared, &is_over));
             let rendered = render_loop::run(self, &shared, progress);
+            // Connections that wait for a picture get none.
+            shared.mailbox.close();
             is_over.store(true, Ordering::Relaxed);
+            while !serving.is_finished() {
+                self.server.wake();
+                thread::sleep(PAUSE);
+            }
             rendered
         })?;
         Ok(())

@@ -28,11 +28,13 @@ struct State<L> {
     at_work: Option<String>,
     /// A newer request of that tab has arrived.
     is_superseded: bool,
+    /// Nobody takes requests any more.
+    is_closed: bool,
 }
 
 impl<L: Queued> Mailbox<L> {
     pub(crate) fn new() -> Mailbox<L> {
-        let state = State { waiting: Vec::new(), at_work: None, is_superseded: false };
+        let state = State { waiting: Vec::new(), at_work: None, is_superseded: false, is_closed: false };
         Mailbox { state: Mutex::new(state), arrived: Condvar::new() }
     }
 
@@ -41,9 +43,12 @@ impl<L: Queued> Mailbox<L> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts a request in; an older one of the same tab is dropped.
+    /// Puts a request in; an older one of the same tab is dropped. After the end it is forgotten.
     pub(crate) fn put(&self, message: L) {
         let mut state = self.state();
+        if state.is_closed {
+            return;
+        }
         state.is_superseded |= state.at_work.as_deref() == Some(message.tab());
         let older = state.waiting.iter().position(|other| other.tab() == message.tab());
         let older = older.map(|place| state.waiting.remove(place));
@@ -53,6 +58,13 @@ impl<L: Queued> Mailbox<L> {
         if let Some(older) = older {
             older.drop_as_stale();
         }
+    }
+
+    /// Nobody takes requests any more: those that wait are forgotten.
+    pub(crate) fn close(&self) {
+        let mut state = self.state();
+        state.is_closed = true;
+        state.waiting.clear();
     }
 
     /// The next request: coarse pictures first, then in the order of arrival. Waits at most so long.
@@ -143,6 +155,17 @@ mod tests {
             [taken(&mailbox), taken(&mailbox), taken(&mailbox), taken(&mailbox)],
             [Some(3), Some(2), Some(4), None]
         );
+    }
+
+    #[test]
+    fn after_the_end_everything_is_forgotten() {
+        let (mailbox, note, dropped) = office();
+        mailbox.put(note("a", 1, false));
+        mailbox.close();
+        mailbox.put(note("b", 2, true));
+        assert_eq!(taken(&mailbox), None);
+        drop(note);
+        assert_eq!(dropped.iter().count(), 0, "and with them whoever waits: all senders are gone");
     }
 
     #[test]

@@ -14,6 +14,7 @@ use crate::request::{COARSE_SIDE, Request};
 use crate::response::Answer;
 use crate::status::Status;
 use crate::{Viewed, Viewer};
+use std::sync::mpsc::Sender;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
@@ -26,7 +27,7 @@ use viewfuse_scene::photographs::{Album, PhotographsError, SourceImages, reduced
 use viewfuse_weighting::Weighting;
 
 /// So long the loop waits for a request before it looks whether it should end.
-pub(crate) const PATIENCE: Duration = Duration::from_millis(50);
+const PATIENCE: Duration = Duration::from_millis(50);
 
 /// What the render loop and the server share.
 pub(crate) struct Shared {
@@ -42,10 +43,11 @@ impl Shared {
     }
 }
 
-/// A request for a picture, with the connection that waits for it.
+/// A request for a picture.
 pub(crate) struct Job {
     pub(crate) request: Request,
-    pub(crate) connection: tiny_http::Request,
+    /// To the connection that waits. That it is gone is nothing to report: a page may be closed at any time.
+    pub(crate) reply: Sender<Answer>,
 }
 
 impl Queued for Job {
@@ -58,7 +60,7 @@ impl Queued for Job {
     }
 
     fn drop_as_stale(self) {
-        Answer::stale().send(self.connection);
+        self.reply.send(Answer::stale()).ok();
     }
 }
 
@@ -217,7 +219,7 @@ impl<'a> RenderLoop<'a> {
                     continue;
                 }
                 Err(error) if error.is_of_device() => {
-                    Answer::error(500, &error.to_string()).send(job.connection);
+                    job.reply.send(Answer::error(500, &error.to_string())).ok();
                     return Err(error);
                 }
                 picture => picture.map_err(|error| error.to_string()).and_then(|(frame, is_full)| {
@@ -225,11 +227,11 @@ impl<'a> RenderLoop<'a> {
                 }),
             };
             self.shared.mailbox.finish();
-            match bytes {
+            let answer = match bytes {
                 Ok(bytes) => Answer::of("application/octet-stream", bytes),
                 Err(message) => Answer::error(500, &message),
-            }
-            .send(job.connection);
+            };
+            job.reply.send(answer).ok();
         }
         Ok(())
     }

@@ -6,31 +6,40 @@
 //! Nothing is written: a request changes no file and no state that another tab can see.
 
 use crate::Viewer;
+use crate::connection::Connection;
+use crate::connections::{Admission, Connections, Standing};
+use crate::message::Message;
 use crate::page::FILES;
-use crate::render_loop::{Job, PATIENCE, Shared};
+use crate::render_loop::{Job, Shared};
 use crate::request::Request;
 use crate::response::Answer;
 use serde::Serialize;
-use std::io::Read;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::time::{Duration, Instant};
-use tiny_http::Method;
-use viewfuse_job::progress::Progress;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::channel;
+use std::thread;
+use std::time::Duration;
 use viewfuse_weighting::sources::SourcePoses;
 
-/// Most bytes of a request's body. What is shorter than this is read before the request arrives here.
-const LONGEST_BODY: usize = 1024;
+/// The port that an address need not name.
+const USUAL_PORT: u16 = 80;
 
-/// So often a connection of the server to itself is opened and closed. When several connections arrive at once, tiny_http's
-/// pool may count on a thread that is taken already, and leave one of them waiting until the next one arrives.
-const NUDGE: Duration = Duration::from_millis(100);
+/// Pause after a connection that could not be accepted, because the system has no more of them.
+const PAUSE: Duration = Duration::from_millis(10);
+
+/// At the end, answers that are on their way have so long to arrive.
+const TIME_TO_END: Duration = Duration::from_millis(200);
+
+/// Stack of a connection's thread: it parses and weighs, and renders nothing.
+const STACK_BYTES: usize = 1 << 20;
 
 /// Random bytes of the token.
 const TOKEN_BYTES: usize = 16;
 
 /// A listening server, whose address is known.
 pub(crate) struct Server {
-    http: tiny_http::Server,
+    listener: TcpListener,
     port: u16,
     token: String,
 }
@@ -46,9 +55,6 @@ pub enum ListenError {
         /// The system's error.
         cause: std::io::Error,
     },
-    /// The server could not be started.
-    #[error("the server cannot be started: {0}")]
-    Start(Box<dyn std::error::Error + Send + Sync>),
     /// The system gives no random numbers.
     #[error("the system gives no random numbers: {0}")]
     Random(getrandom::Error),
@@ -79,7 +85,7 @@ impl Server {
         let mut token = [0; TOKEN_BYTES];
         getrandom::fill(&mut token).map_err(ListenError::Random)?;
         let token = token.iter().map(|byte| format!("{byte:02x}")).collect();
-        Ok(Server { http: tiny_http::Server::from_listener(listener, None).map_err(ListenError::Start)?, port, token })
+        Ok(Server { listener, port, token })
     }
 
     /// The page's address.
@@ -87,60 +93,98 @@ impl Server {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token)
     }
 
-    /// Answers until the progress says that it is cancelled, or `is_over`.
-    pub(crate) fn serve(
-        &self,
-        viewer: &Viewer<'_>,
-        shared: &Shared,
-        progress: &dyn Progress,
-        is_over: impl Fn() -> bool,
-    ) {
-        let mut nudged = Instant::now();
-        while !progress.is_cancelled() && !is_over() {
-            if nudged.elapsed() > NUDGE {
-                drop(TcpStream::connect((Ipv4Addr::LOCALHOST, self.port)));
-                nudged = Instant::now();
+    /// Answers until it is over. Each connection has a thread.
+    pub(crate) fn serve(&self, viewer: &Viewer<'_>, shared: &Shared, is_over: &AtomicBool) {
+        let connections = Connections::default();
+        thread::scope(|scope| {
+            while !is_over.load(Ordering::Relaxed) {
+                let Ok((stream, _)) = self.listener.accept() else {
+                    // A client that is gone already, or one file too many: then one that idles makes way.
+                    connections.make_way();
+                    thread::sleep(PAUSE);
+                    continue;
+                };
+                let stream = Arc::new(stream);
+                if let Some(admission) = connections.admit(&stream) {
+                    let answer_all = move || self.answer_all(&stream, &admission, viewer, shared);
+                    // Without a thread the connection is closed.
+                    thread::Builder::new().stack_size(STACK_BYTES).spawn_scoped(scope, answer_all).ok();
+                }
             }
-            // An error is that of a single connection.
-            let Ok(Some(request)) = self.http.recv_timeout(PATIENCE) else { continue };
-            self.answer(request, viewer, shared);
+            connections.close(TIME_TO_END);
+        });
+    }
+
+    /// Lets [`Server::serve`] see that it is over: it waits for a connection.
+    pub(crate) fn wake(&self) {
+        // If there are no connections left for this one, another one wakes it.
+        TcpStream::connect_timeout(&SocketAddr::from((Ipv4Addr::LOCALHOST, self.port)), TIME_TO_END).ok();
+    }
+
+    /// Answers the requests of a connection, one after another.
+    fn answer_all(&self, stream: &TcpStream, admission: &Admission<'_>, viewer: &Viewer<'_>, shared: &Shared) {
+        let mut connection = Connection::new(stream);
+        loop {
+            let (answer, is_head_only, is_last) = match connection.receive() {
+                Ok(message) => {
+                    let Some(answer) = self.answer(&message, admission, viewer, shared) else { return };
+                    (answer, message.method == "HEAD", message.is_last)
+                }
+                Err(Some(refused)) => {
+                    admission.stands(Standing::Refused);
+                    (refused, false, true)
+                }
+                Err(None) => return,
+            };
+            if connection.send(&answer, is_head_only, is_last).is_err() {
+                return;
+            }
+            if is_last {
+                return connection.end();
+            }
         }
     }
 
-    fn answer(&self, mut connection: tiny_http::Request, viewer: &Viewer<'_>, shared: &Shared) {
-        let url = connection.url().to_owned();
-        let named = |name: &'static str| {
-            let mut values = connection.headers().iter().filter(move |header| header.field.equiv(name));
-            let first = values.next().map(|header| header.value.as_str());
-            // Two of a kind are a trick.
-            if values.next().is_some() { Some("") } else { first }
+    /// The answer to a request. None if the viewer ended before there was one.
+    fn answer(
+        &self,
+        message: &Message,
+        admission: &Admission<'_>,
+        viewer: &Viewer<'_>,
+        shared: &Shared,
+    ) -> Option<Answer> {
+        let headers = ["Host", "Origin", "Sec-Fetch-Site"].map(|name| message.header(name));
+        let route = match check(self.port, &self.token, &message.method, &message.target, headers) {
+            Ok(route) => route,
+            Err(answer) => return Some(answer),
         };
-        let checked = check(
-            self.port,
-            &self.token,
-            connection.method(),
-            &url,
-            [named("Host"), named("Origin"), named("Sec-Fetch-Site")],
-        );
-        let answer = match checked {
-            Err(answer) => answer,
-            Ok(Route::Page(file)) => Answer::of(FILES[file].media_type, FILES[file].text),
-            Ok(Route::Scene) => json(&viewer.subject),
-            Ok(Route::Status) => Answer::json(shared.status.json()),
-            Ok(Route::Source(number)) => {
+        admission.stands(Standing::OfPage);
+        let read = || {
+            let request = Request::read(&message.body, viewer.viewed.weighting);
+            request.map_err(|error| Answer::error(400, &error.to_string()))
+        };
+        Some(match route {
+            Route::Page(file) => Answer::of(FILES[file].media_type, FILES[file].text),
+            Route::Scene => json(&viewer.subject),
+            Route::Status => Answer::json(shared.status.json()),
+            Route::Source(number) => {
                 let thumbnails = shared.thumbnails.get();
                 let picture = number.parse().ok().and_then(|number: usize| thumbnails?.get(number));
                 picture.map_or_else(not_found, |picture| Answer::of("image/jpeg", picture.clone()))
             }
-            Ok(route) => match read(&mut connection, viewer) {
-                Err(answer) => answer,
-                Ok(request) if route == Route::Picture => {
-                    return shared.mailbox.put(Job { request, connection });
+            Route::Weights => read().map_or_else(|refused| refused, |request| weights(&viewer.sources, &request)),
+            Route::Picture => match read() {
+                Err(refused) => refused,
+                Ok(request) => {
+                    admission.stands(Standing::Waits);
+                    let (reply, answer) = channel();
+                    shared.mailbox.put(Job { request, reply });
+                    let answer = answer.recv().ok()?;
+                    admission.stands(Standing::OfPage);
+                    answer
                 }
-                Ok(request) => weights(&viewer.sources, &request),
             },
-        };
-        answer.send(connection);
+        })
     }
 }
 
@@ -157,29 +201,22 @@ fn weights(sources: &SourcePoses, request: &Request) -> Answer {
     json(&&weights.values()[..weights.count() as usize])
 }
 
-/// Reads and checks the body of a request for a picture or for weights.
-fn read(connection: &mut tiny_http::Request, viewer: &Viewer<'_>) -> Result<Request, Answer> {
-    let length = connection.body_length().ok_or_else(|| Answer::error(411, "the request has no length"))?;
-    if length > LONGEST_BODY {
-        return Err(Answer::error(413, "the request is too long"));
-    }
-    let mut body = Vec::new();
-    let read = connection.as_reader().take(LONGEST_BODY as u64).read_to_end(&mut body);
-    read.map_err(|error| Answer::error(400, &error.to_string()))?;
-    Request::read(&body, viewer.viewed.weighting).map_err(|error| Answer::error(400, &error.to_string()))
-}
-
 /// Which route a request takes, or why it is refused. The headers are `Host`, `Origin` and `Sec-Fetch-Site`.
 fn check<'a>(
     port: u16,
     token: &str,
-    method: &Method,
+    method: &str,
     url: &'a str,
     [host, origin, site]: [Option<&str>; 3],
 ) -> Result<Route<'a>, Answer> {
     let forbidden = || Answer::error(403, "this address is for the page of this program alone");
-    let own = [format!("127.0.0.1:{port}"), format!("localhost:{port}")];
-    let is_own = |host: &str| own.iter().any(|own| own == host);
+    let is_own = |host: &str| {
+        ["127.0.0.1", "localhost"].into_iter().any(|own| match host.strip_prefix(own) {
+            Some("") => port == USUAL_PORT,
+            Some(rest) => rest == format!(":{port}"),
+            None => false,
+        })
+    };
     if !host.is_some_and(is_own) {
         return Err(forbidden());
     }
@@ -206,8 +243,8 @@ fn check<'a>(
         },
     };
     let fits = match route {
-        Route::Picture | Route::Weights => *method == Method::Post,
-        _ => matches!(method, Method::Get | Method::Head),
+        Route::Picture | Route::Weights => method == "POST",
+        _ => matches!(method, "GET" | "HEAD"),
     };
     if fits { Ok(route) } else { Err(Answer::error(405, "this address does not take this method")) }
 }
@@ -221,33 +258,34 @@ fn is_same(given: &str, token: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{Route, Server, check};
-    use tiny_http::Method;
 
     const TOKEN: &str = "0123456789abcdef";
 
-    fn status(method: Method, url: &str, headers: [Option<&str>; 3]) -> u16 {
-        check(80, TOKEN, &method, url, headers).map_or_else(|answer| answer.status(), |_| 200)
+    fn status(method: &str, url: &str, headers: [Option<&str>; 3]) -> u16 {
+        check(8000, TOKEN, method, url, headers).map_or_else(|answer| answer.status(), |_| 200)
     }
 
     #[test]
     fn other_hosts_and_sites_are_refused() {
         let url = format!("/{TOKEN}/");
-        let get = |headers| status(Method::Get, &url, headers);
-        let own = Some("127.0.0.1:80");
+        let get = |headers| status("GET", &url, headers);
+        let own = Some("127.0.0.1:8000");
         assert_eq!(get([own, None, None]), 200);
-        assert_eq!(get([Some("localhost:80"), Some("http://localhost:80"), Some("same-origin")]), 200);
+        assert_eq!(get([Some("localhost:8000"), Some("http://localhost:8000"), Some("same-origin")]), 200);
         assert_eq!(get([own, None, Some("none")]), 200, "typed in, or opened by another program");
         for host in [
             None,
             Some(""),
             Some("127.0.0.1"),
+            Some("127.0.0.1:"),
+            Some("127.0.0.1:80"),
             Some("127.0.0.1:81"),
-            Some("evil.example:80"),
-            Some("127.0.0.1:80.evil"),
+            Some("evil.example:8000"),
+            Some("127.0.0.1:8000.evil"),
         ] {
             assert_eq!(get([host, None, None]), 403, "{host:?}");
         }
-        for origin in ["null", "http://evil.example", "https://127.0.0.1:80", "http://127.0.0.1:81", ""] {
+        for origin in ["null", "http://evil.example", "https://127.0.0.1:8000", "http://127.0.0.1:81", ""] {
             assert_eq!(get([own, Some(origin), None]), 403, "{origin}");
         }
         for site in ["cross-site", "same-site", ""] {
@@ -256,9 +294,24 @@ mod tests {
     }
 
     #[test]
+    fn the_usual_port_need_not_be_named() {
+        let url = format!("/{TOKEN}/");
+        let get = |host: &str, origin: &str| {
+            [None, Some(origin)].map(|origin| check(80, TOKEN, "GET", &url, [Some(host), origin, None]).is_ok())
+        };
+        for host in ["127.0.0.1", "127.0.0.1:80", "localhost", "localhost:80"] {
+            assert_eq!(get(host, &format!("http://{host}")), [true; 2], "{host}");
+        }
+        for host in ["127.0.0.1.evil", "127.0.0.1:", "127.0.0.1:8", "localhost.evil"] {
+            assert_eq!(get(host, "http://localhost"), [false; 2], "{host}");
+            assert_eq!(get("localhost", &format!("http://{host}")), [true, false], "{host}");
+        }
+    }
+
+    #[test]
     fn nothing_without_the_token_and_nothing_else_with_it() {
-        let own = [Some("127.0.0.1:80"), None, None];
-        let get = |url: &str| status(Method::Get, url, own);
+        let own = [Some("127.0.0.1:8000"), None, None];
+        let get = |url: &str| status("GET", url, own);
         for url in [
             "",
             "/",
@@ -275,11 +328,11 @@ mod tests {
         {
             assert_eq!(get(&format!("/{TOKEN}/{rest}")), expected, "{rest}");
         }
-        for method in [Method::Put, Method::Delete, Method::Options] {
+        for method in ["PUT", "DELETE", "OPTIONS", "get"] {
             assert_eq!(status(method, &format!("/{TOKEN}/scene"), own), 405);
         }
         let url = format!("/{TOKEN}/source/7");
-        assert_eq!(check(80, TOKEN, &Method::Get, &url, own), Ok(Route::Source("7")));
+        assert_eq!(check(8000, TOKEN, "GET", &url, own), Ok(Route::Source("7")));
     }
 
     #[test]

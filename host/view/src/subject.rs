@@ -6,6 +6,7 @@ use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::ROWS;
 use viewfuse_field::About;
+use viewfuse_job::shell::quoted;
 use viewfuse_scene::rig::Rig;
 use viewfuse_scene::{Scene, View};
 use viewfuse_weighting::scheme_names;
@@ -43,6 +44,8 @@ pub(crate) struct Subject {
 #[derive(Debug, Serialize)]
 struct CameraRow {
     name: String,
+    /// The name as a shell takes it.
+    word: String,
     pose: [[f32; 4]; 4],
     lens: Intrinsics,
 }
@@ -80,15 +83,15 @@ struct ChoiceRow {
     options: &'static [&'static str],
 }
 
-/// Command lines that render a view, as templates: `{weights}` stands for the scheme, `{view}` for the name of a view of
-/// the scene, and `{file}` for the file of a pose that the page saved.
+/// The parts of a command line that renders what is seen. Behind `render` comes the target, then `options`, then the
+/// weighting; every part is text for a shell already ([`viewfuse_job::shell::quoted`]), and nothing is replaced in it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Commands {
-    /// For a view of the scene.
-    pub view: String,
-    /// For any other pose.
-    pub pose: String,
-    /// What stands for the weighting that the page begins with; its own text if this is empty.
+    /// The command and the scene; none is shown if this is empty.
+    pub render: String,
+    /// All other options, with a blank before each.
+    pub options: String,
+    /// The weighting that the page begins with. Every other one is a word as it is.
     pub first_weights: String,
 }
 
@@ -129,7 +132,12 @@ impl Subject {
 
 impl CameraRow {
     fn of(view: &View) -> CameraRow {
-        CameraRow { name: view.name.clone(), pose: view.camera.pose.to_opencv(), lens: Intrinsics::of(&view.camera) }
+        CameraRow {
+            name: view.name.clone(),
+            word: quoted(&view.name),
+            pose: view.camera.pose.to_opencv(),
+            lens: Intrinsics::of(&view.camera),
+        }
     }
 }
 
@@ -176,7 +184,7 @@ fn scheme_rows() -> Vec<SchemeRow> {
 
 #[cfg(test)]
 mod tests {
-    use super::{scheme_rows, start};
+    use super::{quoted, scheme_rows, start};
     use viewfuse_core::Vec3;
     use viewfuse_core::camera::{Camera, Pinhole};
     use viewfuse_core::pose::Pose;
@@ -192,6 +200,7 @@ mod tests {
             let choices =
                 row.choice.iter().flat_map(|own| own.options.iter().map(move |is| format!("{}={is}", own.key)));
             for pair in parameter.chain(choices) {
+                assert_eq!(quoted(&pair), pair, "the page puts it on a command line as it is");
                 Weighting::open(&format!("{}:{pair}", row.name)).expect("a scheme");
             }
             Weighting::open(row.name).expect("a scheme");

@@ -1,13 +1,9 @@
 //! A named scheme, or `auto`: the best one for the scene.
 
-use crate::spec::{AUTO, WeightingError, WeightingSpec, grammar};
+pub use crate::spec::choice_grammar;
+use crate::spec::{AUTO, WeightingError, WeightingSpec};
 use std::fmt;
 use std::str::FromStr;
-
-/// The text forms, for help texts: `auto` before those of [`grammar`].
-pub fn choice_grammar() -> String {
-    format!("{AUTO} (the best for the scene), {}", grammar())
-}
 
 /// Which scheme a run uses.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +19,13 @@ impl FromStr for WeightingChoice {
 
     /// `auto`, or the text of a [`WeightingSpec`].
     fn from_str(text: &str) -> Result<WeightingChoice, WeightingError> {
-        if text == AUTO { Ok(WeightingChoice::Auto) } else { text.parse().map(WeightingChoice::Given) }
+        if text == AUTO {
+            return Ok(WeightingChoice::Auto);
+        }
+        text.parse().map(WeightingChoice::Given).map_err(|error| match error {
+            WeightingError::UnknownScheme { name, .. } => WeightingError::UnknownScheme { name, or_auto: true },
+            error => error,
+        })
     }
 }
 
@@ -47,7 +49,10 @@ mod tests {
             let choice: WeightingChoice = text.parse()?;
             assert_eq!((choice.to_string().as_str(), choice == WeightingChoice::Auto), (text, text == "auto"));
         }
-        assert!("automatic".parse::<WeightingChoice>().is_err());
+        let error = "autto".parse::<WeightingChoice>().expect_err("no scheme").to_string();
+        assert!(error.contains("the nearest is 'auto'; there are: auto (the best"), "{error}");
+        let error = "eror:alpha=1".parse::<WeightingChoice>().expect_err("no scheme").to_string();
+        assert!(error.contains("unknown weighting scheme 'eror', the nearest is 'error'; there are: auto"), "{error}");
         assert!(choice_grammar().starts_with("auto") && choice_grammar().contains("error:alpha=A"));
         Ok(())
     }

@@ -7,6 +7,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use viewfuse_core::weighting::{Choice, Parameter, ROWS, Row, Scheme};
+use viewfuse_job::text::nearest;
 
 /// The published attention without parameters.
 const CROSS_ATTENTION: &str = "cross-attention";
@@ -39,14 +40,33 @@ fn row_grammar(row: &Row) -> String {
     }
 }
 
+/// The text forms, for help texts: `auto` before those of [`grammar`].
+pub fn choice_grammar() -> String {
+    format!("{AUTO} (the best for the scene), {}", grammar())
+}
+
+/// The text forms, with `auto` where a choice is possible.
+fn known(or_auto: bool) -> String {
+    if or_auto { choice_grammar() } else { grammar() }
+}
+
+/// The scheme that was nearly written, as a part of a sentence.
+fn meant(name: &str, or_auto: bool) -> String {
+    let schemes = ROWS.iter().map(|row| row.name).chain([CROSS_ATTENTION, ATTENTION]).chain(or_auto.then_some(AUTO));
+    let found = nearest(name, schemes, 1);
+    found.first().map_or_else(String::new, |found| format!(", the nearest is '{found}'"))
+}
+
 /// Why a text is not a weighting.
 #[derive(Debug, thiserror::Error)]
 pub enum WeightingError {
     /// No scheme has this name.
-    #[error("unknown weighting scheme '{name}'; there are: {}", grammar())]
+    #[error("unknown weighting scheme '{name}'{}; there are: {}", meant(name, *or_auto), known(*or_auto))]
     UnknownScheme {
         /// The given text.
         name: String,
+        /// Whether it could also have been `auto`.
+        or_auto: bool,
     },
     /// The scheme has no such parameter.
     #[error("weighting scheme '{scheme}' has no parameter '{key}'; there are: {}", grammar())]
@@ -185,7 +205,7 @@ impl FromStr for WeightingSpec {
             Kind::CrossAttention
         } else {
             let row = ROWS.iter().find(|row| row.name == name);
-            let row = row.ok_or_else(|| WeightingError::UnknownScheme { name: name.to_owned() })?;
+            let row = row.ok_or_else(|| WeightingError::UnknownScheme { name: name.to_owned(), or_auto: false })?;
             Kind::Formula(pairs.scheme(row)?)
         };
         pairs.finish()?;
@@ -238,7 +258,7 @@ impl<'a> Pairs<'a> {
         Scheme::new(row.formula, choice, parameter).map_err(|_| match given {
             Some((Parameter { key, range, .. }, text)) => self.bad(key, range, text),
             // The defaults are in their ranges.
-            None => WeightingError::UnknownScheme { name: self.scheme.to_owned() },
+            None => WeightingError::UnknownScheme { name: self.scheme.to_owned(), or_auto: false },
         })
     }
 

@@ -143,24 +143,31 @@ fn words_say_what_is_below_a_baseline() {
     assert_eq!(standing, [Standing::Below, Standing::NotBelow]);
     let words = table.verdicts();
     assert_eq!(words.len(), 2, "{words:?}");
-    assert!(words[0].starts_with("mean: below the nearest copy (-4.83 ± 0.72 dB)"), "{words:?}");
-    assert!(
-        words[1].starts_with("other: no difference from the nearest copy beyond the interval (+0.17 "),
-        "{words:?}"
-    );
+    assert_eq!(words, ["mean: below the nearest copy", "other: not shown to differ from the nearest copy"]);
+    let details = table.details();
+    assert!(details[0].starts_with("mean: below the nearest copy (-4.83 ± 0.72 dB)"), "{details:?}");
+    assert!(details[1].starts_with("other: not shown to differ from the nearest copy (+0.17 "), "{details:?}");
     let worse = &tables(&[views(&[[20.0, 19.5, 30.0], [20.0, 20.3, 31.0], [20.0, 19.9, 32.0]])], false)[0];
-    assert!(worse.verdicts()[0].starts_with("mean: below the nearest copy, within the interval (-0.10 "));
-    assert_eq!(worse.verdicts().len(), 1);
+    assert!(worse.details()[0].starts_with("mean: not shown to differ from the nearest copy (-0.10 "));
+    assert_eq!(worse.verdicts(), ["mean: not shown to differ from the nearest copy"]);
     let good = &tables(&[views(&[[20.0, 29.5, 30.0], [20.0, 30.3, 31.0]])], false)[0];
     assert_eq!(good.verdicts(), ["every scheme is above every baseline in PSNR beyond the interval"]);
     let single = &tables(&[views(&[[20.0, 19.5, 30.0]])], false)[0];
     assert_eq!(
-        single.verdicts(),
+        single.details(),
         [
-            "mean: below the nearest copy (-0.50 dB, no interval)",
-            "other: above the nearest copy (+10.00 dB, no interval)"
+            "mean: not shown to differ from the nearest copy (-0.50 dB, no interval)",
+            "other: not shown to differ from the nearest copy (+10.00 dB, no interval)"
         ]
     );
+    // A line about a scheme stays one, however long its name is.
+    let mut long = views(&[[20.0, 15.0, 20.5], [21.0, 16.5, 20.0], [22.0, 17.0, 23.0]]);
+    let name = format!("attention:{}/ends.safetensors", "a/long/path".repeat(20));
+    long.scores.iter_mut().filter(|score| score.scheme == "mean").for_each(|score| score.scheme.clone_from(&name));
+    let lines = tables(&[long], false)[0].verdicts();
+    assert_eq!(lines.len(), 2);
+    assert!(lines.iter().all(|line| line.chars().count() <= 100), "{lines:#?}");
+    assert!(lines.iter().any(|line| line.contains("ends.safetensors: below the nearest copy")), "{lines:#?}");
 }
 
 fn masked_metrics_come_first() {

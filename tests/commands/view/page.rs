@@ -1,26 +1,28 @@
 //! The page in a browser: a hand, two hands on a phone, keys, menus, tabs, and what is taken elsewhere.
 
 use super::super::browser::{self, Browser, InBrowser};
-use super::super::{assert_near, numbers};
+use super::super::{BINARY, assert_near, numbers};
 use super::devtools::{Chromium, Tab};
 use super::{COARSE, COUNT, NOTE_COARSE, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
 use serde_json::json;
 use std::fs;
+use std::process::Command;
 use std::time::Duration;
-use viewfuse_tests::command::names_in;
+use viewfuse_tests::command::{command, names_in, toy};
 use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
-use viewfuse_tests::viewer::request;
+use viewfuse_tests::viewer::{Program, request};
 
-pub(super) fn trials() -> [Trial; 4] {
-    let tests: [(&str, InBrowser); 4] = [
+pub(super) fn trials() -> [Trial; 5] {
+    let tests: [(&str, InBrowser); 5] = [
         ("view::browser::a_hand_turns_the_view", a_hand_turns_the_view),
         ("view::browser::tabs_come_and_go", tabs_come_and_go),
         ("view::browser::a_phone_shows_all_of_it", a_phone_shows_all_of_it),
         ("view::browser::a_view_is_taken_elsewhere", a_view_is_taken_elsewhere),
+        ("view::browser::names_from_files_are_no_commands", names_from_files_are_no_commands),
     ];
     browser::trials(tests)
 }
@@ -244,4 +246,33 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     let line = tab.text("document.getElementById('command').textContent");
     assert!(line.contains("render tests/data/room --targets 000 --sources"), "{line}");
     assert_eq!(tab.console(), [""; 0]);
+}
+
+/// Whoever made a scene chose the names of its folder and of its views: pasted into a shell, they are words.
+fn names_from_files_are_no_commands(browser: &Browser) {
+    const NAME: &str = "$(touch pwned)';touch pwned;#{weights} $& \u{1b}[201~";
+    let folder = toy();
+    let scene = folder.path().join("{view}$'{weights}");
+    fs::rename(folder.path().join("toy"), &scene).expect("renamed");
+    for (part, ending) in [("rgb", "png"), ("pose", "txt")] {
+        let path = |name: &str| scene.join(part).join(format!("{name}.{ending}"));
+        fs::rename(path("000020"), path(NAME)).expect("renamed");
+    }
+    let mut arguments =
+        command(BINARY, folder.path(), "view --sources 000000..000003 --size 24x24 --no-browser --device cpu");
+    arguments.arg("{view}$'{weights}");
+    let program = Program::of(arguments);
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(FULL);
+    let name = serde_json::to_string(NAME).expect("JSON");
+    tab.evaluate(&format!("goTo(scene.others.find((own) => own.name === {name}).pose)"));
+    let line = tab.text("document.getElementById('command').textContent");
+    assert!(!line.chars().any(char::is_control), "{line:?}");
+    let script = format!("viewfuse() {{ printf '%s\\n' \"$@\"; }}\n{line}\n");
+    let words = Command::new("bash").args(["-c", &script]).current_dir(folder.path()).output().expect("bash");
+    let words = String::from_utf8(words.stdout).expect("text");
+    let expected = format!("render\n{{view}}$'{{weights}}\n--targets\n{NAME}\n--sources\n");
+    assert!(words.starts_with(&expected), "{line}\n{words}");
+    assert!(!folder.path().join("pwned").exists());
 }

@@ -1,13 +1,16 @@
 //! `viewfuse compare`.
 
+mod pairs;
+
 use super::metrics_options::MetricOptions;
 use super::options::DeviceOptions;
 use super::say;
 use super::table::table;
 use super::terminal::Terminal;
-use anyhow::{Context, bail, ensure};
+use anyhow::Context;
 use clap::Args;
 use image::RgbImage;
+use pairs::{Pair, pairs};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use viewfuse_device::Device;
@@ -16,7 +19,10 @@ use viewfuse_evaluate::metrics::features::Features;
 use viewfuse_evaluate::metrics::trunk::InceptionKind;
 use viewfuse_evaluate::metrics::{Metrics, Scored};
 use viewfuse_job::progress::Progress;
-use viewfuse_scene::read_picture;
+use viewfuse_output::folder::recorded_background;
+use viewfuse_output::record::RECORD;
+use viewfuse_scene::photographs::{BackgroundChoice, read_over};
+use viewfuse_scene::picture_size;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -29,6 +35,10 @@ pub(crate) struct Arguments {
     prediction: PathBuf,
     /// Its ground truth: a picture, or a folder with a picture of each name
     truth: PathBuf,
+    /// What transparent pictures are laid over: black, white, RED,GREEN,BLUE (0 to 255), none to ignore transparency
+    /// [default: that of the run.json beside the picture, else white]
+    #[arg(long, value_name = "COLOUR")]
+    background: Option<BackgroundChoice>,
     #[command(flatten)]
     metrics: MetricOptions,
     /// Seed of the subsets whose mean is the KID of more than 1000 pictures
@@ -48,41 +58,48 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A picture's name, its path, and the path of its ground truth.
-struct Pair {
-    name: String,
-    prediction: PathBuf,
-    truth: PathBuf,
+/// What pictures with transparency are laid over: `None` for nothing, as a render does with photographs of whole scenes.
+struct Background {
+    colour: Option<[f32; 3]>,
+    /// Where it comes from, for a person.
+    source: String,
 }
 
-/// Every picture with its ground truth.
-fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
-    if !prediction.is_dir() {
-        ensure!(!truth.is_dir(), "{}: is a folder, {} is not", truth.display(), prediction.display());
-        let name = prediction.display().to_string();
-        return Ok(vec![Pair { name, prediction: prediction.to_owned(), truth: truth.to_owned() }]);
+impl Background {
+    /// What was given; otherwise what the record beside the predictions says; otherwise white, as `auto` of `render`.
+    fn of(given: Option<BackgroundChoice>, predictions: &Path) -> Background {
+        let folder = if predictions.is_dir() { predictions } else { predictions.parent().unwrap_or(Path::new("")) };
+        let recorded = || recorded_background(folder).map(|used| (used, folder.join(RECORD).display().to_string()));
+        let white = || (Some([1.0; 3]), "the default".to_owned());
+        let (colour, source) = match given {
+            Some(BackgroundChoice::Colour(colour)) => (Some(colour), "--background".to_owned()),
+            Some(BackgroundChoice::None) => (None, "--background".to_owned()),
+            Some(BackgroundChoice::Auto) | None => recorded().unwrap_or_else(white),
+        };
+        Background { colour, source }
     }
-    let listed = || format!("{}: cannot be listed", prediction.display());
-    let mut pairs = Vec::new();
-    for entry in std::fs::read_dir(prediction).with_context(listed)? {
-        let path = entry.with_context(listed)?.path();
-        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-        if !extension.is_some_and(|extension| ["png", "jpg", "jpeg"].iter().any(|known| extension == *known)) {
-            continue;
-        }
-        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-        pairs.push(Pair { truth: truth.join(&name), prediction: path, name });
-    }
-    pairs.sort_by(|a, b| a.name.cmp(&b.name));
-    match pairs.iter().find(|pair| !pair.truth.is_file()) {
-        _ if pairs.is_empty() => bail!("{}: has no pictures (PNG, JPEG)", prediction.display()),
-        Some(pair) => bail!("{}: is missing, to compare {} with", pair.truth.display(), pair.prediction.display()),
-        None => Ok(pairs),
+
+    fn words(&self) -> String {
+        let Some(colour) = self.colour else { return format!("transparency ignored ({})", self.source) };
+        let [red, green, blue] = colour.map(|value| (255.0 * value).round());
+        format!("over {red},{green},{blue} ({})", self.source)
     }
 }
 
-fn opened(path: &Path) -> anyhow::Result<RgbImage> {
-    Ok(read_picture(path)?.into_rgb8())
+/// The pictures of a pair in one size. A truth that is larger, and of the same shape, is resampled as `render` does it.
+fn opened(pair: &Pair, background: &Background) -> anyhow::Result<([RgbImage; 2], bool)> {
+    let prediction = read_over(&pair.prediction, None, background.colour)?;
+    let size: [u32; 2] = prediction.dimensions().into();
+    let own = picture_size(&pair.truth)?;
+    let is_larger = own != size && is_shape_of(size, own) && own[0] >= size[0] && own[1] >= size[1];
+    let truth = read_over(&pair.truth, is_larger.then_some(size), background.colour)?;
+    Ok(([prediction, truth], is_larger))
+}
+
+/// Whether a picture of the second size, made smaller, has the first one, up to rounding.
+fn is_shape_of(size: [u32; 2], larger: [u32; 2]) -> bool {
+    let [[width, height], [full_width, full_height]] = [size, larger].map(|size| size.map(u64::from));
+    (width * full_height).abs_diff(height * full_width) <= full_width.max(full_height) / 2
 }
 
 fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyhow::Result<()> {
@@ -92,10 +109,12 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
     let parts = if metrics.inception.is_some() && pairs.len() > 1 { 3 } else { 1 };
     progress.stage("comparing pictures", 0..1, parts);
     progress.expect(pairs.len());
-    let (mut scores, mut pictures) = (Vec::new(), Vec::new());
+    let background = Background::of(arguments.background, &arguments.prediction);
+    let (mut scores, mut pictures, mut resampled) = (Vec::new(), Vec::new(), 0);
     for pair in pairs {
         progress.check()?;
-        let [prediction, truth] = [opened(&pair.prediction)?, opened(&pair.truth)?];
+        let ([prediction, truth], is_resampled) = opened(pair, &background)?;
+        resampled += usize::from(is_resampled);
         let scored = metrics.compare(device, &prediction, &truth, None);
         scores.push(scored.with_context(|| pair.prediction.display().to_string())?);
         if metrics.inception.is_some() {
@@ -109,6 +128,10 @@ fn compare<D: Device>(arguments: &Arguments, pairs: &[Pair], device: &D) -> anyh
     };
     drop(progress);
     print_scores(pairs, &scores)?;
+    say(format_args!("transparent pixels: {}", background.words()))?;
+    if resampled > 0 {
+        say(format_args!("{resampled} of {} photographs are larger: resampled by area averages", pairs.len()))?;
+    }
     match (&metrics.inception, sets) {
         (Some(inception), Some(sets)) => print_distances(inception.kind(), &sets, pictures.len(), arguments.seed),
         (Some(_), None) => Ok(say("FID and KID need sets of at least 2 pictures")?),

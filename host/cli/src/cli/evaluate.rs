@@ -77,6 +77,9 @@ pub(crate) struct Arguments {
     seed: u64,
     #[command(flatten)]
     device: DeviceOptions,
+    /// Tell the differences from the baselines with their intervals
+    #[arg(short, long)]
+    verbose: bool,
     /// Print the tables as JSON
     #[arg(long)]
     json: bool,
@@ -125,7 +128,7 @@ pub(crate) fn run(arguments: &Arguments, values: BTreeMap<String, String>) -> an
         match (arguments.json, arguments.latex) {
             (true, _) => json_tables.push(json_of(&title, results)?),
             (_, true) => say(results.latex(&title))?,
-            _ => print_table(&title, results)?,
+            _ => print_table(&title, results, arguments.verbose)?,
         }
         Ok(())
     };

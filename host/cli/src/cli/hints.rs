@@ -7,6 +7,7 @@ use viewfuse_evaluate::protocol::ProtocolError;
 use viewfuse_evaluate::run_folder::FolderError;
 use viewfuse_field::render::RenderError;
 use viewfuse_field::training_free::NoObject;
+use viewfuse_output::folder::OutputError;
 use viewfuse_scene::SceneError;
 use viewfuse_scene::few_shot::SelectionError;
 use viewfuse_scene::photographs::PhotographsError;
@@ -19,8 +20,9 @@ pub(crate) fn hint(error: &anyhow::Error) -> Option<&'static str> {
         let folder = cause.downcast_ref::<FolderError>().and_then(of_run_folder);
         let render = cause.downcast_ref::<RenderError>().and_then(of_render);
         let evaluation = cause.downcast_ref::<EvaluateError>().and_then(of_evaluation);
+        let output = cause.downcast_ref::<OutputError>().and_then(of_output);
         let others = || of_training(cause).or_else(|| of_viewer(cause)).or_else(|| of_tiff(cause));
-        few_shot.or(photographs).or(folder).or(render).or(evaluation).or_else(others)
+        few_shot.or(photographs).or(output).or(folder).or(render).or(evaluation).or_else(others)
     })
 }
 
@@ -61,6 +63,13 @@ fn of_few_shot(error: &SelectionError) -> Option<&'static str> {
 fn of_photographs(error: &PhotographsError) -> Option<&'static str> {
     match error {
         PhotographsError::NoSilhouette { .. } => Some("set the colour with --background"),
+        _ => None,
+    }
+}
+
+fn of_output(error: &OutputError) -> Option<&'static str> {
+    match error {
+        OutputError::OtherRun { .. } => Some("give another folder, or --replace to remove them"),
         _ => None,
     }
 }

@@ -2,6 +2,7 @@
 
 use super::outputs::keep_file_apart;
 use super::say;
+use super::table::table;
 use super::terminal::Terminal;
 use clap::Args;
 use image::DynamicImage;
@@ -12,16 +13,21 @@ use viewfuse_output::camera_map::camera_map;
 use viewfuse_output::png::write_png;
 use viewfuse_scene::Scene;
 use viewfuse_scene::inspect::{Inspection, inspect};
+use viewfuse_scene::listing::{ListedView, Neighbour, list_views};
 use viewfuse_scene::photographs::BackgroundChoice;
 
 #[derive(Args)]
-#[command(after_help = "Example:\n  viewfuse inspect photos/ -o cameras.png")]
+#[command(after_help = "Examples:\n  viewfuse inspect photos/ -o cameras.png\n  \
+    viewfuse inspect photos/ --views\n      names, and the numbers that stand for them: --targets '#3' is the view of index 3")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
     /// Background of the object: auto, black, white, or RED,GREEN,BLUE (0 to 255)
     #[arg(long, value_name = "COLOUR", default_value = "auto")]
     background: BackgroundChoice,
+    /// List the views: index, name, size, and the nearest views with the angle to each, seen from what the cameras look at
+    #[arg(long, conflicts_with = "output")]
+    views: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -32,6 +38,9 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
+    if arguments.views {
+        return print_views(&list_views(&scene), arguments.json);
+    }
     arguments.output.as_deref().map_or(Ok(()), check_writable)?;
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart([&scene], path))?;
     let progress = Terminal::new("reading the photographs");
@@ -48,6 +57,23 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
             say(format_args!("cameras    {}", path.display()))?;
         }
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_views(views: &[ListedView], as_json: bool) -> anyhow::Result<ExitCode> {
+    if as_json {
+        say(format_args!("{}", serde_json::to_string_pretty(views)?))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut rows = table(["index", "name", "size", "nearest views"].map(str::to_owned));
+    for view in views {
+        let near = |own: &Neighbour| format!("{} ({:.1}\u{b0})", views[own.index].name, own.degrees);
+        let neighbours: Vec<String> = view.neighbours.iter().map(near).collect();
+        let [width, height] = view.size;
+        let size = format!("{width}x{height}{}", if view.has_photograph { "" } else { ", no photograph" });
+        rows.add_row([format!("#{}", view.index), view.name.clone(), size, neighbours.join(", ")]);
+    }
+    say(rows)?;
     Ok(ExitCode::SUCCESS)
 }
 

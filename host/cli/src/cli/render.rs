@@ -111,7 +111,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let rate = arguments.outputs.rate(job.frames_per_second);
     if !is_stream {
         check_writable(&arguments.output.join(RECORD))?;
-        check_folder(&arguments.output, &job.targets)?;
+        check_folder(&arguments.output, &job.targets, arguments.outputs.replace)?;
     }
     let Chosen { device, reason } = arguments.device.open()?;
     let renderer = field.on(&device);
@@ -125,6 +125,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let label = arguments.scene.display().to_string();
     let before = weighting.clone().unwrap_or_else(Weighting::default_scheme);
     let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &before);
+    writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
     let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).collect();
     // Frames that follow from one another are not continued.

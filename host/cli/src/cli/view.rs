@@ -11,6 +11,7 @@ use viewfuse_device::choice::Chosen;
 use viewfuse_field::render::{RenderOptions, Stage, open_album};
 use viewfuse_field::{Renderer, auto};
 use viewfuse_job::progress::Progress;
+use viewfuse_job::shell::quoted;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
 use viewfuse_weighting::{WeightingChoice, WeightingSpec, choice_grammar};
@@ -70,7 +71,6 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let sources = arguments.sources.to_selection(None, None).sources_without(&scene, &[], about.least_sources)?;
     let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let Chosen { device, reason } = arguments.device.open()?;
-    let commands = commands(arguments, given, &scene, &sources);
     on_threads(arguments.picture.threads, || -> anyhow::Result<()> {
         let (weighting, settings) = match given_weighting {
             Some(weighting) => (weighting, None),
@@ -89,6 +89,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
             weighting: &weighting,
             settings: settings.as_deref(),
         };
+        let commands = commands(arguments, given, &viewed);
         let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
         let (count, path) = (sources.len(), arguments.scene.display());
         say(format_args!("{path}: {count} sources, {} on {}, {reason}", about.name, viewer.device_name()))?;
@@ -137,32 +138,22 @@ fn plain(error: ViewError) -> anyhow::Error {
     }
 }
 
-/// The command lines that render a view of the page.
-fn commands(arguments: &Arguments, given: &[(String, Option<String>)], scene: &Scene, sources: &[usize]) -> Commands {
+/// The command line that renders a view of the page.
+fn commands(arguments: &Arguments, given: &[(String, Option<String>)], viewed: &Viewed<'_>) -> Commands {
+    let Viewed { scene, sources, weighting: first, .. } = viewed;
     let mut options = String::new();
     if given.iter().any(|(name, _)| name == "sources" || name == "views") {
         let names: Vec<&str> = sources.iter().map(|&view| scene.views[view].name.as_str()).collect();
-        options = format!(" --sources {}", quoted(&names.join(",")));
+        options = format!(" --sources {}", quoted(names.join(",")));
     }
     for (name, value) in given.iter().filter(|(name, _)| !NOT_OF_RENDER.contains(&name.as_str())) {
         options += &format!(" --{name}");
         options.extend(value.iter().map(|value| format!(" {}", quoted(value))));
     }
-    let path = quoted(&arguments.scene.to_string_lossy());
-    let line = |what: &str| format!("viewfuse render {path} {what}{options} --weights {{weights}} -o out");
     let first_weights = match &arguments.weights {
         WeightingChoice::Auto => arguments.weights.to_string(),
-        WeightingChoice::Given(_) => String::new(),
+        WeightingChoice::Given(_) => first.to_string(),
     };
-    Commands { view: line("--targets {view}"), pose: line("--camera-path {file}"), first_weights }
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_@%+=:,./-".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
+    let render = format!("viewfuse render {}", quoted(&arguments.scene));
+    Commands { render, options, first_weights: quoted(first_weights) }
 }

@@ -150,13 +150,13 @@ fn lead(table: &Table) -> Option<Markup> {
         p.lead {
             "From " (sources.join(", ")) " sources: "
             @match names.as_slice() {
-                [] => { "no difference beyond the intervals; " (metric.label) " at most " (metric.text(value.mean)) " " (metric.unit) },
+                [] => { "no row is shown to differ from the best; " (metric.label) " at most " (metric.text(value.mean)) " " (metric.unit) },
                 [name] => {
                     "best is " strong { (name) } ", " (metric.label) " " (metric.text(value.mean)) " " (metric.unit)
                     @if let Some(gain) = gain { ", " (metric.interval_text(&gain, true)) " over " (REFERENCE) }
                 },
                 names => {
-                    "best are " strong { (names.join(", ")) } ", without a difference beyond the intervals; "
+                    "best are " strong { (names.join(", ")) } ", not shown to differ; "
                     (metric.label) " " (metric.text(value.mean)) " " (metric.unit)
                 },
             }

@@ -55,11 +55,11 @@ pub(super) fn results(table: &Table) -> Markup {
 }
 
 fn value(cell: Option<&Cell>, metric: &Metric) -> Markup {
-    let Some(Cell { value, leads, .. }) = cell else { return html! { td {} } };
+    let Some(Cell { value, leads, place, .. }) = cell else { return html! { td {} } };
     let mean = metric.text(value.mean);
     html! {
         td {
-            @if *leads { b { (mean) } } @else { (mean) }
+            @if *leads && *place == 1 { b { (mean) } } @else if *leads { i { (mean) } } @else { (mean) }
             (half_width(value, metric))
         }
     }
@@ -85,7 +85,7 @@ fn half_width(interval: &Interval, metric: &Metric) -> Markup {
 pub(super) fn legend() -> Markup {
     html! {
         p.legend {
-            b { "Bold" } ": the best of its column, or no difference from the best beyond the interval of their difference; none where that is "
+            b { "Bold" } ": the best of its column; " i { "italic" } ": not shown to differ from the best, by the interval of their difference; neither where that is "
             "every row. Means are over scenes, or over the views of one, with 95 % intervals (Student). Differences from the nearest copy and from " code { (REFERENCE) } " are taken scene by scene, or view by view; "
             span.gain { "coloured" } " where the interval leaves out zero."
         }

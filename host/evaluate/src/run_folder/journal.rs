@@ -4,12 +4,12 @@ use super::FolderError;
 use crate::Score;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::Write;
+use std::fs::{self, File, TryLockError};
+use std::io::{BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
-use viewfuse_job::files::read_at_most;
+use viewfuse_job::files::{WriteError, append_ordinary, open_ordinary, read_line};
 
 /// The jobs of a process: those whose number modulo `count` is `index`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,8 +73,10 @@ pub struct Finished {
 const MAX_SCORE: f64 = 1.0e9;
 /// Longest time of a picture, in seconds.
 const LONGEST_TIME: f64 = 1.0e9;
-/// Most bytes of a journal.
-const LONGEST_JOURNAL: u64 = 4 << 30;
+/// Most bytes of a line.
+const MAX_LINE: u64 = 64 << 20;
+/// What every line begins with, as [`Finished`] is written.
+const BEGINNING: &[u8] = b"{\"job\":";
 
 /// Scores as JSON: numbers that JSON cannot hold (the PSNR of equal pictures is infinite) as text.
 mod score_lines {
@@ -148,16 +150,14 @@ impl Journal {
     pub(super) fn open(folder: &Path, shard: Shard) -> Result<Journal, FolderError> {
         let path = folder.join(format!("scores-{}-of-{}.jsonl", shard.index, shard.count));
         let failed = |doing, cause| FolderError::Io { path: path.clone(), doing, cause };
-        let file = OpenOptions::new().create(true).append(true).read(true).open(&path);
-        let file = file.map_err(|cause| failed("cannot be opened", cause))?;
+        let file = append_ordinary(&path).map_err(|cause| failed("cannot be opened", cause))?;
         // File systems without locks still work.
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             return Err(FolderError::Busy { path });
         }
-        let text = read_bytes(&path)?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
-        if whole < text.len() {
-            let cut = file.set_len(whole as u64);
+        // Nothing is cut before all of it is known to be of an evaluation.
+        if let Some(whole) = check(&path)? {
+            let cut = file.set_len(whole);
             cut.map_err(|cause| failed("its unfinished last line cannot be removed", cause))?;
         }
         Ok(Journal { path, file })
@@ -192,24 +192,41 @@ pub(super) fn journals(folder: &Path) -> Result<Vec<PathBuf>, FolderError> {
     Ok(journals)
 }
 
-/// The finished jobs of a journal. A last line without a line break is being written or is incomplete, and is ignored.
-pub(super) fn read(path: &Path) -> Result<Vec<Finished>, FolderError> {
-    let text = read_bytes(path)?;
-    let whole = text.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n"));
-    let parsed = |(index, line): (usize, &[u8])| {
-        serde_json::from_slice(line).map_err(|cause| FolderError::Json {
-            path: path.to_path_buf(),
-            line: Some(index + 1),
-            cause,
-        })
-    };
-    whole.enumerate().map(parsed).collect()
+/// Checks that all of a journal is of an evaluation; where it is to be cut if its last line is not whole.
+///
+/// # Errors
+/// [`FolderError`]: above all, if it is a file of somebody else's.
+pub(super) fn check(path: &Path) -> Result<Option<u64>, FolderError> {
+    let mut whole = 0;
+    let unfinished = each_line(path, |length, _| whole += length)?;
+    let is_own = unfinished.starts_with(BEGINNING) || BEGINNING.starts_with(&unfinished);
+    if is_own {
+        Ok((!unfinished.is_empty()).then_some(whole))
+    } else {
+        Err(WriteError::NotOwn { path: path.to_path_buf() }.into())
+    }
 }
 
-fn read_bytes(path: &Path) -> Result<Vec<u8>, FolderError> {
-    read_at_most(path, LONGEST_JOURNAL).map_err(|cause| FolderError::Io {
-        path: path.to_path_buf(),
-        doing: "cannot be read",
-        cause,
-    })
+/// The finished jobs of a journal. A last line without a line break is being written or is incomplete, and is ignored.
+pub(super) fn read(path: &Path) -> Result<Vec<Finished>, FolderError> {
+    let mut jobs = Vec::new();
+    each_line(path, |_, finished| jobs.push(finished))?;
+    Ok(jobs)
+}
+
+/// Calls `each` with the length of every whole line and what it says; returns the last line if it is not whole.
+fn each_line(path: &Path, mut each: impl FnMut(u64, Finished)) -> Result<Vec<u8>, FolderError> {
+    let failed = |cause| FolderError::Io { path: path.to_path_buf(), doing: "cannot be read", cause };
+    let Some(file) = open_ordinary(path).map_err(failed)? else { return Ok(Vec::new()) };
+    let mut reader = BufReader::new(file);
+    for number in 1.. {
+        let line = read_line(&mut reader, MAX_LINE).map_err(failed)?;
+        if !line.ends_with(b"\n") {
+            return Ok(line);
+        }
+        let finished = serde_json::from_slice(&line);
+        let of_line = |cause| FolderError::Json { path: path.to_path_buf(), line: Some(number), cause };
+        each(line.len() as u64, finished.map_err(of_line)?);
+    }
+    Ok(Vec::new())
 }

@@ -61,24 +61,72 @@ pub(super) fn comparisons(rows: &[Row], difference: impl Fn(&str, &str) -> Optio
     comparisons
 }
 
+/// Most characters of a line about a scheme.
+const MAX_LINE: usize = 100;
+
 impl Table {
-    /// Where schemes are below a baseline, or not clearly above one, a sentence for each such scheme; one sentence if
-    /// there is none. Nothing without schemes or baselines.
+    /// Where schemes are below a baseline, or not shown to be above one, a line of at most 100 characters for each such scheme;
+    /// one line if there is none. Nothing without schemes or baselines.
     pub fn verdicts(&self) -> Vec<String> {
         let Some(metric) = self.metrics.get(self.headline) else { return Vec::new() };
-        let mut sentences = Vec::new();
-        for row in self.rows.iter().filter(|row| !row.is_baseline) {
-            let own = |own: &&Comparison| own.scheme == row.scheme && own.standing != Standing::Above;
-            let parts: Vec<String> =
-                self.comparisons.iter().filter(own).map(|comparison| self.words(comparison, metric)).collect();
-            if !parts.is_empty() {
-                sentences.push(format!("{}: {}", row.scheme, parts.join("; ")));
-            }
+        let lines: Vec<String> = self.schemes_in_doubt().map(|row| self.line(&row.scheme)).collect();
+        if lines.is_empty() && !self.comparisons.is_empty() {
+            return vec![format!("every scheme is above every baseline in {} beyond the interval", metric.label)];
         }
-        if sentences.is_empty() && !self.comparisons.is_empty() {
-            sentences.push(format!("every scheme is above every baseline in {} beyond the interval", metric.label));
+        lines
+    }
+
+    /// The same with the differences and their intervals.
+    pub fn details(&self) -> Vec<String> {
+        let Some(metric) = self.metrics.get(self.headline) else { return Vec::new() };
+        let of_row = |row: &Row| {
+            let own = self.comparisons_of(&row.scheme).filter(|own| own.standing != Standing::Above);
+            let parts: Vec<String> = own.map(|comparison| words(comparison, metric)).collect();
+            format!("{}: {}", row.scheme, parts.join("; "))
+        };
+        self.schemes_in_doubt().map(of_row).collect()
+    }
+
+    fn comparisons_of<'a>(&'a self, scheme: &'a str) -> impl Iterator<Item = &'a Comparison> {
+        self.comparisons.iter().filter(move |own| own.scheme == scheme)
+    }
+
+    /// The schemes that are not above every baseline.
+    fn schemes_in_doubt(&self) -> impl Iterator<Item = &Row> {
+        let is_in_doubt = |row: &&Row| self.comparisons_of(&row.scheme).any(|own| own.standing != Standing::Above);
+        self.rows.iter().filter(move |row| !row.is_baseline && is_in_doubt(row))
+    }
+
+    /// How a scheme stands to the baselines, as short as it has to be.
+    fn line(&self, scheme: &str) -> String {
+        let of = |standings: &[Standing]| -> Vec<&str> {
+            let own = self.comparisons_of(scheme).filter(|own| standings.contains(&own.standing));
+            own.map(|own| own.baseline.as_str()).collect()
+        };
+        let groups = [
+            ("below", of(&[Standing::Below])),
+            ("not shown to differ from", of(&[Standing::NotBelow, Standing::PerhapsBelow])),
+        ];
+        let join = |told: &dyn Fn(&[&str]) -> String| -> String {
+            let parts = groups.iter().filter(|(_, names)| !names.is_empty());
+            parts.map(|(what, names)| format!("{what} {}", told(names))).collect::<Vec<_>>().join("; ")
+        };
+        let named = format!("{scheme}: {}", join(&|names| format!("the {}", names.join(", the "))));
+        if named.chars().count() <= MAX_LINE {
+            return named;
         }
-        sentences
+        let counted = join(&|names| match names {
+            [name] => format!("the {name}"),
+            names => format!("{} baselines", names.len()),
+        });
+        // A scheme may be the path of a file: its end tells more.
+        let room = MAX_LINE.saturating_sub(counted.chars().count() + 2);
+        let length = scheme.chars().count();
+        if length <= room {
+            return format!("{scheme}: {counted}");
+        }
+        let end: String = scheme.chars().skip(length + 1 - room.max(1)).collect();
+        format!("\u{2026}{end}: {counted}")
     }
 
     /// The sampling unit of this table's intervals, in words.
@@ -92,18 +140,17 @@ impl Table {
             ),
         }
     }
+}
 
-    fn words(&self, comparison: &Comparison, metric: &Metric) -> String {
-        let Comparison { baseline, difference, standing, .. } = comparison;
-        let shown = format!("{} {}", metric.interval_text(difference, true), metric.unit);
-        let shown = shown.trim_end();
-        match (standing, difference.half_width.is_some()) {
-            (Standing::Above, _) => format!("above the {baseline} ({shown})"),
-            (Standing::Below, _) => format!("below the {baseline} ({shown})"),
-            (Standing::PerhapsBelow, true) => format!("below the {baseline}, within the interval ({shown})"),
-            (Standing::PerhapsBelow, false) => format!("below the {baseline} ({shown}, no interval)"),
-            (Standing::NotBelow, true) => format!("no difference from the {baseline} beyond the interval ({shown})"),
-            (Standing::NotBelow, false) => format!("above the {baseline} ({shown}, no interval)"),
-        }
+/// A comparison with its numbers.
+fn words(comparison: &Comparison, metric: &Metric) -> String {
+    let Comparison { baseline, difference, standing, .. } = comparison;
+    let shown = format!("{} {}", metric.interval_text(difference, true), metric.unit);
+    let shown = shown.trim_end();
+    match (standing, difference.half_width.is_some()) {
+        (Standing::Above, _) => format!("above the {baseline} ({shown})"),
+        (Standing::Below, _) => format!("below the {baseline} ({shown})"),
+        (_, true) => format!("not shown to differ from the {baseline} ({shown})"),
+        (_, false) => format!("not shown to differ from the {baseline} ({shown}, no interval)"),
     }
 }

@@ -1,9 +1,10 @@
 //! Photographs at targets, to compare predictions with.
 
 use super::{Album, matte, resample, to_rgb8, without_alpha};
-use crate::SceneError;
+use crate::{Photograph, SceneError, read_picture};
 use image::{GrayImage, RgbImage};
 use std::borrow::Cow;
+use std::path::Path;
 
 /// A photograph at the size of a prediction.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,25 @@ pub struct GroundTruth {
     /// 255 where the photograph shows the whole pixel, otherwise 0: the photograph's lens did not see the corners of the
     /// pinhole's picture. `None` if it shows all of them.
     pub seen: Option<GrayImage>,
+}
+
+/// A picture file as a render would compare it: laid over the background, or without its transparency if there is none, and
+/// resampled by area averages to a size, or kept in its own.
+///
+/// # Errors
+/// [`SceneError`] if it cannot be read.
+pub fn read_over(path: &Path, size: Option<[u32; 2]>, background: Option<[f32; 3]>) -> Result<RgbImage, SceneError> {
+    let picture = read_picture(path)?;
+    let has_alpha = picture.color().has_alpha() && background.is_some();
+    let own_size = [picture.width(), picture.height()];
+    if !has_alpha && size.is_none_or(|size| size == own_size) {
+        return Ok(picture.into_rgb8());
+    }
+    let photograph = Photograph { pixels: picture.into_rgba8(), has_alpha, seen: None };
+    let photograph = if has_alpha { photograph } else { without_alpha(photograph) };
+    let size = size.unwrap_or(own_size);
+    let over = matte::laid_over(&photograph, background.unwrap_or_default());
+    Ok(to_rgb8(&resample::area_average(&over, own_size, size), size))
 }
 
 impl Album<'_> {

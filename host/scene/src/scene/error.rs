@@ -265,6 +265,23 @@ pub enum SceneError {
         /// Height in the header.
         height: u32,
     },
+    /// An image whose pixels take too much memory.
+    #[error(
+        "{path}: the image is {width} x {height}: decoding it takes {} MiB; at most {} MiB are used for a photograph",
+        bytes >> 20, most >> 20
+    )]
+    TooMuch {
+        /// The image file.
+        path: PathBuf,
+        /// Width in the header.
+        width: u32,
+        /// Height in the header.
+        height: u32,
+        /// Bytes that decoding takes.
+        bytes: u64,
+        /// The most that are used.
+        most: u64,
+    },
     /// An image file that is too short for the size in its header.
     #[error("{path}: the image is {width} x {height}, and its file has only {length} bytes")]
     Hollow {

@@ -20,6 +20,9 @@ pub(super) const IMAGE_FOLDERS: [&str; 8] =
 /// Most bytes of a list of cameras, points or depths.
 pub(super) const LONGEST_FILE: u64 = 4 << 30;
 
+/// Most bytes of any other text: a `transforms.json` of ten thousand views takes ten million.
+const MAX_TEXT: u64 = 256 << 20;
+
 /// Longest part of a wrong word that an error quotes: a binary file's first "word" may be the whole file.
 const LONGEST_EXCERPT: usize = 40;
 
@@ -33,13 +36,22 @@ pub(super) fn unreadable(path: &Path, cause: io::Error) -> SceneError {
     }
 }
 
-/// A text file's contents, without the byte order mark that some editors put in front.
+/// The contents of a text file of at most 256 MiB, without the byte order mark that some editors put in front. The
+/// length is judged before anything is read.
 ///
 /// # Errors
 /// [`SceneError::Missing`], [`SceneError::Read`] if it cannot be read, or [`SceneError::Damaged`] with the line if it is
 /// not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, SceneError> {
-    let bytes = read_at_most(path, LONGEST_FILE).map_err(|cause| unreadable(path, cause))?;
+    read_text_of(path, MAX_TEXT)
+}
+
+/// The same for another limit.
+///
+/// # Errors
+/// As [`read_text`].
+pub(super) fn read_text_of(path: &Path, most: u64) -> Result<String, SceneError> {
+    let bytes = read_at_most(path, most).map_err(|cause| unreadable(path, cause))?;
     let text = String::from_utf8(bytes).map_err(|error| {
         let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let place = FaultLocation::Line(1 + before.iter().filter(|byte| **byte == b'\n').count());

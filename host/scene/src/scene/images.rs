@@ -20,6 +20,9 @@ use super::{MAX_SIDE, Photograph};
 /// Most bytes of a decoded pixel: four channels of 16 bits.
 const MAX_PIXEL: u64 = 8;
 
+/// Bytes of a pixel as it is kept.
+const RGBA_BYTES: u64 = 4;
+
 /// Decoded pixels of more bytes than this must have a file of fitting length.
 const SMALL_IMAGE: u64 = 32 << 20;
 
@@ -27,8 +30,13 @@ const SMALL_IMAGE: u64 = 32 << 20;
 /// (PNG: 1032). A header of a few bytes must not take memory for pixels that cannot be in the file.
 const MAX_RATIO: u64 = 2064;
 
-/// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles.
-const DECODER_ALLOWANCE: u64 = 64 << 20;
+/// Memory of a decoder in addition to the pixels: its rows, tables, colour profiles. The profile of a PNG is compressed: a
+/// file of one megabyte may hold one of a gigabyte, which is then ignored.
+const DECODER_ALLOWANCE: u64 = 16 << 20;
+
+/// Most memory for the pixels of a photograph while it is decoded: as they are stored, and as 8-bit RGBA. 150 megapixels of
+/// 8-bit RGB fit.
+const MAX_DECODING: u64 = 1 << 30;
 
 /// Bytes of a JPEG file that are read first for its header: the tags with their thumbnail, colour profiles. The decoder
 /// would read the whole file.
@@ -53,7 +61,8 @@ pub(super) struct Header {
 /// Size and orientation; nothing of the size that the header states is allocated.
 ///
 /// # Errors
-/// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels; otherwise as for any unreadable image.
+/// [`SceneError::TooLarge`] if a side has more than [`MAX_SIDE`] pixels, [`SceneError::TooMuch`] if all pixels together take
+/// too much memory; otherwise as for any unreadable image.
 pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     let found = match beginning_of_jpeg(path)? {
         Some(found) => found,
@@ -62,6 +71,10 @@ pub(super) fn header(path: &Path) -> Result<Header, SceneError> {
     let [width, height] = found.size;
     if width > MAX_SIDE || height > MAX_SIDE {
         return Err(SceneError::TooLarge { path: path.to_path_buf(), width, height });
+    }
+    let bytes = found.bytes + RGBA_BYTES * u64::from(width) * u64::from(height);
+    if bytes > MAX_DECODING {
+        return Err(SceneError::TooMuch { path: path.to_path_buf(), width, height, bytes, most: MAX_DECODING });
     }
     Ok(found)
 }
@@ -80,8 +93,17 @@ fn beginning_of_jpeg(path: &Path) -> Result<Option<Header>, SceneError> {
     Ok(described(path, ImageReader::with_format(source, ImageFormat::Jpeg)).ok())
 }
 
+/// What a decoder may allocate before the first pixel.
+fn limits_of_header() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_alloc = Some(DECODER_ALLOWANCE);
+    limits
+}
+
 fn described(path: &Path, reader: ImageReader<Box<dyn Source>>) -> Result<Header, SceneError> {
     decoding(path, || {
+        let mut reader = reader;
+        reader.limits(limits_of_header());
         let mut decoder = reader.into_decoder()?;
         let (width, height) = decoder.dimensions();
         // An unreadable tag is ignored.
@@ -182,8 +204,14 @@ pub(super) fn pixels(path: &Path) -> Result<(DynamicImage, Orientation), SceneEr
     limits.max_image_height = Some(height);
     limits.max_alloc = Some(u64::from(width) * u64::from(height) * MAX_PIXEL + DECODER_ALLOWANCE);
     let mut reader = open(path)?;
-    reader.limits(limits);
-    Ok((decoding(path, || reader.decode())?, orientation))
+    reader.limits(limits_of_header());
+    let decode = || {
+        // A colour profile was unpacked within the limits of a header; those of the pixels come after it.
+        let mut decoder = reader.into_decoder()?;
+        decoder.set_limits(limits)?;
+        DynamicImage::from_decoder(decoder)
+    };
+    Ok((decoding(path, decode)?, orientation))
 }
 
 /// What a decoder makes of a file; it may fail or panic.

@@ -37,5 +37,6 @@ pub(super) fn json_of(title: &str, table: &Table) -> anyhow::Result<Value> {
     }
     whole.insert("intervals".to_owned(), json!(table.interval_words()));
     whole.insert("verdicts".to_owned(), json!(table.verdicts()));
+    whole.insert("details".to_owned(), json!(table.details()));
     Ok(Value::Object(whole))
 }

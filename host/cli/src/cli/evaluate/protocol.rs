@@ -27,8 +27,19 @@ use viewfuse_weighting::OpenedChoice;
 
 const PROTOCOLS: &str = "Options of protocols";
 /// Options that change no number, or that the settings hold in another form.
-const NO_SETTINGS: [&str; 10] =
-    ["output", "shard", "threads", "pictures", "time-limit", "weights", "protocol", "targets", "json", "latex"];
+const NO_SETTINGS: [&str; 11] = [
+    "output",
+    "shard",
+    "threads",
+    "pictures",
+    "time-limit",
+    "weights",
+    "protocol",
+    "targets",
+    "json",
+    "latex",
+    "verbose",
+];
 /// Missing jobs and notes that are told; of more, how many there are.
 const NAMED: usize = 8;
 
@@ -126,7 +137,7 @@ pub(super) fn run(
         results.iter().try_for_each(|table| say(table.latex(&outcome.title(table))))?;
         return Ok(ExitCode::SUCCESS);
     }
-    outcome.print()?;
+    outcome.print(arguments.verbose)?;
     if let Some(folder) = folder {
         print_done(shard, [done, finished.len(), plan.jobs.len()], folder)?;
     }
@@ -259,7 +270,7 @@ impl Outcome<'_> {
         self.results.iter().map(|table| json_of(&self.title(table), table)).collect()
     }
 
-    fn print(&self) -> anyhow::Result<()> {
+    fn print(&self, is_verbose: bool) -> anyhow::Result<()> {
         let notes = &self.plan.notes;
         notes.iter().take(NAMED).try_for_each(|note| say(format_args!("note: {note}")))?;
         if notes.len() > NAMED {
@@ -269,7 +280,7 @@ impl Outcome<'_> {
             self.print_views()?;
         }
         for table in self.results {
-            print_table(&self.title(table), table)?;
+            print_table(&self.title(table), table, is_verbose)?;
         }
         match self.published() {
             Some(published) => Ok(print_published(&published)?),

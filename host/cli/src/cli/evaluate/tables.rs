@@ -14,8 +14,9 @@ pub(super) fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A table with intervals under a title, and what it says in words. The leading rows of each column are marked.
-pub(super) fn print_table(title: &str, results: &Table) -> io::Result<()> {
+/// A table with intervals under a title, and what it says in words, on request with the differences. The best row of each column
+/// is marked, and those that are not shown to differ from it.
+pub(super) fn print_table(title: &str, results: &Table, is_verbose: bool) -> io::Result<()> {
     let columns = results.columns();
     let headings = columns.iter().map(|column| results.heading(*column));
     let mut rows = table(["scheme".to_owned()].into_iter().chain(headings).chain(["s / view".to_owned()]));
@@ -28,11 +29,11 @@ pub(super) fn print_table(title: &str, results: &Table) -> io::Result<()> {
     say(rows)?;
     say(results.interval_words())?;
     if results.rows.iter().flat_map(|row| row.cells.iter().flatten()).any(|cell| cell.leads) {
-        say("*: best of its column, or no difference from the best beyond the interval")?;
+        say("*: best of its column; ~: not shown to differ from the best")?;
     } else if results.target_count > 1 {
-        say("no row is best beyond the intervals")?;
+        say("no row is shown to be best")?;
     }
-    let verdicts = results.verdicts();
+    let verdicts = if is_verbose { results.details() } else { results.verdicts() };
     verdicts.iter().take(VERDICTS).try_for_each(say)?;
     if verdicts.len() > VERDICTS {
         say(format_args!("and {} more", verdicts.len() - VERDICTS))?;
@@ -44,7 +45,11 @@ fn cell(row: &Row, results: &Table, column: Column) -> String {
     let metric = &results.metrics[column.metric(results)];
     let cell = row.cells[column.metric(results)].as_ref();
     if let Column::Value(_) = column {
-        let mark = |cell: &Cell| if cell.leads { "* " } else { "" };
+        let mark = |cell: &Cell| match (cell.leads, cell.place) {
+            (true, 1) => "* ",
+            (true, _) => "~ ",
+            (false, _) => "",
+        };
         return cell
             .map_or(String::new(), |cell| format!("{}{}", mark(cell), metric.interval_text(&cell.value, false)));
     }

@@ -10,7 +10,7 @@ use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::{Scene, View};
 
 /// Options that change no frame.
-const NO_CHANGE: [&str; 5] = ["output", "threads", "time-limit", "video", "fps"];
+const NO_CHANGE: [&str; 6] = ["output", "replace", "threads", "time-limit", "video", "fps"];
 
 /// The digest of a run's inputs: the program's version, the options' values, the device, cameras and photographs (by
 /// length and time of change), and the content of other files.

@@ -22,6 +22,9 @@ pub(crate) struct OutputOptions {
     /// Write no contact sheets
     #[arg(long, help_heading = FILES)]
     no_sheets: bool,
+    /// Remove what an earlier run wrote to the folder and this one does not replace
+    #[arg(long, help_heading = FILES)]
+    pub(crate) replace: bool,
     /// Write all pictures, in order, also as video.FORMAT: webp (animated), y4m (not compressed), mp4 (by the ffmpeg on the
     /// path; without one y4m)
     #[arg(long, value_name = "FORMATS", value_delimiter = ',', help_heading = FILES)]

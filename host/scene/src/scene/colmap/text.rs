@@ -5,7 +5,7 @@ use std::path::Path;
 use super::super::camera_models::CameraModel;
 use super::super::error::SceneError;
 use super::super::fault::{FaultLocation, FileFault};
-use super::super::files::{self, number, read_text};
+use super::super::files::{self, LONGEST_FILE, number, read_text_of};
 use super::{ModelCamera, ModelImage, ModelPoint, camera};
 
 /// The lines that are not comments, numbered from 1. Blank ones are kept: `images.txt` has them.
@@ -29,7 +29,7 @@ fn too_few(path: &Path, line: usize, of: &'static str, expected: usize, found: u
 
 /// `cameras.txt`: `CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]`.
 pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError> {
-    let text = read_text(path)?;
+    let text = read_text_of(path, LONGEST_FILE)?;
     let mut all = Vec::new();
     for (line, content) in lines(&text).filter(|(_, content)| !content.is_empty()) {
         let words: Vec<&str> = content.split_whitespace().collect();
@@ -48,7 +48,7 @@ pub(super) fn cameras(path: &Path) -> Result<Vec<(u32, ModelCamera)>, SceneError
 /// `images.txt`: of each image `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then a line of the points found in it,
 /// which is skipped. Files without these second lines are read, too.
 pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, SceneError> {
-    let text = read_text(path)?;
+    let text = read_text_of(path, LONGEST_FILE)?;
     let mut all = Vec::new();
     let mut lines = lines(&text).peekable();
     while let Some((line, content)) = lines.next() {
@@ -97,7 +97,7 @@ fn behind(content: &str, words: usize) -> &str {
 
 /// `points3D.txt`: `POINT3D_ID X Y Z R G B ERROR` and `IMAGE_ID POINT2D_IDX` of each image that saw it.
 pub(super) fn points(path: &Path) -> Result<Vec<ModelPoint>, SceneError> {
-    let text = read_text(path)?;
+    let text = read_text_of(path, LONGEST_FILE)?;
     let mut all = Vec::new();
     for (line, content) in lines(&text).filter(|(_, content)| !content.is_empty()) {
         let words: Vec<&str> = content.split_whitespace().collect();

@@ -1,0 +1,65 @@
+//! Which picture is compared with which: by name, without what a render writes beside its pictures.
+
+use anyhow::{Context, bail, ensure};
+use std::path::{Path, PathBuf};
+use viewfuse_output::record::SUFFIXES;
+
+/// Extensions of pictures, in small letters.
+const EXTENSIONS: [&str; 6] = ["png", "jpg", "jpeg", "webp", "tif", "tiff"];
+
+/// A picture's name, its path, and the path of its ground truth.
+pub(super) struct Pair {
+    pub(super) name: String,
+    pub(super) prediction: PathBuf,
+    pub(super) truth: PathBuf,
+}
+
+/// Every picture with its ground truth.
+pub(super) fn pairs(prediction: &Path, truth: &Path) -> anyhow::Result<Vec<Pair>> {
+    if !prediction.is_dir() {
+        ensure!(!truth.is_dir(), "{}: is a folder, {} is not", truth.display(), prediction.display());
+        let name = prediction.display().to_string();
+        return Ok(vec![Pair { name, prediction: prediction.to_owned(), truth: truth.to_owned() }]);
+    }
+    let all = pictures(prediction)?;
+    let is_beside = |path: &Path| {
+        let stem = stem(path);
+        let of = SUFFIXES.iter().filter(|suffix| !suffix.is_empty()).find_map(|suffix| stem.strip_suffix(suffix));
+        of.is_some_and(|own| all.iter().any(|other| self::stem(other) == own))
+    };
+    let predictions: Vec<&PathBuf> = all.iter().filter(|path| !is_beside(path)).collect();
+    if predictions.is_empty() {
+        bail!("{}: has no pictures ({})", prediction.display(), EXTENSIONS[..3].join(", "));
+    }
+    let truths = if truth.is_dir() { pictures(truth)? } else { Vec::new() };
+    let pair = |path: &&PathBuf| {
+        let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+        // The very name, before one that differs in its extension.
+        let same = truth.join(&name);
+        let alike = || truths.iter().find(|own| stem(own) == stem(path)).cloned();
+        let found = if same.is_file() { Some(same.clone()) } else { alike() };
+        let truth =
+            found.with_context(|| format!("{}: is missing, to compare {} with", same.display(), path.display()))?;
+        Ok(Pair { name, prediction: path.to_path_buf(), truth })
+    };
+    predictions.iter().map(pair).collect()
+}
+
+/// The pictures of a folder, sorted by name.
+fn pictures(folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
+    let listed = || format!("{}: cannot be listed", folder.display());
+    let mut pictures = Vec::new();
+    for entry in std::fs::read_dir(folder).with_context(listed)? {
+        let path = entry.with_context(listed)?.path();
+        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
+        if extension.is_some_and(|extension| EXTENSIONS.iter().any(|known| extension == *known)) {
+            pictures.push(path);
+        }
+    }
+    pictures.sort();
+    Ok(pictures)
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}

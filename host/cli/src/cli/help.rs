@@ -1,0 +1,72 @@
+//! The help: `-h` has what a person needs first, `--help` everything; and what a network's option says without a network.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Command, Error};
+use std::ffi::OsString;
+use viewfuse_field::rows::ROWS;
+
+/// Options that `-h` shows of the commands that have dozens, by their identifiers.
+const FIRST: [&str; 24] = [
+    "scene",
+    "scenes",
+    "targets",
+    "orbit",
+    "camera_path",
+    "sources",
+    "weights",
+    "size",
+    "background",
+    "model",
+    "device",
+    "video",
+    "replace",
+    "output",
+    "port",
+    "no_browser",
+    "protocol",
+    "split",
+    "verbose",
+    "json",
+    "latex",
+    "shard",
+    "help",
+    "version",
+];
+
+/// The commands with dozens of options.
+const LONG: [&str; 3] = ["render", "view", "evaluate"];
+
+/// The commands, of which the longest show only the first options with `-h`.
+pub(crate) fn shortened(mut commands: Command) -> Command {
+    for name in LONG {
+        commands = commands.mut_subcommand(name, |command| {
+            command.mut_args(|argument| {
+                let is_first = FIRST.contains(&argument.get_id().as_str());
+                if is_first { argument } else { argument.hide_short_help(true) }
+            })
+        });
+    }
+    commands
+}
+
+/// An error of arguments, in words where an option of a network was given without one.
+pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>, command: &mut Command) -> Error {
+    let is_model = |value: &ContextValue| match value {
+        ContextValue::Strings(missing) => missing.len() == 1 && missing[0].starts_with("--model "),
+        _ => false,
+    };
+    let lacks_model =
+        error.kind() == ErrorKind::MissingRequiredArgument && error.get(ContextKind::InvalidArg).is_some_and(is_model);
+    let mut given = arguments.filter_map(|word| Some(word.to_str()?.strip_prefix("--")?.split('=').next()?.to_owned()));
+    let of_network = |name: &String| {
+        let row = ROWS.into_iter().find(|row| row.flags.iter().any(|flag| flag.name == *name));
+        row.filter(|row| row.prefix().is_some()).map(|row| (name.clone(), row.title))
+    };
+    match given.find_map(|name| of_network(&name)).filter(|_| lacks_model) {
+        Some((name, title)) => {
+            let message = format!("--{name} is an option of a {title}, and needs its checkpoint: --model FILE");
+            command.error(ErrorKind::MissingRequiredArgument, message)
+        }
+        None => error,
+    }
+}

@@ -1,0 +1,80 @@
+//! What an earlier run left in an output folder, as its record and its journal say.
+
+use crate::depth::DepthFormat;
+use crate::journal::Journal;
+use crate::record::{RECORD, SUFFIXES};
+use crate::video::VideoFormat;
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::path::{Component, Path};
+use viewfuse_job::files::read_at_most;
+use viewfuse_scene::photographs::BackgroundChoice;
+
+/// Most bytes of a run record. Larger ones are no records of this program.
+const MAX_RECORD: u64 = 256 << 20;
+
+/// What is read of a record.
+#[derive(Deserialize)]
+struct WrittenRecord {
+    #[serde(rename = "viewfuse")]
+    _program: String,
+    frames: Vec<WrittenFrame>,
+    background: Option<WrittenBackground>,
+}
+
+#[derive(Deserialize)]
+struct WrittenBackground {
+    asked: String,
+    used: [u8; 3],
+}
+
+#[derive(Deserialize)]
+struct WrittenFrame {
+    target: String,
+}
+
+/// The names of a target's files, whether they are there or not.
+pub(crate) fn files_of(target: &str) -> Vec<String> {
+    let pictures = SUFFIXES.iter().map(|suffix| format!("{target}{suffix}.png"));
+    let depths = DepthFormat::ALL.iter().map(|format| format!("{target}_depth.{format}"));
+    pictures.chain(depths).collect()
+}
+
+/// Names of the targets of the record in a folder; `None` if the file is no record of a render. An empty one is: of a machine
+/// that lost its power.
+pub(crate) fn recorded_targets(folder: &Path) -> Option<Vec<String>> {
+    let bytes = bytes_of_record(folder)?;
+    if bytes.is_empty() {
+        return Some(Vec::new());
+    }
+    let record: WrittenRecord = serde_json::from_slice(&bytes).ok()?;
+    Some(record.frames.into_iter().map(|frame| frame.target).collect())
+}
+
+/// The background of the record in a folder, red green blue in `[0, 1]`; `Some(None)` if there was none, `None` without a record.
+pub(crate) fn recorded_background(folder: &Path) -> Option<Option<[f32; 3]>> {
+    let record: WrittenRecord = serde_json::from_slice(&bytes_of_record(folder)?).ok()?;
+    let WrittenBackground { asked, used } = record.background?;
+    let is_none = asked == BackgroundChoice::None.to_string();
+    Some((!is_none).then(|| used.map(|value| f32::from(value) / 255.0)))
+}
+
+fn bytes_of_record(folder: &Path) -> Option<Vec<u8>> {
+    let path = folder.join(RECORD);
+    // A pipe would keep its reader waiting.
+    if path.is_file() { read_at_most(&path, MAX_RECORD).ok() } else { None }
+}
+
+/// The files that earlier runs wrote to a folder and that are there; the record and the journal themselves are not among them.
+/// Nothing outside the folder, and no link.
+pub(crate) fn earlier_files(folder: &Path) -> BTreeSet<String> {
+    let recorded = recorded_targets(folder);
+    let videos = recorded.iter().flat_map(|_| VideoFormat::ALL).map(|format| format!("video.{format}"));
+    let finished = Journal::files_of_any_run(folder);
+    let of_targets = recorded.iter().flatten().flat_map(|target| files_of(target));
+    let is_there = |name: &String| {
+        let is_inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+        is_inside && folder.join(name).symlink_metadata().is_ok_and(|about| about.is_file())
+    };
+    videos.chain(of_targets).chain(finished).filter(is_there).collect()
+}

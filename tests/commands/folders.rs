@@ -1,0 +1,164 @@
+//! Output folders that hold something already: a person's own files, an earlier run, a run that is not finished yet.
+
+use super::{BINARY, done};
+use std::fs;
+use std::path::Path;
+use std::process::Stdio;
+use viewfuse_tests::command::{assert_refused, command, files_below, names_in, toy};
+use viewfuse_tests::patience::{end, send, wait_while_running};
+use viewfuse_tests::scenes::Folder;
+
+viewfuse_tests::trials![
+    a_file_with_the_name_of_a_journal_is_left_alone,
+    links_pipes_and_devices_are_no_journals,
+    a_journal_that_was_cut_anywhere_is_continued,
+    two_runs_do_not_mix_in_one_folder,
+    an_earlier_run_is_replaced_as_a_whole_or_not_at_all,
+];
+
+const RENDER: &str =
+    "render toy --targets 20 --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets -o out";
+const EVALUATE: &str =
+    "evaluate toy --protocol random:sources=2 --targets-per-trial 1 --weights mean --size 24x24 --device cpu -o out";
+
+/// What reads and writes which journal.
+const JOURNALS: [(&str, &str); 2] = [(RENDER, "frames.jsonl"), (EVALUATE, "scores-0-of-1.jsonl")];
+
+fn a_file_with_the_name_of_a_journal_is_left_alone() {
+    for (arguments, name) in JOURNALS {
+        let folder = toy();
+        let path = format!("out/{name}");
+        for text in [
+            "my notes\n",
+            "my notes",
+            "{\"frame\": 1}\n",
+            "{\"job\": \"all\"}\n",
+            "{\"jo",
+            "\n",
+            "[1, 2]\n{\"run\":\"a\"}\n",
+        ] {
+            // The beginning of a line of its own is what a kill leaves.
+            if name.starts_with("scores") && text == "{\"jo" {
+                continue;
+            }
+            folder.write(&path, text);
+            assert_refused(BINARY, folder.path(), arguments, &[name]);
+            assert_eq!(fs::read_to_string(folder.path().join(&path)).expect("a file"), text);
+        }
+        fs::remove_file(folder.path().join(&path)).expect("removed");
+        done(folder.path(), arguments);
+    }
+    // A run that keeps no journal removes one of an earlier run, and nothing else.
+    let folder = toy();
+    let sequence = "render toy --targets 20,21 --sources 0..2 --size 16x16 --model genvs:small --steps 2 --samples 8 --reuse 1 --device cpu -o out";
+    folder.write("out/frames.jsonl", "my notes\n");
+    assert_refused(BINARY, folder.path(), sequence, &["frames.jsonl"]);
+    assert_eq!(fs::read(folder.path().join("out/frames.jsonl")).expect("a file"), b"my notes\n");
+}
+
+#[cfg(unix)]
+fn links_pipes_and_devices_are_no_journals() {
+    use std::os::unix::fs::symlink;
+    for (arguments, name) in JOURNALS {
+        let folder = toy();
+        let precious = folder.path().join("precious.jsonl");
+        // What a run of this program would cut.
+        fs::write(&precious, "{\"run\":\"another\"}\n{\"job\":").expect("a file");
+        fs::create_dir(folder.path().join("out")).expect("a folder");
+        let path = folder.path().join("out").join(name);
+        for target in [precious.as_path(), Path::new("/dev/zero"), Path::new("nowhere")] {
+            symlink(target, &path).expect("a link");
+            assert_refused(BINARY, folder.path(), arguments, &[name, "it is a link"]);
+            fs::remove_file(&path).expect("removed");
+        }
+        assert_eq!(fs::read(&precious).expect("a file"), b"{\"run\":\"another\"}\n{\"job\":");
+        let made = std::process::Command::new("mkfifo").arg(&path).status().expect("mkfifo runs");
+        assert!(made.success());
+        assert_refused(BINARY, folder.path(), arguments, &[name, "no ordinary file"]);
+        // Zeros without end, as a file that takes no room on the disk.
+        fs::remove_file(&path).expect("removed");
+        fs::File::create(&path).expect("a file").set_len(3 << 30).expect("a sparse file");
+        assert_refused(BINARY, folder.path(), arguments, &[name]);
+    }
+}
+
+#[cfg(not(unix))]
+fn links_pipes_and_devices_are_no_journals() {}
+
+/// A kill may cut a journal in the middle of its first line.
+fn a_journal_that_was_cut_anywhere_is_continued() {
+    let folder = toy();
+    done(folder.path(), RENDER);
+    let expected = files_below(&folder.path().join("out"));
+    for text in ["", "{", "{\"run\"", "{\"run\":\"", "{\"run\":\"0123"] {
+        folder.write("out/frames.jsonl", text);
+        done(folder.path(), RENDER);
+        let names: Vec<_> = files_below(&folder.path().join("out")).into_iter().map(|(path, _)| path).collect();
+        assert_eq!(names, expected.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>(), "{text:?}");
+    }
+}
+
+fn two_runs_do_not_mix_in_one_folder() {
+    let folder = toy();
+    let long = "render toy --orbit 2000 --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets -o out";
+    let mut first = command(BINARY, folder.path(), long);
+    let mut first = first.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
+    wait_while_running(&mut first, || folder.path().join("out/orbit-000.png").exists());
+    // The same run, and another one; what the first one writes meanwhile is its own.
+    for arguments in [long, RENDER, &format!("{RENDER} --replace")] {
+        let second = command(BINARY, folder.path(), arguments).output().expect("the command starts");
+        let said = String::from_utf8_lossy(&second.stderr).into_owned();
+        assert_eq!(second.status.code(), Some(1), "{said}");
+        assert!(
+            said.contains("out") && (said.contains("another process is writing") || said.contains("earlier run")),
+            "{said}"
+        );
+    }
+    assert!(!folder.path().join("out/000020.png").exists());
+    send("-INT", &first);
+    assert_eq!(end(&mut first).expect("it ends").code(), Some(130));
+    // Whoever was interrupted holds the folder no longer.
+    done(folder.path(), &format!("{RENDER} --replace"));
+    // Exports appear as a whole: of two, one.
+    let both = [(); 2].map(|()| {
+        let mut export = command(BINARY, folder.path(), "export toy --layout colmap -o exported");
+        export.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts")
+    });
+    let codes = both.map(|mut export| end(&mut export).expect("it ends").code());
+    assert!(codes.contains(&Some(0)), "{codes:?}");
+    let alone = Folder::new();
+    done(folder.path(), &format!("export toy --layout colmap -o {}", alone.path().join("exported").display()));
+    let files = |folder: &Path| -> Vec<(String, u64)> {
+        let of = |(path, length): (std::path::PathBuf, u64)| {
+            (path.file_name().expect("a name").to_string_lossy().into_owned(), length)
+        };
+        files_below(&folder.join("exported")).into_iter().map(of).collect()
+    };
+    assert_eq!(files(folder.path()), files(alone.path()));
+}
+
+fn an_earlier_run_is_replaced_as_a_whole_or_not_at_all() {
+    let folder = toy();
+    let orbit = "render toy --orbit 4 --sources 0..3 --size 24x24 --device cpu --weights mean --video webp -o out";
+    done(folder.path(), orbit);
+    folder.write("out/notes.txt", "mine");
+    assert_refused(
+        BINARY,
+        folder.path(),
+        RENDER,
+        &["out: has 12 files of an earlier run", "orbit-000.png", "--replace"],
+    );
+    // The same targets replace it without a question.
+    done(folder.path(), &format!("{orbit} --no-sheets"));
+    assert_eq!(names_in(&folder.path().join("out")).len(), 4 * 2 + 3);
+    done(folder.path(), &format!("{RENDER} --replace"));
+    let names = names_in(&folder.path().join("out"));
+    assert_eq!(names, ["000020.png", "000020_depth.png", "notes.txt", "run.json"]);
+    // A record that names files elsewhere removes none.
+    let record = fs::read_to_string(folder.path().join("out/run.json")).expect("a record");
+    folder.write("elsewhere.png", "mine");
+    folder.write("out/run.json", record.replace("\"target\": \"000020\"", "\"target\": \"../elsewhere\""));
+    done(folder.path(), &format!("{} --replace", RENDER.replace("--targets 20", "--targets 21")));
+    assert_eq!(fs::read_to_string(folder.path().join("elsewhere.png")).expect("a file"), "mine");
+    assert_eq!(fs::read_to_string(folder.path().join("out/notes.txt")).expect("a file"), "mine");
+}

@@ -1,0 +1,120 @@
+//! Files that promise, or hide, more than fits: each is one error, or no matter, and takes no memory.
+
+use super::{BINARY, done};
+use std::fs;
+use viewfuse_tests::command::{Outcome, assert_command_refused, assert_wrong_arguments, command, toy};
+
+viewfuse_tests::trials![
+    a_compressed_colour_profile_takes_no_memory,
+    an_image_of_too_many_pixels_is_refused,
+    a_text_that_is_too_long_is_not_read,
+    a_picture_that_does_not_fit_is_refused,
+];
+
+/// What the process may take, in KiB of addresses: less than one such file took.
+const LIMIT: u32 = 900_000;
+
+/// The command where it may take no more than that.
+fn limited(folder: &std::path::Path, arguments: &str) -> std::process::Command {
+    let mut limited = command("sh", folder, "");
+    limited.args(["-c", &format!("ulimit -v {LIMIT}; exec \"$@\""), "sh", BINARY]).args(arguments.split(' '));
+    limited
+}
+
+/// A chunk of a PNG.
+fn chunk(kind: &[u8], content: &[u8]) -> Vec<u8> {
+    let own = [kind, content].concat();
+    let mut checksum = u32::MAX;
+    for byte in &own {
+        checksum ^= u32::from(*byte);
+        for _ in 0..8 {
+            checksum = if checksum & 1 == 1 { (checksum >> 1) ^ 0xedb8_8320 } else { checksum >> 1 };
+        }
+    }
+    [&(content.len() as u32).to_be_bytes()[..], &own, &(!checksum).to_be_bytes()[..]].concat()
+}
+
+/// So many zeros, compressed (RFC 1950, 1951): one, and copies of it, 258 at a time, in 13 bits.
+fn zeros(count: usize) -> Vec<u8> {
+    let (mut bytes, mut bits, mut held) = (vec![0x78, 0x01], 0_u64, 0);
+    let mut put = |value: u64, length: u32| {
+        bits |= value << held;
+        held += length;
+        while held >= 8 {
+            bytes.push(bits as u8);
+            (bits, held) = (bits >> 8, held - 8);
+        }
+    };
+    // The only block, of fixed codes, which stand in it from their highest bit on: a zero is 00110000.
+    put(0b011, 3);
+    put(0b0000_1100, 8);
+    for _ in 0..count / 258 {
+        // Length 258 is 11000101, distance 1 is 00000.
+        put(0b1010_0011, 13);
+    }
+    // The end, and what is left of its byte.
+    put(0, 14);
+    // The checksum of n zeros (Adler) is n, 1.
+    let sum = (count / 258 * 258 + 1) % 65_521;
+    bytes.extend([(sum >> 8) as u8, sum as u8, 0, 1]);
+    bytes
+}
+
+fn a_compressed_colour_profile_takes_no_memory() {
+    let folder = toy();
+    let profile = chunk(b"iCCP", &[b"p\0\0", zeros(1 << 30).as_slice()].concat());
+    // Behind the signature and the header.
+    for view in 0..8 {
+        let path = folder.path().join(format!("toy/rgb/{view:06}.png"));
+        let photograph = fs::read(&path).expect("a photograph");
+        fs::write(&path, [&photograph[..33], &profile, &photograph[33..]].concat()).expect("written");
+    }
+    let outcome = Outcome::of(limited(folder.path(), "inspect toy"));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let render = "render toy --targets 20 --sources 0..7 --size 32x32 --weights mean --device cpu -o out";
+    let outcome = Outcome::of(limited(folder.path(), render));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    // The pixels are those of the photographs.
+    let plain = toy();
+    done(plain.path(), render);
+    let picture = |folder: &std::path::Path| fs::read(folder.join("out/000020.png")).expect("a picture");
+    assert!(picture(folder.path()) == picture(plain.path()));
+}
+
+fn an_image_of_too_many_pixels_is_refused() {
+    let folder = toy();
+    let side = 16_384_u32.to_be_bytes();
+    let header = chunk(b"IHDR", &[&side[..], &side, &[8, 2, 0, 0, 0]].concat());
+    let pixels = chunk(b"IDAT", &zeros(16_384 * (3 * 16_384 + 1)));
+    let bytes = [b"\x89PNG\r\n\x1a\n".as_slice(), &header, &pixels, &chunk(b"IEND", b"")].concat();
+    folder.write("toy/rgb/000003.png", bytes);
+    let parts = ["toy/rgb/000003.png: the image is 16384 x 16384", "decoding it takes 1792 MiB; at most 1024 MiB"];
+    assert_command_refused(limited(folder.path(), "inspect toy"), folder.path(), &parts);
+    let compared = "compare toy/rgb/000003.png toy/rgb/000003.png";
+    assert_command_refused(limited(folder.path(), compared), folder.path(), &parts);
+}
+
+fn a_text_that_is_too_long_is_not_read() {
+    let folder = toy();
+    fs::create_dir(folder.path().join("scene")).expect("a folder");
+    let file = fs::File::create(folder.path().join("scene/transforms.json")).expect("a file");
+    // It takes no room on the disk.
+    file.set_len(3 << 30).expect("a sparse file");
+    let parts = ["scene/transforms.json: ", "it is longer than 268435456 bytes"];
+    assert_command_refused(limited(folder.path(), "inspect scene"), folder.path(), &parts);
+    let path = "render toy --camera-path scene/transforms.json --device cpu -o out";
+    assert_command_refused(
+        limited(folder.path(), path),
+        folder.path(),
+        &["transforms.json: ", "longer than 268435456"],
+    );
+}
+
+fn a_picture_that_does_not_fit_is_refused() {
+    let folder = toy();
+    for model in ["", "--model formula:8"] {
+        let render = format!("render toy --targets 20 --size 16384x12288 --device cpu -o out {model}");
+        let parts = ["'16384x12288'", "takes about 9216 MiB", "at most 4096 MiB"];
+        assert_wrong_arguments(BINARY, folder.path(), &render, &parts);
+    }
+}
