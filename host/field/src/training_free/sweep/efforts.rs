@@ -11,7 +11,7 @@ const TRIAL_PLANES: u32 = 32;
 /// Shares of the side at which views are compared and of the planes, and the neighbours of each source, with the error and the
 /// work that are typical of them (the experiment `efforts` of `viewfuse-research`, on the sample room and on herz_jesus_p8).
 const EFFORTS: [(f32, f32, usize, f32, f32); 4] =
-    [(0.25, 0.5, 2, 0.055, 0.1), (0.5, 1.0, 1, 0.029, 0.25), (0.75, 1.0, 1, 0.0185, 0.5), (1.0, 1.0, 1, 0.014, 0.8)];
+    [(0.25, 0.5, 2, 0.055, 0.1), (0.5, 1.0, 1, 0.035, 0.22), (0.75, 1.0, 1, 0.027, 0.4), (1.0, 1.0, 1, 0.024, 0.8)];
 
 /// Most planes, and the longest side at which views are compared, in pictures for a moving camera.
 const PREVIEW: (u32, u32) = (32, 80);
