@@ -184,7 +184,7 @@ fn bad_input_is_refused() {
     refused("pareto toy --targets 20 -o toy/intrinsics.txt", &["intrinsics.txt is not a folder"]);
     wrong("pareto toy --targets 20 --device gpu -o out", &["gpu", "vulkan:NUMBER"]);
     wrong("pareto toy --targets 20 --repeat 0 -o out", &["--repeat", "1..=1000"]);
-    wrong("pareto toy --targets 20 --samples 8,8,8 -o out", &["required"]);
+    wrong("pareto toy --targets 20 --samples 8,8,8 -o out", &["--samples", "PixelNeRF", "--model FILE"]);
     wrong("pareto toy --targets 20 --device cpu --only sampler -o out", &["--only sampler", "exact; leave out 0.01"]);
     wrong("pareto toy --targets 20", &["required"]);
 }
