@@ -14,7 +14,7 @@ fn the_cpu_beside_its_limits() {
     let device = &bench["devices"][0];
     assert!(device["device"].as_str().is_some_and(|name| name.starts_with("cpu")), "{device}");
     let number = |of: &Value, key: &str| of[key].as_f64().unwrap_or(f64::NAN);
-    for key in ["copy_giga_bytes", "multiply_add_giga_operations"] {
+    for key in ["copy_giga_bytes", "multiply_add_giga_operations", "giga_look_ups"] {
         assert!(number(device, key) > 0.0, "{key}: {device}");
     }
     let kernels = device["kernels"].as_array().expect("a list");
@@ -27,6 +27,7 @@ fn the_cpu_beside_its_limits() {
         let rate = match kernel["limit"].as_str() {
             Some("copy") => number(kernel, "giga_bytes"),
             Some("multiply_add") => number(kernel, "giga_operations"),
+            Some("look_up") => number(kernel, "giga_look_ups"),
             other => panic!("the limit {other:?}"),
         };
         // How large they are depends on what else the machine does.

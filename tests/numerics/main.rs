@@ -21,6 +21,7 @@ mod rays;
 mod sampler;
 mod sampling;
 mod schedule;
+mod sweep_twins;
 mod visual_hull;
 mod volumes;
 mod weighting;

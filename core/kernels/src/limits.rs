@@ -1,5 +1,5 @@
-//! What a device can do at most: kernels that only copy, and that only multiply and add. Rates of other kernels are compared
-//! with theirs.
+//! What a device can do at most: kernels that only copy, that only multiply and add, and that only look texels up. Rates of other
+//! kernels are compared with theirs.
 //!
 //! A chain is a number that is multiplied and added to again and again, `x = x * factor + summand`: each step needs the one
 //! before, and nothing is read or written in between. An element has [`CHAINS`] of them, so that a device always has one
@@ -8,11 +8,27 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec4;
 use viewfuse_core::fetch::Fetch;
+use viewfuse_core::lookup::bilinear_from;
 
 /// Chains of an element.
 pub const CHAINS: u32 = 12;
 /// Steps of each chain in a round: the loop around them then takes no time.
 pub const ROUND_STEPS: u32 = 8;
+
+/// Look-ups of an element.
+pub const LOOK_UPS: u32 = 16;
+/// From one look-up of an element to the next, in pixels to the right: as planes of a sweep follow each other in a view.
+pub const LOOK_UP_STEP: f32 = 0.3;
+
+/// A dispatch of [`looked_up`], as plain data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LookUpBlock {
+    /// Columns of the image, at least 1.
+    pub width: u32,
+    /// Its rows, at least 1.
+    pub height: u32,
+}
 
 /// A dispatch of [`chained`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -48,6 +64,24 @@ pub fn chained(block: &ChainBlock, start: f32) -> f32 {
     }
     let all = a + b + c;
     all.x + all.y + all.z + all.w
+}
+
+/// The sum of all channels of [`LOOK_UPS`] bilinear look-ups in `texels[row][column]`, [`LOOK_UP_STEP`] apart, the first one a little
+/// below and right of the corner of the pixel of the element's number, counted row by row and again from the first one behind
+/// the last. Channels are summed first, in pairs.
+#[inline(always)]
+pub fn looked_up(block: &LookUpBlock, texels: &(impl Fetch<[f32; 4]> + ?Sized), element: u32) -> f32 {
+    let (column, row) = (element % block.width, element / block.width % block.height);
+    let y = row as f32 + 0.625;
+    let mut sum = 0.0;
+    let mut index = 0;
+    while index < LOOK_UPS {
+        let x = column as f32 + 0.625 + LOOK_UP_STEP * index as f32;
+        let [red, green, blue, alpha] = bilinear_from(texels, 0, block.width, block.height, x, y);
+        sum += (red + green) + (blue + alpha);
+        index += 1;
+    }
+    sum
 }
 
 /// Four numbers of an array, unchanged.

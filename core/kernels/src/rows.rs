@@ -62,7 +62,7 @@ pub use kernel::{Access, Array, Form, Kernel, Layout, Piece, SHARED_BYTES, WORKG
 pub use crate::compact::RUN;
 pub use crate::finite::FINITE_RUN;
 pub use crate::genvs::{DenoiserInputBlock, FeatureBlock, VolumeBlock};
-pub use crate::limits::ChainBlock;
+pub use crate::limits::{ChainBlock, LookUpBlock};
 pub use crate::network::attend::MatrixBlock;
 pub use crate::network::convolve::ConvolveBlock;
 pub use crate::network::depthwise::DepthwiseBlock;

@@ -35,7 +35,7 @@ pub const NO_SURFACE: f32 = 1.0e30;
 /// Visibility of what lies behind a surface: 1 at the surface, falling in a bell curve with the distance behind it in
 /// units of the curve's width, 0 from two widths on. `(1 - b^2 / 4)^4` follows `exp(-b^2)` to 0.075 and costs a quarter
 /// of it.
-#[inline]
+#[inline(always)]
 pub fn fade(behind: f32) -> f32 {
     let rest = viewfuse_core::math::max(1.0 - 0.25 * behind * behind, 0.0);
     let squared = rest * rest;

@@ -1,12 +1,13 @@
 //! Rates of the kernels that take the time, beside what the device can do at most, both measured in the same run.
 //!
-//! Two limits are measured: how fast a kernel copies, and how fast one multiplies and adds in registers. A kernel that must
-//! move so many bytes and needs so many operations takes at least the longer of the times that these limits allow; its
-//! *share* is that time over the time that it took. Limits and kernels are measured in turns, because what else a machine
+//! Three limits are measured: how fast a kernel copies, how fast one multiplies and adds in registers, and how fast one looks
+//! texels up, bilinear, of four channels. A kernel that must move so many bytes and needs so many operations or look-ups takes at
+//! least the longest of the times that these limits allow; its *share* is that time over the time that it took. Limits and kernels are measured in turns, because what else a machine
 //! does, and how fast its clock may run, changes from second to second: a share is the median of the shares of all rounds.
 //!
-//! Bytes count each number once that is read or written; a cache may serve several reads. Of products, convolutions and
-//! compositing the operations are counted by hand; other kernels are compared with the copy only.
+//! Bytes count each number once that is read or written; a cache may serve several reads. Of products, convolutions,
+//! compositing and the census the operations are counted by hand; an operation that no device may fuse with another takes the
+//! place of two. Where views are compared on planes it is look-ups. Other kernels are compared with the copy only.
 
 mod limits;
 mod networks;
@@ -35,6 +36,8 @@ pub enum Limit {
     Copy,
     /// Multiply-adds in registers.
     MultiplyAdd,
+    /// Bilinear look-ups of four channels.
+    LookUp,
 }
 
 /// A kernel at one size.
@@ -48,6 +51,8 @@ pub struct KernelRate {
     pub milliseconds: f64,
     /// Billions of operations a second, an addition or a product each; null where they are not counted.
     pub giga_operations: Option<f64>,
+    /// Billions of bilinear look-ups a second; null where they are not counted.
+    pub giga_look_ups: Option<f64>,
     /// Billions of bytes a second that it reads and writes.
     pub giga_bytes: f64,
     /// The limit that allows least.
@@ -67,16 +72,47 @@ pub struct DeviceRates {
     pub copy_giga_bytes: f64,
     /// Billions of operations a second in registers.
     pub multiply_add_giga_operations: f64,
+    /// Billions of bilinear look-ups of four channels a second.
+    pub giga_look_ups: f64,
     /// The kernels, in the order of the data.
     pub kernels: Vec<KernelRate>,
+}
+
+/// What a kernel has to compute.
+#[derive(Clone, Copy)]
+enum Operations {
+    /// Not counted.
+    Uncounted,
+    /// Additions and products, which may be fused in pairs.
+    Fused(f64),
+    /// Operations that may not be fused.
+    Single(f64),
+    /// Bilinear look-ups of four channels.
+    LookUps(f64),
+}
+
+impl Operations {
+    /// Additions and products.
+    fn arithmetic(self) -> Option<f64> {
+        match self {
+            Operations::Fused(count) | Operations::Single(count) => Some(count),
+            Operations::Uncounted | Operations::LookUps(_) => None,
+        }
+    }
+
+    fn look_ups(self) -> Option<f64> {
+        match self {
+            Operations::LookUps(count) => Some(count),
+            _ => None,
+        }
+    }
 }
 
 /// A dispatch that can be repeated.
 struct Work<'a> {
     kernel: Kernel,
     size: String,
-    /// Additions and products.
-    operations: Option<f64>,
+    work: Operations,
     /// Bytes of all numbers that it reads and writes, once each.
     bytes: f64,
     run: Box<dyn FnMut() -> Result<(), DeviceError> + 'a>,
@@ -87,7 +123,7 @@ impl<'a> Work<'a> {
         device: &'a D,
         dispatch: K,
         size: String,
-        operations: Option<f64>,
+        work: Operations,
         bytes: f64,
     ) -> Result<Work<'a>, DeviceError>
     where
@@ -95,7 +131,7 @@ impl<'a> Work<'a> {
     {
         let mut loaded = K::upload(device, std::slice::from_ref(&dispatch))?;
         let run = Box::new(move || dispatch.dispatch(device, &mut loaded, 0));
-        Ok(Work { kernel: K::KERNEL, size, operations, bytes, run })
+        Ok(Work { kernel: K::KERNEL, size, work, bytes, run })
     }
 }
 
@@ -109,10 +145,12 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
         |kernel: &'static str| move |source: DeviceError| CheckError::Device { kernel, source: Box::new(source) };
     let mut copy = limits::copy(device).map_err(making("copy_numbers"))?;
     let mut chains = limits::chains(device).map_err(making("multiply_add"))?;
+    let mut look_ups = limits::look_ups(device).map_err(making("look_up_texels"))?;
     let mut works = sweeps::works(device).map_err(making("compare_views"))?;
     works.extend(networks::works(device).map_err(making("linear"))?);
     let copies = repeats(device, &mut copy)?;
     let rounds_of_chains = repeats(device, &mut chains)?;
+    let rounds_of_look_ups = repeats(device, &mut look_ups)?;
     let mut limits = Vec::new();
     let mut times = vec![Vec::new(); works.len()];
     let mut shares = vec![Vec::new(); works.len()];
@@ -124,6 +162,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
             let limit = Limits {
                 bytes: rate(device, &mut copy, copies)?,
                 operations: rate(device, &mut chains, rounds_of_chains)?,
+                look_ups: rate(device, &mut look_ups, rounds_of_look_ups)?,
             };
             let count = repeats(device, work)?;
             let time = seconds(device, work, count)?;
@@ -137,6 +176,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
     let typical = Limits {
         bytes: median(limits.iter().map(|limit| limit.bytes).collect()),
         operations: median(limits.iter().map(|limit| limit.operations).collect()),
+        look_ups: median(limits.iter().map(|limit| limit.look_ups).collect()),
     };
     let kernel = |((work, times), shares): ((&Work<'_>, Vec<f64>), Vec<f64>)| {
         let time = median(times);
@@ -144,7 +184,8 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
             kernel: work.kernel.name(),
             size: work.size.clone(),
             milliseconds: 1.0e3 * time,
-            giga_operations: work.operations.map(|operations| operations / time / 1.0e9),
+            giga_operations: work.work.arithmetic().map(|operations| operations / time / 1.0e9),
+            giga_look_ups: work.work.look_ups().map(|look_ups| look_ups / time / 1.0e9),
             giga_bytes: work.bytes / time / 1.0e9,
             limit: typical.seconds(work).1,
             share: median(shares),
@@ -155,6 +196,7 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
         rounds,
         copy_giga_bytes: of_limits(|limit| limit.bytes),
         multiply_add_giga_operations: of_limits(|limit| limit.operations),
+        giga_look_ups: of_limits(|limit| limit.look_ups),
         kernels: works.iter().zip(times).zip(shares).map(kernel).collect(),
     })
 }
@@ -163,20 +205,27 @@ pub fn measure_rates<D: Device>(device: &D, rounds: u32, progress: &dyn Progress
 struct Limits {
     bytes: f64,
     operations: f64,
+    look_ups: f64,
 }
 
 impl Limits {
     /// The least time for some work, and what takes it.
     fn seconds(&self, work: &Work<'_>) -> (f64, Limit) {
         let copying = work.bytes / self.bytes;
-        let computing = work.operations.map_or(0.0, |operations| operations / self.operations);
-        if computing > copying { (computing, Limit::MultiplyAdd) } else { (copying, Limit::Copy) }
+        let (computing, limit) = match work.work {
+            Operations::Uncounted => (0.0, Limit::Copy),
+            Operations::Fused(count) => (count / self.operations, Limit::MultiplyAdd),
+            Operations::Single(count) => (2.0 * count / self.operations, Limit::MultiplyAdd),
+            Operations::LookUps(count) => (count / self.look_ups, Limit::LookUp),
+        };
+        if computing > copying { (computing, limit) } else { (copying, Limit::Copy) }
     }
 }
 
-/// How fast a limit's own kernel is: operations a second, or bytes if it has none.
+/// How fast a limit's own kernel is: operations or look-ups a second, or bytes if it has none.
 fn rate<D: Device>(device: &D, work: &mut Work<'_>, repeats: u32) -> Result<f64, CheckError> {
-    Ok(work.operations.unwrap_or(work.bytes) / seconds(device, work, repeats)?)
+    let amount = work.work.arithmetic().or(work.work.look_ups()).unwrap_or(work.bytes);
+    Ok(amount / seconds(device, work, repeats)?)
 }
 
 /// As many repetitions as take the time that is measured, after one for what is made at the first use.

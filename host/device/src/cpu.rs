@@ -13,6 +13,7 @@ mod matrices;
 mod network;
 mod points;
 mod scratch;
+mod sweep;
 mod volumes;
 mod winograd;
 
@@ -30,6 +31,7 @@ use matrices::*;
 use network::*;
 use points::*;
 use pulp::Arch;
+use sweep::*;
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::for_each_kernel;
 use viewfuse_kernels::rows::*;
@@ -108,6 +110,7 @@ macro_rules! compute {
         parallel!(wide $method $block $arrays $elements)
     };
     ({ definition $($mark:ident)* } $($row:tt)*) => { compute!({ $($mark)* } $($row)*) };
+    ({ measured $($mark:ident)* } $($row:tt)*) => { compute!({ $($mark)* } $($row)*) };
     ({} $method:ident $block:tt $counts:tt $arrays:tt $elements:tt) => {
         parallel!(plain $method $block $arrays $elements)
     };

@@ -1,6 +1,6 @@
 //! Operations on pictures and other numbers, and what a device can do at most.
 
-use crate::limits::{ChainBlock, chained, copied};
+use crate::limits::{ChainBlock, LookUpBlock, chained, copied, looked_up};
 use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::half_precision;
@@ -49,4 +49,15 @@ pub fn copy_numbers(
 #[inline]
 pub fn multiply_add(block: &ChainBlock, starts: &[f32], ends: &mut (impl Store<f32> + ?Sized), chain: u32) {
     ends.store(chain as usize, chained(block, starts[chain as usize]));
+}
+
+/// Several look-ups.
+#[inline(always)]
+pub fn look_up_texels(
+    block: &LookUpBlock,
+    texels: &(impl Fetch<[f32; 4]> + ?Sized),
+    sums: &mut (impl Store<f32> + ?Sized),
+    element: u32,
+) {
+    sums.store(element as usize, looked_up(block, texels, element));
 }

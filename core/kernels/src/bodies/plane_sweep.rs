@@ -13,7 +13,7 @@ use crate::store::Store;
 use viewfuse_core::fetch::Fetch;
 
 /// What the views show on a group of planes of a pixel of the band.
-#[inline]
+#[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn compare_views(
     block: &FrustumBlock,
@@ -41,7 +41,7 @@ pub fn compare_views(
 }
 
 /// The costs of a group of planes of a pixel of the band.
-#[inline]
+#[inline(always)]
 pub fn census_cost(
     block: &FrustumBlock,
     pairs: &[ViewPair],
@@ -59,7 +59,7 @@ pub fn census_cost(
 }
 
 /// Costs summed over a row's part of the windows around a group of planes of a pixel.
-#[inline]
+#[inline(always)]
 pub fn row_sums(block: &WindowBlock, costs: &[Planes], sums: &mut (impl Store<Planes> + ?Sized), group: u32) {
     let found = window::row_sums(block, costs, group / block.group_count, group % block.group_count);
     let mut window = 0;
@@ -72,14 +72,14 @@ pub fn row_sums(block: &WindowBlock, costs: &[Planes], sums: &mut (impl Store<Pl
 }
 
 /// The cost of a group of planes of a pixel, averaged over the windows.
-#[inline]
+#[inline(always)]
 pub fn window_cost(block: &WindowBlock, sums: &[Planes], means: &mut (impl Store<Planes> + ?Sized), group: u32) {
     let mean = window::window_cost(block, sums, group / block.group_count, group % block.group_count);
     means.store(group as usize, mean);
 }
 
 /// How opaque a group of planes of a pixel is.
-#[inline]
+#[inline(always)]
 pub fn plane_opacity(
     block: &FrustumBlock,
     views: &(impl Fetch<SweptView> + ?Sized),
@@ -92,7 +92,7 @@ pub fn plane_opacity(
 }
 
 /// The costs of a pixel's planes, with the preference for the first opaque one.
-#[inline]
+#[inline(always)]
 pub fn front_cost(
     block: &FrontBlock,
     opacities: &(impl Fetch<Planes> + ?Sized),
@@ -110,7 +110,7 @@ pub fn front_cost(
 }
 
 /// The joined costs of a line.
-#[inline]
+#[inline(always)]
 pub fn follow_paths(
     block: &CostBlock,
     means: &(impl Fetch<Planes> + ?Sized),
@@ -134,14 +134,14 @@ pub fn follow_paths(
 }
 
 /// The cost of a group of planes of a pixel: the mean of the directions' costs.
-#[inline]
+#[inline(always)]
 pub fn join_paths(block: &CostBlock, paths: &[Planes], costs: &mut (impl Store<Planes> + ?Sized), group: u32) {
     let cost = path::joined_cost(block, paths, group / block.group_count, group % block.group_count);
     costs.store(group as usize, cost);
 }
 
 /// Disparity and confidence of a pixel of a view.
-#[inline]
+#[inline(always)]
 pub fn pick_disparity(
     block: &FrustumBlock,
     costs: &[Planes],
@@ -153,7 +153,7 @@ pub fn pick_disparity(
 }
 
 /// A pixel of the target, blended from the planes.
-#[inline]
+#[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub fn blend_planes(
     block: &BlendBlock,

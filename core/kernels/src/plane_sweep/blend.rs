@@ -56,7 +56,7 @@ pub struct Blended {
 }
 
 /// Visibility of a point of this disparity in a view, by its own map: 1 at the surface it sees or in front of that.
-#[inline]
+#[inline(always)]
 pub fn visibility(
     view: &SweptView,
     disparities: &(impl Fetch<[f32; 2]> + ?Sized),
@@ -83,7 +83,7 @@ pub fn visibility(
 }
 
 /// The pixel at the image coordinate `at`, from `costs[row][column][group]` of a volume of any size.
-#[inline]
+#[inline(always)]
 pub fn blend(
     block: &BlendBlock,
     views: &(impl Fetch<SweptView> + ?Sized),
@@ -171,7 +171,7 @@ pub fn blend(
 }
 
 /// The costs of all planes at an image coordinate of the target: bilinear in the volume.
-#[inline]
+#[inline(always)]
 fn pixel_costs(block: &BlendBlock, costs: &(impl Fetch<Planes> + ?Sized), at: [f32; 2]) -> [Planes; MAX_GROUPS] {
     let (width, height) = (block.volume_width, block.volume_height);
     let groups = block.group_count as usize;

@@ -24,7 +24,7 @@ pub const OUTSIDE_COST: f32 = 0.5;
 ///
 /// `grey[view][row][column][group]` and `evidence[row][column][group][difference, weight, dissent, hull]` are of the band;
 /// `pixel` is counted in it.
-#[inline]
+#[inline(always)]
 pub fn census_cost(
     frustum: &FrustumBlock,
     pairs: &[ViewPair],
@@ -77,8 +77,16 @@ pub fn census_cost(
         }
         offset += 1;
     }
+    cost_of_sums(frustum, evidence, here, &[sum, count, texture])
+}
+
+/// Cost and weight of a group of planes, from the pairs' sums `[difference, weight, contrast]` over the census window and the
+/// group's `evidence[here][difference, weight, dissent, hull]`.
+#[inline(always)]
+pub fn cost_of_sums(frustum: &FrustumBlock, evidence: &[Planes], here: usize, sums: &[Planes; 3]) -> [Planes; 2] {
     let (difference, weight) = (&evidence[4 * here], &evidence[4 * here + 1]);
     let (dissent, hull) = (&evidence[4 * here + 2], &evidence[4 * here + 3]);
+    let [sum, count, texture] = sums;
     let mut cost = [0.0; PLANES];
     let mut share = [0.0; PLANES];
     let mut plane = 0;

@@ -16,7 +16,7 @@ pub const DOUBT_WIDTH: f32 = 0.02;
 /// Disparity and confidence in `[0, 1]` of a pixel, from `costs[row][column][group]`. The disparity is that of the plane of
 /// least cost, moved to the vertex of the parabola through it and its neighbours; the confidence is the share of the softmax
 /// within [`NEAR_PLANES`] of it, times a logistic step on the least cost.
-#[inline]
+#[inline(always)]
 pub fn pick_disparity(frustum: &FrustumBlock, costs: &[Planes], pixel: u32) -> [f32; 2] {
     let groups = frustum.group_count as usize;
     let first = pixel as usize * groups;

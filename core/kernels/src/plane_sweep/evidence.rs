@@ -46,14 +46,14 @@ pub struct Evidence {
 
 /// How far a point lies behind the surface that a view sees, in planes of the view's own sweep; negative in front of
 /// it.
-#[inline]
+#[inline(always)]
 pub fn planes_behind(surface: f32, disparity: f32, step: f32) -> f32 {
     (surface - disparity) / step
 }
 
 /// The evidence for a group of planes at a pixel. `disparities[view's map][row][column]` are disparity and confidence;
 /// the views' texels are premultiplied.
-#[inline]
+#[inline(always)]
 pub fn evidence(
     frustum: &FrustumBlock,
     views: &(impl Fetch<SweptView> + ?Sized),

@@ -46,7 +46,7 @@ const _: () = assert!(size_of::<FrontBlock>() == 16);
 /// Opacities in `[0, 1)` of a group of planes at a pixel: support over the sum of support, [`SEEN_THROUGH`] times free-space
 /// violation, and [`TRANSPARENT`]. A view's support is its confidence times a bell of one plane around its surface. All views count
 /// alike. `disparities[view's map][row][column]` are disparity and confidence.
-#[inline]
+#[inline(always)]
 pub fn plane_opacity(
     frustum: &FrustumBlock,
     views: &(impl Fetch<SweptView> + ?Sized),
@@ -77,6 +77,12 @@ pub fn plane_opacity(
         }
         slot += 1;
     }
+    opacity_of(&support, &violation)
+}
+
+/// Opacities of a group of planes from the views' support and free-space violation.
+#[inline(always)]
+pub fn opacity_of(support: &Planes, violation: &Planes) -> Planes {
     let mut opacity = [0.0; PLANES];
     let mut plane = 0;
     while plane < PLANES {
@@ -89,7 +95,7 @@ pub fn plane_opacity(
 /// A pixel's costs of all planes, `costs[pixel][group]`, each with the preference added: `front_share` times 1 less the plane's
 /// opacity times the transmittance before it. The opacity is the mean over three by three pixels of `opacities[row][column][group]`
 /// (those in the image); the transmittance is 1 less what the most opaque plane hides of those at least [`GUARD`] planes before.
-#[inline]
+#[inline(always)]
 pub fn front_cost(
     block: &FrontBlock,
     opacities: &(impl Fetch<Planes> + ?Sized),
@@ -122,7 +128,7 @@ pub fn front_cost(
 }
 
 /// Means of three by three pixels, row by row.
-#[inline]
+#[inline(always)]
 fn mean_opacity(block: &FrontBlock, opacities: &(impl Fetch<Planes> + ?Sized), pixel: u32) -> [Planes; MAX_GROUPS] {
     let (column, row) = (pixel % block.width, pixel / block.width);
     let groups = block.group_count as usize;

@@ -38,13 +38,13 @@ const _: () = assert!(size_of::<FrustumBlock>() == 116);
 
 impl FrustumBlock {
     /// Disparity of a plane.
-    #[inline]
+    #[inline(always)]
     pub fn disparity(&self, plane: usize) -> f32 {
         self.far_disparity + plane as f32 * self.disparity_step
     }
 
     /// The track of a pixel's points in a view: `pixel` is counted row by row in the whole image.
-    #[inline]
+    #[inline(always)]
     pub fn track(&self, view: &CameraBlock, pixel: u32) -> Track {
         let (column, row) = (pixel % self.camera.width, pixel / self.camera.width);
         Track::new(&self.camera, view, column as f32 + 0.5, row as f32 + 0.5)
@@ -77,7 +77,7 @@ const _: () = assert!(size_of::<SweptView>() == 128);
 
 impl SweptView {
     /// Where a point of the view's image lies in the view's map of disparities, of the same size as the image.
-    #[inline]
+    #[inline(always)]
     pub fn map_texel(&self, x: f32, y: f32) -> usize {
         let column = min(x, self.camera.width as f32 - 1.0) as usize;
         let row = min(y, self.camera.height as f32 - 1.0) as usize;
@@ -111,7 +111,7 @@ pub struct Sight {
 
 impl Track {
     /// The ray through the image coordinate `(x, y)` of `camera`, as `view` sees it.
-    #[inline]
+    #[inline(always)]
     pub fn new(camera: &CameraBlock, view: &CameraBlock, x: f32, y: f32) -> Track {
         Track {
             far: view.pose.rotate_to_camera(camera.towards(x, y)),
@@ -123,7 +123,7 @@ impl Track {
 
     /// The ray's point of this disparity. For a point behind the view, the coordinates are those of a point just in
     /// front of it.
-    #[inline]
+    #[inline(always)]
     pub fn at(&self, disparity: f32) -> Sight {
         let [focal_x, focal_y, principal_x, principal_y] = self.intrinsics;
         let depth = self.far.z + self.slope.z * disparity;

@@ -31,13 +31,13 @@ const _: () = assert!(size_of::<CostBlock>() == 16);
 
 impl CostBlock {
     /// Number of lines in all directions.
-    #[inline]
+    #[inline(always)]
     pub fn line_count(&self) -> u32 {
         2 * (self.width + self.height)
     }
 
     /// A line's direction, its number among those of the direction, and how many pixels it has. Directions are right, left, down, up.
-    #[inline]
+    #[inline(always)]
     pub fn line(&self, line: u32) -> (u32, u32, u32) {
         if line < 2 * self.height {
             (line / self.height, line % self.height, self.width)
@@ -48,14 +48,14 @@ impl CostBlock {
     }
 
     /// Where a line begins in `paths[direction][line][step][group]`.
-    #[inline]
+    #[inline(always)]
     pub fn first_of_line(&self, line: u32) -> usize {
         let (direction, number, step_count) = self.line(line);
         (direction * self.width * self.height + number * step_count) as usize * self.group_count as usize
     }
 
     /// The pixel of a line.
-    #[inline]
+    #[inline(always)]
     pub fn pixel(&self, direction: u32, number: u32, step: u32) -> u32 {
         match direction {
             0 => number * self.width + step,
@@ -66,7 +66,7 @@ impl CostBlock {
     }
 
     /// Offset of a pixel's groups in `paths[direction][line][step][group]`.
-    #[inline]
+    #[inline(always)]
     pub fn place(&self, direction: u32, column: u32, row: u32) -> usize {
         let (width, height) = (self.width, self.height);
         let at = match direction {
@@ -91,7 +91,7 @@ impl Line {
     pub const START: Line = Line { costs: [[0.0; PLANES]; MAX_GROUPS], least: 0.0 };
 
     /// Advances to a pixel with these costs, `costs[first..][group]`; the aggregated ones are [`Line::costs`].
-    #[inline]
+    #[inline(always)]
     pub fn advance(&mut self, costs: &(impl Fetch<Planes> + ?Sized), first: usize, group_count: usize) {
         let jump = self.least + JUMP_COST;
         let mut joined = [[0.0; PLANES]; MAX_GROUPS];
@@ -128,14 +128,14 @@ impl Line {
     }
 
     /// The costs of a group of planes at the last pixel.
-    #[inline]
+    #[inline(always)]
     pub fn costs(&self, group: usize) -> Planes {
         self.costs[group]
     }
 }
 
 /// The mean of the four directions' costs at a pixel: `paths[direction][line][step][group]`.
-#[inline]
+#[inline(always)]
 pub fn joined_cost(block: &CostBlock, paths: &[Planes], pixel: u32, group: u32) -> Planes {
     let (column, row) = (pixel % block.width, pixel / block.width);
     let mut sum = [0.0; PLANES];

@@ -51,7 +51,7 @@ impl WindowBlock {
 /// Sums over a row's parts of the three windows: `[window][cost times weight, weight]`, from
 /// `costs[row][column][group][cost times weight, weight]`. `pixel` is counted in the image. From the middle outwards, the
 /// smaller window first.
-#[inline]
+#[inline(always)]
 pub fn row_sums(block: &WindowBlock, costs: &[Planes], pixel: u32, group: u32) -> [[Planes; 2]; 3] {
     let column = (pixel % block.width) as i32;
     let first = (pixel - pixel % block.width) as usize;
@@ -80,7 +80,7 @@ pub fn row_sums(block: &WindowBlock, costs: &[Planes], pixel: u32, group: u32) -
 }
 
 /// The cost of a group of planes at a pixel: the three windows' means, from `sums[row][column][group][window][2]`.
-#[inline]
+#[inline(always)]
 pub fn window_cost(block: &WindowBlock, sums: &[Planes], pixel: u32, group: u32) -> Planes {
     let (column, row) = ((pixel % block.width) as i32, (pixel / block.width) as i32);
     let (width, height) = (block.width as i32, block.height as i32);

@@ -360,7 +360,7 @@ macro_rules! for_each_kernel {
             /// What views show on planes, and how far their colours agree: `grey[view][row][column][group]` and
             /// `evidence[row][column][group][4]` of a band of a frustum. An element is a group of planes of a pixel.
             CompareViews compare_views(block: FrustumBlock)
-            for group in [0..block.row_count * block.camera.width * block.group_count], looped {
+            for group in [0..block.row_count * block.camera.width * block.group_count], twin {
                 read views: SweptView as vectors,
                 read pairs: ViewPair,
                 read texels: [f32; 4] as vectors,
@@ -372,7 +372,7 @@ macro_rules! for_each_kernel {
             /// `costs[row][column][group][cost times weight, weight]`. An element is a group of planes of a pixel.
             CensusCost census_cost(block: FrustumBlock; first_row, row_count)
             for group in [first_row * block.camera.width * block.group_count ..
-                (first_row + row_count) * block.camera.width * block.group_count; 128 a core], wide {
+                (first_row + row_count) * block.camera.width * block.group_count; 128 a core], twin {
                 read pairs: ViewPair,
                 read grey: Planes,
                 read evidence: Planes,
@@ -394,7 +394,7 @@ macro_rules! for_each_kernel {
             /// How opaque planes are by the views' own disparities: `opacities[row][column][group]`. An element is a group of
             /// planes of a pixel.
             PlaneOpacity plane_opacity(block: FrustumBlock)
-            for group in [0..block.camera.width * block.camera.height * block.group_count; 128 a core], wide {
+            for group in [0..block.camera.width * block.camera.height * block.group_count; 128 a core], twin {
                 read views: SweptView as vectors,
                 read disparities: [f32; 2] as vectors,
                 write opacities: Planes as vectors,
@@ -462,6 +462,12 @@ macro_rules! for_each_kernel {
             MultiplyAdd multiply_add(block: ChainBlock; element_count) for chain in [0..element_count], twin, measured {
                 read starts: f32,
                 write ends: f32,
+            }
+            /// Texels looked up, to measure how fast a device does that: `sums[element]`. An element is several look-ups.
+            LookUpTexels look_up_texels(block: LookUpBlock; element_count)
+            for element in [0..element_count; 1024 a core], measured, wide {
+                read texels: [f32; 4] as vectors,
+                write sums: f32,
             }
         }
     };

@@ -1,8 +1,9 @@
-//! [`Kernel::CopyNumbers`] and [`Kernel::MultiplyAdd`]: numbers of all sizes; chains that tend to one number and chains
-//! that tend to 0, also without a round.
+//! [`Kernel::CopyNumbers`], [`Kernel::MultiplyAdd`] and [`Kernel::LookUpTexels`]: numbers of all sizes; chains that tend to one number
+//! and chains that tend to 0, also without a round; images of one row, of one column and larger ones.
 
 use super::*;
-use viewfuse_kernels::limits::{CHAINS, ROUND_STEPS};
+use crate::camera_oracle::{bilinear, tents};
+use viewfuse_kernels::limits::{CHAINS, LOOK_UP_STEP, LOOK_UPS, ROUND_STEPS};
 
 impl Case for CopyNumbers {
     const SEED_COUNT: u64 = 2;
@@ -53,5 +54,45 @@ impl Case for MultiplyAdd {
             (0..CHAINS).map(chain).fold(Bounded::ZERO, |sum, chain| sum + chain)
         };
         decided(self.starts.iter().map(sum), 1)
+    }
+}
+
+impl Case for LookUpTexels {
+    const SEED_COUNT: u64 = 2;
+    const HAS_REAL_PARAMETERS: bool = false;
+    const LIMITS: Limits = Limits { tolerance: 1.0e-3, least: 1.0e-3 };
+    const REASON: &'static str = "rounding of the places, times the image's changes, and of the sums";
+    const NEGATIVE_CONTROLS: &'static [NegativeControl<Self>] =
+        &[("texels", |own| increase(own.texels.as_flattened_mut()))];
+
+    fn inputs(seed: u64, size: u32) -> Vec<LookUpTexels> {
+        let random = &mut random(62, seed, size);
+        let dispatch = |(width, height): (u32, u32)| LookUpTexels {
+            block: LookUpBlock { width, height },
+            element_count: size,
+            texels: numbers(4 * (width * height) as usize, || random.normal()).as_chunks().0.to_vec(),
+            sums: Output::Zeros(size as usize + 1),
+        };
+        [(1, 1), (1, 7), (5, 1), (11, 6)].map(dispatch).to_vec()
+    }
+
+    fn expected(&self) -> Vec<Option<Bounded>> {
+        let LookUpBlock { width, height } = self.block;
+        let sum = |element: u32| {
+            let (column, row) = (element % width, element / width % height);
+            let rows = tents(Bounded::from(row as f32) + Bounded::from(0.625), height);
+            let looked = |index: u32| {
+                let step = Bounded::from(LOOK_UP_STEP) * Bounded::from(index as f32);
+                let columns = tents(Bounded::from(column as f32) + Bounded::from(0.625) + step, width);
+                let node = |channel: usize| {
+                    let texels = &self.texels;
+                    move |row: usize, column: usize| texels[row * width as usize + column][channel]
+                };
+                let [red, green, blue, alpha] = [0, 1, 2, 3].map(|channel| bilinear(node(channel), &columns, &rows));
+                (red + green) + (blue + alpha)
+            };
+            (0..LOOK_UPS).map(looked).fold(Bounded::ZERO, |sum, looked| sum + looked)
+        };
+        decided((0..self.element_count).map(sum), 1)
     }
 }

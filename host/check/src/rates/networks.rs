@@ -1,7 +1,7 @@
 //! Kernels of networks at the sizes of a render: linear layers of the published PixelNeRF and of the included one,
 //! look-ups in its grids, fusion, compositing; a convolution and an attention's product of a GeNVS.
 
-use super::Work;
+use super::{Operations, Work};
 use crate::dispatch::*;
 use crate::poses::{numbers, random};
 use crate::ray_inputs::{camera, point};
@@ -47,7 +47,7 @@ fn linear<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceErro
     };
     let size = format!("{row_count}x{inner_count}x{column_count}");
     let bytes = F32 * (rows * inner + inner * columns + rows * columns) as f64;
-    Work::new(device, linear, size, Some(2.0 * (rows * inner * columns) as f64), bytes)
+    Work::new(device, linear, size, Operations::Fused(2.0 * (rows * inner * columns) as f64), bytes)
 }
 
 fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>, DeviceError> {
@@ -82,7 +82,7 @@ fn convolve<D: Device>(device: &D, side: u32, channels: u32) -> Result<Work<'_>,
     let size = format!("{side}x{side}, {channels} channels, 3x3");
     // Of the definition: an algorithm with fewer products may have a share above 1.
     let operations = 2.0 * (image * inner) as f64;
-    Work::new(device, convolve, size, Some(operations), F32 * (2 * image + inner * columns) as f64)
+    Work::new(device, convolve, size, Operations::Fused(operations), F32 * (2 * image + inner * columns) as f64)
 }
 
 fn matrix_product<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, DeviceError> {
@@ -103,7 +103,7 @@ fn matrix_product<D: Device>(device: &D, sizes: [u32; 3]) -> Result<Work<'_>, De
     let product = MatrixProduct { block, left, right, outputs: Output::Zeros(rows * columns) };
     let size = format!("{row_count}x{inner_count}x{column_count}");
     let bytes = F32 * (rows * inner + inner * columns + rows * columns) as f64;
-    Work::new(device, product, size, Some(2.0 * (rows * inner * columns) as f64), bytes)
+    Work::new(device, product, size, Operations::Fused(2.0 * (rows * inner * columns) as f64), bytes)
 }
 
 fn gather<D: Device>(device: &D, point_count: u32, channels: u32, side: u32) -> Result<Work<'_>, DeviceError> {
@@ -122,7 +122,13 @@ fn gather<D: Device>(device: &D, point_count: u32, channels: u32, side: u32) -> 
     let (grid, residual) = (values(9, nodes), Some(values(10, count)));
     let gather = GatherLatents { block, views, points, grid, residual, gathered: Output::Zeros(count) };
     let size = format!("{point_count} points, {channels} channels of {side}x{side}");
-    Work::new(device, gather, size, None, F32 * (2 * count + nodes) as f64 + 32.0 * f64::from(point_count))
+    Work::new(
+        device,
+        gather,
+        size,
+        Operations::Uncounted,
+        F32 * (2 * count + nodes) as f64 + 32.0 * f64::from(point_count),
+    )
 }
 
 fn fuse<D: Device>(device: &D, view_count: u32, point_count: u32, channel_count: u32) -> Result<Work<'_>, DeviceError> {
@@ -137,7 +143,7 @@ fn fuse<D: Device>(device: &D, view_count: u32, point_count: u32, channel_count:
     };
     let size = format!("{view_count} views, {point_count} points, {channel_count} channels");
     let bytes = F32 * f64::from((view_count + 1) * count + point_count * view_count);
-    Work::new(device, fuse, size, Some(2.0 * f64::from(view_count * count)), bytes)
+    Work::new(device, fuse, size, Operations::Fused(2.0 * f64::from(view_count * count)), bytes)
 }
 
 fn composite<D: Device>(device: &D, ray_count: u32, sample_count: u32) -> Result<Work<'_>, DeviceError> {
@@ -153,5 +159,5 @@ fn composite<D: Device>(device: &D, ray_count: u32, sample_count: u32) -> Result
         depths: Output::Zeros(ray_count as usize),
     };
     let bytes = F32 * f64::from(ray_count) * (5.0 * f64::from(sample_count) + 5.0);
-    Work::new(device, composite, format!("{ray_count} rays, {sample_count} samples"), None, bytes)
+    Work::new(device, composite, format!("{ray_count} rays, {sample_count} samples"), Operations::Uncounted, bytes)
 }

@@ -1,14 +1,14 @@
 //! Kernels of the plane sweep, on a frustum about as large as the training-free field's.
 
-use super::Work;
+use super::{Operations, Work};
 use crate::dispatch::*;
 use crate::swept::{Swept, band, costs, opacities};
 use crate::world::Numbers;
 use viewfuse_device::{Device, DeviceError};
-use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::front::FrontBlock;
 use viewfuse_kernels::plane_sweep::path::DIRECTIONS;
 use viewfuse_kernels::plane_sweep::window::WindowBlock;
+use viewfuse_kernels::plane_sweep::{PLANES, Planes};
 
 /// Groups of planes of all pixels together.
 const GROUPS: u32 = 24_000;
@@ -37,6 +37,12 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
         evidence,
         costs: Output::Zeros(2 * group_count),
     };
+    let look_ups = (views.len() * PLANES * group_count) as f64;
+    // Of each plane and each of the twelve pixels of half a census window: of a view a difference, a product, two limits and an
+    // amount; of a pair a difference, its amount, a limit, a greater one, two products and three sums.
+    let comparisons = (12 * (5 * views.len() + 9 * pairs.len()) * PLANES * group_count) as f64;
+    // Of a plane and a view: 19 of the projection, 23 of support and free space.
+    let opacity_operations = 42.0 * look_ups;
     let census_bytes = bytes((views.len() + 4 + 2) * band_len);
     let compare_bytes = texel_bytes + bytes((views.len() + 4) * band_len);
     let grey = Output::Zeros(views.len() * band_len);
@@ -68,12 +74,12 @@ pub(super) fn works<D: Device>(device: &D) -> Result<Vec<Work<'_>>, DeviceError>
     let directions = DIRECTIONS as usize;
     let follow = FollowPaths { block: volume, means: single, paths: Output::Zeros(directions * group_count) };
     Ok(vec![
-        Work::new(device, compare, of_views.clone(), None, compare_bytes)?,
-        Work::new(device, census, of_views.clone(), None, census_bytes)?,
-        Work::new(device, opacity, of_views, None, opacity_bytes)?,
-        Work::new(device, front, size.clone(), None, bytes(3 * group_count))?,
-        Work::new(device, rows, size.clone(), None, bytes(8 * group_count))?,
-        Work::new(device, window, size.clone(), None, bytes(7 * group_count))?,
-        Work::new(device, follow, size, None, bytes((1 + directions) * group_count))?,
+        Work::new(device, compare, of_views.clone(), Operations::LookUps(look_ups), compare_bytes)?,
+        Work::new(device, census, of_views.clone(), Operations::Single(comparisons), census_bytes)?,
+        Work::new(device, opacity, of_views, Operations::Single(opacity_operations), opacity_bytes)?,
+        Work::new(device, front, size.clone(), Operations::Uncounted, bytes(3 * group_count))?,
+        Work::new(device, rows, size.clone(), Operations::Uncounted, bytes(8 * group_count))?,
+        Work::new(device, window, size.clone(), Operations::Uncounted, bytes(7 * group_count))?,
+        Work::new(device, follow, size, Operations::Uncounted, bytes((1 + directions) * group_count))?,
     ])
 }

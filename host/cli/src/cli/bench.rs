@@ -72,8 +72,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
 
 fn print_device(rates: &DeviceRates) -> std::io::Result<()> {
     say(format_args!(
-        "{}: copies {:.1} GB/s, multiplies and adds {:.1} GFLOP/s in registers",
-        rates.device, rates.copy_giga_bytes, rates.multiply_add_giga_operations
+        "{}: copies {:.1} GB/s, multiplies and adds {:.1} GFLOP/s in registers, looks up {:.3} G texels/s",
+        rates.device, rates.copy_giga_bytes, rates.multiply_add_giga_operations, rates.giga_look_ups
     ))?;
     let header = ["kernel", "size", "ms", "GFLOP/s", "GB/s", "limit", "share of it"];
     let mut rows = table(header.map(str::to_owned));
@@ -87,6 +87,7 @@ fn row(kernel: &KernelRate) -> [String; 7] {
     let limit = match kernel.limit {
         Limit::Copy => "copy",
         Limit::MultiplyAdd => "multiply-add",
+        Limit::LookUp => "look-up",
     };
     [
         kernel.kernel.to_owned(),

@@ -27,7 +27,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::blend::BlendBlock;
 use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
-use viewfuse_kernels::plane_sweep::frustum::SweptView;
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
 use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -35,10 +35,12 @@ const NEAR_COST: &str = "near cost";
 const FRONT_SHARE: &str = "front share";
 const DISSENT_SHARE: &str = "dissent share";
 const TEMPERATURE_NAME: &str = "temperature";
+const SECOND_SHARE: &str = "second share";
 
 /// The scalars that differ most from scene to scene, the most effective ones first.
 const TUNABLES: &[Tunable] = &[
     Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
+    Tunable { name: SECOND_SHARE, default: DEFAULT.second_share, others: &[0.03] },
     Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
     Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
     Tunable { name: TEMPERATURE_NAME, default: DEFAULT.temperature, others: &[0.005, 0.013] },
@@ -51,6 +53,7 @@ const DEFAULT: Sweep = Sweep {
     match_side: 256,
     near_cost: 0.01,
     front_share: 0.1,
+    second_share: 0.0,
     dissent_share: 0.0625,
     temperature: TEMPERATURE,
 };
@@ -69,6 +72,9 @@ pub struct Sweep {
     /// Cost of a plane that is transparent, or hidden by a nearer one, by the sources' own disparities: the nearer of two
     /// surfaces wins, whichever more sources see.
     pub front_share: f32,
+    /// The same for the sources: their disparities are then found a second time, by what the first ones say of one another; 0
+    /// for once.
+    pub second_share: f32,
     /// Cost of contradicting the sources' own disparities.
     pub dissent_share: f32,
     /// Temperature of the softmax over planes.
@@ -97,6 +103,8 @@ pub(super) struct Views<'a, D: Device> {
     matched: Images<D>,
     /// `[view][row][column]` of the matched ones: disparity and confidence.
     disparities: D::Buffer<[f32; 2]>,
+    /// Those found the second time, and of which views.
+    settled: Option<(Vec<usize>, D::Buffer<[f32; 2]>)>,
     /// From a plane's disparity to the next one's, of each view; 0 if it is not encoded.
     steps: Vec<f32>,
     relevance: Vec<SourceWeights>,
@@ -118,9 +126,10 @@ struct Volume<D: Device> {
 
 impl Sweep {
     /// The scalars that can be chosen for a scene, by the names in [`TUNABLES`].
-    fn scalars(&mut self) -> [(&'static str, &mut f32); 4] {
+    fn scalars(&mut self) -> [(&'static str, &mut f32); 5] {
         [
             (FRONT_SHARE, &mut self.front_share),
+            (SECOND_SHARE, &mut self.second_share),
             (NEAR_COST, &mut self.near_cost),
             (DISSENT_SHARE, &mut self.dissent_share),
             (TEMPERATURE_NAME, &mut self.temperature),
@@ -164,6 +173,7 @@ impl Sweep {
             pictures: Images::upload(device, &pictures)?,
             matched: Images::upload(device, &small)?,
             disparities: device.zeros(texels.len())?,
+            settled: None,
             steps: vec![0.0; sources.images.len()],
             relevance: Vec::new(),
             space,
@@ -255,7 +265,7 @@ impl<D: Device> Views<'_, D> {
     /// Estimates the gains from these views alone: a picture does not depend on sources that its weights leave out.
     fn estimate_gains(&mut self, views: &[usize]) -> Result<(), FieldError> {
         if self.gains.as_ref().is_none_or(|(own, _)| own != views) {
-            let maps = self.device.download(&self.disparities)?;
+            let maps = self.device.download(self.maps())?;
             let step = |view: usize| if views.contains(&view) { self.steps[view] } else { 0.0 };
             let steps: Vec<f32> = (0..self.steps.len()).map(step).collect();
             let gains = exposure::gains(&self.matched.cameras, &self.texels, &maps, &steps);
@@ -263,9 +273,66 @@ impl<D: Device> Views<'_, D> {
         }
         Ok(())
     }
+
+    /// The sources' disparities and confidences.
+    fn maps(&self) -> &D::Buffer<[f32; 2]> {
+        self.settled.as_ref().map_or(&self.disparities, |(_, maps)| maps)
+    }
+
+    /// Finds the disparities of these views the second time, if the settings ask for it.
+    fn settle(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(), FieldError> {
+        if self.settings.second_share <= 0.0 || self.settled.as_ref().is_some_and(|(own, _)| own == views) {
+            return Ok(());
+        }
+        self.gains = None;
+        let mut settled = self.device.zeros(self.texels.len())?;
+        for &view in views {
+            let front_share = self.settings.second_share;
+            let others: Vec<(usize, f32)> =
+                self.others(view).into_iter().filter(|(other, _)| views.contains(other)).collect();
+            let cameras = &self.matched.cameras;
+            let voters = swept(cameras, cameras, &others, Some(&self.steps), None);
+            let settings = Sweep { front_share, ..self.settings };
+            let (frustum, costs) = self.source_costs(view, &voters, settings, progress)?;
+            self.device.pick_disparity(&frustum, &costs, &mut settled)?;
+        }
+        self.settled = Some((views.to_vec(), settled));
+        Ok(())
+    }
+
+    /// The other views with their weights for a source, the greatest first.
+    fn others(&self, view: usize) -> Vec<(usize, f32)> {
+        let relevance = &self.relevance[view];
+        let others = (0..self.matched.cameras.len()).filter(|other| *other != view);
+        let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
+        weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        weights
+    }
+
+    /// The costs of a source's planes.
+    fn source_costs(
+        &self,
+        view: usize,
+        voters: &[SweptView],
+        settings: Sweep,
+        progress: &dyn Progress,
+    ) -> Result<(FrustumBlock, D::Buffer<Planes>), FieldError> {
+        let cameras = &self.matched.cameras;
+        let camera = cameras[view];
+        let mut weights = self.others(view);
+        weights.truncate(settings.neighbours);
+        weights.push((view, 1.0));
+        let swept = swept(cameras, cameras, &weights, None, None);
+        let matching = settings.matching(self.device, self.has_silhouettes);
+        let frustum = matching.frustum(camera, self.range(&camera), &swept);
+        let costs = matching.costs(frustum, &swept, voters, &self.matched.texels, &self.disparities, progress)?;
+        Ok((frustum, costs))
+    }
+
     /// The costs of a target's planes, and what its pixels are blended from.
     fn volume(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Volume<D>, FieldError> {
         let &Request { camera: target, views, .. } = request;
+        self.settle(views, progress)?;
         self.estimate_gains(views)?;
         let (small_width, small_height) = reduced_size(target, self.settings.match_side);
         let pinhole = target.pinhole.resized(small_width, small_height).map_err(FieldError::unsuitable)?;
@@ -276,7 +343,7 @@ impl<D: Device> Views<'_, D> {
         let matched = swept(maps, maps, &weights, Some(&self.steps), gains);
         let matching = self.settings.matching(self.device, self.has_silhouettes);
         let frustum = matching.frustum(camera, range, &matched);
-        let costs = matching.costs(frustum, &matched, &self.matched.texels, &self.disparities, progress)?;
+        let costs = matching.costs(frustum, &matched, &matched, &self.matched.texels, self.maps(), progress)?;
         let views = swept(&self.pictures.cameras, maps, &weights, Some(&self.steps), gains);
         let block = BlendBlock {
             target: target.block(0),
@@ -295,21 +362,10 @@ impl<D: Device> Views<'_, D> {
 
 impl<D: Device> Prepared for Views<'_, D> {
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        let cameras = &self.matched.cameras;
-        let camera = cameras[view];
-        let range = self.range(&camera);
-        let relevance = &self.relevance[view];
-        let others = (0..cameras.len()).filter(|other| *other != view);
-        let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
-        weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        weights.truncate(self.settings.neighbours);
-        weights.push((view, 1.0));
-        let swept = swept(cameras, cameras, &weights, None, None);
-        let matching = self.settings.matching(self.device, self.has_silhouettes);
-        let frustum = matching.frustum(camera, range, &swept);
-        let costs = matching.costs(frustum, &swept, &self.matched.texels, &self.disparities, progress)?;
+        let (frustum, costs) = self.source_costs(view, &[], self.settings, progress)?;
         self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
-        self.steps[view] = range.step;
+        self.steps[view] = frustum.disparity_step;
+        self.settled = None;
         Ok(())
     }
 
@@ -327,7 +383,7 @@ impl<D: Device> Prepared for Views<'_, D> {
             height,
             &blend_views,
             &self.pictures.texels,
-            &self.disparities,
+            self.maps(),
             &costs,
             &mut colours,
             &mut depths,
@@ -363,6 +419,7 @@ impl<D: Device> Weighted for Views<'_, D> {
     fn weigh(&mut self, relevance: &[SourceWeights]) -> Result<(), FieldError> {
         self.relevance = relevance.to_vec();
         self.steps.fill(0.0);
+        self.settled = None;
         self.gains = None;
         Ok(())
     }
@@ -376,6 +433,7 @@ impl<D: Device> Tuned for Views<'_, D> {
     fn tune(&mut self, settings: &[Setting]) {
         let Sweep { plane_count, match_side, neighbours, .. } = self.settings;
         self.settings = Sweep { plane_count, match_side, neighbours, ..self.defaults };
+        self.settled = None;
         for Setting { name, value } in settings {
             if let Some((_, scalar)) = self.settings.scalars().into_iter().find(|(own, _)| own == name) {
                 *scalar = *value;
@@ -390,7 +448,7 @@ impl<D: Device> Geometry for Views<'_, D> {
     }
 
     fn source_depths(&self) -> Result<Vec<DepthMap>, FieldError> {
-        let maps = self.device.download(&self.disparities)?;
+        let maps = self.device.download(self.maps())?;
         let map = |(camera, step): (&CameraBlock, &f32)| {
             let own = maps[camera.first_texel as usize..].iter().take((camera.width * camera.height) as usize);
             // Below half a step a disparity is that of the farthest plane: it bounds nothing.

@@ -63,6 +63,7 @@ impl<D: Device> Efforts for Views<'_, D> {
         self.texels = joined_texels(&images);
         self.disparities = self.device.zeros(self.texels.len())?;
         self.steps.fill(0.0);
+        self.settled = None;
         self.gains = None;
         Ok(Encodings::Dropped)
     }

@@ -85,11 +85,13 @@ impl<D: Device> Matching<'_, D> {
     }
 
     /// The costs of all planes in a frustum: `costs[row][column][group]`. `texels` are those of the views' cameras, `maps`
-    /// their disparities and confidences.
+    /// their disparities and confidences; the maps of `voters`, of which the first [`MAX_MATCHED`] count, say which planes are
+    /// opaque.
     pub(super) fn costs(
         &self,
         whole: FrustumBlock,
         swept: &[SweptView],
+        voters: &[SweptView],
         texels: &D::Buffer<[f32; 4]>,
         maps: &D::Buffer<[f32; 2]>,
         progress: &dyn Progress,
@@ -120,9 +122,11 @@ impl<D: Device> Matching<'_, D> {
         let mut means = device.zeros::<Planes>(volume)?;
         device.window_cost(&window, &sums, &mut means)?;
         drop(sums);
-        if self.front_share > 0.0 && matched.iter().any(|view| view.disparity_step > 0.0) {
+        let voters = &voters[..voters.len().min(MAX_MATCHED)];
+        if self.front_share > 0.0 && voters.iter().any(|view| view.disparity_step > 0.0) {
             let mut opacities = device.zeros::<Planes>(volume)?;
-            device.plane_opacity(&whole, &views, maps, &mut opacities)?;
+            let frustum = FrustumBlock { view_count: voters.len() as u32, ..whole };
+            device.plane_opacity(&frustum, &device.upload(voters)?, maps, &mut opacities)?;
             let block = FrontBlock { width, height, group_count, front_share: self.front_share };
             let mut preferred = device.zeros::<Planes>(volume)?;
             device.front_cost(&block, &opacities, &means, &mut preferred)?;

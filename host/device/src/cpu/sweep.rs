@@ -1,0 +1,464 @@
+//! The plane sweep's views compared on a group of planes at a time. The sums are those of the bodies, in their order, so the results
+//! are the same bits; what the bodies do for one plane after the other is done here for all planes of a group: projections,
+//! places and shares of a look-up first, in vectors, then the loads, then what follows from the texels.
+
+use crate::parallel::for_each_row;
+use pulp::{Arch, Simd, WithSimd};
+use std::sync::Mutex;
+use viewfuse_core::math::{abs, clamp, max, min};
+use viewfuse_kernels::plane_sweep::census::{CONTRAST, REACH, cost_of_sums};
+use viewfuse_kernels::plane_sweep::evidence::{MAX_DIFFERENCE, MIN_ALPHA, UNSEEN, ViewPair, planes_behind};
+use viewfuse_kernels::plane_sweep::front::{FREE_PLANES, opacity_of};
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView, Track};
+use viewfuse_kernels::plane_sweep::{MAX_GROUPS, MAX_MATCHED, PLANES, Planes};
+use viewfuse_kernels::visual_hull::fade;
+
+/// Where a group's points lie in a view.
+struct Places {
+    x: Planes,
+    y: Planes,
+    depth_ratio: Planes,
+    /// 1 where the point is in the image, 0 elsewhere.
+    in_image: Planes,
+}
+
+/// What is shared by all groups of a frustum.
+struct Comparison<'a> {
+    block: &'a FrustumBlock,
+    views: &'a [SweptView],
+    pairs: &'a [ViewPair],
+    texels: &'a [[f32; 4]],
+    disparities: &'a [[f32; 2]],
+}
+
+/// A group's sums over the views.
+struct Sums {
+    colours: [[Planes; 3]; MAX_MATCHED],
+    grey: [Planes; MAX_MATCHED],
+    hull: Planes,
+    dissent: Planes,
+    informed: Planes,
+}
+
+pub(super) fn compare_views(
+    block: &FrustumBlock,
+    views: &[SweptView],
+    pairs: &[ViewPair],
+    texels: &[[f32; 4]],
+    disparities: &[[f32; 2]],
+    grey: &mut [Planes],
+    evidence: &mut [Planes],
+) {
+    let groups = block.group_count as usize;
+    let row_len = block.camera.width as usize * groups;
+    let slice = block.row_count as usize * row_len;
+    let (views, pairs) = (&views[..block.view_count as usize], &pairs[..block.pair_count as usize]);
+    let comparison = Comparison { block, views, pairs, texels, disparities };
+    // A row of the evidence, and the same row of each view's grey.
+    let mut views_of_row: Vec<Vec<&mut [Planes]>> = (0..block.row_count).map(|_| Vec::new()).collect();
+    for view in grey[..slice * views.len()].chunks_exact_mut(slice) {
+        views_of_row.iter_mut().zip(view.chunks_exact_mut(row_len)).for_each(|(rows, row)| rows.push(row));
+    }
+    let views_of_row: Vec<Mutex<Vec<&mut [Planes]>>> = views_of_row.into_iter().map(Mutex::new).collect();
+    for_each_row(&mut evidence[..4 * slice], 4 * row_len, 512, |row, evidence| {
+        let Ok(mut grey) = views_of_row[row].lock() else { return };
+        Arch::new().dispatch(Compared { comparison: &comparison, row, grey: &mut grey, evidence });
+    });
+}
+
+/// A row of a band that is compared.
+struct Compared<'a, 'g> {
+    comparison: &'a Comparison<'a>,
+    row: usize,
+    grey: &'a mut [&'g mut [Planes]],
+    evidence: &'a mut [Planes],
+}
+
+impl WithSimd for Compared<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.comparison.row(self.row, self.grey, self.evidence);
+    }
+}
+
+impl Comparison<'_> {
+    /// A row of the band.
+    #[inline(always)]
+    fn row(&self, row: usize, grey: &mut [&mut [Planes]], evidence: &mut [Planes]) {
+        let Comparison { block, views, .. } = self;
+        let groups = block.group_count as usize;
+        let mut tracks: Vec<Track> = Vec::with_capacity(views.len());
+        let mut sums = Sums::new();
+        for column in 0..block.camera.width as usize {
+            let pixel = (block.first_row as usize + row) * block.camera.width as usize + column;
+            tracks.clear();
+            tracks.extend(views.iter().map(|view| block.track(&view.camera, pixel as u32)));
+            for group in 0..groups {
+                let at = column * groups + group;
+                self.group(&tracks, group, &mut sums, &mut evidence[4 * at..][..4]);
+                grey.iter_mut().zip(&sums.grey).for_each(|(row, grey)| row[at] = *grey);
+            }
+        }
+    }
+
+    /// A group of planes of a pixel: difference, weight, dissent, hull.
+    #[inline(always)]
+    fn group(&self, tracks: &[Track], group: usize, sums: &mut Sums, evidence: &mut [Planes]) {
+        let planes = planes(self.block, group);
+        (sums.hull, sums.dissent, sums.informed) = ([1.0; PLANES], [0.0; PLANES], [0.0; PLANES]);
+        for (slot, (view, track)) in self.views.iter().zip(tracks).enumerate() {
+            let places = places(track, &planes);
+            self.add_colours(view, slot, &places, sums);
+            if view.disparity_step > 0.0 {
+                self.add_dissent(view, &planes, &places, sums);
+            }
+        }
+        let [difference, weight, dissent, hull] = evidence else { return };
+        (*difference, *weight) = self.compare(sums);
+        for plane in 0..PLANES {
+            dissent[plane] = sums.dissent[plane] / max(sums.informed[plane], 1.0e-6);
+        }
+        *hull = sums.hull;
+    }
+
+    /// A view's colours and grey, and its part of the hull.
+    #[inline(always)]
+    fn add_colours(&self, view: &SweptView, slot: usize, places: &Places, sums: &mut Sums) {
+        let looked = look_up(view, self.texels, places);
+        let mut alpha = [0.0; PLANES];
+        for plane in 0..PLANES {
+            alpha[plane] = looked[plane][3];
+        }
+        if self.block.has_silhouettes != 0 {
+            for plane in 0..PLANES {
+                sums.hull[plane] *= alpha[plane];
+            }
+        }
+        let colours = &mut sums.colours[slot];
+        // Most photographs are opaque: a division by 1 changes nothing.
+        if alpha.iter().fold(true, |opaque, alpha| opaque & (*alpha == 1.0)) {
+            for channel in 0..3 {
+                for plane in 0..PLANES {
+                    colours[channel][plane] = looked[plane][channel] * view.gain[channel];
+                }
+            }
+        } else {
+            for channel in 0..3 {
+                for plane in 0..PLANES {
+                    let divisor = if alpha[plane] >= MIN_ALPHA { alpha[plane] } else { 1.0 };
+                    colours[channel][plane] = looked[plane][channel] / divisor * view.gain[channel];
+                }
+            }
+        }
+        let grey = &mut sums.grey[slot];
+        for plane in 0..PLANES {
+            let mean = (colours[0][plane] + colours[1][plane] + colours[2][plane]) * (1.0 / 3.0);
+            grey[plane] = if alpha[plane] >= MIN_ALPHA { mean } else { UNSEEN };
+        }
+    }
+
+    /// How far the points contradict a view's own disparities.
+    #[inline(always)]
+    fn add_dissent(&self, view: &SweptView, planes: &Planes, places: &Places, sums: &mut Sums) {
+        let (surfaces, confidences) = surfaces(view, self.disparities, places);
+        for plane in 0..PLANES {
+            let disparity = planes[plane] / places.depth_ratio[plane];
+            let behind = planes_behind(surfaces[plane], disparity, 2.0 * view.disparity_step);
+            let doubt = 1.0 - fade(0.707_106_77 * behind);
+            sums.dissent[plane] += view.weight * confidences[plane] * doubt;
+            sums.informed[plane] += view.weight * places.in_image[plane];
+        }
+    }
+
+    /// The pairs' differences, weighted and summed, and their weights.
+    #[inline(always)]
+    fn compare(&self, sums: &Sums) -> (Planes, Planes) {
+        let mut difference = [0.0; PLANES];
+        let mut weight = [0.0; PLANES];
+        for pair in self.pairs {
+            let (first, second) = (pair.first as usize, pair.second as usize);
+            let (a, b) = (&sums.colours[first], &sums.colours[second]);
+            let (grey_a, grey_b) = (&sums.grey[first], &sums.grey[second]);
+            for plane in 0..PLANES {
+                let seen = if min(grey_a[plane], grey_b[plane]) >= 0.0 { pair.weight } else { 0.0 };
+                let sum =
+                    abs(a[0][plane] - b[0][plane]) + abs(a[1][plane] - b[1][plane]) + abs(a[2][plane] - b[2][plane]);
+                difference[plane] += seen * min(sum * (1.0 / 3.0), MAX_DIFFERENCE);
+                weight[plane] += seen;
+            }
+        }
+        (difference, weight)
+    }
+}
+
+impl Sums {
+    fn new() -> Sums {
+        let none = [0.0; PLANES];
+        Sums {
+            colours: [[none; 3]; MAX_MATCHED],
+            grey: [[UNSEEN; PLANES]; MAX_MATCHED],
+            hull: none,
+            dissent: none,
+            informed: none,
+        }
+    }
+}
+
+/// The points of these disparities.
+#[inline(always)]
+fn places(track: &Track, planes: &Planes) -> Places {
+    let mut places = Places { x: [0.0; PLANES], y: [0.0; PLANES], depth_ratio: [0.0; PLANES], in_image: [0.0; PLANES] };
+    for plane in 0..PLANES {
+        let seen = track.at(planes[plane]);
+        places.x[plane] = seen.x;
+        places.y[plane] = seen.y;
+        places.depth_ratio[plane] = seen.depth_ratio;
+        places.in_image[plane] = if seen.in_image { 1.0 } else { 0.0 };
+    }
+    places
+}
+
+/// Bilinear look-ups of a group's points in a view, as `viewfuse_core::lookup::bilinear`; zeros outside its image.
+#[inline(always)]
+fn look_up(view: &SweptView, texels: &[[f32; 4]], places: &Places) -> [[f32; 4]; PLANES] {
+    let (width, height) = (view.camera.width as i32, view.camera.height as i32);
+    let (last_column, last_row) = (width - 1, height - 1);
+    let mut upper = [0; PLANES];
+    let mut right = [0; PLANES];
+    let mut down = [0; PLANES];
+    let mut share_x = [0.0; PLANES];
+    let mut share_y = [0.0; PLANES];
+    for plane in 0..PLANES {
+        let x = clamp(places.x[plane] - 0.5, 0.0, last_column as f32);
+        let y = clamp(places.y[plane] - 0.5, 0.0, last_row as f32);
+        // Not negative: truncation is the floor.
+        let (column, row) = (x as i32, y as i32);
+        upper[plane] = row * width + column;
+        right[plane] = if column < last_column { 1 } else { 0 };
+        down[plane] = if row < last_row { width } else { 0 };
+        share_x[plane] = x - column as f32;
+        share_y[plane] = y - row as f32;
+    }
+    let image = &texels[view.camera.first_texel as usize..][..(width * height) as usize];
+    let mut looked = [[0.0; 4]; PLANES];
+    for plane in 0..PLANES {
+        if places.in_image[plane] > 0.0 {
+            let at = upper[plane] as usize;
+            let (right, down) = (right[plane] as usize, down[plane] as usize);
+            let above = mix(&image[at], &image[at + right], share_x[plane]);
+            let below = mix(&image[at + down], &image[at + down + right], share_x[plane]);
+            looked[plane] = mix(&above, &below, share_y[plane]);
+        }
+    }
+    looked
+}
+
+/// Disparity and confidence of the surfaces that a view's own map has there; zeros outside its image.
+#[inline(always)]
+fn surfaces(view: &SweptView, disparities: &[[f32; 2]], places: &Places) -> (Planes, Planes) {
+    let (last_column, last_row) = (view.camera.width as f32 - 1.0, view.camera.height as f32 - 1.0);
+    let mut at = [0; PLANES];
+    for plane in 0..PLANES {
+        // Points outside the image may lie anywhere.
+        let column = clamp(places.x[plane], 0.0, last_column) as i32;
+        let row = clamp(places.y[plane], 0.0, last_row) as i32;
+        at[plane] = row * view.map_width as i32 + column;
+    }
+    let map = &disparities[view.first_disparity as usize..][..(view.map_width * view.map_height) as usize];
+    let (mut surfaces, mut confidences) = ([0.0; PLANES], [0.0; PLANES]);
+    for plane in 0..PLANES {
+        [surfaces[plane], confidences[plane]] = map[at[plane] as usize];
+    }
+    for plane in 0..PLANES {
+        confidences[plane] *= places.in_image[plane];
+    }
+    (surfaces, confidences)
+}
+
+#[inline(always)]
+fn mix(a: &[f32; 4], b: &[f32; 4], share: f32) -> [f32; 4] {
+    std::array::from_fn(|channel| a[channel] + (b[channel] - a[channel]) * share)
+}
+
+pub(super) fn plane_opacity(
+    block: &FrustumBlock,
+    views: &[SweptView],
+    disparities: &[[f32; 2]],
+    opacities: &mut [Planes],
+) {
+    let row_len = (block.camera.width * block.group_count) as usize;
+    let views = &views[..block.view_count as usize];
+    for_each_row(&mut opacities[..block.camera.height as usize * row_len], row_len, 128, |row, opacities| {
+        Arch::new().dispatch(Opaque { block, views, disparities, row, opacities });
+    });
+}
+
+/// A row of a volume whose opacities are sought.
+struct Opaque<'a> {
+    block: &'a FrustumBlock,
+    views: &'a [SweptView],
+    disparities: &'a [[f32; 2]],
+    row: usize,
+    opacities: &'a mut [Planes],
+}
+
+impl WithSimd for Opaque<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Opaque { block, views, disparities, row, opacities } = self;
+        for (column, groups) in opacities.chunks_exact_mut(block.group_count as usize).enumerate() {
+            let pixel = row * block.camera.width as usize + column;
+            let (mut support, mut violation) = ([[0.0; PLANES]; MAX_GROUPS], [[0.0; PLANES]; MAX_GROUPS]);
+            for view in views.iter().filter(|view| view.disparity_step > 0.0) {
+                let track = block.track(&view.camera, pixel as u32);
+                for group in 0..groups.len() {
+                    let planes = planes(block, group);
+                    let places = places(&track, &planes);
+                    let (surfaces, confidences) = surfaces(view, disparities, &places);
+                    for plane in 0..PLANES {
+                        let disparity = planes[plane] / places.depth_ratio[plane];
+                        let behind = planes_behind(surfaces[plane], disparity, view.disparity_step);
+                        support[group][plane] += confidences[plane] * fade(0.707_106_77 * behind);
+                        let free = max(-behind - FREE_PLANES, 0.0);
+                        violation[group][plane] += confidences[plane] * (1.0 - fade(0.707_106_77 * free));
+                    }
+                }
+            }
+            for (group, opacity) in groups.iter_mut().enumerate() {
+                *opacity = opacity_of(&support[group], &violation[group]);
+            }
+        }
+    }
+}
+
+/// The disparities of a group.
+#[inline(always)]
+fn planes(block: &FrustumBlock, group: usize) -> Planes {
+    std::array::from_fn(|plane| block.disparity(group * PLANES + plane))
+}
+
+pub(super) fn census_cost(
+    block: &FrustumBlock,
+    first_row: u32,
+    row_count: u32,
+    pairs: &[ViewPair],
+    grey: &[Planes],
+    evidence: &[Planes],
+    costs: &mut [Planes],
+) {
+    let row_len = (block.camera.width * block.group_count) as usize;
+    let pairs = &pairs[..block.pair_count as usize];
+    let first = 2 * (block.first_row + first_row) as usize * row_len;
+    for_each_row(&mut costs[first..][..2 * row_count as usize * row_len], 2 * row_len, 256, |row, costs| {
+        Arch::new().dispatch(Census { block, pairs, grey, evidence, row: first_row as usize + row, costs });
+    });
+}
+
+/// A row of a band.
+struct Census<'a> {
+    block: &'a FrustumBlock,
+    pairs: &'a [ViewPair],
+    grey: &'a [Planes],
+    evidence: &'a [Planes],
+    row: usize,
+    costs: &'a mut [Planes],
+}
+
+impl WithSimd for Census<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        let Census { block, pairs, grey, evidence, row, costs } = self;
+        let (width, groups) = (block.camera.width as usize, block.group_count as usize);
+        let row_len = width * groups;
+        let slice = block.row_count as usize * row_len;
+        let view_count = block.view_count as usize;
+        let reach = REACH as usize;
+        // Of the rows of the window's first half, the groups of planes that all views see.
+        let first_row = row.saturating_sub(reach);
+        let seen: Vec<bool> = (first_row * row_len..(row + 1) * row_len)
+            .map(|at| (0..view_count).all(|slot| is_seen(&grey[slot * slice + at])))
+            .collect();
+        for column in 0..width {
+            // The half of the window before the pixel, as in the body.
+            let mut before = [0; 12];
+            let mut count = 0;
+            for offset in 0..12 {
+                let (x, y) = ((column + offset % 5).checked_sub(reach), (row + offset / 5).checked_sub(reach));
+                if let (Some(x), Some(y)) = (x.filter(|x| *x < width), y) {
+                    before[count] = (y * width + x) * groups;
+                    count += 1;
+                }
+            }
+            for group in 0..groups {
+                let here = (row * width + column) * groups + group;
+                let mut sums = [[0.0; PLANES]; 3];
+                for first in before[..count].iter().map(|first| first + group) {
+                    let all_seen = seen[here - first_row * row_len] && seen[first - first_row * row_len];
+                    let of = |slot: usize| [&grey[slot * slice + here], &grey[slot * slice + first]];
+                    add_census(simd, pairs, view_count, of, all_seen, &mut sums);
+                }
+                let at = 2 * (column * groups + group);
+                costs[at..at + 2].copy_from_slice(&cost_of_sums(block, evidence, here, &sums));
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn is_seen(grey: &Planes) -> bool {
+    grey.iter().fold(true, |seen, grey| seen & (*grey >= 0.0))
+}
+
+/// Adds the pairs' comparisons of a pixel with one of its window to `[difference, weight, contrast]`; `of` gives a view's grey at
+/// both. Where all views see both the weights need no products: 1 times 1 times a weight is the weight.
+#[inline(always)]
+fn add_census<'a, S: Simd>(
+    simd: S,
+    pairs: &[ViewPair],
+    view_count: usize,
+    of: impl Fn(usize) -> [&'a Planes; 2],
+    all_seen: bool,
+    sums: &mut [Planes; 3],
+) {
+    let [difference, weight, contrast] = sums;
+    let (differences, _) = S::as_mut_simd_f32s(difference);
+    let (weights, _) = S::as_mut_simd_f32s(weight);
+    let (contrasts, _) = S::as_mut_simd_f32s(contrast);
+    let (zero, one, minus) = (simd.splat_f32s(0.0), simd.splat_f32s(1.0), simd.splat_f32s(-1.0));
+    let scale = simd.splat_f32s(1.0 / CONTRAST);
+    for lane in 0..differences.len() {
+        let mut lighter = [zero; MAX_MATCHED];
+        let mut strength = [zero; MAX_MATCHED];
+        let mut valid = [one; MAX_MATCHED];
+        for slot in 0..view_count {
+            let [own, other] = of(slot);
+            let (own, other) = (S::as_simd_f32s(own).0[lane], S::as_simd_f32s(other).0[lane]);
+            let steps = simd.mul_f32s(simd.sub_f32s(own, other), scale);
+            lighter[slot] = simd.min_f32s(simd.max_f32s(steps, minus), one);
+            strength[slot] = simd.abs_f32s(lighter[slot]);
+            if !all_seen {
+                let both = simd.greater_than_or_equal_f32s(simd.min_f32s(own, other), zero);
+                valid[slot] = simd.select_f32s(both, one, zero);
+            }
+        }
+        let (mut sum, mut count, mut texture) = (differences[lane], weights[lane], contrasts[lane]);
+        for pair in pairs {
+            let (a, b) = (pair.first as usize % MAX_MATCHED, pair.second as usize % MAX_MATCHED);
+            let mut seen = simd.splat_f32s(pair.weight);
+            if !all_seen {
+                seen = simd.mul_f32s(simd.mul_f32s(valid[a], valid[b]), seen);
+            }
+            let apart = simd.min_f32s(simd.abs_f32s(simd.sub_f32s(lighter[a], lighter[b])), one);
+            sum = simd.add_f32s(sum, simd.mul_f32s(seen, apart));
+            count = simd.add_f32s(count, seen);
+            texture = simd.add_f32s(texture, simd.mul_f32s(seen, simd.max_f32s(strength[a], strength[b])));
+        }
+        (differences[lane], weights[lane], contrasts[lane]) = (sum, count, texture);
+    }
+}
