@@ -1,10 +1,12 @@
 //! The training-free field on whole photographs, on the CPU: the sample scene with a background, and a painted wall.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use viewfuse::device::cpu::Cpu;
 use viewfuse::field::render::{RenderOptions, Stage, render_all};
-use viewfuse::field::training_free::TrainingFree;
+use viewfuse::field::training_free::{Cache, TrainingFree};
 use viewfuse::field::{On, Rendered};
+use viewfuse::job::digest::sha256;
 use viewfuse::job::progress::Silent;
 use viewfuse::scene::Scene;
 use viewfuse::scene::few_shot::Selection;
@@ -17,6 +19,7 @@ use viewfuse_core::metrics::psnr;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
 use viewfuse_tests::places::repository;
+use viewfuse_tests::scenes::Folder;
 
 /// Distance of the painted wall.
 const WALL: f32 = 3.0;
@@ -76,8 +79,12 @@ fn relevance(count: usize) -> Vec<SourceWeights> {
 
 /// A picture with equal weights.
 fn picture(sources: &SourceImages, target: &Camera) -> Rendered {
-    let (field, count) = (TrainingFree::default(), sources.images.len());
-    let renderer = On { device: &Cpu, field: &field };
+    picture_of(&TrainingFree::default(), sources, target)
+}
+
+fn picture_of(field: &TrainingFree, sources: &SourceImages, target: &Camera) -> Rendered {
+    let count = sources.images.len();
+    let renderer = On { device: &Cpu, field };
     let options = RenderOptions::default();
     let mut stage = Stage::of_sources(Arc::new(sources.clone()), &renderer, &options, &Silent).expect("a stage");
     stage.weigh_by(&relevance(count), &Silent).expect("a weighting");
@@ -245,4 +252,48 @@ fn the_room_is_better_than_a_copy() {
         println!("{}: {ours:.2} dB, a copy {copied:.2} dB", frame.target.name);
         assert!(ours > copied + 4.0, "{}: {ours} dB, a copy {copied} dB", frame.target.name);
     }
+}
+
+/// The files of a folder and their bytes, by name.
+fn kept_files(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let entries = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+    let mut files: Vec<_> = entries.map(|path| (path.clone(), std::fs::read(path).expect("a file"))).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn what_is_kept_of_the_sources_is_used_and_gives_the_same_picture() {
+    let folder = Folder::new();
+    let kept = folder.path().join("kept");
+    let field = TrainingFree { cache: Some(Cache::open(&kept).expect("a cache")), ..TrainingFree::default() };
+    let target = camera(Vec3::ZERO, 72, 54);
+    let sources = SourceImages { near_far: None, ..wall([1.0; 3]) };
+    let expected = picture(&sources, &target);
+    assert_eq!(picture_of(&field, &sources, &target), expected, "nothing is kept yet");
+    let files = kept_files(&kept);
+    // Of each source its disparities, of the scene its points.
+    assert_eq!(files.len(), 4, "{files:?}");
+    assert_eq!(picture_of(&field, &sources, &target), expected, "all is kept");
+    assert_eq!(kept_files(&kept), files, "and nothing is new");
+    // Other surfaces in a file that is whole: another picture, so it is used.
+    let (path, bytes) = files.iter().find(|(_, bytes)| bytes.len() == 64 + 8 * 72 * 54).expect("disparities");
+    let other = vec![0x3f; bytes.len() - 64];
+    std::fs::write(path, [sha256(&other).as_bytes(), &other].concat()).expect("written");
+    assert_ne!(picture_of(&field, &sources, &target), expected);
+    // A damaged file is not used, and is made again; neither is a file of another length.
+    for damaged in [[&bytes[..], b"more"].concat(), bytes[..bytes.len() - 8].to_vec(), b"short".to_vec(), {
+        let mut one_bit = bytes.clone();
+        one_bit[100] ^= 1;
+        one_bit
+    }] {
+        std::fs::write(path, damaged).expect("written");
+        assert_eq!(picture_of(&field, &sources, &target), expected);
+        assert_eq!(kept_files(&kept), files);
+    }
+    // Another photograph has files of its own: its own disparities, those of the two that it is compared with, and the points.
+    let mut others = sources.clone();
+    others.images[2].texels[0][0] *= 0.5;
+    assert_eq!(picture_of(&field, &others, &target), picture(&others, &target));
+    assert_eq!(kept_files(&kept).len(), 8);
 }

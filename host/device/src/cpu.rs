@@ -4,6 +4,7 @@
 //! own, faster loops, and the body in `viewfuse-kernels` is the definition that it is tested against; where it says
 //! `looped`, such a function has the loop over the body or its parts.
 
+mod census;
 mod fusion;
 mod group_norm;
 mod limits;
@@ -23,6 +24,7 @@ use super::memory::{Element, KernelTime, Memory};
 use crate::argument;
 use crate::parallel::{Rest, for_each_piece};
 use bytemuck::{Pod, cast_slice_mut};
+use census::*;
 use fusion::*;
 use group_norm::*;
 use limits::*;

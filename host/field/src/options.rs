@@ -2,6 +2,7 @@
 //! options that it does not have.
 
 use std::collections::BTreeMap;
+use viewfuse_job::files::WriteError;
 use viewfuse_nn::checkpoint::CheckpointError;
 
 /// Options of a field as a person gives them.
@@ -102,6 +103,9 @@ pub enum OpenError {
     /// The checkpoint is of no field, or cannot be read.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// A folder that an option names cannot be used.
+    #[error(transparent)]
+    Folder(#[from] WriteError),
     /// An option does not go with the field.
     #[error("{option} {problem} with a network that {reason}")]
     Refused {

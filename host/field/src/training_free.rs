@@ -14,18 +14,20 @@ mod presets;
 mod space;
 mod sweep;
 
+use super::options::{FieldOptions, Flag, FlagAbout, OpenError, flags};
 use super::row::{Origin, Row};
 use super::{About, AnyField, Field, FieldError, Prepared, SourceSide};
+use std::path::PathBuf;
 use viewfuse_device::Device;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::photographs::SourceImages;
 
 pub use hull::NoObject;
 pub(crate) use sweep::ROW as SWEEP;
-pub use sweep::Sweep;
+pub use sweep::{Cache, Sweep};
 
 /// Depths from the consensus of the photographs, colour by weighted fusion with visibility. Nothing is learned.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct TrainingFree {
     /// Settings for sources with silhouettes.
     pub hull: hull::Hull,
@@ -33,12 +35,14 @@ pub struct TrainingFree {
     pub sweep: Sweep,
     /// Side of the sources as a share of the pictures', above 0: smaller sources take less time to match.
     pub source_share: f32,
+    /// Where what is found of sources without silhouettes is kept.
+    pub cache: Option<Cache>,
 }
 
 impl Default for TrainingFree {
     /// Sources at the size of the pictures.
     fn default() -> TrainingFree {
-        TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0 }
+        TrainingFree { hull: hull::Hull::default(), sweep: Sweep::default(), source_share: 1.0, cache: None }
     }
 }
 
@@ -47,11 +51,25 @@ pub(crate) const ROW: Row = Row {
     name: "training-free",
     title: "training-free field",
     heading: "Options of the training-free field",
-    origin: Origin::TrainingFree { open: |_| Ok(AnyField::new(TrainingFree::default())) },
-    flags: &[],
+    origin: Origin::TrainingFree { open },
+    flags: Given::FLAGS,
     omissions: &[],
     presets: presets::of,
 };
+
+flags! {
+    cache: PathBuf = "cache", "FOLDER", parse_folder, Picture, &[], "Keep what is found of the sources in this folder, and start from \
+        what is there: it may be deleted at any time";
+}
+
+fn parse_folder(text: &str) -> Result<PathBuf, String> {
+    if text.is_empty() { Err("a folder".to_owned()) } else { Ok(PathBuf::from(text)) }
+}
+
+fn open(options: &FieldOptions) -> Result<AnyField, OpenError> {
+    let cache = Given::of(options).cache.map(|folder| Cache::open(&folder)).transpose()?;
+    Ok(AnyField::new(TrainingFree { cache, ..TrainingFree::default() }))
+}
 
 impl Field for TrainingFree {
     fn about(&self) -> About {
@@ -73,11 +91,11 @@ impl Field for TrainingFree {
         if sources.has_silhouettes {
             Ok(Box::new(self.hull.views(device, sources, progress)?))
         } else {
-            self.sweep.prepare(device, sources, progress)
+            self.sweep.prepare_kept(device, sources, self.cache.as_ref(), progress)
         }
     }
 
     fn preview(&self) -> Option<TrainingFree> {
-        Some(TrainingFree { sweep: self.sweep.cheaper(), ..*self })
+        Some(TrainingFree { sweep: self.sweep.cheaper(), ..self.clone() })
     }
 }

@@ -13,7 +13,6 @@
 //! ```
 #![forbid(unsafe_code)]
 
-#[cfg(feature = "digest")]
 pub mod digest;
 pub mod files;
 pub mod panics;

@@ -25,7 +25,7 @@ pub(super) fn of(field: &AnyField, options: &RenderOptions, _target_count: usize
     let Some(field) = field.downcast_ref::<TrainingFree>() else { return Vec::new() };
     let preset = |words: &str, source_share, leave_out, early_termination| Preset {
         words: words.to_owned(),
-        field: AnyField::new(TrainingFree { source_share, ..*field }),
+        field: AnyField::new(TrainingFree { source_share, ..field.clone() }),
         options: RenderOptions { leave_out, early_termination, ..options.clone() },
     };
     let mut presets = vec![preset(EXACT, 1.0, 0.0, 0.0)];

@@ -3,14 +3,18 @@
 //!
 //! ```text
 //! matching    costs of the planes in a frustum
+//! sources     the sources' disparities: found, found again by what they say of one another, kept
 //! search      surface points of a scene whose files do not tell its depths
+//! kept        what was found of the sources, in a folder between runs
 //! unseen      parts of a picture that its photograph does not show
 //! efforts     coarser comparisons, from the cheapest to the exact one
 //! ```
 
 mod efforts;
+mod kept;
 mod matching;
 mod search;
+mod sources;
 mod unseen;
 
 use super::exposure;
@@ -20,6 +24,8 @@ use crate::{
     About, AnyField, DepthMap, Efforts, Field, FieldError, Geometry, Prepared, Rendered, Request, Setting, Surfaces,
     Tunable, Tuned, Weighted,
 };
+pub use kept::Cache;
+use kept::{Kept, Key};
 use matching::{Images, Matching, Range};
 use viewfuse_core::camera::{Camera, CameraBlock};
 use viewfuse_device::Device;
@@ -27,7 +33,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_kernels::plane_sweep::Planes;
 use viewfuse_kernels::plane_sweep::blend::BlendBlock;
 use viewfuse_kernels::plane_sweep::disparity::TEMPERATURE;
-use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+use viewfuse_kernels::plane_sweep::frustum::SweptView;
 use viewfuse_scene::photographs::{SourceImage, SourceImages, reduced_size};
 use viewfuse_weighting::sources::SourceWeights;
 
@@ -40,9 +46,9 @@ const SECOND_SHARE: &str = "second share";
 /// The scalars that differ most from scene to scene, the most effective ones first.
 const TUNABLES: &[Tunable] = &[
     Tunable { name: FRONT_SHARE, default: DEFAULT.front_share, others: &[0.0, 0.2] },
-    Tunable { name: SECOND_SHARE, default: DEFAULT.second_share, others: &[0.03] },
     Tunable { name: NEAR_COST, default: DEFAULT.near_cost, others: &[0.002, 0.02] },
     Tunable { name: DISSENT_SHARE, default: DEFAULT.dissent_share, others: &[0.0, 0.125] },
+    Tunable { name: SECOND_SHARE, default: DEFAULT.second_share, others: &[0.03] },
     Tunable { name: TEMPERATURE_NAME, default: DEFAULT.temperature, others: &[0.005, 0.013] },
 ];
 
@@ -111,6 +117,12 @@ pub(super) struct Views<'a, D: Device> {
     space: Space,
     /// The matched sources' texels on the host, for the gains.
     texels: Vec<[f32; 4]>,
+    /// What is found of the sources, in a folder.
+    kept: Option<Kept>,
+    /// Disparities that were kept, and are not on the device yet...
+    found: Vec<(usize, Vec<[f32; 2]>)>,
+    /// ... and those on the device that are to be kept.
+    unkept: Vec<(usize, Key)>,
     /// The gains estimated from some views under the current weighting, and these views.
     gains: Option<(Vec<usize>, Vec<[f32; 4]>)>,
 }
@@ -145,8 +157,10 @@ impl Sweep {
         &'a self,
         device: &'a D,
         sources: &SourceImages,
+        cache: Option<&Cache>,
         progress: &dyn Progress,
     ) -> Result<Views<'a, D>, FieldError> {
+        let kept = cache.map(|cache| Kept::new(cache.clone(), device, progress)).transpose()?;
         let reduced = |side: u32| -> Result<Vec<SourceImage>, FieldError> {
             let images = sources.images.iter().map(|image| image.reduced(side));
             images.collect::<Result<_, _>>().map_err(FieldError::unsuitable)
@@ -155,7 +169,10 @@ impl Sweep {
         let known = Space::of(sources);
         let space = match known.is_known() {
             true => known,
-            false => self.matching(device, has_silhouettes).find_space(&reduced(search::SIDE)?, progress)?,
+            false => {
+                let matching = self.matching(device, has_silhouettes);
+                matching.kept_space(&reduced(search::SIDE)?, kept.as_ref(), progress)?
+            }
         };
         let small = reduced(self.match_side)?;
         // With silhouettes, alpha 0 is the background.
@@ -179,6 +196,9 @@ impl Sweep {
             space,
             texels,
             gains: None,
+            kept,
+            found: Vec::new(),
+            unkept: Vec::new(),
             small,
         })
     }
@@ -244,15 +264,28 @@ impl Field for Sweep {
         sources: &SourceImages,
         progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        if !sources.has_silhouettes {
-            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
-            viewfuse_scene::rig::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
-        }
-        Ok(Box::new(self.views(device, sources, progress)?))
+        self.prepare_kept(device, sources, None, progress)
     }
 
     fn preview(&self) -> Option<Sweep> {
         Some(self.cheaper())
+    }
+}
+
+impl Sweep {
+    /// As [`Field::prepare`], with what was found of the sources before.
+    pub(super) fn prepare_kept<'a, D: Device>(
+        &'a self,
+        device: &'a D,
+        sources: &SourceImages,
+        cache: Option<&Cache>,
+        progress: &dyn Progress,
+    ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
+        if !sources.has_silhouettes {
+            let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+            viewfuse_scene::rig::gap_warning(&cameras).iter().for_each(|warning| progress.warn(warning));
+        }
+        Ok(Box::new(self.views(device, sources, cache, progress)?))
     }
 }
 
@@ -274,64 +307,10 @@ impl<D: Device> Views<'_, D> {
         Ok(())
     }
 
-    /// The sources' disparities and confidences.
-    fn maps(&self) -> &D::Buffer<[f32; 2]> {
-        self.settled.as_ref().map_or(&self.disparities, |(_, maps)| maps)
-    }
-
-    /// Finds the disparities of these views the second time, if the settings ask for it.
-    fn settle(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(), FieldError> {
-        if self.settings.second_share <= 0.0 || self.settled.as_ref().is_some_and(|(own, _)| own == views) {
-            return Ok(());
-        }
-        self.gains = None;
-        let mut settled = self.device.zeros(self.texels.len())?;
-        for &view in views {
-            let front_share = self.settings.second_share;
-            let others: Vec<(usize, f32)> =
-                self.others(view).into_iter().filter(|(other, _)| views.contains(other)).collect();
-            let cameras = &self.matched.cameras;
-            let voters = swept(cameras, cameras, &others, Some(&self.steps), None);
-            let settings = Sweep { front_share, ..self.settings };
-            let (frustum, costs) = self.source_costs(view, &voters, settings, progress)?;
-            self.device.pick_disparity(&frustum, &costs, &mut settled)?;
-        }
-        self.settled = Some((views.to_vec(), settled));
-        Ok(())
-    }
-
-    /// The other views with their weights for a source, the greatest first.
-    fn others(&self, view: usize) -> Vec<(usize, f32)> {
-        let relevance = &self.relevance[view];
-        let others = (0..self.matched.cameras.len()).filter(|other| *other != view);
-        let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
-        weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        weights
-    }
-
-    /// The costs of a source's planes.
-    fn source_costs(
-        &self,
-        view: usize,
-        voters: &[SweptView],
-        settings: Sweep,
-        progress: &dyn Progress,
-    ) -> Result<(FrustumBlock, D::Buffer<Planes>), FieldError> {
-        let cameras = &self.matched.cameras;
-        let camera = cameras[view];
-        let mut weights = self.others(view);
-        weights.truncate(settings.neighbours);
-        weights.push((view, 1.0));
-        let swept = swept(cameras, cameras, &weights, None, None);
-        let matching = settings.matching(self.device, self.has_silhouettes);
-        let frustum = matching.frustum(camera, self.range(&camera), &swept);
-        let costs = matching.costs(frustum, &swept, voters, &self.matched.texels, &self.disparities, progress)?;
-        Ok((frustum, costs))
-    }
-
     /// The costs of a target's planes, and what its pixels are blended from.
     fn volume(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Volume<D>, FieldError> {
         let &Request { camera: target, views, .. } = request;
+        self.exchange(progress)?;
         self.settle(views, progress)?;
         self.estimate_gains(views)?;
         let (small_width, small_height) = reduced_size(target, self.settings.match_side);
@@ -362,11 +341,7 @@ impl<D: Device> Views<'_, D> {
 
 impl<D: Device> Prepared for Views<'_, D> {
     fn encode(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
-        let (frustum, costs) = self.source_costs(view, &[], self.settings, progress)?;
-        self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
-        self.steps[view] = frustum.disparity_step;
-        self.settled = None;
-        Ok(())
+        self.find(view, progress)
     }
 
     fn render(&mut self, request: &Request<'_>, progress: &dyn Progress) -> Result<Rendered, FieldError> {
@@ -420,6 +395,8 @@ impl<D: Device> Weighted for Views<'_, D> {
         self.relevance = relevance.to_vec();
         self.steps.fill(0.0);
         self.settled = None;
+        self.found.clear();
+        self.unkept.clear();
         self.gains = None;
         Ok(())
     }

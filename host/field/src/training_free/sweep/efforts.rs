@@ -64,6 +64,8 @@ impl<D: Device> Efforts for Views<'_, D> {
         self.disparities = self.device.zeros(self.texels.len())?;
         self.steps.fill(0.0);
         self.settled = None;
+        self.found.clear();
+        self.unkept.clear();
         self.gains = None;
         Ok(Encodings::Dropped)
     }

@@ -1,5 +1,6 @@
 //! Surface points of a scene whose files do not tell its depths: a coarse sweep of some sources, checked between them.
 
+use super::kept::Kept;
 use super::matching::{Images, Matching, Range};
 use super::swept;
 use crate::FieldError;
@@ -19,12 +20,34 @@ const PLANE_COUNT: u32 = 128;
 const MAX_SWEPT: usize = 12;
 /// Neighbours that each is compared with.
 const NEIGHBOURS: usize = 4;
+/// Most points: a pixel of a source that is swept has one.
+const MAX_POINTS: usize = MAX_SWEPT * (SIDE * SIDE) as usize;
 /// Confidence from which on a pixel counts.
 const MIN_CONFIDENCE: f32 = 0.6;
 /// Most planes between the disparities of two views at the same point.
 const MAX_DIFFERENCE: f32 = 1.5;
 
 impl<D: Device> Matching<'_, D> {
+    /// As [`Matching::find_space`], from its points if they were kept.
+    pub(super) fn kept_space(
+        &self,
+        images: &[SourceImage],
+        kept: Option<&Kept>,
+        progress: &dyn Progress,
+    ) -> Result<Space, FieldError> {
+        let cameras: Vec<Camera> = images.iter().map(|image| image.camera).collect();
+        let key = kept.map(|kept| kept.of_scene(images));
+        if let Some(points) = kept.zip(key.as_ref()).and_then(|(kept, key)| kept.read::<[f32; 3]>(key, MAX_POINTS)) {
+            return Ok(Space::of_points(points.into_iter().map(Vec3::from).collect(), &cameras));
+        }
+        let space = self.find_space(images, progress)?;
+        if let Some((kept, key)) = kept.zip(key) {
+            let points: Vec<[f32; 3]> = space.surfaces().points.iter().map(Vec3::to_array).collect();
+            kept.write(&key, &points, progress);
+        }
+        Ok(space)
+    }
+
     /// The depths of a scene, from all its sources at a longest side of [`SIDE`].
     pub(super) fn find_space(&self, images: &[SourceImage], progress: &dyn Progress) -> Result<Space, FieldError> {
         let device = self.device;

@@ -1,0 +1,112 @@
+//! The disparities of the sources: found in each one's own frustum, found a second time by what they say of one another, and
+//! kept between runs.
+
+use super::{Sweep, Views, swept};
+use crate::FieldError;
+use viewfuse_core::camera::CameraBlock;
+use viewfuse_device::Device;
+use viewfuse_job::progress::Progress;
+use viewfuse_kernels::plane_sweep::Planes;
+use viewfuse_kernels::plane_sweep::frustum::{FrustumBlock, SweptView};
+
+impl<D: Device> Views<'_, D> {
+    /// The sources' disparities and confidences.
+    pub(super) fn maps(&self) -> &D::Buffer<[f32; 2]> {
+        self.settled.as_ref().map_or(&self.disparities, |(_, maps)| maps)
+    }
+
+    /// Finds the disparities of these views the second time, if the settings ask for it.
+    pub(super) fn settle(&mut self, views: &[usize], progress: &dyn Progress) -> Result<(), FieldError> {
+        if self.settings.second_share <= 0.0 || self.settled.as_ref().is_some_and(|(own, _)| own == views) {
+            return Ok(());
+        }
+        self.gains = None;
+        let mut settled = self.device.zeros(self.texels.len())?;
+        for &view in views {
+            let front_share = self.settings.second_share;
+            let others: Vec<(usize, f32)> =
+                self.others(view).into_iter().filter(|(other, _)| views.contains(other)).collect();
+            let cameras = &self.matched.cameras;
+            let voters = swept(cameras, cameras, &others, Some(&self.steps), None);
+            let settings = Sweep { front_share, ..self.settings };
+            let (frustum, swept) = self.source_frustum(view, settings);
+            let costs = self.source_costs(&frustum, &swept, &voters, settings, progress)?;
+            self.device.pick_disparity(&frustum, &costs, &mut settled)?;
+        }
+        self.settled = Some((views.to_vec(), settled));
+        Ok(())
+    }
+
+    /// The other views with their weights for a source, the greatest first.
+    fn others(&self, view: usize) -> Vec<(usize, f32)> {
+        let relevance = &self.relevance[view];
+        let others = (0..self.matched.cameras.len()).filter(|other| *other != view);
+        let mut weights: Vec<(usize, f32)> = others.map(|other| (other, relevance.get(other as u32))).collect();
+        weights.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        weights
+    }
+
+    /// A source's frustum, and the views that are compared in it.
+    fn source_frustum(&self, view: usize, settings: Sweep) -> (FrustumBlock, Vec<SweptView>) {
+        let cameras = &self.matched.cameras;
+        let camera = cameras[view];
+        let mut weights = self.others(view);
+        weights.truncate(settings.neighbours);
+        weights.push((view, 1.0));
+        let matching = settings.matching(self.device, self.has_silhouettes);
+        let swept = swept(cameras, cameras, &weights, None, None);
+        (matching.frustum(camera, self.range(&camera), &swept), swept)
+    }
+
+    /// The costs of a source's planes.
+    fn source_costs(
+        &self,
+        frustum: &FrustumBlock,
+        swept: &[SweptView],
+        voters: &[SweptView],
+        settings: Sweep,
+        progress: &dyn Progress,
+    ) -> Result<D::Buffer<Planes>, FieldError> {
+        let matching = settings.matching(self.device, self.has_silhouettes);
+        matching.costs(*frustum, swept, voters, &self.matched.texels, &self.disparities, progress)
+    }
+
+    /// Brings what was kept to the device, and keeps what is new on it: once for all sources that were encoded since.
+    pub(super) fn exchange(&mut self, progress: &dyn Progress) -> Result<(), FieldError> {
+        let Some(kept) = &self.kept else { return Ok(()) };
+        if self.found.is_empty() && self.unkept.is_empty() {
+            return Ok(());
+        }
+        let mut maps = self.device.download(&self.disparities)?;
+        let place = |view: usize| {
+            let CameraBlock { first_texel, width, height, .. } = self.matched.cameras[view];
+            first_texel as usize..(first_texel + width * height) as usize
+        };
+        for (view, key) in self.unkept.drain(..) {
+            kept.write(&key, &maps[place(view)], progress);
+        }
+        if !self.found.is_empty() {
+            self.found.drain(..).for_each(|(view, found)| maps[place(view)].copy_from_slice(&found));
+            self.disparities = self.device.upload(&maps)?;
+        }
+        Ok(())
+    }
+
+    /// Finds a source's disparities, or takes those that were kept.
+    pub(super) fn find(&mut self, view: usize, progress: &dyn Progress) -> Result<(), FieldError> {
+        self.settled = None;
+        let (frustum, swept) = self.source_frustum(view, self.settings);
+        self.steps[view] = frustum.disparity_step;
+        let key = self.kept.as_ref().map(|kept| kept.of_source(&self.settings, &frustum, &swept, &self.texels));
+        let len = (frustum.camera.width * frustum.camera.height) as usize;
+        let found = self.kept.as_ref().zip(key.as_ref()).and_then(|(kept, key)| kept.read(key, len));
+        if let Some(found) = found.filter(|found| found.len() == len) {
+            self.found.push((view, found));
+            return Ok(());
+        }
+        let costs = self.source_costs(&frustum, &swept, &[], self.settings, progress)?;
+        self.device.pick_disparity(&frustum, &costs, &mut self.disparities)?;
+        self.unkept.extend(key.map(|key| (view, key)));
+        Ok(())
+    }
+}
