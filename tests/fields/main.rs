@@ -6,6 +6,7 @@ mod genvs;
 mod pixelnerf;
 mod plane_sweep;
 mod rows;
+mod scales;
 mod sampling;
 mod surveyed;
 mod visual_hull;
