@@ -6,7 +6,7 @@ mod genvs;
 mod pixelnerf;
 mod plane_sweep;
 mod rows;
-mod scales;
 mod sampling;
+mod scales;
 mod surveyed;
 mod visual_hull;

@@ -95,9 +95,9 @@ fn pictures(scene: &Scene, selection: &Selection, field: &AnyField, side: u32, s
     let device = AnyDevice::Cpu(Cpu);
     let renderer = field.on(&device);
     let options = RenderOptions { size: Some([side; 2]), ..RenderOptions::default() };
-    let album = open_album(scene, job.sources.iter().copied(), renderer.as_ref(), &options, &Silent).expect("photographs");
-    let mut stage =
-        Stage::prepare(scene, &album, &job.sources, renderer.as_ref(), &options, &Silent).expect("sources");
+    let album =
+        open_album(scene, job.sources.iter().copied(), renderer.as_ref(), &options, &Silent).expect("photographs");
+    let mut stage = Stage::prepare(scene, &album, &job.sources, renderer.as_ref(), &options, &Silent).expect("sources");
     let target = Target { truth: None, ..job.targets[0].clone() };
     let of_scheme = |scheme: &String| {
         let weighting = Weighting::open(scheme).expect("a scheme");
@@ -130,7 +130,8 @@ fn assert_same_pictures(field: &str, name: &str, [sources, target]: [&str; 2], s
         let made = pictures(&scene, &selection, &opened, side, &schemes);
         let apart = |(a, b): (&Vec<u8>, &Vec<u8>)| a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
         let (worst, scheme) = made.iter().zip(&expected).map(apart).zip(&schemes).max().expect("a scheme");
-        let scheme = if worst > 0 { Path::new(scheme).file_name().unwrap_or_default().to_string_lossy() } else { "".into() };
+        let scheme =
+            if worst > 0 { Path::new(scheme).file_name().unwrap_or_default().to_string_lossy() } else { "".into() };
         println!("| {field} | {name} | {scale:e} | {worst}/255 | {scheme} |");
         assert!(worst <= 1, "{field}, {name} x {scale:e}, {scheme}: a picture differs by {worst} of 255");
     }
@@ -203,7 +204,8 @@ fn mirrored_neighbours_have_equal_weights() {
             let centre = radius * (Vec3::new(angle.cos(), angle.sin(), 0.3)).normalize();
             unit.pose(&Pose::look_at(centre, Vec3::ZERO, Vec3::Z).expect("a pose"))
         };
-        let sources = viewfuse::weighting::sources::SourcePoses::new(&[at(1.0 - turn), at(1.0 + turn)]).expect("sources");
+        let sources =
+            viewfuse::weighting::sources::SourcePoses::new(&[at(1.0 - turn), at(1.0 + turn)]).expect("sources");
         let weights = weighting.weigh(&sources, &at(1.0));
         assert!((weights.get(0) - 0.5).abs() < 1.0e-5, "{turn}: {:?}", &weights.values()[..2]);
     }

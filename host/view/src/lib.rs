@@ -27,6 +27,7 @@ mod mailbox;
 mod message;
 mod pace;
 mod page;
+pub mod protocol;
 mod render_loop;
 mod request;
 mod response;
