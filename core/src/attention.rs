@@ -11,7 +11,7 @@
 pub mod quantised;
 
 use crate::fetch::{Fetch, StartingAt};
-use crate::math::{abs, max, sin_cos, sqrt, two_product, two_sum};
+use crate::math::{has_finite_bits, max, sin_cos, sqrt, two_product, two_sum};
 use crate::pose::Pose;
 use crate::sources::Sources;
 use crate::weights::Weights;
@@ -229,7 +229,7 @@ fn product(query: &(impl Fetch<f32> + ?Sized), key: &(impl Fetch<f32> + ?Sized))
         feature += 1;
     }
     // Where products overflow there is no rest.
-    (sum, if abs(rest) <= f32::MAX { rest } else { 0.0 })
+    (sum, if has_finite_bits(rest) { rest } else { 0.0 })
 }
 
 /// `softmax(products / sqrt(A))`. The largest is subtracted before anything is rounded again.

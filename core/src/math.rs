@@ -10,6 +10,22 @@
 
 use core::f32::consts::{FRAC_PI_2, FRAC_PI_4, LOG2_E, PI};
 
+/// Whether a number is NaN, from its bits: a compiler of shaders may assume that there is none, and then finds every
+/// comparison with itself true.
+#[inline]
+pub fn has_nan_bits(x: f32) -> bool {
+    x.to_bits() & 0x7fff_ffff > INFINITE_BITS
+}
+
+/// Whether a number is neither infinite nor NaN, from its bits.
+#[inline]
+pub fn has_finite_bits(x: f32) -> bool {
+    x.to_bits() & INFINITE_BITS != INFINITE_BITS
+}
+
+/// The bits of infinity; those of NaN are above.
+const INFINITE_BITS: u32 = 0x7f80_0000;
+
 /// Square root, correctly rounded. Negative input gives NaN.
 #[inline]
 pub fn sqrt(x: f32) -> f32 {
@@ -184,8 +200,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     const FIRST: f32 = 1.570_312_5;
     const SECOND: f32 = 4.837_513e-4;
     const THIRD: f32 = 7.549_789_4e-8;
-    let finite = abs(x) <= f32::MAX;
-    let x = if finite { x } else { 0.0 };
+    let x = if has_finite_bits(x) { x } else { 0.0 };
     let quadrant = floor_to_i32(x * (2.0 / PI) + 0.5);
     let k = quadrant as f32;
     // Rounding of the quadrant lets r exceed pi / 4 a little; the limit only matters for huge arguments.

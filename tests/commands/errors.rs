@@ -188,8 +188,12 @@ fn attention_parameters_that_are_none() {
     let mut values = vec![0.1; N * N];
     values[5] = f32::NAN;
     let query = ("query_layer.weight", "F32", [N, N].as_slice(), f32_bytes(values));
-    folder.write("nan.safetensors", safetensors(&[query, key]));
+    folder.write("nan.safetensors", safetensors(&[query, key.clone()]));
     refused("nan.safetensors", &["nan.safetensors: tensor 'query_layer.weight' is not finite at flat index 5"]);
+    // Finite, but every logit would overflow, and all weights be equal.
+    let query = ("query_layer.weight", "F32", [N, N].as_slice(), f32_bytes(vec![1.0e38; N * N]));
+    folder.write("large.safetensors", safetensors(&[query, key]));
+    refused("large.safetensors", &["large.safetensors: the parameters are too large", "'query_layer.weight'"]);
 }
 
 fn sizes_that_do_not_fit() {

@@ -18,7 +18,7 @@ use viewfuse_tests::scenes::Folder;
 viewfuse_tests::trials![killed_at_any_moment];
 
 /// Files of an output folder.
-type Files = BTreeMap<PathBuf, Vec<u8>>;
+pub(super) type Files = BTreeMap<PathBuf, Vec<u8>>;
 
 /// Every command that writes, into the folder `OUT`. The others (`compare`, `devices`, `verify`, `check`, `bench`) only
 /// print; `view` keeps nothing.
@@ -79,7 +79,7 @@ fn inputs(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 /// Every file is whole: it is read by whatever reads its kind, or is `like` the one that an undisturbed run wrote. Hidden
 /// ones are those that a kill leaves.
 #[track_caller]
-fn assert_whole(folder: &Path, like: &Files) -> Files {
+pub(super) fn assert_whole(folder: &Path, like: &Files) -> Files {
     let mut whole = Files::new();
     if !folder.is_dir() {
         return whole;
@@ -132,7 +132,7 @@ fn lost<'a>(finished: &'a Files, now: &Files) -> Option<&'a PathBuf> {
 }
 
 /// What an undisturbed run wrote, and its time.
-fn undisturbed(folder: &Path, arguments: &str, out: &Path) -> (Files, Duration) {
+pub(super) fn undisturbed(folder: &Path, arguments: &str, out: &Path) -> (Files, Duration) {
     let start = Instant::now();
     done(folder, arguments);
     let time = start.elapsed();
@@ -196,6 +196,6 @@ fn killed_at_any_moment() {
     println!("{kills} kills, {in_a_file} of them while a file was written; {too_late} more came too late");
 }
 
-fn is_unfinished(path: &Path) -> bool {
+pub(super) fn is_unfinished(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }

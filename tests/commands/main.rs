@@ -25,6 +25,7 @@ mod pareto;
 mod progress;
 mod protocols;
 mod python;
+mod races;
 mod readme;
 mod render;
 mod report;
@@ -64,6 +65,7 @@ fn main() -> ExitCode {
         inspect::trials(),
         interrupt::trials(),
         kill::trials(),
+        races::trials(),
         limits::trials(),
         lists::trials(),
         memory::trials(),

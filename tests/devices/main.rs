@@ -7,6 +7,7 @@
 mod arguments;
 mod candidate;
 mod child;
+mod expectations;
 mod genvs;
 mod layers;
 mod limits;
@@ -59,6 +60,7 @@ fn main() -> ExitCode {
         metrics::TESTS,
         sampling::TESTS,
         limits::TESTS,
+        expectations::TESTS,
     ]
     .concat()
     .into_iter()

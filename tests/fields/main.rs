@@ -7,5 +7,6 @@ mod pixelnerf;
 mod plane_sweep;
 mod rows;
 mod sampling;
+mod scales;
 mod surveyed;
 mod visual_hull;

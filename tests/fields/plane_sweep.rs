@@ -58,7 +58,7 @@ fn sources(images: Vec<SourceImage>) -> SourceImages {
         has_silhouettes: false,
         points: Vec::new(),
         near_far: Some([1.5, 8.0]),
-        warning: None,
+        warnings: Vec::new(),
     }
 }
 

@@ -5,9 +5,13 @@ mod checkpoints;
 mod fall;
 mod guarded;
 mod images;
+mod journals;
 mod parsers;
+mod paths;
 mod records;
+mod requests;
 mod scenes;
+mod shell;
 mod state;
 
 use std::fs;
@@ -49,7 +53,7 @@ pub(crate) trait Target {
 type Row = (&'static str, fn() -> Box<dyn Target>);
 
 /// All targets.
-pub(crate) const ALL: [Row; 20] = [
+pub(crate) const ALL: [Row; 25] = [
     ("images", || Box::new(images::Images::new())),
     ("transforms", || Box::new(scenes::transforms())),
     ("srn", || Box::new(scenes::srn())),
@@ -67,6 +71,11 @@ pub(crate) const ALL: [Row; 20] = [
     ("pareto", || Box::new(records::Sweeps::new())),
     ("training", || Box::new(records::Trainings::new())),
     ("state", || Box::new(state::State::new())),
+    ("requests", || Box::new(requests::Requests)),
+    ("journals", || Box::new(journals::Journals::new())),
+    ("path-tables", || Box::new(paths::Paths::tables())),
+    ("path-json", || Box::new(paths::Paths::json())),
+    ("shell", || Box::new(shell::Shell)),
     ("specs", || Box::new(parsers::Specs)),
     ("views", || Box::new(parsers::Views::new())),
     ("capi", || Box::new(capi::Face::new())),

@@ -148,7 +148,7 @@ fn sources() -> SourceImages {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
-        warning: None,
+        warnings: Vec::new(),
     }
 }
 

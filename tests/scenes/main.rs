@@ -13,6 +13,7 @@ mod made;
 mod paths;
 mod photographs;
 mod synthetic;
+mod targets;
 mod transforms;
 mod world;
 mod written;

@@ -34,7 +34,7 @@ pub fn photographs(count: u32, side: u32) -> SourceImages {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
-        warning: None,
+        warnings: Vec::new(),
     }
 }
 

@@ -186,7 +186,12 @@ impl Adapter {
             timestamp_bits: family.map_or(0, |family| families[family as usize].timestamp_valid_bits),
             timestamp_period: own.timestamp_period,
             offset_alignment: own.min_storage_buffer_offset_alignment,
-            extensions: extensions(properties.api_version, subgroup_size.is_some(), has),
+            extensions: extensions(
+                properties.api_version,
+                subgroup_size.is_some(),
+                has(khr::pipeline_executable_properties::NAME) && reports_pipelines(instance, raw),
+                has,
+            ),
             has_memory_budget: has(ext::memory_budget::NAME),
             identity: Identity {
                 vendor: properties.vendor_id,
@@ -239,14 +244,29 @@ fn best_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
 }
 
 /// Those to enable: what a device asks for, and what is used where it is offered.
-fn extensions(api_version: u32, has_subgroups: bool, has: impl Fn(&CStr) -> bool) -> Vec<&'static CStr> {
+fn extensions(
+    api_version: u32,
+    has_subgroups: bool,
+    has_reports: bool,
+    has: impl Fn(&CStr) -> bool,
+) -> Vec<&'static CStr> {
     let wanted = [
         (khr::portability_subset::NAME, true),
         (khr::vulkan_memory_model::NAME, api_version < vk::API_VERSION_1_2),
         (ext::memory_budget::NAME, true),
         (ext::subgroup_size_control::NAME, has_subgroups),
+        (khr::pipeline_executable_properties::NAME, has_subgroups && has_reports),
     ];
     wanted.into_iter().filter(|(name, is_used)| *is_used && has(name)).map(|(name, _)| name).collect()
+}
+
+/// Whether a device with the extension reports on its pipelines.
+fn reports_pipelines(instance: &Instance, raw: vk::PhysicalDevice) -> bool {
+    let mut own = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut own);
+    // SAFETY: the device knows the chained struct.
+    unsafe { instance.raw.get_physical_device_features2(raw, &mut features) };
+    own.pipeline_executable_info == vk::TRUE
 }
 
 fn memory_model(instance: &Instance, raw: vk::PhysicalDevice, api_version: u32, has_extension: bool) -> bool {

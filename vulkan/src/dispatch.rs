@@ -1,7 +1,7 @@
 //! Dispatches of kernels: arguments checked, split to fit the device, in the fastest form of their tiles.
 
-use crate::buffer::{Bound, ranges};
-use crate::error::VulkanError;
+use crate::buffer::{Array, Bound, ranges};
+use crate::error::{Missing, VulkanError};
 use crate::forms::{self, Class};
 use crate::gpu::{Gpu, State, WIDEST_PAGED, barrier};
 use crate::kernel::{Access, Form, Kernel, Layout, Piece, WORKGROUP};
@@ -17,8 +17,8 @@ use viewfuse_kernels::pages::MAX_PAGES;
 const UNKNOWN: Duration = Duration::from_millis(20);
 
 /// A dispatch whose arguments are right.
-struct Job<'a> {
-    kernel: Kernel,
+pub(crate) struct Job<'a> {
+    pub(crate) kernel: Kernel,
     parameters: &'a [u8],
     arrays: &'a [Bound<'a>],
     page_shift: u32,
@@ -60,7 +60,7 @@ impl Gpu {
                 None => (Form::Single, elements.clone()),
             };
             let count = u64::from(elements.end - elements.start);
-            let dispatches = gpu.record_job(state, &job, form, of_form, count)?;
+            let dispatches = gpu.record_in_pieces(state, &job, form, of_form, count)?;
             let tally = &mut state.tallies[kernel as usize];
             tally.dispatches += dispatches;
             tally.elements += count;
@@ -71,7 +71,13 @@ impl Gpu {
     /// The form for a class of products: as was asked for, as is known, or measured now.
     fn form(&self, state: &mut State, job: &Job<'_>, class: &Class) -> Result<Form, VulkanError> {
         if let Some(form) = self.form {
-            return Ok(form);
+            return match state.pipelines.fits(job.kernel, form, job.page_shift)? {
+                true => Ok(form),
+                false => Err(VulkanError::Missing {
+                    device: self.handle.name.clone(),
+                    missing: vec![Missing::Feature("subgroups of the size that was asked for")],
+                }),
+            };
         }
         let candidates = class.candidates(self.is_software, self.handle.subgroup_size().is_some());
         if candidates.len() == 1 {
@@ -80,9 +86,19 @@ impl Gpu {
         if let Some(form) = state.choices.get(class).filter(|form| candidates.contains(form)) {
             return Ok(form);
         }
-        let mut fastest = (Form::Single, Duration::MAX);
+        let (mut fastest, mut expected) = ((Form::Single, Duration::MAX), None);
         for form in candidates {
-            let time = self.time_form(state, job, class, form)?;
+            // A driver that compiled it for subgroups of another size would give other results.
+            if !state.pipelines.fits(job.kernel, form, job.page_shift)? {
+                state.refused.push((job.kernel, form));
+                continue;
+            }
+            let (time, outputs) = self.time_form(state, job, class, form)?;
+            // The first one is the definition of the others.
+            if expected.get_or_insert_with(|| outputs.clone()) != &outputs {
+                state.refused.push((job.kernel, form));
+                continue;
+            }
             if time < fastest.1 {
                 fastest = (form, time);
             }
@@ -91,10 +107,36 @@ impl Gpu {
         Ok(fastest.0)
     }
 
-    /// The least time of a few dispatches of some tiles. They write what the dispatch that follows writes, too.
-    fn time_form(&self, state: &mut State, job: &Job<'_>, class: &Class, form: Form) -> Result<Duration, VulkanError> {
+    /// Forms that gave other results than [`Form::Single`] when they were measured, or were compiled for subgroups of another
+    /// size: they are not used. On a driver without faults there are none.
+    pub fn refused_forms(&self) -> Vec<(Kernel, Form)> {
+        self.lock().refused.clone()
+    }
+
+    /// Invocations of a subgroup that the driver reports of the kernel's pipelines that need them; `None` where it reports
+    /// nothing, or there are none yet.
+    pub fn reported_subgroup_size(&self, kernel: Kernel) -> Option<u32> {
+        self.lock().pipelines.reported(kernel)
+    }
+
+    /// The least time of a few dispatches of some tiles, and the outputs' first bytes. What they write the dispatch that
+    /// follows writes, too.
+    fn time_form(
+        &self,
+        state: &mut State,
+        job: &Job<'_>,
+        class: &Class,
+        form: Form,
+    ) -> Result<(Duration, Vec<u8>), VulkanError> {
         let elements = class.measured_elements(form, self.is_software);
-        let mut least = Duration::MAX;
+        let (mut least, mut outputs) = (Duration::MAX, Vec::new());
+        let listed = job.kernel.arrays().iter().zip(job.arrays);
+        let written: Vec<&Arc<Array>> =
+            listed.filter(|(array, _)| array.access == Access::Write).map(|(_, bound)| bound.0).collect();
+        // What an earlier form wrote would stand for a form that writes nothing.
+        for array in &written {
+            self.spoil_start(state, array)?;
+        }
         // The first one makes what is made at the first use.
         for round in 0..forms::ROUNDS {
             state.wait()?;
@@ -103,14 +145,18 @@ impl Gpu {
             state.wait()?;
             if round > 0 {
                 least = least.min(start.elapsed());
+            } else {
+                for array in &written {
+                    outputs.extend(self.read_start(state, array)?);
+                }
             }
         }
-        Ok(least)
+        Ok((least, outputs))
     }
 
     /// Records a dispatch, in as many pieces as the device's limits demand, and returns how many these are. `counted`
     /// elements are counted for the time that later ones are expected to take.
-    fn record_job(
+    pub(crate) fn record_job(
         &self,
         state: &mut State,
         job: &Job<'_>,

@@ -92,11 +92,41 @@ pub(crate) fn excerpt(module: &[u32], entry_point: &str) -> Vec<u32> {
 mod tests {
     use super::*;
     use crate::kernel::{Form, Kernel};
-    use crate::pipelines::MODULE;
+    use crate::pipelines::{MODULE, SUBGROUPS};
+
+    const CAPABILITY: u32 = 17;
+    /// `Shader` and `VulkanMemoryModel`: Vulkan has the one, a device without the other is refused.
+    const OF_ALL: [u32; 2] = [1, 5345];
+    /// `GroupNonUniform`, `GroupNonUniformBallot`, `GroupNonUniformShuffle`: asked for in `subgroups::fitting_size`.
+    const OF_SUBGROUPS: [u32; 3] = [61, 64, 65];
+
+    fn words(module: &[u8]) -> Vec<u32> {
+        module.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect()
+    }
+
+    #[test]
+    fn an_excerpt_relies_on_nothing_that_was_not_asked_for() {
+        let (kernels, subgroups) = (words(MODULE), words(SUBGROUPS));
+        let mut seen = 0;
+        for kernel in Kernel::ALL {
+            for form in Form::ALL.into_iter().filter(|form| *form == Form::Single || kernel.is_tiled()) {
+                let own = excerpt(if form.needs_subgroups() { &subgroups } else { &kernels }, kernel.entry_point(form));
+                let of = |wanted| instructions(&own).filter(move |(code, _)| *code == wanted);
+                assert_eq!(of(ENTRY_POINT).count(), 1, "{} {}", kernel.name(), form.name());
+                for (_, capability) in of(CAPABILITY) {
+                    let is_asked_for = OF_ALL.contains(&capability[1])
+                        || form.needs_subgroups() && OF_SUBGROUPS.contains(&capability[1]);
+                    assert!(is_asked_for, "{} {}: capability {}", kernel.name(), form.name(), capability[1]);
+                    seen += 1;
+                }
+            }
+        }
+        assert!(seen >= 2 * Kernel::ALL.len());
+    }
 
     #[test]
     fn an_excerpt_has_one_entry_point_and_little_else() {
-        let module: Vec<u32> = MODULE.chunks_exact(4).map(bytemuck::pod_read_unaligned).collect();
+        let module = words(MODULE);
         let count = |module: &[u32], wanted| instructions(module).filter(|(code, _)| *code == wanted).count();
         for kernel in Kernel::ALL {
             let own = excerpt(&module, kernel.entry_point(Form::Single));

@@ -31,6 +31,9 @@ pub struct GpuOptions {
     pub limits: Limits,
     /// The form of all tiled kernels; `None` for the fastest, which is measured. The results are the same bits.
     pub form: Option<Form>,
+    /// The longest time that a piece of a dispatch may be expected to take; `None` for the device's default:
+    /// [`GpuOptions::longest_piece_on`]. The results are the same bits.
+    pub longest_piece: Option<Duration>,
 }
 
 impl Default for GpuOptions {
@@ -38,7 +41,14 @@ impl Default for GpuOptions {
     fn default() -> GpuOptions {
         let limits =
             Limits { buffer_range: u64::MAX, allocation: u64::MAX, workgroup_count: u32::MAX, memory: u64::MAX };
-        GpuOptions { time_limit: None, barriers: true, closing: Duration::from_secs(10), limits, form: None }
+        GpuOptions {
+            time_limit: None,
+            barriers: true,
+            closing: Duration::from_secs(10),
+            limits,
+            form: None,
+            longest_piece: None,
+        }
     }
 }
 
@@ -53,6 +63,20 @@ impl GpuOptions {
             _ => Some(Duration::from_secs(120)),
         };
         self.time_limit.or(of_kind)
+    }
+}
+
+impl GpuOptions {
+    /// The longest time that a piece of a dispatch may be expected to take on a device of this kind; `None` where work is cut by
+    /// the device's limits alone.
+    ///
+    /// The default of a GPU is 0.2 s: systems end what takes seconds (two on Windows). Nobody watches a software driver.
+    pub fn longest_piece_on(&self, kind: AdapterKind) -> Option<Duration> {
+        let of_kind = match kind {
+            AdapterKind::Software => None,
+            _ => Some(Duration::from_millis(200)),
+        };
+        self.longest_piece.or(of_kind)
     }
 }
 
@@ -77,6 +101,7 @@ pub struct Gpu {
     pub(crate) barriers: bool,
     pub(crate) form: Option<Form>,
     pub(crate) is_software: bool,
+    pub(crate) longest_piece: Option<Duration>,
 }
 
 pub(crate) struct State {
@@ -84,6 +109,8 @@ pub(crate) struct State {
     pub(crate) pipelines: Pipelines,
     /// Forms of tiled kernels, as far as they are known.
     pub(crate) choices: Choices,
+    /// Forms that are not used, because their results were others.
+    pub(crate) refused: Vec<(Kernel, Form)>,
     /// How long elements took.
     pub(crate) rates: [Rate; Kernel::ALL.len()],
     pub(crate) upload: Option<Memory>,
@@ -132,6 +159,7 @@ impl Gpu {
             submissions,
             pipelines,
             choices: Choices::default(),
+            refused: Vec::new(),
             rates: [Rate::default(); Kernel::ALL.len()],
             upload: None,
             download: None,
@@ -146,6 +174,7 @@ impl Gpu {
             barriers: options.barriers,
             form: options.form,
             is_software: adapter.kind == AdapterKind::Software,
+            longest_piece: options.longest_piece_on(adapter.kind),
         })
     }
 
@@ -267,6 +296,13 @@ pub(crate) struct Rate {
 }
 
 impl Rate {
+    /// The time of what was waited for, if the device did not tell one.
+    pub(crate) fn or_took(&mut self, time: Duration) {
+        if self.time.is_zero() {
+            self.time = time;
+        }
+    }
+
     /// The time that so many elements are expected to take, if any have been measured.
     pub(crate) fn time_of(&self, elements: u64) -> Option<Duration> {
         let share = elements as f64 / self.elements as f64;

@@ -3,7 +3,7 @@
 use crate::adapter::{Adapter, Identity, Limits};
 use crate::error::{VulkanError, failed};
 use crate::instance::Instance;
-use ash::vk;
+use ash::{khr, vk};
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings};
@@ -26,6 +26,8 @@ pub(crate) struct Handle {
     /// A submission may still run and is not waited for any more: its resources must not be freed.
     abandoned: AtomicBool,
     adapter: Adapter,
+    /// Reports on pipelines, where the device has them.
+    executables: Option<khr::pipeline_executable_properties::Device>,
     pub(crate) instance: Arc<Instance>,
 }
 
@@ -46,6 +48,12 @@ impl Handle {
             .push_next(&mut model);
         if adapter.subgroup_size.is_some() {
             info = info.push_next(&mut subgroups);
+        }
+        let mut executable =
+            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        let reports = adapter.extensions.contains(&khr::pipeline_executable_properties::NAME);
+        if reports {
+            info = info.push_next(&mut executable);
         }
         // SAFETY: everything that `info` points to lives until the call returns; the adapter has what is enabled.
         let device =
@@ -73,8 +81,10 @@ impl Handle {
                 return Err(unexpected(&adapter.name, &error));
             }
         };
+        let executables = reports.then(|| khr::pipeline_executable_properties::Device::new(&instance.raw, &device));
         Ok(Handle {
             name: adapter.name.clone(),
+            executables,
             device,
             queue,
             limits,
@@ -94,6 +104,14 @@ impl Handle {
     /// Invocations of a subgroup, where kernels may use them.
     pub(crate) fn subgroup_size(&self) -> Option<u32> {
         self.adapter.subgroup_size
+    }
+
+    /// Invocations of a subgroup of a compute pipeline, as the driver reports them; `None` where it does not.
+    pub(crate) fn reported_subgroup_size(&self, pipeline: vk::Pipeline) -> Option<u32> {
+        let info = vk::PipelineInfoKHR::default().pipeline(pipeline);
+        // SAFETY: the pipeline is the device's, and the device has the extension and its feature.
+        let reports = unsafe { self.executables.as_ref()?.get_pipeline_executable_properties(&info) }.ok()?;
+        reports.first().map(|report| report.subgroup_size).filter(|size| *size > 0)
     }
 
     /// Whether this many more bytes are available.

@@ -14,7 +14,7 @@
 //! submissions                    submitted commands
 //! gpu                            an opened device: its state, recorded commands
 //! remembered                     pipelines and forms from one process to the next
-//! dispatch                       dispatches, split to fit the device
+//! dispatch, pieces               dispatches, split to fit the device and its watchdog
 //! transfers                      arrays between host and device
 //! ```
 //!
@@ -31,6 +31,7 @@ mod handle;
 mod instance;
 pub mod kernel;
 mod messages;
+mod pieces;
 mod pipelines;
 mod remembered;
 mod subgroups;

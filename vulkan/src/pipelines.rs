@@ -29,6 +29,8 @@ pub(crate) struct Pipelines {
     /// The data that the cache began with.
     recalled: Vec<u8>,
     pipelines: HashMap<(Kernel, Form, u32), vk::Pipeline>,
+    /// The size of subgroups that the driver reports of a pipeline, where it reports one.
+    reported: HashMap<(Kernel, Form, u32), u32>,
     handle: Arc<Handle>,
 }
 
@@ -39,6 +41,7 @@ impl Pipelines {
             layouts: HashMap::new(),
             recalled: Vec::new(),
             pipelines: HashMap::new(),
+            reported: HashMap::new(),
             handle: handle.clone(),
         };
         // SAFETY: an empty cache needs nothing.
@@ -77,6 +80,22 @@ impl Pipelines {
             None => self.create(kernel, form, layout, page_shift)?,
         };
         Ok(Pipeline { raw, layout, set_layout })
+    }
+
+    /// Whether a form has the subgroups that it demands, as far as the driver reports it of the pipeline, which is made if it is
+    /// not there.
+    pub(crate) fn fits(&mut self, kernel: Kernel, form: Form, page_shift: u32) -> Result<bool, VulkanError> {
+        if !form.needs_subgroups() {
+            return Ok(true);
+        }
+        self.get(kernel, form, page_shift)?;
+        let reported = self.reported.get(&(kernel, form, page_shift)).copied();
+        Ok(reported.is_none() || reported == self.handle.subgroup_size())
+    }
+
+    /// The size of subgroups that the driver reports of a kernel's pipelines, where it reports one.
+    pub(crate) fn reported(&self, kernel: Kernel) -> Option<u32> {
+        self.reported.iter().find(|((own, ..), _)| *own == kernel).map(|(_, size)| *size)
     }
 
     fn layouts(&mut self, kernel: Kernel) -> Result<(vk::DescriptorSetLayout, vk::PipelineLayout), VulkanError> {
@@ -159,6 +178,11 @@ impl Pipelines {
             Err((_, result)) => return Err(self.handle.failure("vkCreateComputePipelines", result)),
         };
         self.pipelines.insert((kernel, form, page_shift), pipeline);
+        if form.needs_subgroups()
+            && let Some(size) = self.handle.reported_subgroup_size(pipeline)
+        {
+            self.reported.insert((kernel, form, page_shift), size);
+        }
         Ok(pipeline)
     }
 

@@ -1,6 +1,7 @@
 //! Finds the first NaN or infinity among computed numbers on the device: it returns one index for a run of numbers.
 
 use viewfuse_core::fetch::Fetch;
+use viewfuse_core::math::has_finite_bits;
 
 /// Numbers of a run, which one invocation processes.
 pub const FINITE_RUN: u32 = 1024;
@@ -15,8 +16,7 @@ pub fn first_non_finite(values: &(impl Fetch<f32> + ?Sized), value_count: u32, r
     let end = (run * FINITE_RUN + FINITE_RUN).min(value_count);
     let mut index = run * FINITE_RUN;
     while index < end {
-        // From the bits: devices may compare NaN as they like.
-        if values.fetch(index as usize).to_bits() & 0x7f80_0000 == 0x7f80_0000 {
+        if !has_finite_bits(values.fetch(index as usize)) {
             return index;
         }
         index += 1;

@@ -9,7 +9,7 @@ use glam::Vec3;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fetch::Fetch;
 use viewfuse_core::half_precision::fetch_f16;
-use viewfuse_core::math::{exp, floor_to_i32, max};
+use viewfuse_core::math::{exp, floor_to_i32, has_nan_bits, max};
 use viewfuse_core::rays::RayPoint;
 
 /// A dispatch of [`volume_value`] or [`volume_value_f16`], as plain data.
@@ -191,12 +191,12 @@ pub fn weigh_features(
         let is_last = index + 1 == block.sample_count as usize;
         let length = if is_last { block.last_length } else { points.fetch(sample).length * block.length_scale };
         let own = density * length;
-        passed += if given.is_nan() { given } else { own };
+        passed += if has_nan_bits(given) { given } else { own };
         let behind = exp(-passed);
         let stopped = before - behind;
         let weight = if block.inclusive != 0 { stopped * exp(-own) } else { stopped };
         // The exponential of NaN is 0.
-        weigh(sample, if passed.is_nan() { passed } else { weight });
+        weigh(sample, if has_nan_bits(passed) { passed } else { weight });
         before = behind;
         index += 1;
     }

@@ -148,7 +148,7 @@ impl Subject<'_> {
             let side = about.source_side.of(working_side(scene, options, about.longest_side)?);
             if !known.iter().any(|(known_side, _)| *known_side == side) {
                 let prepared = album.sources(&job.sources, side, options.background, progress)?;
-                if let Some(warning) = &prepared.warning {
+                for warning in &prepared.warnings {
                     progress.warn(&format!("{}: {warning}", scene.path.display()));
                 }
                 known.push((side, Arc::new(prepared)));

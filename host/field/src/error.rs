@@ -8,7 +8,7 @@ use viewfuse_nn::loader::LoadError;
 
 /// A tensor has an element that is NaN or infinite.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{stage}: element {index} of the {tensor} is {value}, not a finite number")]
+#[error("{stage}: element {index} of the {tensor} is {}not a finite number", known(*value))]
 pub struct NotFinite {
     /// The stage.
     pub stage: String,
@@ -16,8 +16,13 @@ pub struct NotFinite {
     pub tensor: String,
     /// Index of the first such element, flat.
     pub index: usize,
-    /// Its value.
+    /// Its value; NaN also where only its place is known.
     pub value: f32,
+}
+
+/// A value in front of what it is not.
+fn known(value: f32) -> String {
+    if value.is_nan() { String::new() } else { format!("{value}, ") }
 }
 
 /// Why a field could not make a picture.

@@ -1,8 +1,11 @@
-//! Common parts of learned fields: the form of their input images, and near and far bounds.
+//! Common parts of learned fields: the form of their input images, near and far bounds, and the unit of length.
 
 use super::options::list;
 use viewfuse_core::camera::Camera;
+use viewfuse_job::progress::Progress;
+use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::rig::Rig;
+use viewfuse_scene::unit::{RigUnit, SRN_DISTANCE};
 
 /// Help of the flag of near and far bounds.
 pub(super) const NEAR_FAR: &str = "Near and far bounds of rays, world units [default: 8/13 and 18/13 of the cameras' distance \
@@ -29,6 +32,26 @@ pub fn default_near_far(cameras: &[Camera]) -> [f32; 2] {
         cameras => Rig::of(cameras).distance,
     };
     NEAR_FAR_SHARES.map(|share| share * if distance > 0.0 { distance } else { 1.0 })
+}
+
+/// The unit in which a network measures lengths, and the cameras of its sources in it.
+pub(super) fn in_network_unit(sources: &SourceImages) -> (RigUnit, Vec<Camera>) {
+    let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+    let unit = RigUnit::of_network(&cameras);
+    let cameras = cameras.iter().map(|camera| unit.camera(camera)).collect();
+    (unit, cameras)
+}
+
+/// Says that a network measures in another unit than the world's, if it does.
+pub(super) fn warn_of_unit(unit: RigUnit, progress: &dyn Progress) {
+    if !unit.is_world() {
+        progress.warn(&format!(
+            "the cameras are {:.3e} units from what they look at: for the network all lengths are divided by {:.3e}, so that this \
+             distance is {SRN_DISTANCE}, as in the scenes that published networks learned from",
+            unit.length() * SRN_DISTANCE,
+            unit.length()
+        ));
+    }
 }
 
 /// The far bound of rays is not above the near bound, or a bound is NaN or infinite.

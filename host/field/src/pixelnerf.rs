@@ -27,7 +27,7 @@ pub use architecture::{Architecture, Level, Pass};
 pub(crate) use open::ROW;
 pub use options::{MIN_OPACITY, MIN_SHARE, Omissions, PixelNerfOptions, Sampling};
 
-use super::learned::{default_near_far, over_white};
+use super::learned::{default_near_far, in_network_unit, over_white, warn_of_unit};
 use super::{
     About, Check, Effort, Efforts, Encoding, Encodings, ExactPixels, Field, FieldError, LeftOut, Prepared, Record,
     Rendered, Request, SourceSide,
@@ -39,13 +39,14 @@ use open::{BEHIND, LAYERS, RAYS, SPACE};
 use parameters::{DeviceParameters, HostParameters};
 use pass::{Evaluated, Renderer};
 use std::sync::Arc;
-use viewfuse_core::camera::{Camera, CameraBlock};
+use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::rays::CastBlock;
 use viewfuse_device::{Device, DeviceError};
 use viewfuse_job::progress::Progress;
 use viewfuse_nn::checkpoint::{Checkpoint, CheckpointError};
 use viewfuse_nn::image::{Image, Size};
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_scene::unit::RigUnit;
 use visibility::Visibility;
 
 /// A PixelNeRF with its parameters, ready for any device.
@@ -61,6 +62,8 @@ struct Views<'a, D: Device> {
     device: &'a D,
     parameters: DeviceParameters<D>,
     images: Vec<Image<D>>,
+    /// The network's unit; cameras and bounds are in it.
+    unit: RigUnit,
     cameras: Vec<CameraBlock>,
     /// `[view]`: none before it is encoded.
     latents: Vec<Option<ViewLatents<D>>>,
@@ -121,7 +124,8 @@ impl PixelNerf {
 
     /// Takes photographs and parameters to a device.
     fn views<'a, D: Device>(&'a self, device: &'a D, sources: &SourceImages) -> Result<Views<'a, D>, DeviceError> {
-        let cameras: Vec<Camera> = sources.images.iter().map(|image| image.camera).collect();
+        let (unit, cameras) = in_network_unit(sources);
+        let given = self.options.sampling.near_far.map(|bounds| bounds.map(|depth| depth / unit.length()));
         let size = |image: &SourceImage| [image.camera.pinhole.width(), image.camera.pinhole.height()];
         let sizes: Vec<[u32; 2]> = sources.images.iter().map(size).collect();
         Ok(Views {
@@ -131,7 +135,8 @@ impl PixelNerf {
             images: sources.images.iter().map(|image| upload_image(device, image)).collect::<Result<_, _>>()?,
             cameras: cameras.iter().map(|camera| camera.block(0)).collect(),
             latents: cameras.iter().map(|_| None).collect(),
-            near_far: self.options.sampling.near_far.unwrap_or_else(|| default_near_far(&cameras)),
+            near_far: given.unwrap_or_else(|| default_near_far(&cameras)),
+            unit,
             background: sources.background,
             memory_estimate: self.memory_estimate(device, &sizes),
             counts: Counts::default(),
@@ -150,9 +155,11 @@ impl Field for PixelNerf {
         &'a self,
         device: &'a D,
         sources: &SourceImages,
-        _progress: &dyn Progress,
+        progress: &dyn Progress,
     ) -> Result<Box<dyn Prepared + 'a>, FieldError> {
-        Ok(Box::new(self.views(device, sources)?))
+        let views = self.views(device, sources)?;
+        warn_of_unit(views.unit, progress);
+        Ok(Box::new(views))
     }
 }
 
@@ -188,7 +195,7 @@ impl<D: Device> Views<'_, D> {
 
     /// A target's rays.
     fn cast(&self, request: &Request<'_>) -> CastBlock {
-        let ([near, far], camera) = (self.near_far, request.camera.block(0));
+        let ([near, far], camera) = (self.near_far, self.unit.camera(request.camera).block(0));
         CastBlock { camera, near, far, pixel_centre: self.field.architecture.pixel_centre, along_axis: 0 }
     }
 
@@ -266,7 +273,11 @@ impl<D: Device> Prepared for Views<'_, D> {
             0 => renderer.picture(&mut workspace, probes.as_ref(), &mut evaluated)?,
             _ => renderer.picture_between_nodes(&mut workspace, &mut evaluated)?,
         };
+        workspace.check(self.device)?;
         along_axis(&mut rendered, &renderer.cast);
+        if !self.unit.is_world() {
+            rendered.depths.iter_mut().for_each(|depth| *depth *= self.unit.length());
+        }
         let PixelNerf { architecture, options, .. } = self.field;
         let views_and_layers = [request.views.len(), architecture.injected_count].map(|count| count as u64);
         self.counts.add(views_and_layers, options.omissions.latent_layers, &evaluated);
@@ -309,7 +320,8 @@ impl<D: Device> Prepared for Views<'_, D> {
             SPACE.left_out(first, omitted(coarse), coarse.samples),
             RAYS.left_out(second, omitted(fine), fine.samples),
         ];
-        let (memory_estimate, near_far) = (Some(self.memory_estimate), Some(self.near_far));
+        let (memory_estimate, near_far) =
+            (Some(self.memory_estimate), Some(self.near_far.map(|depth| depth * self.unit.length())));
         Record { left_out, memory_estimate, near_far, ..Record::default() }
     }
 }
@@ -346,6 +358,7 @@ impl<D: Device> ExactPixels for Views<'_, D> {
         let mut workspace = self.workspace(request, most_points)?;
         let mut evaluated = [Evaluated::default(); 2];
         let (colours, _) = renderer.pixels_at(&mut workspace, pixels, None, &mut evaluated)?;
+        workspace.check(self.device)?;
         Ok(colours)
     }
 }

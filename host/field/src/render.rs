@@ -67,6 +67,7 @@ pub(crate) fn render_chosen<C, X: From<RenderError>>(
     let shown = job.sources.iter().copied().chain(truths);
     let (count, stage_count) = (job.targets.len(), 3 + job.targets.len());
     progress.stage("reading the sources", 0..1, stage_count);
+    viewfuse_scene::few_shot::away_warning(scene, job).iter().for_each(|warning| progress.warn(warning));
     let album = open_album(scene, shown, renderer, options, progress)?;
     let mut stage = Stage::prepare(scene, &album, &job.sources, renderer, options, progress)?;
     progress.stage("choosing the scheme", 1..2, stage_count);

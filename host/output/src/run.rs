@@ -67,7 +67,7 @@ pub struct RunWriter {
     frames: Vec<FrameRecord>,
     size: [u32; 2],
     background: [f32; 3],
-    warning: Option<String>,
+    warnings: Vec<String>,
     chosen: Option<Chosen>,
 }
 
@@ -108,7 +108,7 @@ impl RunWriter {
             frames: Vec::new(),
             size: [0, 0],
             background: [0.0; 3],
-            warning: None,
+            warnings: Vec::new(),
             chosen: None,
         }
     }
@@ -202,7 +202,7 @@ impl RunWriter {
         }
         self.size = size;
         self.background = sources.background;
-        self.warning.clone_from(&sources.warning);
+        self.warnings.clone_from(&sources.warnings);
         let expected = self.chosen.as_ref().and_then(|chosen| chosen.expected(frame));
         let record = FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.space) };
         if let Some(journal) = &mut self.journal {
@@ -280,7 +280,7 @@ impl RunWriter {
             background: background_record(options, self.background),
             leave_out: options.leave_out,
             early_termination: options.early_termination,
-            warnings: self.warning.into_iter().collect(),
+            warnings: self.warnings,
             sources: self.source_names,
             memory_estimate: record.memory_estimate,
             near_far: record.near_far.map(|bounds| bounds.map(|depth| self.space.file_length(depth))),

@@ -6,6 +6,7 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::sources::SourcesError;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
+use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::select::select_sources;
 use viewfuse_weighting::sources::{SourcePoses, SourceWeights};
@@ -65,17 +66,18 @@ impl SelectedSources {
         weighting: &Weighting,
         count: usize,
     ) -> Result<SelectedSources, SourcesError> {
-        let poses: Vec<Pose> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let unit = RigUnit::of_scene(scene);
+        let poses: Vec<Pose> = job.sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let all = SourcePoses::new(&poses)?;
         let weights: Vec<SourceWeights> =
-            job.targets.iter().map(|target| weighting.weigh(&all, &target.camera.pose)).collect();
+            job.targets.iter().map(|target| weighting.weigh(&all, &unit.pose(&target.camera.pose))).collect();
         let share = |own: &SourceWeights, chosen: &[usize]| chosen.iter().map(|&one| own.get(one as u32)).sum::<f32>();
         let name = |&view: &usize| scene.views[view].name.clone();
         let mut targets = Vec::with_capacity(job.targets.len());
         for (target, own) in job.targets.iter().zip(&weights) {
             let chosen = select_sources(std::slice::from_ref(own), count);
             let few = SourcePoses::new(&chosen.iter().map(|&one| poses[one]).collect::<Vec<_>>())?;
-            let few_weights = weighting.weigh(&few, &target.camera.pose);
+            let few_weights = weighting.weigh(&few, &unit.pose(&target.camera.pose));
             let mut order: Vec<(usize, f32)> =
                 chosen.iter().copied().zip(few_weights.values().iter().copied()).collect();
             order.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));

@@ -8,6 +8,7 @@ use viewfuse_core::sources::SourcesError;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::numpy::npy;
+use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
 
@@ -50,12 +51,13 @@ impl WeightTable {
     /// # Errors
     /// [`SourcesError`] if there are too few or too many sources.
     pub fn of(scene: &Scene, job: &FewShot, weightings: &[Weighting]) -> Result<WeightTable, SourcesError> {
-        let poses: Vec<Pose> = job.sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let unit = RigUnit::of_scene(scene);
+        let poses: Vec<Pose> = job.sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let sources = SourcePoses::new(&poses)?;
         let mut values = Vec::with_capacity(weightings.len() * job.targets.len() * poses.len());
         for weighting in weightings {
             for target in &job.targets {
-                let weights = weighting.weigh(&sources, &target.camera.pose);
+                let weights = weighting.weigh(&sources, &unit.pose(&target.camera.pose));
                 values.extend_from_slice(&weights.values()[..poses.len()]);
             }
         }

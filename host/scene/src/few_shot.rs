@@ -4,10 +4,13 @@
 //! 0, in any scene), a range `A..B` of these (both ends included), `all`, a split of the scene (`train`, `val`, `test`, where its files define splits), and `/STEP` after
 //! either to take every `STEP`-th.
 
+mod targets;
+
+pub use targets::away_warning;
+
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
 use crate::rig::{Rig, spread};
 use crate::{Scene, SceneError, Split, View};
-use std::collections::HashSet;
 use std::path::PathBuf;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::PoseError;
@@ -110,6 +113,19 @@ pub enum SelectionError {
     /// A camera path could not be read.
     #[error(transparent)]
     Path(#[from] SceneError),
+    /// Files of two targets would be one file on some systems.
+    #[error(
+        "{scene}: targets '{first}' and '{second}' would have the same files where file names ignore case or the forms of \
+         accented letters; render them one after the other"
+    )]
+    AlikeNames {
+        /// The scene's path.
+        scene: String,
+        /// The name of one.
+        first: String,
+        /// The name of the other.
+        second: String,
+    },
     /// A camera of a path has the name of a chosen target.
     #[error("{scene}: two targets are called '{name}'")]
     SameName {
@@ -201,10 +217,7 @@ impl Selection {
         if targets.is_empty() {
             return Err(SelectionError::NoTargets { scene: scene.path.display().to_string() });
         }
-        let mut seen = HashSet::new();
-        if let Some(Target { name, .. }) = targets.iter().find(|target| !seen.insert(target.name.as_str())) {
-            return Err(SelectionError::SameName { scene: scene.path.display().to_string(), name: name.clone() });
-        }
+        targets::check_names(scene, &targets)?;
         Ok(FewShot { sources, targets, frames_per_second })
     }
 

@@ -3,6 +3,7 @@
 use crate::photographs::object_box::find_object;
 use crate::photographs::{Album, BackgroundChoice};
 use crate::rig::{Rig, gap_warning};
+use crate::unit::SRN_DISTANCE;
 use crate::{Scene, View};
 use serde::Serialize;
 use viewfuse_core::Vec3;
@@ -16,7 +17,7 @@ use viewfuse_kernels::visual_hull::ObjectBlock;
 const LOOK_SIDE: u32 = 128;
 /// A rig whose axes miss their common point by more than this share of the distance has no common subject.
 const MAX_AXIS_MISS: f32 = 0.25;
-/// Range of distances for which the parameters of published schemes (Gaussian, attention) are meaningful.
+/// Range of distances beyond which a unit is likely a mistake.
 const USUAL_DISTANCES: (f32, f32) = (0.1, 100.0);
 
 /// The findings about a scene. Lengths in world units, world coordinates.
@@ -141,8 +142,8 @@ fn rig_warnings(scene: &Scene, rig: &Rig) -> Vec<String> {
     }
     if !(USUAL_DISTANCES.0..=USUAL_DISTANCES.1).contains(&rig.distance) {
         warnings.push(format!(
-            "the cameras are {:.3e} units from what they look at: weightings that depend on the unit (gaussian, l1, \
-             frobenius, attention) expect between {} and {}",
+            "the cameras are {:.3e} units from what they look at, usual are {} to {}: weightings and networks measure in units in \
+             which this is {SRN_DISTANCE}",
             rig.distance, USUAL_DISTANCES.0, USUAL_DISTANCES.1
         ));
     }
@@ -180,7 +181,7 @@ fn object_of(
     }
     let album = Album::open_at(scene, views.iter().copied(), LOOK_SIDE, progress).map_err(|error| error.to_string())?;
     let images = album.sources(&views, LOOK_SIDE, background, progress).map_err(|error| error.to_string())?;
-    warnings.extend(images.warning.clone());
+    warnings.extend(images.warnings.clone());
     if !images.has_silhouettes {
         return Ok(None);
     }

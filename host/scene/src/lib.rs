@@ -8,6 +8,7 @@
 //!               reader: what a layout's reader is, and READERS, all of them
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up
+//! unit          the unit of length of weightings and networks: RigUnit
 //! path          cameras without photographs: from files, or generated
 //! listing       the views as a list, with their neighbours: ListedView
 //! few_shot      which views are sources, which cameras are targets: FewShot
@@ -26,6 +27,7 @@ pub mod path;
 pub mod photographs;
 pub mod rig;
 mod scene;
+pub mod unit;
 pub mod write;
 
 pub use scene::{

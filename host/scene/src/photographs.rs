@@ -1,5 +1,6 @@
 //! Photographs prepared for a field: at working size, premultiplied, with the background removed.
 
+mod exposure;
 mod ground_truth;
 mod matte;
 pub mod object_box;
@@ -87,8 +88,8 @@ pub struct SourceImages {
     pub points: Vec<Vec3>,
     /// Near and far bound of the sources, where the scene's files state them.
     pub near_far: Option<[f32; 2]>,
-    /// A warning about the background, if there is one.
-    pub warning: Option<String>,
+    /// Warnings about the background and the exposures.
+    pub warnings: Vec<String>,
 }
 
 impl SourceImages {
@@ -100,6 +101,14 @@ impl SourceImages {
         let texels: Vec<[f32; 4]> = texels.iter().map(over).collect();
         to_rgb8(&texels, [camera.pinhole.width(), camera.pinhole.height()])
     }
+}
+
+/// All results, or the first error in the order of the work: rayon's own collection returns any of several, so that equal runs
+/// would name different photographs.
+fn in_order<T: Send>(
+    work: impl IndexedParallelIterator<Item = Result<T, PhotographsError>>,
+) -> Result<Vec<T>, PhotographsError> {
+    work.collect::<Vec<_>>().into_iter().collect()
 }
 
 /// Most bytes of decoded photographs that are kept. If a run needs more, each is decoded again at every use.
@@ -187,7 +196,7 @@ impl<'a> Album<'a> {
                 progress.step();
                 Ok((view, photograph))
             };
-            let photographs: Vec<_> = now.par_iter().map(read).collect::<Result<_, PhotographsError>>()?;
+            let photographs = in_order(now.par_iter().map(read))?;
             for (view, photograph) in photographs {
                 self.kept[view] = Some(photograph);
             }
@@ -237,9 +246,9 @@ impl<'a> Album<'a> {
             progress.check()?;
             Ok(matte::Border::of(self.photograph(view)?.as_ref(), choice))
         };
-        let mut borders: Vec<_> = views.par_iter().map(look).collect::<Result<_, PhotographsError>>()?;
+        let mut borders = in_order(views.par_iter().map(look))?;
         let backdrop = matte::Backdrop::of(borders.iter().flatten(), choice);
-        let (background, mut warning) = (backdrop.colour(), None);
+        let (background, mut warnings) = (backdrop.colour(), Vec::new());
         let whole_pictures = match choice {
             BackgroundChoice::None => true,
             BackgroundChoice::Colour(_) => false,
@@ -247,7 +256,7 @@ impl<'a> Album<'a> {
         };
         if choice == BackgroundChoice::Auto && whole_pictures {
             // The same text for any choice of sources, so that it is shown once.
-            warning = Some(format!(
+            warnings.push(format!(
                 "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): nothing is cut out, \
                  whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG with \
                  alpha)",
@@ -260,34 +269,30 @@ impl<'a> Album<'a> {
                 progress.check()?;
                 self.cut_out(view, longest_side, border.as_ref(), &backdrop, border.is_some() || !whole_pictures)
             });
-            images.collect::<Result<Vec<_>, PhotographsError>>()
+            in_order(images)
         };
         if whole_pictures {
             borders.iter_mut().for_each(|border| *border = None);
         }
+        let names = || views.iter().map(|&view| self.scene.views[view].name.as_str());
         match all(&borders) {
             Err(PhotographsError::NoSilhouette { path, colour }) if choice == BackgroundChoice::Auto => {
-                warning = Some(format!(
+                warnings.push(format!(
                     "{path}: shows no object in front of a background of {colour}: nothing is cut out, whole pictures are used"
                 ));
                 borders.iter_mut().for_each(|border| *border = None);
-                let images = views
-                    .par_iter()
-                    .map(|&view| {
-                        progress.check()?;
-                        self.cut_out(view, longest_side, None, &backdrop, false)
-                    })
-                    .collect::<Result<Vec<_>, PhotographsError>>()?;
-                Ok(SourceImages { images, background, has_silhouettes: false, points, near_far, warning })
+                let images = in_order(views.par_iter().map(|&view| {
+                    progress.check()?;
+                    self.cut_out(view, longest_side, None, &backdrop, false)
+                }))?;
+                warnings.extend(exposure::warning(&images, names()));
+                Ok(SourceImages { images, background, has_silhouettes: false, points, near_far, warnings })
             }
-            images => Ok(SourceImages {
-                images: images?,
-                background,
-                has_silhouettes: !whole_pictures,
-                points,
-                near_far,
-                warning,
-            }),
+            images => {
+                let images = images?;
+                warnings.extend(exposure::warning(&images, names()));
+                Ok(SourceImages { images, background, has_silhouettes: !whole_pictures, points, near_far, warnings })
+            }
         }
     }
 

@@ -94,7 +94,7 @@ pub fn spread(points: &[Vec3], count: usize) -> Vec<usize> {
 }
 
 /// Half the image's diagonal over the focal length: the slope of the ray through a corner.
-fn half_diagonal_slope(pinhole: &Pinhole) -> f32 {
+pub(crate) fn half_diagonal_slope(pinhole: &Pinhole) -> f32 {
     let [fx, fy] = pinhole.focal();
     (pinhole.width() as f32 / (2.0 * fx)).hypot(pinhole.height() as f32 / (2.0 * fy))
 }

@@ -50,13 +50,13 @@ impl SourceDraw {
 
 /// Sources and target rays of some objects.
 pub(crate) struct Batch {
-    /// Sources of each object, `[object][view]`.
+    /// Sources of each object, `[object][view]`, in the unit of weightings.
     pub(crate) sources: Vec<Vec<Camera>>,
-    /// The same as kernels take them.
+    /// The same in world units, as kernels take them.
     pub(crate) cameras: Vec<Vec<CameraBlock>>,
     /// Pictures of the sources `[object and view][row][column][3]`, in `[-1, 1]`.
     pub(crate) pictures: Tensor,
-    /// Target view of each object; the first one for rays of many targets.
+    /// Target view of each object, in the unit of weightings; the first one for rays of many targets.
     pub(crate) targets: Vec<Camera>,
     /// `[object][ray]`.
     pub(crate) rays: Vec<Vec<TargetRay>>,
@@ -138,8 +138,8 @@ impl Batch {
                 truth.extend(scene.colour(view, column, row));
             }
             batch.1.push(sources.iter().map(|camera| camera.block(0)).collect::<Vec<_>>());
-            batch.0.push(sources);
-            batch.2.push(scene.cameras[others[0]]);
+            batch.0.push(sources.iter().map(|camera| scene.unit.camera(camera)).collect::<Vec<_>>());
+            batch.2.push(scene.unit.camera(&scene.cameras[others[0]]));
             batch.3.push(rays);
         }
         let (sources, cameras, targets, rays) = batch;

@@ -7,6 +7,7 @@ use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::random::normal;
 use viewfuse_field::learned::default_near_far;
 use viewfuse_scene::photographs::{SourceImage, SourceImages};
+use viewfuse_scene::unit::RigUnit;
 use viewfuse_synthetic::{Orbit, render, toy};
 
 pub(super) fn orbit(side: u32) -> Orbit {
@@ -28,7 +29,7 @@ pub(super) fn photographs(count: u32, side: u32) -> SourceImages {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
-        warning: None,
+        warnings: Vec::new(),
     }
 }
 
@@ -49,6 +50,7 @@ pub(super) fn scene(side: u32, count: u32) -> TrainingScene {
         blocks: cameras.iter().map(|camera| camera.block(0)).collect(),
         bounds: vec![[2, 2, side - 3, side - 3]; count as usize],
         near_far: default_near_far(&cameras),
+        unit: RigUnit::WORLD,
         cameras,
         pictures,
     }

@@ -11,6 +11,7 @@ use viewfuse_field::learned::default_near_far;
 use viewfuse_job::digest::hexadecimal;
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
+use viewfuse_scene::unit::RigUnit;
 
 /// The whole work is so many parts of about the same time: reading the scenes is the first, training all others.
 pub(crate) const STAGES: usize = 20;
@@ -78,6 +79,8 @@ pub(crate) struct TrainingScene {
     pub(crate) bounds: Vec<[u32; 4]>,
     /// Near and far bounds.
     pub(crate) near_far: [f32; 2],
+    /// The unit of weightings.
+    pub(crate) unit: RigUnit,
 }
 
 impl TrainingScene {
@@ -104,11 +107,15 @@ impl TrainingScene {
             cameras.push(Camera { pose: view.camera.pose, pinhole });
             pictures.push(picture);
         }
+        // As the field shows them to a network.
+        let network_unit = RigUnit::of_network(&cameras);
+        cameras.iter_mut().for_each(|camera| *camera = network_unit.camera(camera));
         Ok(TrainingScene {
             path: path.clone(),
             blocks: cameras.iter().map(|camera| camera.block(0)).collect(),
             bounds: pictures.iter().map(bounds).collect(),
             near_far: default_near_far(&cameras),
+            unit: RigUnit::of(&cameras),
             cameras,
             pictures,
         })
@@ -134,7 +141,8 @@ impl TrainingScene {
             progress.step();
             Ok(scene)
         };
-        paths.par_iter().map(open).collect()
+        // The first error in the order of the scenes, not any of several.
+        paths.par_iter().map(open).collect::<Vec<_>>().into_iter().collect()
     }
 
     /// Red, green, blue in `[0, 1]`.

@@ -30,7 +30,7 @@ pub(crate) fn reduced(images: &SourceImages, side: u32, scene: &Scene) -> Result
     Ok(SourceImages {
         images: small.map_err(unsuitable)?,
         points: images.points.clone(),
-        warning: images.warning.clone(),
+        warnings: images.warnings.clone(),
         ..*images
     })
 }

@@ -27,6 +27,7 @@ mod mailbox;
 mod message;
 mod pace;
 mod page;
+pub mod protocol;
 mod render_loop;
 mod request;
 mod response;
@@ -51,6 +52,7 @@ use viewfuse_field::render::{RenderError, RenderOptions};
 use viewfuse_field::{AnyField, Setting};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
+use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::SourcePoses;
 
@@ -103,6 +105,9 @@ pub struct Viewer<'a> {
     /// Width and height of full pictures.
     size: [u32; 2],
     device_name: String,
+    /// The unit of weightings.
+    unit: RigUnit,
+    /// In that unit.
     sources: SourcePoses,
     subject: Subject,
     server: Server,
@@ -118,7 +123,8 @@ impl<'a> Viewer<'a> {
         let Viewed { scene, sources, field, device, options, weighting, .. } = viewed;
         let first = sources.first().ok_or(RenderError::Sources(SourcesError::Empty))?;
         let camera = scene.views[*first].camera;
-        let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let unit = RigUnit::of_scene(scene);
+        let poses: Vec<_> = sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let about = field.about();
         let size = render_loop::full_size(scene, &camera, options, about.longest_side)?;
@@ -129,7 +135,7 @@ impl<'a> Viewer<'a> {
         let full = Camera { pinhole, ..camera };
         let subject = Subject::of(scene, sources, &full, &about, device_name.clone(), weighting.to_string(), commands);
         let server = Server::listen(port)?;
-        Ok(Viewer { viewed, pinhole: camera.pinhole, size, device_name, sources: source_poses, subject, server })
+        Ok(Viewer { viewed, pinhole: camera.pinhole, size, device_name, unit, sources: source_poses, subject, server })
     }
 
     /// The address of the page, with its token. Who knows it can look at the scene.

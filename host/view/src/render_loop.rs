@@ -166,7 +166,7 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
         shared.status.begin("reading photographs");
         let album = open_album(scene, sources.iter().copied(), renderer.as_ref(), options, &watch)?;
         let images = Arc::new(album.sources(sources, source_side, options.background, &watch)?);
-        if let Some(warning) = &images.warning {
+        for warning in &images.warnings {
             watch.warn(&format!("{}: {warning}", scene.path.display()));
         }
         let small = coarse::reduced(&images, COARSE_SIDE, scene)?;

@@ -27,6 +27,11 @@ pub(crate) struct Answer {
 }
 
 impl Answer {
+    /// Its status code.
+    pub(crate) fn status(&self) -> u16 {
+        self.status
+    }
+
     pub(crate) fn of(media_type: &'static str, body: impl Into<Vec<u8>>) -> Answer {
         Answer { status: 200, media_type, body: body.into() }
     }

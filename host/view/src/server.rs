@@ -20,7 +20,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
 use std::time::Duration;
-use viewfuse_weighting::sources::SourcePoses;
 
 /// The port that an address need not name.
 const USUAL_PORT: u16 = 80;
@@ -172,7 +171,7 @@ impl Server {
                 let picture = number.parse().ok().and_then(|number: usize| thumbnails?.get(number));
                 picture.map_or_else(not_found, |picture| Answer::of("image/jpeg", picture.clone()))
             }
-            Route::Weights => read().map_or_else(|refused| refused, |request| weights(&viewer.sources, &request)),
+            Route::Weights => read().map_or_else(|refused| refused, |request| weights(viewer, &request)),
             Route::Picture => match read() {
                 Err(refused) => refused,
                 Ok(request) => {
@@ -196,8 +195,8 @@ fn not_found() -> Answer {
     Answer::error(404, "there is no such address here")
 }
 
-fn weights(sources: &SourcePoses, request: &Request) -> Answer {
-    let weights = request.weighting.weigh(sources, &request.pose);
+fn weights(viewer: &Viewer<'_>, request: &Request) -> Answer {
+    let weights = request.weighting.weigh(&viewer.sources, &viewer.unit.pose(&request.pose));
     json(&&weights.values()[..weights.count() as usize])
 }
 

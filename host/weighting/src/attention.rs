@@ -12,6 +12,7 @@
 
 mod c_header;
 pub mod quantised;
+mod range;
 
 pub use c_header::c_header;
 
@@ -74,6 +75,17 @@ pub enum AttentionError {
         /// The file's shape.
         shape: Vec<usize>,
     },
+    /// Its finite parameters give logits that are not.
+    #[error("{}: the parameters are too large: logits reach {bound:.1e}, beyond what 32-bit numbers hold, and all weights would \
+             be equal; the largest parameter is in tensor '{tensor}'", path.display())]
+    Overflow {
+        /// The file.
+        path: PathBuf,
+        /// The tensor with the largest parameter.
+        tensor: String,
+        /// A bound on the logits of all poses.
+        bound: f64,
+    },
     /// A tensor holds NaN or infinity.
     #[error("{}: tensor '{tensor}' is not finite at flat index {index}", path.display())]
     NotFinite {
@@ -117,8 +129,16 @@ impl AttentionModel {
         let file = SafeTensors::deserialize(&bytes)
             .map_err(|cause| AttentionError::Format { path: path.to_path_buf(), cause })?;
         let has = |name: &str| file.tensor(name).is_ok();
-        let mut read = |name: &str, shape: &[usize]| read_tensor(path, &file, name, shape);
-        if has("paper.0.weight") {
+        let mut largest: Option<(String, f32)> = None;
+        let mut read = |name: &str, shape: &[usize]| {
+            let values = read_tensor(path, &file, name, shape)?;
+            let own = values.iter().fold(0.0_f32, |most, value| most.max(value.abs()));
+            if largest.as_ref().is_none_or(|(_, most)| own > *most) {
+                largest = Some((name.to_owned(), own));
+            }
+            Ok(values)
+        };
+        let model = if has("paper.0.weight") {
             AttentionModel::fourier(&mut read)
         } else if has("paper_flat.0.weight") {
             AttentionModel::flat(&mut read)
@@ -128,7 +148,13 @@ impl AttentionModel {
             AttentionModel::pose_self(&mut read)
         } else {
             Err(AttentionError::UnknownVariant { path: path.to_path_buf() })
+        }?;
+        let bound = range::largest_logit(&model);
+        if bound >= range::MAX_LOGIT {
+            let tensor = largest.map_or_else(String::new, |(name, _)| name);
+            return Err(AttentionError::Overflow { path: path.to_path_buf(), tensor, bound });
         }
+        Ok(model)
     }
 
     /// The paper's cross attention, Fourier embedding.

@@ -1,12 +1,18 @@
 //! Input that nobody would give on purpose: results stay finite and in range.
 
 use super::{assert_sound, body, exact, leaving_out, mist, orbit, picture, picture_with, sources, target};
-use viewfuse::field::pixelnerf::{Omissions, PixelNerfOptions};
+use std::collections::BTreeMap;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::field::FieldError;
+use viewfuse::field::pixelnerf::{Architecture, Omissions, PixelNerf, PixelNerfOptions, test_networks};
+use viewfuse::job::progress::Silent;
+use viewfuse::nn::checkpoint::{Checkpoint, TensorShape};
 use viewfuse::scene::photographs::SourceImages;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
 use viewfuse_core::pose::Pose;
 use viewfuse_core::weights::Weights;
+use viewfuse_tests::fields;
 
 #[test]
 fn one_source_and_the_most_sources() {
@@ -100,5 +106,45 @@ fn pictures_of_one_pixel_and_of_one_row() {
         let camera = target(32);
         let pinhole = camera.pinhole.resized(width, height).expect("a size");
         assert_sound(&picture(&body(PixelNerfOptions::default()), &sources(2), &Camera { pinhole, ..camera }));
+    }
+}
+
+/// Times this, every weight is finite still; what becomes of numbers that meet several of them is not.
+const LARGE: f32 = 1.9e38;
+
+/// The body's network with all weights of a layer of both passes multiplied.
+fn multiplied(layer: &'static str, options: PixelNerfOptions) -> PixelNerf {
+    let made = test_networks::body(&Architecture::small(16));
+    let shapes = made.shapes().iter();
+    let shapes: Vec<TensorShape> =
+        shapes.map(|(name, shape)| TensorShape { name: name.clone(), shape: shape.clone() }).collect();
+    assert!(shapes.iter().any(|tensor| tensor.name.ends_with(layer)), "{layer}");
+    let checkpoint = Checkpoint::computed("changed", shapes, BTreeMap::new(), move |tensor| {
+        let mut values = made.tensor(&tensor.name).expect("values");
+        if tensor.name.ends_with(layer) {
+            values.iter_mut().for_each(|value| *value *= LARGE);
+        }
+        values
+    });
+    PixelNerf::new(&checkpoint, options).expect("a made network")
+}
+
+#[test]
+fn networks_that_overflow_are_errors_and_no_white_pictures() {
+    let sources = sources(2);
+    let weights = Weights::mean(2);
+    let between_nodes = Omissions { nodes: 16, ..Omissions::default() };
+    for layer in ["lin_in.weight", "blocks.1.fc_1.weight", "lin_out.weight"] {
+        for omissions in [Omissions::NONE, Omissions::default(), between_nodes] {
+            let field = multiplied(layer, leaving_out(omissions));
+            let made = fields::picture(&Cpu, &field, &sources, &weights, &target(8), 0.0, &Silent);
+            let error = made.err().unwrap_or_else(|| panic!("{layer}: a picture"));
+            let said = error.to_string();
+            assert!(matches!(error, FieldError::NotFinite(_)), "{layer}: {said}");
+            assert!(
+                said.contains("evaluating the network at points") && said.contains("not a finite number"),
+                "{said}"
+            );
+        }
     }
 }

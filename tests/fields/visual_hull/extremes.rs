@@ -68,7 +68,7 @@ fn photographs_without_any_background() {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
-        warning: None,
+        warnings: Vec::new(),
     };
     assert_sound(&Run::default().picture(&sources, &target(24)).expect("a picture"));
 }
@@ -84,7 +84,7 @@ fn pictures_of_hardly_any_pixels() {
             has_silhouettes: true,
             points: Vec::new(),
             near_far: None,
-            warning: None,
+            warnings: Vec::new(),
         };
         for target_side in [1, 5] {
             match Run::default().picture(&sources, &target(target_side)) {

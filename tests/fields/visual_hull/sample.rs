@@ -152,5 +152,5 @@ fn a_photograph_of_nothing_is_named() {
     // Where nobody said that there is a background, nothing is cut out, and a warning says why.
     let whole = album.sources(&sources, 128, BackgroundChoice::Auto, &Silent).expect("whole photographs");
     assert!(!whole.has_silhouettes);
-    assert!(whole.warning.is_some_and(|warning| warning.contains("000007.png")));
+    assert!(whole.warnings.iter().any(|warning| warning.contains("000007.png")));
 }

@@ -88,7 +88,7 @@ pub(crate) fn views(object: &Object, cameras: &[Camera]) -> SourceImages {
         has_silhouettes: true,
         points: Vec::new(),
         near_far: None,
-        warning: None,
+        warnings: Vec::new(),
     }
 }
 

@@ -5,7 +5,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
-use viewfuse_core::math::{exp, max};
+use viewfuse_core::math::{exp, has_nan_bits, max};
 
 /// A dispatch of [`matrix_element`], as plain data.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -79,7 +79,7 @@ pub fn softmax_scale(scores: &(impl Fetch<f32> + ?Sized), first: usize, column_c
     while column < column_count as usize {
         let below = scores.fetch(first + column) - largest;
         // The exponential of NaN is 0.
-        sum += if below <= 0.0 { exp(below) } else { f32::NAN };
+        sum += if has_nan_bits(below) { below } else { exp(below) };
         column += 1;
     }
     [largest, if sum == 0.0 { 0.0 } else { 1.0 / sum }]

@@ -8,7 +8,7 @@
 
 use bytemuck::{Pod, Zeroable};
 use viewfuse_core::fetch::Fetch;
-use viewfuse_core::math::{exp, max, sqrt};
+use viewfuse_core::math::{exp, has_finite_bits, max, sqrt};
 
 /// Pixels whose statistics are taken together.
 pub const PART: u32 = 64;
@@ -111,8 +111,7 @@ pub fn group_norm_statistics(
         part += 1;
     }
     let spread = deviations / count + block.variance_floor;
-    // Not the other way round: NaN is no spread either.
-    if !(spread <= f32::MAX) {
+    if !has_finite_bits(spread) {
         return [mean, f32::NAN];
     }
     [mean, if spread > 0.0 { 1.0 / sqrt(spread) } else { 0.0 }]

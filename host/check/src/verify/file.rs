@@ -114,7 +114,7 @@ impl File<'_> {
             has_silhouettes: true,
             points: Vec::new(),
             near_far: None,
-            warning: None,
+            warnings: Vec::new(),
         })
     }
 

@@ -1,5 +1,6 @@
 //! `viewfuse weights`.
 
+use super::complain;
 use super::options::SourceOptions;
 use super::outputs::keep_file_apart;
 use super::path::PathOptions;
@@ -13,7 +14,8 @@ use std::process::ExitCode;
 use viewfuse_job::files::write_whole;
 use viewfuse_output::weights::WeightTable;
 use viewfuse_scene::Scene;
-use viewfuse_scene::few_shot::{FewShot, Target};
+use viewfuse_scene::few_shot::{FewShot, Target, away_warning};
+use viewfuse_scene::unit::{RigUnit, SRN_DISTANCE};
 use viewfuse_weighting::WeightingSpec;
 
 #[derive(Args)]
@@ -50,6 +52,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     let scene = Scene::open(&arguments.scene)?;
     let selection = arguments.sources.to_selection(arguments.targets.as_deref(), arguments.path.choice());
     let job = selection.resolve(&scene, 1)?;
+    if let Some(warning) = away_warning(&scene, &job) {
+        complain(format_args!("warning: {warning}"));
+    }
     let weights = WeightTable::of(&scene, &job, &weightings)?;
     if arguments.json {
         let mut documents = weights.documents();
@@ -71,6 +76,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     } else {
         for (index, target) in job.targets.iter().enumerate() {
             print_table(&scene, &job, target, &weights, index)?;
+        }
+        let unit = RigUnit::of_scene(&scene);
+        if !unit.is_world() {
+            say(format_args!(
+                "Schemes measure lengths in {:.4e} world units: in these the cameras are {SRN_DISTANCE} from what they look at.",
+                unit.length()
+            ))?;
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -112,7 +112,7 @@ impl<'a> Trials<'a> {
                 has_silhouettes: stage.images.has_silhouettes,
                 points: surfaces.points.clone(),
                 near_far: surfaces.near_far,
-                warning: None,
+                warnings: Vec::new(),
             });
             let quiet = &Quiet(progress);
             let prepared =

@@ -4,12 +4,15 @@ use super::architecture::Architecture;
 use super::encoder::ViewLatents;
 use super::parameters::PointNetwork;
 use super::visibility::Visibility;
+use crate::FieldError;
+use crate::finite::NotFinite;
 use std::mem::swap;
 use viewfuse_core::camera::CameraBlock;
 use viewfuse_core::fuse::FuseBlock;
 use viewfuse_core::rays::RayPoint;
 use viewfuse_device::Device;
 use viewfuse_device::DeviceError;
+use viewfuse_kernels::finite::{ALL_FINITE, FINITE_RUN};
 use viewfuse_kernels::pixelnerf::{EmbedBlock, GatherBlock};
 use viewfuse_nn::linear::{Linear, LinearOptions};
 
@@ -46,6 +49,8 @@ pub(super) struct Workspace<D: Device> {
     inside: D::Buffer<f32>,
     visible: D::Buffer<f32>,
     pub(super) raw: D::Buffer<f32>,
+    /// Of each chunk so far the first outputs that are not finite, by runs: looked at when all is dispatched.
+    not_finite: Vec<D::Buffer<u32>>,
 }
 
 impl<D: Device> Workspace<D> {
@@ -70,7 +75,26 @@ impl<D: Device> Workspace<D> {
             inside: device.zeros(rows * width)?,
             visible: device.zeros(rows)?,
             raw: device.zeros(points * 4)?,
+            not_finite: Vec::new(),
         })
+    }
+
+    /// Checks all outputs since the last check.
+    ///
+    /// # Errors
+    /// [`FieldError::NotFinite`]: weights that are finite themselves may overflow together.
+    pub(super) fn check(&mut self, device: &D) -> Result<(), FieldError> {
+        for firsts in std::mem::take(&mut self.not_finite) {
+            if let Some(first) = device.download(&firsts)?.into_iter().find(|first| *first != ALL_FINITE) {
+                return Err(FieldError::NotFinite(NotFinite {
+                    stage: "evaluating the network at points".to_owned(),
+                    tensor: "outputs [point][4]".to_owned(),
+                    index: first as usize,
+                    value: f32::NAN,
+                }));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -148,7 +172,12 @@ impl<D: Device> Network<'_, D> {
             self.run_block(workspace, point_count, block)?;
         }
         let options = LinearOptions { relu_inputs: true, relu_outputs: false };
-        layers.lin_out.run(device, point_count, options, &workspace.flow, None, &mut workspace.raw)
+        layers.lin_out.run(device, point_count, options, &workspace.flow, None, &mut workspace.raw)?;
+        let value_count = 4 * point_count;
+        let mut firsts = device.zeros(value_count.div_ceil(FINITE_RUN) as usize)?;
+        device.find_non_finite(&value_count, &workspace.raw, &mut firsts)?;
+        workspace.not_finite.push(firsts);
+        Ok(())
     }
 
     /// Interpolates the latents in every view.

@@ -12,6 +12,7 @@ use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::photographs::{Album, SourceImages, longest_side, reduced_size, scaled_size, to_rgb8};
+use viewfuse_scene::unit::RigUnit;
 use viewfuse_weighting::Weighting;
 use viewfuse_weighting::sources::{MAX_SOURCES, SourcePoses, SourceWeights};
 
@@ -33,6 +34,9 @@ pub struct Stage<'a> {
     side: u32,
     /// A camera whose pictures have the options' size: the scene's first, or the first source's.
     first: Option<Camera>,
+    /// The unit of weightings.
+    unit: RigUnit,
+    /// In that unit.
     sources: SourcePoses,
     /// The sources at working size.
     pub images: Arc<SourceImages>,
@@ -68,7 +72,7 @@ impl<'a> Stage<'a> {
         let source_side = about.source_side.of(working_side(scene, options, about.longest_side)?);
         let mut photographs = Duration::ZERO;
         let images = timed(&mut photographs, || album.sources(sources, source_side, options.background, progress))?;
-        if let Some(warning) = &images.warning {
+        for warning in &images.warnings {
             progress.warn(&format!("{}: {warning}", scene.path.display()));
         }
         let images = Arc::new(images);
@@ -92,10 +96,11 @@ impl<'a> Stage<'a> {
         options: &'a RenderOptions,
         progress: &dyn Progress,
     ) -> Result<Stage<'a>, RenderError> {
-        let poses: Vec<_> = sources.iter().map(|&view| scene.views[view].camera.pose).collect();
+        let unit = RigUnit::of_scene(scene);
+        let poses: Vec<_> = sources.iter().map(|&view| unit.pose(&scene.views[view].camera.pose)).collect();
         let source_poses = SourcePoses::new(&poses).map_err(RenderError::Sources)?;
         let side = working_side(scene, options, renderer.about().longest_side)?;
-        let stage = Stage::new(images, source_poses, renderer, options, progress);
+        let stage = Stage::new(images, (unit, source_poses), renderer, options, progress);
         let sources = Some(SceneSources { scene, album, views: sources.to_vec() });
         let first = scene.views.first().map(|view| view.camera);
         Ok(Stage { scene: sources, first, side, ..stage.map_err(|error| RenderError::of(error, scene))? })
@@ -111,14 +116,15 @@ impl<'a> Stage<'a> {
         options: &'a RenderOptions,
         progress: &dyn Progress,
     ) -> Result<Stage<'a>, FieldError> {
-        let poses: Vec<_> = images.images.iter().map(|image| image.camera.pose).collect();
+        let unit = RigUnit::of(&images.images.iter().map(|image| image.camera).collect::<Vec<_>>());
+        let poses: Vec<_> = images.images.iter().map(|image| unit.pose(&image.camera.pose)).collect();
         let sources = SourcePoses::new(&poses).map_err(FieldError::unsuitable)?;
-        Stage::new(images, sources, renderer, options, progress)
+        Stage::new(images, (unit, sources), renderer, options, progress)
     }
 
     fn new(
         images: Arc<SourceImages>,
-        sources: SourcePoses,
+        (unit, sources): (RigUnit, SourcePoses),
         renderer: &'a dyn Renderer,
         options: &'a RenderOptions,
         progress: &dyn Progress,
@@ -129,7 +135,7 @@ impl<'a> Stage<'a> {
         let first = images.images.first().map(|image| image.camera);
         let largest = images.images.iter().map(|image| longest_side(&image.camera)).max().unwrap_or(1);
         let side = options.size.map_or(largest, |[width, height]| width.max(height));
-        let mut stage = Stage { scene: None, options, side, first, sources, images, session, controller, costs };
+        let mut stage = Stage { scene: None, options, side, first, unit, sources, images, session, controller, costs };
         stage.tune(&options.settings);
         Ok(stage)
     }
@@ -294,7 +300,7 @@ impl<'a> Stage<'a> {
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
         let start = Instant::now();
-        let weights = weighting.weigh(&self.sources, &target.camera.pose);
+        let weights = weighting.weigh(&self.sources, &self.unit.pose(&target.camera.pose));
         let omission = weights.without_least(self.options.leave_out);
         let early_termination = self.options.early_termination;
         let (rendered, kept, encode) = match &mut self.controller {

@@ -122,6 +122,14 @@ pub(super) fn of_tests() -> Vec<Row> {
         )
         .only(&["core/src", "tests/numerics"]),
         row(
+            "scales",
+            "weights and pictures of scenes at ten scales from 1e-9 to 1e9, of every scheme and field",
+            &["scales.txt"],
+            Hours::Estimated(0.3),
+            vec![print("VIEWFUSE_ALL_SCALES=1 cargo test --release -p viewfuse-tests --test fields scales -- --nocapture --test-threads 1")],
+        )
+        .only(&["core/src", "host/scene/src", "host/weighting/src", "host/field/src", "host/models", "tests/fields"]),
+        row(
             "bounds",
             "pictures under a bound: their error, and their time beside fixed efforts",
             &["bounds.txt"],

@@ -22,15 +22,15 @@ pub(crate) struct ViewCounts {
 
 /// Sources and targets of some objects.
 pub(crate) struct Views {
-    /// Of the sources, `[object][view]`.
+    /// Of the sources, `[object][view]`, in the unit of weightings.
     pub(crate) sources: Vec<Vec<Camera>>,
-    /// The same as kernels take them.
+    /// The same in world units, as kernels take them.
     pub(crate) cameras: Vec<Vec<CameraBlock>>,
     /// Pictures of the sources `[object and view][row][column][3]`, in `[-1, 1]`.
     pub(crate) pictures: Tensor,
-    /// Of the targets, `[object][target]`.
+    /// Of the targets, `[object][target]`, in the unit of weightings.
     pub(crate) target_cameras: Vec<Vec<Camera>>,
-    /// The same as kernels take them.
+    /// The same in world units, as kernels take them.
     pub(crate) targets: Vec<Vec<CameraBlock>>,
     /// `[object and target][row][column][3]`, in `[-1, 1]`.
     pub(crate) truth: Tensor,
@@ -70,9 +70,9 @@ impl Views {
             others.iter().for_each(|view| truth.extend(inputs(&scene.pictures[*view])));
             lists.0.push(default_near_far(&cameras));
             lists.2.push(cameras.iter().map(|camera| camera.block(0)).collect());
-            lists.1.push(cameras);
+            lists.1.push(cameras.iter().map(|camera| scene.unit.camera(camera)).collect());
             lists.3.push(others.iter().map(|&view| scene.blocks[view]).collect());
-            lists.4.push(others.iter().map(|&view| scene.cameras[view]).collect());
+            lists.4.push(others.iter().map(|&view| scene.unit.camera(&scene.cameras[view])).collect());
         }
         let side = objects[0].pictures[0].width() as usize;
         let images = |values: Vec<f32>, count| {

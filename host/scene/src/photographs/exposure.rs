@@ -1,0 +1,41 @@
+//! How bright photographs are, and a warning where some are much darker than others.
+
+use super::SourceImage;
+
+/// Ratio of the brightness of two photographs, in linear light, from which on their exposures are warned of. Views of one scene
+/// seldom differ by half of that; gains between sources are equalised up to 2 in stored values, which is about 5.
+const MAX_RATIO: f64 = 6.0;
+
+/// Brightness of a black photograph: half a step of 8 bits, in linear light.
+const BLACK: f64 = 1.0e-6;
+
+/// Exponent of stored values, about that of sRGB.
+const GAMMA: f64 = 2.2;
+
+/// The mean of red, green and blue over what a photograph shows, in linear light; `None` if it shows nothing.
+fn brightness(image: &SourceImage) -> Option<f64> {
+    let (mut sum, mut opacity) = (0.0, 0.0);
+    for [colours @ .., alpha] in image.texels.iter().map(|texel| texel.map(f64::from)) {
+        if alpha > 0.0 {
+            sum += alpha * colours.map(|colour| (colour / alpha).max(0.0).powf(GAMMA)).iter().sum::<f64>() / 3.0;
+            opacity += alpha;
+        }
+    }
+    (opacity > 0.0).then(|| (sum / opacity).max(BLACK))
+}
+
+/// A warning that names the darkest and the brightest of photographs, if they are far apart; `names` in their order.
+pub(super) fn warning<'a>(images: &[SourceImage], names: impl Iterator<Item = &'a str>) -> Option<String> {
+    let known: Vec<(f64, &str)> =
+        images.iter().zip(names).filter_map(|(image, name)| Some((brightness(image)?, name))).collect();
+    let darkest = known.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let brightest = known.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let ratio = brightest.0 / darkest.0;
+    (ratio > MAX_RATIO).then(|| {
+        format!(
+            "photograph '{}' is {ratio:.0} times as bright as '{}' (the mean, in linear light): with other exposures surfaces are \
+             not recognised and pictures become patchy; develop all photographs with one exposure",
+            brightest.1, darkest.1
+        )
+    })
+}

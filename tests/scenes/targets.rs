@@ -1,0 +1,118 @@
+//! What is said of targets and photographs before anything is rendered: names that are one file on some systems, targets that
+//! face away from everything, exposures far apart; and that equal runs say the same.
+
+use super::made::open;
+use image::{Rgba, RgbaImage};
+use viewfuse::job::progress::Silent;
+use viewfuse::scene::Scene;
+use viewfuse::scene::few_shot::{FewShot, Selection, Target, away_warning, target_of};
+use viewfuse::scene::photographs::{Album, BackgroundChoice};
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::Camera;
+use viewfuse_core::pose::Pose;
+use viewfuse_tests::places::data;
+use viewfuse_tests::scenes::{Folder, WORLD_FROM_CAMERA, words};
+
+/// An SRN scene of photographs with these names.
+fn called(names: &[&str]) -> Folder {
+    let folder = Folder::new();
+    for (index, name) in names.iter().enumerate() {
+        let mut pose = WORLD_FROM_CAMERA;
+        pose[3] += index as f64;
+        folder.image(&format!("rgb/{name}.png"), 16, 12).write(&format!("pose/{name}.txt"), words(&pose));
+    }
+    folder.write("intrinsics.txt", "20. 8. 6. 0.\n0. 0. 0.\n1.\n12 16\n");
+    folder
+}
+
+#[test]
+fn targets_that_would_be_one_file_are_refused() {
+    for (first, second) in [("a", "A"), ("B\u{e4}r", "Ba\u{308}r"), ("\u{c9}t\u{e9}", "e\u{301}te\u{301}")] {
+        let folder = called(&[first, second, "c", "d"]);
+        let scene = open(&folder);
+        let resolve = |targets: &str| {
+            let selection = Selection { targets: Some(targets.to_owned()), ..Selection::default() };
+            selection.resolve(&scene, 1).map_err(|error| error.to_string())
+        };
+        let error = resolve(&format!("{first},{second}")).expect_err("two targets of one file");
+        assert!(error.contains(&format!("'{first}'")) && error.contains(&format!("'{second}'")), "{error}");
+        assert!(error.contains("the same files where file names ignore case"), "{error}");
+        // As sources they make no files.
+        for targets in [first, second, "c,d"] {
+            resolve(targets).expect("targets with names of their own");
+        }
+    }
+}
+
+fn job(scene: &Scene, target: Camera) -> FewShot {
+    let target = Target { name: "away".to_owned(), camera: target, truth: None };
+    FewShot { sources: (0..8).collect(), targets: vec![target_of(scene, 20), target], frames_per_second: None }
+}
+
+#[test]
+fn a_target_that_faces_away_is_told() {
+    let scene = Scene::open(data("toy")).expect("the sample scene");
+    let camera = scene.views[20].camera;
+    let centre = camera.pose.centre_world();
+    let turned = Pose::look_at(centre, centre * 3.0, Vec3::Z).expect("a pose");
+    // Above the object, looking up: no source looks there.
+    let up = Pose::look_at(Vec3::new(0.0, 0.1, 3.0), Vec3::new(0.0, 0.3, 9.0), Vec3::Y).expect("a pose");
+    let warning = away_warning(&scene, &job(&scene, Camera { pose: up, ..camera })).expect("a warning");
+    assert!(warning.contains("target 'away' faces away from everything that the sources show"), "{warning}");
+    assert_eq!(away_warning(&scene, &job(&scene, camera)), None);
+    // From behind the object towards it, as no source looks, but what it sees they see.
+    let behind = Pose::look_at(-centre, Vec3::ZERO, Vec3::Z).expect("a pose");
+    assert_eq!(away_warning(&scene, &job(&scene, Camera { pose: behind, ..camera })), None);
+    // One source alone, and away from it.
+    let alone = FewShot { sources: vec![20], ..job(&scene, Camera { pose: turned, ..camera }) };
+    assert!(away_warning(&scene, &alone).is_some());
+}
+
+fn warnings(scene: &Scene, views: &[usize]) -> Vec<String> {
+    let album = Album::open(scene, views.iter().copied(), &Silent).expect("photographs");
+    album.sources(views, 64, BackgroundChoice::None, &Silent).expect("sources").warnings
+}
+
+#[test]
+fn exposures_far_apart_are_told() {
+    let folder = called(&["0", "1", "2", "3"]);
+    // In linear light a tenth is 0.35 of the stored value.
+    for (name, level) in [("0", 200), ("1", 190), ("2", 70), ("3", 120)] {
+        RgbaImage::from_pixel(16, 12, Rgba([level, level, level, 255]))
+            .save(folder.file(&format!("rgb/{name}.png")))
+            .expect("saved");
+    }
+    let scene = open(&folder);
+    let told = warnings(&scene, &[0, 1, 2, 3]);
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("photograph '0' is 10 times as bright as '2'"), "{told:?}");
+    assert_eq!(warnings(&scene, &[0, 1, 3]), Vec::<String>::new());
+    for name in ["toy", "room", "car"] {
+        let scene = Scene::open(data(name)).expect("a scene");
+        let views: Vec<usize> = (0..scene.views.len()).filter(|view| scene.views[*view].image.is_some()).collect();
+        let told = warnings(&scene, &views);
+        assert!(told.iter().all(|warning| !warning.contains("times as bright")), "{name}: {told:?}");
+    }
+}
+
+/// Several photographs show nothing: the first in the order of the scene is named, whichever thread finds another one sooner.
+#[test]
+fn equal_runs_name_the_same_photograph() {
+    let folder = called(&["0", "1", "2", "3", "4", "5", "6", "7"]);
+    for name in 0..8 {
+        let level = if name < 2 { 10 } else { 255 };
+        let picture = RgbaImage::from_fn(160, 120, |x, y| {
+            let is_object = x.abs_diff(80) < 20 && y.abs_diff(60) < 20;
+            Rgba([if is_object { level } else { 255 }, 255, 255, 255])
+        });
+        picture.save(folder.file(&format!("rgb/{name}.png"))).expect("saved");
+    }
+    folder.write("intrinsics.txt", "200. 80. 60. 0.\n0. 0. 0.\n1.\n120 160\n");
+    let scene = open(&folder);
+    for _ in 0..40 {
+        let album = Album::open(&scene, 0..8, &Silent).expect("photographs");
+        let choice = BackgroundChoice::Colour([1.0; 3]);
+        let error = album.sources(&[0, 1, 2, 3, 4, 5, 6, 7], 160, choice, &Silent).expect_err("no object").to_string();
+        assert!(error.contains("2.png"), "{error}");
+    }
+}
