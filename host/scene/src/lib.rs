@@ -8,6 +8,7 @@
 //!               reader: what a layout's reader is, and READERS, all of them
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up
+//! coverage      how much of a camera's picture the photographs show
 //! path          cameras without photographs: from files, or generated
 //! listing       the views as a list, with their neighbours: ListedView
 //! few_shot      which views are sources, which cameras are targets: FewShot
@@ -17,6 +18,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod coverage;
 pub mod dataset;
 pub mod few_shot;
 pub mod inspect;
