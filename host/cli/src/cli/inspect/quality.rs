@@ -96,8 +96,8 @@ fn is_of_scene(error: &anyhow::Error) -> bool {
 /// What a score looks like.
 fn in_words(psnr: f64) -> &'static str {
     match psnr {
-        24.0.. => "good: sharp, small errors at edges",
-        19.0.. => "soft: blurred or torn in places",
+        26.0.. => "good: sharp, small errors at edges",
+        20.0.. => "soft: blurred or torn in places",
         _ => "broken: what is where cannot be relied on",
     }
 }
