@@ -8,9 +8,9 @@ use std::io::BufReader;
 use std::path::Path;
 use viewfuse::core::Vec3;
 use viewfuse::scene::Scene;
-use viewfuse_tests::command::{assert_refused, toy};
+use viewfuse_tests::command::{assert_refused, assert_wrong_arguments, toy};
 
-viewfuse_tests::trials![the_lorry_as_points, too_much_agreement_is_refused];
+viewfuse_tests::trials![the_lorry_as_points, too_much_agreement_is_refused, another_format_is_refused_before_the_work];
 
 struct Point {
     position: Vec3,
@@ -92,4 +92,14 @@ fn too_much_agreement_is_refused() {
     let folder = toy();
     let arguments = "points toy --sources 0..1 --agree 3 --size 16x16 --device cpu -o none.ply";
     assert_refused(BINARY, folder.path(), arguments, &["toy: no 3 of 2 views agree"]);
+}
+
+fn another_format_is_refused_before_the_work() {
+    let folder = toy();
+    for file in ["toy.obj", "toy", "ply"] {
+        let parts = [file, "point clouds are written as .ply"];
+        assert_wrong_arguments(BINARY, folder.path(), &format!("points toy -o {file}"), &parts);
+    }
+    done(folder.path(), "points toy --size 16x16 --sources 0..7 --agree 1 --device cpu -o toy.PLY");
+    assert!(folder.path().join("toy.PLY").exists());
 }

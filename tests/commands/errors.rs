@@ -215,7 +215,7 @@ fn wrong_arguments_of_networks() {
         let option = other.split(' ').next().unwrap_or(other);
         assert_wrong(&format!("render toy --model body:16 --exact {other} -o out"), &["--exact", option]);
     }
-    assert_wrong("render toy --compute rays -o out", &["required arguments were not provided"]);
+    assert_wrong("render toy --compute rays -o out", &["--compute computes what a network leaves out", "--model FILE"]);
     assert_wrong("render toy --model body:17 -o out", &["body:17", "multiple of 8"]);
 }
 
@@ -296,6 +296,7 @@ fn wrong_arguments() {
     assert_wrong(&format!("{RENDER} --leave-out 1"), &["--leave-out", "less than 1"]);
     assert_wrong(&format!("{RENDER} --leave-out nan"), &["--leave-out"]);
     assert_wrong(&format!("{RENDER} --orbit 0"), &["--orbit", "from 1 to 10000"]);
+    assert_wrong(&format!("{RENDER} --orbit 8,half"), &["--orbit", "8,half", "`,full`"]);
     assert_wrong(&format!("{RENDER} --threads 0"), &["--threads", "1..=256"]);
     assert_wrong(&format!("{RENDER} --seed -1"), &["-1"]);
     assert_wrong("verify", &["required"]);

@@ -100,7 +100,7 @@ fn a_journal_that_was_cut_anywhere_is_continued() {
 
 fn two_runs_do_not_mix_in_one_folder() {
     let folder = toy();
-    let long = "render toy --orbit 2000 --sources 0..3 --size 24x24 --device cpu --weights mean --no-sheets -o out";
+    let long = "render toy --orbit 2000 --size 24x24 --device cpu --weights mean --no-sheets -o out";
     let mut first = command(BINARY, folder.path(), long);
     let mut first = first.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the command starts");
     wait_while_running(&mut first, || folder.path().join("out/orbit-000.png").exists());
@@ -139,7 +139,7 @@ fn two_runs_do_not_mix_in_one_folder() {
 
 fn an_earlier_run_is_replaced_as_a_whole_or_not_at_all() {
     let folder = toy();
-    let orbit = "render toy --orbit 4 --sources 0..3 --size 24x24 --device cpu --weights mean --video webp -o out";
+    let orbit = "render toy --orbit 4 --size 24x24 --device cpu --weights mean --video webp -o out";
     done(folder.path(), orbit);
     folder.write("out/notes.txt", "mine");
     assert_refused(

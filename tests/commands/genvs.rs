@@ -117,7 +117,8 @@ fn exact_leaves_nothing_out() {
 fn frames_start_from_the_ones_before() {
     let scene = toy();
     let orbit = |options: &str| {
-        let arguments = "render toy --orbit 3 --views 2 --size 16x16 --model genvs:small --compute calls --steps 6";
+        let arguments =
+            "render toy --orbit 3,full --views 2 --size 16x16 --model genvs:small --compute calls --steps 6";
         done(scene.path(), &format!("{arguments} {options} --device cpu -o out"));
         let text = fs::read(scene.path().join("out/run.json")).expect("a run record");
         let record: Value = serde_json::from_slice(&text).expect("JSON");

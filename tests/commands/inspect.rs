@@ -13,7 +13,9 @@ viewfuse_tests::trials![
     a_scene_in_other_units,
     a_scene_in_a_map,
     two_views_from_one_place,
-    a_background_of_many_colours,
+    a_background_of_many_colours_is_a_fault_only_of_an_object,
+    what_the_cameras_cover,
+    the_quality_is_what_photographs_that_are_left_out_have,
     views_are_listed_with_their_neighbours,
 ];
 
@@ -142,9 +144,10 @@ fn two_views_from_one_place() {
     assert_warns(&scene, "views '000003' and '000007' have the same pose", 1);
 }
 
-fn a_background_of_many_colours() {
-    let scene = toy();
-    for name in names_in(&scene.file("toy/rgb")) {
+/// Puts clutter behind the object of some photographs, which have no alpha channel then.
+fn clutter(scene: &Folder, which: impl Fn(usize) -> bool) {
+    let names = names_in(&scene.file("toy/rgb"));
+    for name in names.iter().enumerate().filter(|(index, _)| which(*index)).map(|(_, name)| name) {
         let path = scene.file(&format!("toy/rgb/{name}"));
         let object = image::open(&path).expect("a photograph").to_rgba8();
         let cluttered = image::RgbImage::from_fn(object.width(), object.height(), |x, y| {
@@ -154,8 +157,70 @@ fn a_background_of_many_colours() {
         });
         cluttered.save(&path).expect("a photograph");
     }
+}
+
+fn a_background_of_many_colours_is_a_fault_only_of_an_object() {
+    // Whole photographs: nobody asked for an object.
+    let scene = toy();
+    clutter(&scene, |_| true);
+    let whole = inspection(&scene);
+    assert!(texts(&whole["warnings"]).iter().all(|warning| !warning.contains("one colour")), "{whole}");
+    assert!(whole["object"].is_null());
+    assert!(done(scene.path(), "inspect toy").contains("\nobject     none cut out: whole photographs\n"));
+    // Some are cut out.
+    let scene = toy();
+    clutter(&scene, |index| index % 4 == 0);
     assert_warns(&scene, "not of one colour", 1);
     let outcome = run(env!("CARGO_BIN_EXE_viewfuse"), scene.path(), "render toy --targets 20 --size 32x32 -o out");
     let warnings = outcome.stderr.lines().filter(|line| line.contains("not of one colour")).count();
     assert_eq!(warnings, 1, "{}", outcome.stderr);
+}
+
+fn what_the_cameras_cover() {
+    let scene = toy();
+    let own = inspection(&scene);
+    let gaps = numbers(&own["gaps"]);
+    assert!(10.0 < gaps[0] && gaps[0] < gaps[1] && gaps[1] < 40.0, "{gaps:?}");
+    assert_eq!(own["arc"], 360.0);
+    let printed = done(scene.path(), "inspect toy");
+    let line = format!(
+        "\nneighbours {:.0} degrees apart (median), at most {:.0}\ncoverage   all around the focus, from ",
+        gaps[0], gaps[1]
+    );
+    assert!(printed.contains(&line), "{printed}");
+    assert!(own.get("quality").is_none() && printed.contains("\nexpected   --quality "), "{printed}");
+}
+
+fn the_quality_is_what_photographs_that_are_left_out_have() {
+    let scene = toy();
+    let quality = |arguments: &str| -> Value {
+        let printed = done(scene.path(), &format!("inspect toy --json --quality{arguments}"));
+        serde_json::from_str::<Value>(&printed).expect("JSON")["quality"].clone()
+    };
+    let own = quality("");
+    let scores: Vec<f64> =
+        own["left_out"].as_array().expect("views").iter().map(|one| one["psnr"].as_f64().expect("a score")).collect();
+    assert_eq!(scores.len(), 6);
+    let mean = scores.iter().sum::<f64>() / 6.0;
+    let expected = own["expected"]["psnr"].as_f64().expect("a score");
+    // A view between neighbours has nearer sources than a view that is left out.
+    assert!(20.0 < mean && mean < expected && expected < 45.0, "{own}");
+    let printed = done(scene.path(), "inspect toy --quality");
+    let said = format!("\nleft out   6 photographs, rendered from the others: PSNR {mean:.1} dB, from ");
+    assert!(
+        printed.contains(&said) && printed.contains(&format!("\nexpected   PSNR {expected:.1} dB half-way")),
+        "{printed}"
+    );
+    // Photographs that do not show what their poses say: there is no object, and that is said.
+    change_poses(&scene, |view, matrix| {
+        if view % 2 == 0 {
+            matrix.swap(3, 7);
+        }
+    });
+    let wrong = quality("");
+    assert!(
+        wrong["expected"].is_null() && wrong["problem"].as_str().is_some_and(|own| own.contains("silhouettes")),
+        "{wrong}"
+    );
+    assert!(done(scene.path(), "inspect toy --quality").contains("\nexpected   not measured: toy: the silhouettes"));
 }

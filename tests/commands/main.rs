@@ -9,6 +9,7 @@ mod compare;
 mod convert;
 mod devices;
 mod errors;
+mod examples;
 mod folders;
 mod genvs;
 mod help;
@@ -58,6 +59,7 @@ fn main() -> ExitCode {
         convert::trials(),
         devices::trials(),
         errors::trials(),
+        examples::trials(),
         folders::trials(),
         genvs::trials(),
         help::trials(),

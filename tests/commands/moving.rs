@@ -29,6 +29,10 @@ fn always() -> Vec<Trial> {
             "commands::moving::a_run_that_was_killed_twice_ends_with_the_same_bytes",
             a_run_that_was_killed_twice_ends_with_the_same_bytes,
         ),
+        trial(
+            "commands::moving::more_frames_than_a_gif_can_show_keep_their_pace",
+            more_frames_than_a_gif_can_show_keep_their_pace,
+        ),
         trial("commands::moving::another_run_begins_anew", another_run_begins_anew),
         trial("commands::moving::an_ffmpeg_gets_the_video_or_there_is_y4m", an_ffmpeg_gets_the_video_or_there_is_y4m),
         trial("commands::moving::depths_and_opacity_for_other_programs", depths_and_opacity_for_other_programs),
@@ -52,7 +56,7 @@ fn rgb_of(frame: &y4m::Frame<'_>, width: usize, x: usize, y: usize) -> [f64; 3] 
 
 fn a_path_as_animated_webp_and_as_y4m() {
     let scene = toy();
-    let printed = done(scene.path(), &format!("{PATH} --video webp,y4m --fps 12 -o out"));
+    let printed = done(scene.path(), &format!("{PATH} --video webp,gif,y4m --fps 12 -o out"));
     assert!(printed.contains("out/video.webp\n") && printed.contains("out/video.y4m\n"), "{printed}");
     let out = scene.path().join("out");
     let pictures: Vec<RgbImage> = (0..5).map(|frame| png(&out, &format!("between-{frame:03}.png"))).collect();
@@ -82,6 +86,7 @@ fn a_path_as_animated_webp_and_as_y4m() {
         }
     }
     assert!(video.read_frame().is_err(), "a sixth frame");
+    assert_gif(&out.join("video.gif"), &pictures);
     // On standard output the same bytes, and nothing else.
     let before = files_below(scene.path());
     let run = command(BINARY, scene.path(), &format!("{PATH} --fps 12 -o -")).output().expect("the command starts");
@@ -89,6 +94,41 @@ fn a_path_as_animated_webp_and_as_y4m() {
     assert!(run.status.success() && said.is_empty(), "{said}");
     assert!(run.stdout == fs::read(out.join("video.y4m")).expect("a file"), "another video on standard output");
     assert_eq!(files_below(scene.path()), before);
+}
+
+/// The frames of a GIF are these pictures, up to its 256 colours, at 12 a second.
+#[track_caller]
+fn assert_gif(path: &Path, pictures: &[RgbImage]) {
+    let mut options = gif::DecodeOptions::new();
+    options.set_color_output(gif::ColorOutput::RGBA);
+    let mut decoder = options.read_info(File::open(path).expect("a file")).expect("a GIF");
+    assert_eq!((decoder.width(), decoder.height()), (24, 24));
+    let mut delays = Vec::new();
+    for picture in pictures {
+        let frame = decoder.read_next_frame().expect("a frame").expect("a frame for each picture");
+        delays.push(frame.delay);
+        let shown = RgbImage::from_fn(24, 24, |x, y| {
+            let at = 4 * (24 * y + x) as usize;
+            Rgb([frame.buffer[at], frame.buffer[at + 1], frame.buffer[at + 2]])
+        });
+        let difference: u32 = shown.iter().zip(picture.iter()).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
+        assert!(difference < 3 * 24 * 24 * 4, "{difference}: more than 4 levels on average");
+    }
+    assert!(decoder.read_next_frame().expect("the end").is_none(), "one frame more");
+    assert_eq!(delays, [8, 9, 8, 8, 9]);
+}
+
+fn more_frames_than_a_gif_can_show_keep_their_pace() {
+    let scene = toy();
+    done(scene.path(), &format!("{PATH} --video gif --fps 120 -o out"));
+    let mut decoder =
+        gif::DecodeOptions::new().read_info(File::open(scene.file("out/video.gif")).expect("a file")).expect("a GIF");
+    let mut delays = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().expect("a frame") {
+        delays.push(frame.delay);
+    }
+    // Five frames of 1/120 s: those that would be shown for less than 2 hundredths are left out.
+    assert_eq!(delays, [2, 2]);
 }
 
 /// Starts a run and kills it without warning when this many frames are in its journal.
@@ -200,8 +240,9 @@ fn an_ffmpeg_gets_the_video_or_there_is_y4m() {
     let programs = folder.join("programs");
     fs::create_dir(&programs).expect("a folder");
     let run = with_programs(folder, &programs, &format!("{PATH} --video mp4 -o out"));
-    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
-    assert!(run.stdout.contains("out/video.y4m: instead of mp4: there is no ffmpeg"), "{}", run.stdout);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_eq!(run.stderr, "viewfuse: out/video.y4m, not mp4, is written: there is no ffmpeg on the path\n");
+    assert!(run.stdout.contains("\nout/video.y4m\n"), "{}", run.stdout);
     let video = fs::read(folder.join("out/video.y4m")).expect("a video");
     if cfg!(not(unix)) {
         return;

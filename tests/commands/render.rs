@@ -1,16 +1,17 @@
 //! `viewfuse render`.
 
-use super::{assert_near, done, numbers, texts};
+use super::{BINARY, assert_near, done, numbers, texts};
 use image::{ColorType, DynamicImage};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use viewfuse_tests::command::{change_poses, names_in, toy};
+use viewfuse_tests::command::{change_poses, names_in, run, toy};
 
 viewfuse_tests::trials![
     writes_a_picture_a_depth_map_a_sheet_and_a_record,
     leaves_out_what_counts_little,
     orbits,
+    an_orbit_stays_where_photographs_are,
     cameras_of_a_map_stay_in_its_coordinates,
     the_same_run_makes_the_same_pictures,
     chooses_sources,
@@ -125,6 +126,39 @@ fn orbits() {
         let gap = |other: usize| (0..3).map(|k| (centres[frame][k] - centres[other][k]).powi(2)).sum::<f64>().sqrt();
         assert_near(gap((frame + 1) % 3), gap((frame + 2) % 3), 1.0e-3);
     }
+}
+
+fn an_orbit_stays_where_photographs_are() {
+    let scene = toy();
+    let shares = |output: &str| -> Vec<f64> {
+        let frames = record(scene.path(), output)["frames"].as_array().expect("frames").clone();
+        frames.iter().map(|frame| frame["seen"].as_f64().expect("a share")).collect()
+    };
+    // Two views that are neighbours.
+    let orbit = |count: &str, output: &str| {
+        let arguments =
+            format!("render toy --orbit {count} --sources 0,8 --size 32x32 --weights mean --no-sheets -o {output}");
+        let outcome = run(BINARY, scene.path(), &arguments);
+        assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+        outcome.stderr
+    };
+    let said = orbit("4", "arc");
+    assert!(
+        said.starts_with("viewfuse: --orbit: the ")
+            && said.contains(" degrees on which there are photographs; `--orbit 4,full`"),
+        "{said}"
+    );
+    assert!(!said.contains("leave"), "{said}");
+    let arc = shares("arc");
+    assert!(arc.len() == 4 && arc.iter().all(|share| *share > 0.5), "{arc:?}");
+    let said = orbit("4,full", "full");
+    assert!(!said.contains("degrees on which"), "{said}");
+    let warning = "of 4 pictures leave what was photographed: orbit-00";
+    assert!(said.lines().any(|line| line.contains("warning: ") && line.contains(warning)), "{said}");
+    let full = shares("full");
+    assert!(full.iter().filter(|share| **share < 0.1).count() >= 2, "{full:?}");
+    let warnings = record(scene.path(), "full")["warnings"].clone();
+    assert!(texts(&warnings).iter().any(|own| own.contains(warning)), "{warnings}");
 }
 
 fn cameras_of_a_map_stay_in_its_coordinates() {

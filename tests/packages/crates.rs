@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 /// So many crates the command may take with its default features, procedural macros and what builds them included.
 const MAX_CRATES: usize = 120;
 /// Not one of these is among them: features that are off by default, and dependencies that cost more than they saved.
-const FORBIDDEN: [&str; 16] = [
+const FORBIDDEN: [&str; 17] = [
     "viewfuse-check",
     "viewfuse-synthetic",
     "viewfuse-train",
@@ -18,6 +18,7 @@ const FORBIDDEN: [&str; 16] = [
     "maud",
     "plotters",
     "exr",
+    "gif",
     "tiff",
     "half",
     "embedded-graphics",
@@ -27,7 +28,7 @@ const FORBIDDEN: [&str; 16] = [
 ];
 
 /// The crates along the data: one uses only those before it.
-const ORDER: [&str; 17] = [
+pub(crate) const ORDER: [&str; 17] = [
     "viewfuse-core",
     "viewfuse-kernels",
     "viewfuse-vulkan",
@@ -48,7 +49,7 @@ const ORDER: [&str; 17] = [
 ];
 
 /// Heavy dependencies, and where they may be: in crates, always or only as an option.
-const HEAVY: [(&str, &[&str]); 11] = [
+const HEAVY: [(&str, &[&str]); 12] = [
     ("candle-core", &["viewfuse-research", "viewfuse-train"]),
     ("ndarray", &["viewfuse-train"]),
     ("faer", &["viewfuse-evaluate?", "viewfuse-research"]),
@@ -57,6 +58,7 @@ const HEAVY: [(&str, &[&str]); 11] = [
     ("plotters", &["viewfuse-evaluate?", "viewfuse-research", "viewfuse-train"]),
     ("httparse", &["viewfuse-view"]),
     ("exr", &["viewfuse-output?"]),
+    ("gif", &["viewfuse-output?"]),
     ("clap", &["viewfuse-cli"]),
     ("ctrlc", &["viewfuse-cli"]),
     ("anyhow", &["viewfuse-cli", "viewfuse-research"]),

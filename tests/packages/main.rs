@@ -7,6 +7,7 @@ mod documents;
 mod libraries;
 mod modules;
 mod outside;
+mod picture;
 mod release;
 mod rooms;
 mod safety;

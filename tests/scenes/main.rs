@@ -2,6 +2,7 @@
 
 mod arrays;
 mod colmap;
+mod coverage;
 mod damaged;
 mod datasets;
 mod errors;

@@ -47,6 +47,27 @@ fn parts_in_files_are_one_scene() {
 }
 
 #[test]
+fn a_photograph_may_lie_outside_the_folder() {
+    let elsewhere = Folder::new();
+    elsewhere.image("2.png", 16, 12);
+    let absolute = elsewhere.file("2.png").display().to_string();
+    let folder = Folder::new();
+    folder.image("photographs/1.png", 16, 12);
+    let mut transforms = scenes::transforms();
+    transforms["frames"] = json!([frame("../photographs/1.png"), frame(&absolute)]);
+    folder.write("poses/transforms.json", transforms.to_string());
+    let scene = Scene::open(folder.path().join("poses")).expect("a scene");
+    assert_eq!(names(&scene), ["1", "2"]);
+    assert_eq!(scene.views[1].image.as_deref(), Some(elsewhere.file("2.png").as_path()));
+    // What is no picture is not read.
+    folder.write("notes.txt", "private");
+    transforms["frames"] = json!([frame("../notes.txt")]);
+    folder.write("poses/transforms.json", transforms.to_string());
+    let error = Scene::open(folder.path().join("poses")).expect_err("no picture").to_string();
+    assert!(error.contains("notes.txt") && !error.contains("private"), "{error}");
+}
+
+#[test]
 fn parts_in_lists() {
     let photographs = ["images/1.png", "images/2.png", "images/3.png"];
     let folder = with_frames(photographs.map(frame).to_vec().into(), &photographs);

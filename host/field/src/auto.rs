@@ -22,7 +22,7 @@ pub use geometry::Standing;
 pub use leave_out::{MAX_LEFT_OUT, MAX_NEIGHBOURS, SIDE};
 
 use crate::render::{Finished, Frame, RenderError, RenderOptions, Stage, render_chosen};
-use crate::{Renderer, Setting};
+use crate::{Renderer, Setting, Tunable};
 use geometry::Measure;
 use leave_out::{Outcome, Trials, coarse, mean};
 use serde::Serialize;
@@ -112,6 +112,28 @@ impl Chosen {
         })
     }
 
+    /// The expected score of a picture in the middle between two neighbouring sources: the mean over all sources, each with
+    /// the one nearest to it. `None` if nothing could be left out.
+    pub fn expected_between(&self) -> Option<Expected> {
+        let basis = self.basis?;
+        let middles: Vec<Pose> = self.poses.iter().enumerate().filter_map(|(own, _)| self.middle(own)).collect();
+        let standings = middles.iter().map(|pose| self.measure.standing(pose, self.poses.iter()));
+        let all: Vec<Expected> = standings.map(|standing| basis.expected(standing, basis.confidence)).collect();
+        let mean = |value: &dyn Fn(&Expected) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
+        let interval = [0, 1].map(|end| mean(&|own: &Expected| own.interval[end]));
+        (!all.is_empty()).then(|| Expected { psnr: mean(&|own| own.psnr), interval })
+    }
+
+    /// The pose half-way between a source and the one nearest to it.
+    fn middle(&self, own: usize) -> Option<Pose> {
+        let own = &self.poses[own];
+        let others = self.poses.iter().filter(|other| !std::ptr::eq(*other, own));
+        let other = others.min_by(|a, b| a.distance(own).total_cmp(&b.distance(own)))?;
+        let centre = 0.5 * (own.centre_world() + other.centre_world());
+        let ahead = own.forward_world() + other.forward_world();
+        Pose::look_at(centre, centre + ahead, -(own.down_world() + other.down_world())).ok()
+    }
+
     /// The expected score of a target's picture; `None` if nothing could be left out.
     pub fn expected(&self, frame: &Frame) -> Option<Expected> {
         self.basis.map(|basis| basis.expected(self.standing(frame), mean(&frame.confidences)))
@@ -128,7 +150,32 @@ pub fn choose(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<Chosen, RenderError> {
-    let mut schemes = schemes().into_iter().map(Weighting::from);
+    choose_of(schemes(), stage.tunables(), stage, renderer, options, progress)
+}
+
+/// As [`choose`] without a choice: the baseline alone is tried. For the scores of the sources that are left out, in a part of
+/// the time.
+///
+/// # Errors
+/// [`RenderError`].
+pub fn estimate(
+    stage: &Stage<'_>,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Chosen, RenderError> {
+    choose_of(schemes().into_iter().take(1).collect(), &[], stage, renderer, options, progress)
+}
+
+fn choose_of(
+    schemes: Vec<Scheme>,
+    tunables: &[Tunable],
+    stage: &Stage<'_>,
+    renderer: &dyn Renderer,
+    options: &RenderOptions,
+    progress: &dyn Progress,
+) -> Result<Chosen, RenderError> {
+    let mut schemes = schemes.into_iter().map(Weighting::from);
     let first = schemes.next().unwrap_or_else(Weighting::default_scheme);
     let coarse = coarse(options, stage);
     let mut trials = Trials::prepare(stage, &first, renderer, &coarse, progress)?;
@@ -146,7 +193,6 @@ pub fn choose(
         return Ok(chosen);
     }
     chosen.weighting = first;
-    let tunables = stage.tunables();
     let others: usize = tunables.iter().map(|tunable| tunable.others.len()).sum();
     progress.expect(trials.len() * (1 + schemes.len() + others));
     let mut search = Search { trials: &mut trials, candidates: Vec::new(), progress };

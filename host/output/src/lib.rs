@@ -13,6 +13,7 @@
 //! ply      point clouds as PLY
 //! rate     frames per second
 //! webp     animated pictures
+//! gif      the same for who takes no WebP (feature `gif`)
 //! y4m      video without compression
 //! video    the frames of a run as one file of any format
 //! weights  the weights of many targets: JSON, NumPy's arrays
@@ -31,6 +32,8 @@ mod earlier;
 #[cfg(feature = "exr")]
 pub mod exr;
 pub mod folder;
+#[cfg(feature = "gif")]
+mod gif;
 pub mod journal;
 pub mod ply;
 pub mod png;

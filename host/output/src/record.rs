@@ -7,6 +7,7 @@ use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
 use viewfuse_field::budget::Kept;
 use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Setting};
+use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::{Scene, SceneFrame};
 
@@ -196,6 +197,10 @@ pub struct FrameRecord {
     pub weights_before: Vec<f32>,
     /// Names of the sources that were left out.
     pub left_out: Vec<String>,
+    /// Share of its surfaces that a photograph of a source shows from within 30 degrees, whatever stands before them; of
+    /// a field without depths, of points as far away as what the sources look at.
+    #[serde(default)]
+    pub seen: f32,
     /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the range
     /// of its inputs.
     pub left_out_weight: f32,
@@ -218,8 +223,8 @@ pub struct FrameRecord {
 }
 
 impl FrameRecord {
-    /// The record of a frame whose sources have these names; `space` is the scene's frame.
-    pub fn of(frame: &Frame, source_names: &[String], space: &SceneFrame) -> FrameRecord {
+    /// The record of a frame whose sources have these names and this coverage; `space` is the scene's frame.
+    pub fn of(frame: &Frame, source_names: &[String], coverage: &Coverage, space: &SceneFrame) -> FrameRecord {
         let count = source_names.len();
         let used = &frame.omission.weights.values()[..count];
         let before = &frame.weights.values()[..count];
@@ -234,6 +239,7 @@ impl FrameRecord {
                 .filter(|(_, (used, before))| **used == 0.0 && **before > 0.0)
                 .map(|(name, _)| name.clone())
                 .collect(),
+            seen: coverage.seen_in(&frame.target.camera, frame.picture.dimensions().into(), &frame.depths),
             left_out_weight: frame.omission.omitted_weight,
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
             expected: None,

@@ -23,6 +23,7 @@ use viewfuse_field::auto::Chosen;
 use viewfuse_field::render::{Finished, Frame, RenderOptions};
 use viewfuse_job::files::{FolderLock, WriteError, remove_if_there, write_whole};
 use viewfuse_job::progress::Progress;
+use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::FewShot;
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{Scene, SceneFrame};
@@ -64,9 +65,12 @@ pub struct RunWriter {
     space: SceneFrame,
     weighting: String,
     source_names: Vec<String>,
+    coverage: Coverage,
     frames: Vec<FrameRecord>,
     size: [u32; 2],
     background: [f32; 3],
+    /// Before those about the photographs.
+    given: Vec<String>,
     warnings: Vec<String>,
     chosen: Option<Chosen>,
 }
@@ -105,12 +109,19 @@ impl RunWriter {
             space: scene.frame,
             weighting: weighting.to_string(),
             source_names: source_names(scene, job),
+            coverage: Coverage::of(&job.source_cameras(scene)),
             frames: Vec::new(),
             size: [0, 0],
             background: [0.0; 3],
+            given: Vec::new(),
             warnings: Vec::new(),
             chosen: None,
         }
+    }
+
+    /// Adds a warning to the record.
+    pub fn warn(&mut self, warning: String) {
+        self.given.push(warning);
     }
 
     /// Writes this for the frames that follow, instead of the defaults.
@@ -204,7 +215,8 @@ impl RunWriter {
         self.background = sources.background;
         self.warnings.clone_from(&sources.warnings);
         let expected = self.chosen.as_ref().and_then(|chosen| chosen.expected(frame));
-        let record = FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.space) };
+        let record =
+            FrameRecord { expected, ..FrameRecord::of(frame, &self.source_names, &self.coverage, &self.space) };
         if let Some(journal) = &mut self.journal {
             journal.add(&FinishedFrame { frame: record.clone(), files })?;
         }
@@ -280,7 +292,7 @@ impl RunWriter {
             background: background_record(options, self.background),
             leave_out: options.leave_out,
             early_termination: options.early_termination,
-            warnings: self.warnings,
+            warnings: self.given.into_iter().chain(self.warnings).collect(),
             sources: self.source_names,
             memory_estimate: record.memory_estimate,
             near_far: record.near_far.map(|bounds| bounds.map(|depth| self.space.file_length(depth))),

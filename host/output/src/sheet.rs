@@ -32,8 +32,10 @@ pub struct Sheet {
 
 const MARGIN: u32 = 10;
 const GAP: u32 = 8;
-const THUMBNAIL_HEIGHT: u32 = 96;
-const SOURCES_PER_ROW: usize = 6;
+/// Least height of a source's picture. They fill the width of the results, and are at most as high as those.
+const MIN_THUMBNAIL_HEIGHT: u32 = 96;
+/// The page is wide enough for so many of the smallest sources beside one another, if there are as many.
+const MIN_SOURCES_PER_ROW: usize = 6;
 const BAR: u32 = 4;
 /// The most shown sources; further ones have small weights and are only counted.
 const SOURCES_SHOWN: usize = 24;
@@ -46,11 +48,6 @@ impl Sheet {
         self.sources.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let hidden = self.sources.split_off(self.sources.len().min(SOURCES_SHOWN));
         let hidden_left_out = hidden.iter().filter(|source| source.weight == 0.0).count();
-        let thumbnails: Vec<RgbImage> = self.sources.iter().map(|source| thumbnail(&source.picture)).collect();
-        let cell_width = thumbnails.iter().map(RgbImage::width).max().unwrap_or(THUMBNAIL_HEIGHT) + GAP;
-        let cell_height = THUMBNAIL_HEIGHT + BAR + 2 * LINE_HEIGHT + GAP;
-        let row_count = self.sources.len().div_ceil(SOURCES_PER_ROW) as u32;
-
         let mut results: Vec<(String, RgbImage)> = vec![("prediction".to_owned(), self.prediction.clone())];
         if let Some((truth, psnr, ssim)) = &self.truth {
             let ssim = ssim.map_or(String::new(), |value| format!("  SSIM {value:.3}"));
@@ -66,35 +63,21 @@ impl Sheet {
         let result_cell = result_width.max(CHARACTER_WIDTH * 34) + GAP;
 
         let title_width = CHARACTER_WIDTH * self.title.len() as u32;
-        let content_width = (cell_width * self.sources.len().min(SOURCES_PER_ROW) as u32)
-            .max(result_cell * results.len() as u32)
-            .max(title_width);
+        let results_width = result_cell * results.len() as u32;
+        let grid = Grid::of(&self.sources, results_width.max(title_width), result_height);
+        let content_width = results_width.max(title_width).max(grid.cell_width * grid.columns as u32);
         let sources_top = MARGIN + LINE_HEIGHT + GAP;
-        let results_top = sources_top + row_count * cell_height + LINE_HEIGHT + GAP;
+        let more_height = if hidden.is_empty() { 0 } else { LINE_HEIGHT };
+        let results_top = sources_top + grid.height(self.sources.len()) + more_height + GAP;
         let height = results_top + LINE_HEIGHT + result_height + MARGIN;
         let mut canvas = Canvas::new(content_width + 2 * MARGIN, height);
 
         canvas.text(MARGIN as i32, MARGIN as i32, &self.title, INK);
-        let heaviest = self.sources.first().map_or(1.0, |source| source.weight.max(f32::MIN_POSITIVE));
-        for (index, (source, picture)) in self.sources.iter().zip(&thumbnails).enumerate() {
-            let x = (MARGIN + (index % SOURCES_PER_ROW) as u32 * cell_width) as i32;
-            let y = (sources_top + (index / SOURCES_PER_ROW) as u32 * cell_height) as i32;
-            canvas.picture(x, y, picture);
-            canvas.frame(x, y, picture.width(), picture.height(), GREY);
-            let below = y + THUMBNAIL_HEIGHT as i32 + 2;
-            let length = (picture.width() as f32 * source.weight / heaviest).round() as u32;
-            canvas.fill(x, below, length, BAR, BLUE);
-            let weight = if source.weight > 0.0 { format!("{:.4}", source.weight) } else { "left out".to_owned() };
-            let text_top = below + BAR as i32 + 2;
-            canvas.text(x, text_top, &weight, if source.weight > 0.0 { INK } else { GREY });
-            let name = end_of(&source.name, ((cell_width - GAP) / CHARACTER_WIDTH) as usize);
-            canvas.text(x, text_top + LINE_HEIGHT as i32, &name, GREY);
-        }
+        self.draw_sources(&mut canvas, &grid, sources_top);
         if !hidden.is_empty() {
-            let y = results_top - LINE_HEIGHT - GAP;
             canvas.text(
                 MARGIN as i32,
-                y as i32,
+                (results_top - LINE_HEIGHT - GAP) as i32,
                 &format!("and {} more of smaller weight, {hidden_left_out} of them left out", hidden.len()),
                 GREY,
             );
@@ -108,6 +91,59 @@ impl Sheet {
         }
         canvas.into_image()
     }
+
+    /// The sources, each with its weight and its name, from `top` on.
+    fn draw_sources(&self, canvas: &mut Canvas, grid: &Grid, top: u32) {
+        let heaviest = self.sources.first().map_or(1.0, |source| source.weight.max(f32::MIN_POSITIVE));
+        for (index, source) in self.sources.iter().enumerate() {
+            let picture = thumbnail(&source.picture, grid.picture_height);
+            let x = (MARGIN + (index % grid.columns) as u32 * grid.cell_width) as i32;
+            let y = (top + (index / grid.columns) as u32 * grid.cell_height()) as i32;
+            canvas.picture(x, y, &picture);
+            canvas.frame(x, y, picture.width(), picture.height(), GREY);
+            let below = y + grid.picture_height as i32 + 2;
+            let length = (picture.width() as f32 * source.weight / heaviest).round() as u32;
+            canvas.fill(x, below, length, BAR, BLUE);
+            let weight = if source.weight > 0.0 { format!("{:.4}", source.weight) } else { "left out".to_owned() };
+            let text_top = below + BAR as i32 + 2;
+            canvas.text(x, text_top, &weight, if source.weight > 0.0 { INK } else { GREY });
+            let name = end_of(&source.name, ((grid.cell_width - GAP) / CHARACTER_WIDTH) as usize);
+            canvas.text(x, text_top + LINE_HEIGHT as i32, &name, GREY);
+        }
+    }
+}
+
+/// Rows and columns of the sources.
+struct Grid {
+    columns: usize,
+    cell_width: u32,
+    picture_height: u32,
+}
+
+impl Grid {
+    /// As few rows as fit into a width, with pictures as high as that leaves, at most `highest`.
+    fn of(sources: &[SheetSource], width: u32, highest: u32) -> Grid {
+        let shape = |source: &SheetSource| source.picture.width() as f32 / source.picture.height().max(1) as f32;
+        let widest = sources.iter().map(shape).fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+        let least_width = (MIN_THUMBNAIL_HEIGHT as f32 * widest).ceil().max(1.0) as u32 + GAP;
+        let count = sources.len().max(1);
+        let width = width.max(least_width * count.min(MIN_SOURCES_PER_ROW) as u32);
+        let rows = count.div_ceil((width / least_width).max(1) as usize);
+        let columns = count.div_ceil(rows);
+        let height = (width / columns as u32).saturating_sub(GAP) as f32 / widest;
+        let picture_height = (height as u32).min(highest).max(MIN_THUMBNAIL_HEIGHT);
+        Grid { columns, cell_width: (picture_height as f32 * widest).ceil().max(1.0) as u32 + GAP, picture_height }
+    }
+
+    /// Of a picture with what stands below it.
+    fn cell_height(&self) -> u32 {
+        self.picture_height + BAR + 2 * LINE_HEIGHT + GAP
+    }
+
+    /// Of all rows.
+    fn height(&self, count: usize) -> u32 {
+        count.div_ceil(self.columns) as u32 * self.cell_height()
+    }
 }
 
 /// A name shortened to this many characters: the end of a long one, where names of one series differ.
@@ -120,9 +156,9 @@ fn end_of(name: &str, most: usize) -> String {
     format!("..{kept}")
 }
 
-fn thumbnail(picture: &RgbImage) -> RgbImage {
-    let width = (picture.width() * THUMBNAIL_HEIGHT / picture.height().max(1)).max(1);
-    imageops::resize(picture, width, THUMBNAIL_HEIGHT, imageops::FilterType::Triangle)
+fn thumbnail(picture: &RgbImage, height: u32) -> RgbImage {
+    let width = (picture.width() * height / picture.height().max(1)).max(1);
+    imageops::resize(picture, width, height, imageops::FilterType::Triangle)
 }
 
 /// Mean absolute error over the channels of each pixel: white where equal, through red to black at a quarter of the

@@ -1,5 +1,7 @@
 //! The frames of a run as one file: an animated picture, or a video.
 
+#[cfg(feature = "gif")]
+use crate::gif::Gif;
 use crate::rate::FrameRate;
 use crate::webp::Animation;
 use crate::y4m::Y4m;
@@ -22,6 +24,9 @@ const FFMPEG: &str = "ffmpeg";
 pub enum VideoFormat {
     /// Animated WebP without loss, for pages and messages.
     Webp,
+    /// Animated GIF of 256 colours a frame, for those that take no WebP.
+    #[cfg(feature = "gif")]
+    Gif,
     /// YUV4MPEG2, without compression, for video programs.
     Y4m,
     /// MP4, by the person's own `ffmpeg`.
@@ -29,8 +34,21 @@ pub enum VideoFormat {
 }
 
 impl VideoFormat {
-    /// All of them.
-    pub const ALL: [VideoFormat; 3] = [VideoFormat::Webp, VideoFormat::Y4m, VideoFormat::Mp4];
+    /// All of them that this build writes.
+    pub const ALL: &[VideoFormat] = &[
+        VideoFormat::Webp,
+        #[cfg(feature = "gif")]
+        VideoFormat::Gif,
+        VideoFormat::Y4m,
+        VideoFormat::Mp4,
+    ];
+
+    /// Whether this machine can write it: MP4 needs an `ffmpeg` on the path.
+    pub fn is_possible(self) -> bool {
+        let starts =
+            || Command::new(FFMPEG).arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
+        self != VideoFormat::Mp4 || starts()
+    }
 }
 
 impl fmt::Display for VideoFormat {
@@ -38,6 +56,8 @@ impl fmt::Display for VideoFormat {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             VideoFormat::Webp => "webp",
+            #[cfg(feature = "gif")]
+            VideoFormat::Gif => "gif",
             VideoFormat::Y4m => "y4m",
             VideoFormat::Mp4 => "mp4",
         })
@@ -46,15 +66,15 @@ impl fmt::Display for VideoFormat {
 
 /// The name is not that of a format of moving pictures.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("'{0}' is not a format of moving pictures: webp, y4m or mp4")]
+#[error("'{0}' is not a format of moving pictures: {all}", all = VideoFormat::ALL.iter().map(|one| one.to_string()).collect::<Vec<_>>().join(", "))]
 pub struct UnknownVideoFormat(String);
 
 impl FromStr for VideoFormat {
     type Err = UnknownVideoFormat;
 
     fn from_str(name: &str) -> Result<VideoFormat, UnknownVideoFormat> {
-        let found = VideoFormat::ALL.into_iter().find(|format| format.to_string() == name);
-        found.ok_or_else(|| UnknownVideoFormat(name.to_owned()))
+        let found = VideoFormat::ALL.iter().find(|format| format.to_string() == name);
+        found.copied().ok_or_else(|| UnknownVideoFormat(name.to_owned()))
     }
 }
 
@@ -117,6 +137,18 @@ pub fn write_video(
             let encode = |cause: ImageError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
             frames.each(|frame| Ok(animation.add(&frame).map_err(encode)?))?;
             Ok(write_whole(path, &animation.finish())?)
+        }
+        #[cfg(feature = "gif")]
+        VideoFormat::Gif => {
+            let encode =
+                |cause: ::gif::EncodingError| WriteError::Encode { path: path.to_path_buf(), cause: cause.into() };
+            let mut file = WholeFile::create(path)?;
+            let mut output = Unfailing(&mut file);
+            let mut animation = Gif::begin(&mut output, frames.size, rate).map_err(encode)?;
+            frames.each(|frame| Ok(animation.frame(&over(frame, background)).map_err(encode)?))?;
+            // The end of the file is written when the encoder goes.
+            drop(animation);
+            Ok(file.finish()?)
         }
         VideoFormat::Y4m => {
             let mut file = WholeFile::create(path)?;

@@ -8,6 +8,7 @@ mod targets;
 
 pub use targets::away_warning;
 
+use crate::path::arc::Arc;
 use crate::path::{CameraPath, NamedCamera, generated, numbered};
 use crate::rig::{Rig, spread};
 use crate::{Scene, SceneError, Split, View};
@@ -164,8 +165,11 @@ pub struct FewShot {
 /// Targets that are cameras along a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PathChoice {
-    /// This many cameras on a circle around what the sources look at, named `orbit-000` and so on.
+    /// This many cameras on a circle around what the sources look at, on the arc from source to source
+    /// ([`Arc::covered`]), named `orbit-000` and so on.
     Orbit(usize),
+    /// As an orbit, on the whole circle.
+    FullOrbit(usize),
     /// The way from a view to another, both included, named `between-000` and so on.
     Between {
         /// Name of the first view.
@@ -268,6 +272,13 @@ impl Selection {
     }
 }
 
+impl FewShot {
+    /// The cameras of the sources.
+    pub fn source_cameras(&self, scene: &Scene) -> Vec<Camera> {
+        self.sources.iter().map(|&view| scene.views[view].camera).collect()
+    }
+}
+
 /// A view of the scene as a target; its photograph, if it has one, is the truth.
 pub fn target_of(scene: &Scene, view: usize) -> Target {
     let View { name, camera, image, .. } = &scene.views[view];
@@ -355,8 +366,10 @@ fn along(choice: &PathChoice, scene: &Scene, sources: &[usize]) -> Result<Camera
     let pinhole = cameras[0].pinhole;
     let (what, cameras) = match choice {
         PathChoice::File(file) => return Ok(CameraPath::open(file, scene, &pinhole)?),
-        PathChoice::Orbit(count) => {
-            let orbit = generated::orbit(&cameras, pinhole, *count);
+        PathChoice::Orbit(count) | PathChoice::FullOrbit(count) => {
+            let is_full = matches!(choice, PathChoice::FullOrbit(_));
+            let arc = if is_full { Arc::full(&cameras) } else { Arc::covered(&cameras) };
+            let orbit = generated::orbit(&cameras, &arc, pinhole, *count);
             ("orbit", orbit.map_err(|error| SelectionError::NoOrbit { scene: scene_name(), error })?)
         }
         PathChoice::Between { first, last, count } => {

@@ -1,5 +1,6 @@
 //! The contents of a scene and likely faults in it, to be checked before hours of rendering.
 
+use crate::path::arc::Arc;
 use crate::photographs::object_box::find_object;
 use crate::photographs::{Album, BackgroundChoice};
 use crate::rig::{Rig, gap_warning};
@@ -55,7 +56,15 @@ pub struct Inspection {
     pub distances: [f32; 2],
     /// The up direction.
     pub up: [f32; 3],
-    /// Least and greatest corner of the bounding box of the visual hull, if there is one.
+    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: the median and the greatest of
+    /// the photographs; null for fewer than two.
+    pub gaps: Option<[f32; 2]>,
+    /// How much of the circle around the focus the photographs cover, in degrees: 360, or the arc of `--orbit`.
+    pub arc: f32,
+    /// Least and greatest angle of a photograph's camera above the focus, in degrees.
+    pub elevations: [f32; 2],
+    /// Least and greatest corner of the bounding box of the visual hull; null where no object is cut out of the
+    /// photographs.
     pub object: Option<[[f32; 3]; 2]>,
     /// Least depth of the object in any view, or of the ball that the cameras see.
     pub near: f32,
@@ -78,10 +87,12 @@ pub fn inspect(
     let rig = Rig::of(&cameras);
     let mut warnings = scene.warnings.clone();
     warnings.extend(rig_warnings(scene, &rig));
+    let is_photographed = |view: &&View| view.image.is_some();
+    let photographed: Vec<Camera> = scene.views.iter().filter(is_photographed).map(|view| view.camera).collect();
     let object = match object_of(scene, background, progress, &mut warnings) {
         Ok(object) => {
             if object.is_none() {
-                warnings.extend(gap_warning(&cameras));
+                warnings.extend(gap_warning(&photographed));
             }
             object
         }
@@ -115,11 +126,31 @@ pub fn inspect(
             cameras.iter().map(distance).fold(0.0, f32::max),
         ],
         up: rig.up.to_array(),
+        gaps: gaps(&rig, &photographed),
+        arc: Arc::covered(&photographed).width.to_degrees(),
+        elevations: elevations(&rig, &photographed),
         object: object.map(|object| [object.low, object.high].map(|c| [c[0], c[1], c[2]])),
         near,
         far,
         warnings,
     })
+}
+
+/// The median and the greatest angle to the nearest other camera.
+fn gaps(rig: &Rig, cameras: &[Camera]) -> Option<[f32; 2]> {
+    let gaps = rig.gaps(cameras);
+    Some([*gaps.get(gaps.len() / 2)?, *gaps.last()?])
+}
+
+/// Least and greatest angle above the focus, degrees; zeros without a camera.
+fn elevations(rig: &Rig, cameras: &[Camera]) -> [f32; 2] {
+    let above = |camera: &Camera| {
+        let direction = (camera.pose.centre_world() - rig.focus).normalize_or_zero();
+        direction.dot(rig.up).clamp(-1.0, 1.0).asin().to_degrees()
+    };
+    let mut all = cameras.iter().map(above);
+    let first = all.next().unwrap_or_default();
+    all.fold([first; 2], |[least, most], own| [least.min(own), most.max(own)])
 }
 
 /// Warnings about the cameras.

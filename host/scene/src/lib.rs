@@ -9,6 +9,7 @@
 //! dataset       folders of many scenes: Dataset, Split
 //! rig           the cameras as a whole: focus, up
 //! unit          the unit of length of weightings and networks: RigUnit
+//! coverage      how much of a camera's picture the photographs show
 //! path          cameras without photographs: from files, or generated
 //! listing       the views as a list, with their neighbours: ListedView
 //! few_shot      which views are sources, which cameras are targets: FewShot
@@ -18,6 +19,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod coverage;
 pub mod dataset;
 pub mod few_shot;
 pub mod inspect;

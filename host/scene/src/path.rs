@@ -1,6 +1,7 @@
 //! Camera paths: cameras without photographs, read from files or generated from the cameras of a scene.
 //!
 //! ```text
+//! arc         the part of a circle on which there are photographs
 //! generated   an orbit, the way between two cameras, a spiral
 //! nerfstudio  camera_path.json of nerfstudio's viewer
 //! transforms  transforms.json, of which only the poses are read
@@ -10,6 +11,7 @@
 //! A file's poses are in the coordinates of the scene's own files, and are moved and scaled with them
 //! ([`crate::SceneFrame`]).
 
+pub mod arc;
 mod csv;
 pub mod generated;
 mod nerfstudio;

@@ -254,12 +254,23 @@ impl<'a> Album<'a> {
             BackgroundChoice::Colour(_) => false,
             BackgroundChoice::Auto => !backdrop.can_be_told(),
         };
-        if choice == BackgroundChoice::Auto && whole_pictures {
+        // Whole photographs of a place are no fault. It is one where a person wants an object: by the background's colour, or
+        // by cutting it out of some of the photographs.
+        let is_asked = match choice {
+            BackgroundChoice::None => false,
+            BackgroundChoice::Colour(_) => true,
+            BackgroundChoice::Auto => borders.iter().any(Option::is_none),
+        };
+        if is_asked && !backdrop.can_be_told() {
             // The same text for any choice of sources, so that it is shown once.
+            let outcome = if whole_pictures {
+                "nothing is cut out, whole pictures are used"
+            } else {
+                "what is cut out may be more or less than the object"
+            };
             warnings.push(format!(
-                "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): nothing is cut out, \
-                 whole pictures are used; for an object alone, photograph before a plain background or cut it out (PNG with \
-                 alpha)",
+                "the photographs' borders are not of one colour (they deviate by more than {:.0} of 255): {outcome}; for an \
+                 object alone, photograph before a plain background or cut it out (PNG with alpha)",
                 matte::MAX_NOISE_LEVEL
             ));
         }

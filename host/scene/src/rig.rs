@@ -50,9 +50,9 @@ impl Rig {
         }
     }
 
-    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: the median over the cameras;
-    /// `None` for fewer than two.
-    pub fn median_gap(&self, cameras: &[Camera]) -> Option<f32> {
+    /// The angle between a camera and the nearest other one, seen from the focus, in degrees: of all cameras, ascending;
+    /// none of fewer than two.
+    pub fn gaps(&self, cameras: &[Camera]) -> Vec<f32> {
         let directions: Vec<Vec3> =
             cameras.iter().map(|c| (c.pose.centre_world() - self.focus).normalize_or_zero()).collect();
         let nearest = |own: usize| {
@@ -61,13 +61,19 @@ impl Rig {
         };
         let mut gaps: Vec<f32> = (0..cameras.len()).filter_map(nearest).collect();
         gaps.sort_by(f32::total_cmp);
+        gaps
+    }
+
+    /// The median of [`Rig::gaps`]; `None` for fewer than two cameras.
+    pub fn median_gap(&self, cameras: &[Camera]) -> Option<f32> {
+        let gaps = self.gaps(cameras);
         gaps.get(gaps.len() / 2).copied()
     }
 }
 
 /// Angle between neighbouring views, seen from what they look at, beyond which depths are no longer found in whole
 /// photographs.
-const MAX_GAP_DEGREES: f32 = 15.0;
+pub(crate) const MAX_GAP_DEGREES: f32 = 15.0;
 
 /// A warning if neighbouring views are too far apart to find depths in whole photographs. `cameras` are the sources'.
 pub fn gap_warning(cameras: &[Camera]) -> Option<String> {

@@ -12,6 +12,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageError, RgbImage};
 use serde::Serialize;
 use viewfuse_field::render::Frame;
+use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::encode_png;
 
 /// Quality of coarse pictures and thumbnails, of 100.
@@ -30,6 +31,8 @@ struct Header<'a> {
     /// Rendering and encoding of this picture, seconds.
     seconds: f64,
     weights: &'a [f32],
+    /// Share of the picture that a photograph shows from within 30 degrees.
+    seen: f32,
     /// Sources that were left out, for their weights are the least.
     left_out: u32,
     picture: Part,
@@ -58,7 +61,7 @@ struct LayerPart {
 ///
 /// # Errors
 /// If the picture cannot be encoded.
-pub(crate) fn bytes(frame: &Frame, layer: Layer, is_full: bool) -> Result<Vec<u8>, ImageError> {
+pub(crate) fn bytes(frame: &Frame, coverage: &Coverage, layer: Layer, is_full: bool) -> Result<Vec<u8>, ImageError> {
     let (media_type, picture) = match is_full {
         true => ("image/png", encode_png(&DynamicImage::ImageRgb8(frame.picture.clone()))?),
         false => ("image/jpeg", jpeg(&frame.picture)?),
@@ -74,6 +77,7 @@ pub(crate) fn bytes(frame: &Frame, layer: Layer, is_full: bool) -> Result<Vec<u8
         full: is_full,
         seconds: frame.time.as_secs_f64(),
         weights: &frame.weights.values()[..frame.weights.count() as usize],
+        seen: coverage.seen_in(&frame.target.camera, frame.picture.dimensions().into(), &frame.depths),
         left_out: frame.omission.omitted_count,
         picture: Part { media_type, bytes: picture.len() },
         layers: has.into_iter().filter(|(_, is_there)| *is_there).map(|(layer, _)| layer).collect(),

@@ -11,16 +11,39 @@ pub(crate) struct PageFile {
     pub(crate) text: &'static str,
 }
 
-/// All of them.
-pub(crate) const FILES: [PageFile; 3] = [
+const fn script(name: &'static str, text: &'static str) -> PageFile {
+    PageFile { name, media_type: "text/javascript; charset=utf-8", text }
+}
+
+/// All of them. Scripts are modules in the order of their imports.
+pub(crate) const FILES: [PageFile; 18] = [
     PageFile { name: "", media_type: "text/html; charset=utf-8", text: include_str!("../page/index.html") },
     PageFile { name: "view.css", media_type: "text/css; charset=utf-8", text: include_str!("../page/view.css") },
-    PageFile { name: "view.js", media_type: "text/javascript; charset=utf-8", text: include_str!("../page/view.js") },
+    script("vectors.js", include_str!("../page/vectors.js")),
+    script("poses.js", include_str!("../page/poses.js")),
+    script("colours.js", include_str!("../page/colours.js")),
+    script("canvas.js", include_str!("../page/canvas.js")),
+    script("state.js", include_str!("../page/state.js")),
+    script("frusta.js", include_str!("../page/frusta.js")),
+    script("picture.js", include_str!("../page/picture.js")),
+    script("map.js", include_str!("../page/map.js")),
+    script("sources.js", include_str!("../page/sources.js")),
+    script("schemes.js", include_str!("../page/schemes.js")),
+    script("elsewhere.js", include_str!("../page/elsewhere.js")),
+    script("answers.js", include_str!("../page/answers.js")),
+    script("requests.js", include_str!("../page/requests.js")),
+    script("hand.js", include_str!("../page/hand.js")),
+    script("work.js", include_str!("../page/work.js")),
+    script("view.js", include_str!("../page/view.js")),
 ];
 
 #[cfg(test)]
 mod tests {
     use super::FILES;
+    use std::collections::BTreeSet;
+
+    /// Most lines of a file of the page.
+    const MAX_LINES: usize = 250;
 
     #[test]
     fn the_page_refers_to_its_own_files_only() {
@@ -33,5 +56,40 @@ mod tests {
         }
         assert!(!html.contains("style=\"") && !html.contains(" onclick"), "the content security policy forbids both");
         assert!(FILES.iter().all(|file| !file.text.contains("https://")), "an address outside");
+    }
+
+    #[test]
+    fn every_file_of_the_folder_is_part_of_the_page_and_short() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");
+        let entries = std::fs::read_dir(folder).expect("the folder").map(|entry| entry.expect("a file").file_name());
+        let there: BTreeSet<String> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
+        let served = FILES.iter().map(|file| if file.name.is_empty() { "index.html" } else { file.name });
+        assert_eq!(there, served.map(str::to_owned).collect());
+        for file in FILES {
+            let lines = file.text.lines().count();
+            assert!(lines <= MAX_LINES, "{}: {lines} lines", file.name);
+        }
+    }
+
+    /// A module imports only from those before it, and only what it uses.
+    #[test]
+    fn modules_import_from_those_before_them() {
+        for (place, file) in FILES.iter().enumerate().filter(|(_, file)| file.name.ends_with(".js")) {
+            for line in file.text.lines().filter(|line| line.starts_with("import ")) {
+                let (names, from) = line.split_once(" } from './").unwrap_or_else(|| panic!("{line}"));
+                let from = from.strip_suffix("';").expect("the end of an import");
+                let before = FILES[..place].iter().find(|other| other.name == from);
+                let before = before.unwrap_or_else(|| panic!("{} imports {from}", file.name));
+                for name in names.trim_start_matches("import { ").split(", ") {
+                    let exports = ["function", "async function", "const"].map(|kind| format!("export {kind} {name}"));
+                    let is_there = exports.iter().any(|export| {
+                        before.text.split(export.as_str()).skip(1).any(|rest| rest.starts_with(['(', ' ']))
+                    });
+                    assert!(is_there, "{from} does not export {name}, which {} imports", file.name);
+                    let words = file.text.split(|own: char| !own.is_ascii_alphanumeric() && own != '_');
+                    assert!(words.filter(|word| *word == name).count() > 1, "{} does not use {name}", file.name);
+                }
+            }
+        }
     }
 }

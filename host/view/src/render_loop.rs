@@ -22,6 +22,7 @@ use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_albu
 use viewfuse_field::{FieldError, Renderer};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
+use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::Target;
 use viewfuse_scene::photographs::{Album, PhotographsError, SourceImages, reduced_size, scaled_size};
 use viewfuse_weighting::Weighting;
@@ -121,6 +122,7 @@ struct RenderLoop<'a> {
     shared: &'a Shared,
     outer: &'a dyn Progress,
     album: &'a Album<'a>,
+    coverage: Coverage,
     images: Arc<SourceImages>,
     renderer: &'a dyn Renderer,
     /// For fields with a cheaper form.
@@ -172,11 +174,13 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
         let small = coarse::reduced(&images, COARSE_SIDE, scene)?;
         let thumbnails = (0..sources.len()).map(|source| answer::jpeg(&small.picture(source)).unwrap_or_default());
         let _ = shared.thumbnails.set(thumbnails.collect());
+        let cameras: Vec<Camera> = sources.iter().map(|&view| scene.views[view].camera).collect();
         let mut pictures = RenderLoop {
             viewer,
             shared,
             outer,
             album: &album,
+            coverage: Coverage::of(&cameras),
             images: Arc::clone(&images),
             renderer: renderer.as_ref(),
             coarse: None,
@@ -223,7 +227,7 @@ impl<'a> RenderLoop<'a> {
                     return Err(error);
                 }
                 picture => picture.map_err(|error| error.to_string()).and_then(|(frame, is_full)| {
-                    answer::bytes(&frame, request.layer, is_full).map_err(|error| error.to_string())
+                    answer::bytes(&frame, &self.coverage, request.layer, is_full).map_err(|error| error.to_string())
                 }),
             };
             self.shared.mailbox.finish();

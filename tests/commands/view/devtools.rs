@@ -12,6 +12,13 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use viewfuse_tests::patience::PATIENCE;
 
+/// What the page shows becomes `shows`, beside two of its functions.
+const NAMES_FOR_TESTS: &str = "addEventListener('load', async () => {
+    const [{ state }, { matrixOf }, { goTo }] =
+        await Promise.all(['state', 'poses', 'hand'].map((own) => import(`${document.baseURI}${own}.js`)));
+    Object.assign(window, { matrixOf, goTo, shows: state });
+})";
+
 /// A running browser.
 pub(super) struct Chromium {
     process: Child,
@@ -105,6 +112,8 @@ impl Chromium {
         let size = json!({"width": width, "height": height, "deviceScaleFactor": ratio, "mobile": is_phone});
         tab.call("Emulation.setDeviceMetricsOverride", size);
         tab.call("Emulation.setTouchEmulationEnabled", json!({"enabled": is_phone, "maxTouchPoints": 5}));
+        // Modules keep their names to themselves: the page's state and what leads to poses get names for the tests.
+        tab.call("Page.addScriptToEvaluateOnNewDocument", json!({"source": NAMES_FOR_TESTS}));
         tab.call("Page.navigate", json!({"url": address}));
         tab
     }

@@ -48,10 +48,10 @@ fn pictures_of_the_lorry_follow_the_hand(browser: &Browser) {
 }
 
 /// On the page, from now on: the sizes of the pictures and which requests they answer, and how often weights were drawn.
-const WATCH: &str = "(() => { drawnSizes = []; drawnNumbers = []; weightsTold = 0; \
-    const [drawing, telling] = [drawPicture, tellWeights]; \
-    drawPicture = () => { drawing(); drawnSizes.push(shown.size); drawnNumbers.push(drawn); }; \
-    tellWeights = (own, number) => { weightsTold += 1; telling(own, number); }; })()";
+const WATCH: &str = "(() => { window.drawnSizes = []; window.drawnNumbers = []; window.weightsTold = 0; \
+    new MutationObserver(() => { drawnSizes.push([...shows.shown.size]); drawnNumbers.push(shows.shown.number); }) \
+        .observe(document.getElementById('picture'), {attributes: true, attributeFilter: ['data-pictures']}); \
+    new MutationObserver(() => { weightsTold += 1; }).observe(document.getElementById('sum'), {childList: true}); })()";
 
 /// While a hand drags, coarse pictures come: each answers a newer request than the one before, with its weights, in one of
 /// the sizes that there are, of which `finest` is the largest; once it lets go, the picture is that of the last view. How many
@@ -75,7 +75,7 @@ fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], ke
         let is_coarse = SIXTEENTHS.iter().any(|share| (0..2).all(|i| (own[i] - finest[i] * share / 16.0).abs() < 1.0));
         assert!(is_coarse, "{own:?} while dragging");
     }
-    tab.wait_for("shown.full && shown.pose === pose");
+    tab.wait_for("shows.shown.full && shows.shown.pose === shows.pose");
     assert_eq!(tab.console(), [""; 0]);
 }
 
@@ -107,7 +107,7 @@ fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
     let program = room("--sources 003..006 --size 96x72");
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [900, 700], false);
-    tab.wait_for("typeof shown !== 'undefined' && shown && shown.full");
+    tab.wait_for("window.shows && shows.shown && shows.shown.full");
     let ([x, y], moves) = (tab.middle_of("#picture"), moves());
     let drag = |moves: usize| {
         tab.mouse("mousePressed", [x, y], json!({}));
@@ -116,7 +116,7 @@ fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
             tab.mouse("mouseMoved", [x + 80.0 * angle.sin(), y + 30.0 * angle.cos()], json!({}));
         }
         tab.mouse("mouseReleased", [x, y], json!({}));
-        tab.wait_for("shown.full && shown.pose === pose");
+        tab.wait_for("shows.shown.full && shows.shown.pose === shows.pose");
     };
     // Events are kept by this test, not by the page.
     tab.call("Log.disable", json!({}));

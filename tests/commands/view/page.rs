@@ -28,7 +28,7 @@ pub(super) fn trials() -> [Trial; 5] {
 }
 
 /// The full picture of the view as it is now.
-const FULL: &str = "typeof shown !== 'undefined' && shown && shown.full && shown.pose === pose";
+const FULL: &str = "window.shows && shows.shown && shows.shown.full && shows.shown.pose === shows.pose";
 
 /// Small enough that a full picture comes soon.
 const SMALL: &str = "--sources 003..007 --size 96x72";
@@ -83,14 +83,15 @@ fn a_hand_turns_the_view(browser: &Browser) {
     keep(&tab, "desktop.png");
 
     // Keys: back and forth is where it was; then to the start.
-    let matrix = "JSON.stringify(matrixOf(pose))";
+    let matrix = "JSON.stringify(matrixOf(shows.pose))";
     let place = tab.text(matrix);
     for (there, back) in [("ArrowLeft", "ArrowRight"), ("ArrowUp", "ArrowDown"), ("+", "-")] {
         tab.key(there);
         assert_ne!(tab.text(matrix), place, "{there}");
         tab.key(back);
-        let gap = tab
-            .number(&format!("Math.max(...matrixOf(pose).flat().map((own, i) => Math.abs(own - {place}.flat()[i])))"));
+        let gap = tab.number(&format!(
+            "Math.max(...matrixOf(shows.pose).flat().map((own, i) => Math.abs(own - {place}.flat()[i])))"
+        ));
         assert!(gap < 1.0e-9, "{there} and {back}: {gap}");
     }
     tab.evaluate(NOTE_COARSE);
@@ -125,7 +126,7 @@ fn schemes_and_layers(tab: &Tab<'_>) {
     let plain = canvas(tab);
     for layer in ["depth", "confidence"] {
         tab.evaluate(&format!("document.querySelector('input[value={layer}]').click()"));
-        tab.wait_for(&format!("shown.layer && shown.layer.kind === '{layer}' && shown.full"));
+        tab.wait_for(&format!("shows.shown.layer && shows.shown.layer.kind === '{layer}' && shows.shown.full"));
         assert!(difference(&canvas(tab), &plain) > 5.0, "{layer}");
         keep(tab, &format!("{layer}.png"));
     }
@@ -146,8 +147,8 @@ fn tabs_come_and_go(browser: &Browser) {
     second.wait_for(COARSE);
     second.wait_for(FULL);
     // Each has a view of its own.
-    assert_eq!(first.evaluate("pose.centre.every((own, i) => own === scene.start.centre[i])"), true);
-    assert_eq!(second.evaluate("pose.centre.every((own, i) => own === scene.start.centre[i])"), false);
+    assert_eq!(first.evaluate("shows.pose.centre.every((own, i) => own === shows.scene.start.centre[i])"), true);
+    assert_eq!(second.evaluate("shows.pose.centre.every((own, i) => own === shows.scene.start.centre[i])"), false);
     assert_eq!(second.console(), [""; 0]);
     // Closed in the middle of a drag.
     second.mouse("mousePressed", [x, y], json!({}));
@@ -187,7 +188,7 @@ fn a_phone_shows_all_of_it(browser: &Browser) {
     tab.wait_for(COARSE);
     tab.wait_for(FULL);
     assert!(difference(&canvas(&tab), &first) > 2.0, "the picture does not follow the finger");
-    let distance = "length(sub(pose.centre, focus))";
+    let distance = "Math.hypot(...shows.pose.centre.map((own, i) => own - shows.focus[i]))";
     let before = tab.number(distance);
     tab.touch("touchStart", &[[x - 30.0, y], [x + 30.0, y]]);
     tab.touch("touchMove", &[[x - 45.0, y], [x + 45.0, y]]);
@@ -223,7 +224,7 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     RgbImage::new(96, 72).save(folder.file("view.png")).expect("a picture");
     let scene = viewfuse::scene::Scene::open(folder.path()).expect("a scene");
     let pose = scene.views[0].camera.pose.to_opencv();
-    let shown: Vec<f64> = numbers(&tab.evaluate("matrixOf(pose).flat()"));
+    let shown: Vec<f64> = numbers(&tab.evaluate("matrixOf(shows.pose).flat()"));
     for (own, shown) in pose.iter().flatten().zip(shown) {
         assert_near(f64::from(*own), shown, 1.0e-6);
     }
@@ -239,10 +240,11 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
     done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
     let rendered = image::open(folder.path().join("out/view.png")).expect("a picture").to_rgb8();
-    let (_, picture) = program.connect().picture(&request("x", &tab.evaluate("matrixOf(pose)"), false)).unpacked();
+    let (_, picture) =
+        program.connect().picture(&request("x", &tab.evaluate("matrixOf(shows.pose)"), false)).unpacked();
     assert!(rendered == picture, "the command line renders another picture");
     // A view of the scene that is no source has a name.
-    tab.evaluate("goTo(scene.others[0].pose)");
+    tab.evaluate("goTo(shows.scene.others[0].pose)");
     let line = tab.text("document.getElementById('command').textContent");
     assert!(line.contains("render tests/data/room --targets 000 --sources"), "{line}");
     assert_eq!(tab.console(), [""; 0]);
@@ -266,7 +268,7 @@ fn names_from_files_are_no_commands(browser: &Browser) {
     let tab = chromium.open(&program.address(), [1280, 860], false);
     tab.wait_for(FULL);
     let name = serde_json::to_string(NAME).expect("JSON");
-    tab.evaluate(&format!("goTo(scene.others.find((own) => own.name === {name}).pose)"));
+    tab.evaluate(&format!("goTo(shows.scene.others.find((own) => own.name === {name}).pose)"));
     let line = tab.text("document.getElementById('command').textContent");
     assert!(!line.chars().any(char::is_control), "{line:?}");
     let script = format!("viewfuse() {{ printf '%s\\n' \"$@\"; }}\n{line}\n");

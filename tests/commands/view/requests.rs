@@ -19,6 +19,7 @@ pub(super) fn trials() -> Vec<Trial> {
     vec![
         needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), on_vulkan),
         trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
+        trial("commands::view::every_module_of_the_page_is_served", every_module_of_the_page_is_served),
         trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
         trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
         trial("commands::view::the_newest_request_wins", the_newest_request_wins),
@@ -67,6 +68,28 @@ fn other_hosts_and_addresses_get_nothing() {
     // After all of that it goes on.
     let (answer, picture) = program.connect().picture(&request("a", start, false)).unpacked();
     assert_eq!((answer["full"].as_bool(), picture.dimensions()), (Some(true), (24, 24)));
+}
+
+/// From the page on, along the imports.
+fn every_module_of_the_page_is_served() {
+    let program = start(&repository(), &format!("{} --size 24x24", data("toy").display()));
+    let mut modules = vec!["view.js".to_owned()];
+    let mut place = 0;
+    while let Some(name) = modules.get(place).cloned() {
+        place += 1;
+        let answer = program.get(&name);
+        assert_eq!(answer.status, 200, "{name}");
+        assert!(answer.head.contains("Content-Type: text/javascript"), "{name}: {}", answer.head);
+        assert!(answer.head.contains("script-src 'self'"), "{name}: {}", answer.head);
+        let text = String::from_utf8(answer.body).expect("text");
+        for rest in text.split("from './").skip(1) {
+            let imported = rest.split('\'').next().expect("a name").to_owned();
+            if !modules.contains(&imported) {
+                modules.push(imported);
+            }
+        }
+    }
+    assert!(modules.len() > 10, "{modules:?}");
 }
 
 fn full_pictures_are_those_of_render() {

@@ -33,6 +33,9 @@ const FIRST: [&str; 24] = [
     "version",
 ];
 
+/// An option of all networks.
+const COMPUTE: &str = "compute";
+
 /// The commands with dozens of options.
 const LONG: [&str; 3] = ["render", "view", "evaluate"];
 
@@ -57,16 +60,23 @@ pub(crate) fn explained(error: Error, arguments: impl Iterator<Item = OsString>,
     };
     let lacks_model =
         error.kind() == ErrorKind::MissingRequiredArgument && error.get(ContextKind::InvalidArg).is_some_and(is_model);
-    let mut given = arguments.filter_map(|word| Some(word.to_str()?.strip_prefix("--")?.split('=').next()?.to_owned()));
+    if !lacks_model {
+        return error;
+    }
+    let given: Vec<String> =
+        arguments.filter_map(|word| Some(word.to_str()?.strip_prefix("--")?.split('=').next()?.to_owned())).collect();
     let of_network = |name: &String| {
         let row = ROWS.into_iter().find(|row| row.flags.iter().any(|flag| flag.name == *name));
         row.filter(|row| row.prefix().is_some()).map(|row| (name.clone(), row.title))
     };
-    match given.find_map(|name| of_network(&name)).filter(|_| lacks_model) {
+    let message = match given.iter().find_map(of_network) {
         Some((name, title)) => {
-            let message = format!("--{name} is an option of a {title}, and needs its checkpoint: --model FILE");
-            command.error(ErrorKind::MissingRequiredArgument, message)
+            format!("--{name} is an option of a {title}, and needs its checkpoint: --model FILE")
         }
-        None => error,
-    }
+        None if given.iter().any(|name| name == COMPUTE) => {
+            format!("--{COMPUTE} computes what a network leaves out, and needs its checkpoint: --model FILE")
+        }
+        None => return error,
+    };
+    command.error(ErrorKind::MissingRequiredArgument, message)
 }

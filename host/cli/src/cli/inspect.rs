@@ -1,11 +1,15 @@
 //! `viewfuse inspect`.
 
+mod quality;
+
 use super::outputs::keep_file_apart;
 use super::say;
 use super::table::table;
 use super::terminal::Terminal;
 use clap::Args;
 use image::DynamicImage;
+use quality::Quality;
+use serde::Serialize;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_job::files::check_writable;
@@ -18,7 +22,8 @@ use viewfuse_scene::photographs::BackgroundChoice;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  viewfuse inspect photos/ -o cameras.png\n  \
-    viewfuse inspect photos/ --views\n      names, and the numbers that stand for them: --targets '#3' is the view of index 3")]
+    viewfuse inspect photos/ --quality\n      \
+    how good pictures will be, before they are rendered\n  viewfuse inspect photos/ --views\n      names, and the numbers that stand for them: --targets '#3' is the view of index 3")]
 pub(crate) struct Arguments {
     /// The scene
     scene: PathBuf,
@@ -28,6 +33,10 @@ pub(crate) struct Arguments {
     /// List the views: index, name, size, and the nearest views with the angle to each, seen from what the cameras look at
     #[arg(long, conflicts_with = "output")]
     views: bool,
+    /// Leave photographs out, one at a time, render them coarsely from the others, and say which PSNR to expect: as long as
+    /// `render` takes before its first picture, seconds for a dozen photographs
+    #[arg(long, conflicts_with = "views")]
+    quality: bool,
     /// Print JSON instead of text
     #[arg(long)]
     json: bool,
@@ -45,11 +54,19 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
     arguments.output.as_deref().map_or(Ok(()), |path| keep_file_apart([&scene], path))?;
     let progress = Terminal::new("reading the photographs");
     let inspection = inspect(&scene, arguments.background, &progress)?;
+    let measure = || Quality::of(&scene, arguments.background, &progress);
+    let quality = arguments.quality.then(measure).transpose()?;
     drop(progress);
     if arguments.json {
-        say(format_args!("{}", serde_json::to_string_pretty(&inspection)?))?;
+        let document = Document { inspection: &inspection, quality: quality.as_ref() };
+        say(format_args!("{}", serde_json::to_string_pretty(&document)?))?;
     } else {
         print_text(&inspection)?;
+        match &quality {
+            Some(quality) => quality.print()?,
+            None => say("expected   --quality leaves photographs out and says which PSNR to expect")?,
+        }
+        print_warnings(&inspection)?;
     }
     if let Some(path) = &arguments.output {
         write_png(path, &DynamicImage::ImageRgb8(camera_map(&scene, &inspection)))?;
@@ -58,6 +75,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is printed as JSON.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    inspection: &'a Inspection,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    quality: Option<&'a Quality>,
 }
 
 fn print_views(views: &[ListedView], as_json: bool) -> anyhow::Result<ExitCode> {
@@ -101,13 +127,26 @@ fn print_text(inspection: &Inspection) -> std::io::Result<()> {
     say(format_args!("focus      {}, missed by the axes by {miss} (root mean square)", point(i.focus)))?;
     say(format_args!("distance   {} to {}", number(i.distances[0]), number(i.distances[1])))?;
     say(format_args!("up         {}", point(i.up)))?;
+    if let Some([median, greatest]) = i.gaps {
+        say(format_args!("neighbours {median:.0} degrees apart (median), at most {greatest:.0}"))?;
+        // Without a minus before a zero.
+        let [low, high] = i.elevations.map(|angle| angle.round() + 0.0);
+        let around = match i.arc {
+            360.0.. => "all around the focus".to_owned(),
+            arc => format!("{arc:.0} of 360 degrees around the focus"),
+        };
+        say(format_args!("coverage   {around}, from {low:.0} to {high:.0} degrees above it"))?;
+    }
     match i.object {
         Some([low, high]) => say(format_args!("object     {} to {}", point(low), point(high)))?,
-        None => say(format_args!("object     not found"))?,
+        None => say(format_args!("object     none cut out: whole photographs"))?,
     }
-    say(format_args!("depth      near {}, far {}", number(i.near), number(i.far)))?;
-    if i.warnings.is_empty() {
+    say(format_args!("depth      near {}, far {}", number(i.near), number(i.far)))
+}
+
+fn print_warnings(inspection: &Inspection) -> std::io::Result<()> {
+    if inspection.warnings.is_empty() {
         say("warnings   none")?;
     }
-    i.warnings.iter().try_for_each(|warning| say(format_args!("warning    {warning}")))
+    inspection.warnings.iter().try_for_each(|warning| say(format_args!("warning    {warning}")))
 }

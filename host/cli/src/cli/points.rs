@@ -7,6 +7,7 @@ use super::say;
 use super::terminal::Terminal;
 use anyhow::bail;
 use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use viewfuse_device::choice::Chosen;
@@ -40,12 +41,20 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     device: DeviceOptions,
     /// The .ply file
-    #[arg(short, long, value_name = "FILE")]
+    #[arg(short, long, value_name = "FILE", value_parser = PathBufValueParser::new().try_map(ply_file))]
     output: PathBuf,
 }
 
 fn scheme_help() -> String {
     format!("Weighting scheme: {}", grammar())
+}
+
+/// A file of the one format that is written.
+fn ply_file(path: PathBuf) -> Result<PathBuf, &'static str> {
+    match path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply")) {
+        true => Ok(path),
+        false => Err("point clouds are written as .ply, which MeshLab, CloudCompare and Blender read"),
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<ExitCode> {

@@ -10,7 +10,7 @@ use super::outputs::keep_folder_apart;
 use super::path::PathOptions;
 use super::terminal::Terminal;
 use super::weighting::choice_help;
-use super::{on_threads, say};
+use super::{complain, on_threads, say};
 use clap::Args;
 use identity::run_identity;
 use outputs::OutputOptions;
@@ -19,7 +19,6 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 use viewfuse_device::choice::Chosen;
-use viewfuse_field::Setting;
 use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
 use viewfuse_field::render::{Frame, render};
@@ -29,7 +28,8 @@ use viewfuse_output::folder::check_folder;
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::record::{ChosenRecord, FrameRecord, RunRecord};
 use viewfuse_output::run::{Circumstances, RECORD, RunWriter};
-use viewfuse_output::video::{VideoError, VideoFormat};
+use viewfuse_output::video::VideoFormat;
+use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{READERS, Scene, looked_for};
@@ -37,7 +37,7 @@ use viewfuse_weighting::{Weighting, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
-    viewfuse render photos/ --orbit 24 -o out\n      24 views on a circle around what the cameras look at\n  \
+    viewfuse render photos/ --orbit 24 -o out\n      24 views around what the cameras look at, from photograph to photograph\n  \
     viewfuse render dino/ --targets 1,4,7 --size 160x120 -o out\n      views 1, 4 and 7 from the other thirteen, with scores\n  \
     viewfuse render car/ --targets 5 --sources all/3 --weights mean -o out\n      view 5 from every third view, averaged instead of weighted\n  \
     viewfuse render photos/ --between 3 7 --frames 120 --video webp,mp4 -o out\n      the way from view 3 to view 7 as a video\n  \
@@ -109,6 +109,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let job = selection.resolve(&scene, about.least_sources)?;
     let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let rate = arguments.outputs.rate(job.frames_per_second);
+    arguments.path.tell_arc(&job.source_cameras(&scene));
     if !is_stream {
         check_writable(&arguments.output.join(RECORD))?;
         check_folder(&arguments.output, &job.targets, arguments.outputs.replace)?;
@@ -117,6 +118,9 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let renderer = field.on(&device);
     let renderer = renderer.as_ref();
     let progress = Terminal::new("rendering");
+    let leaving = leaving(arguments, &scene, &job);
+    leaving.iter().for_each(|warning| progress.warn(warning));
+    let formats = if is_stream { Vec::new() } else { video_formats(arguments) };
     if is_stream {
         let render = || stream::render_to_stdout(&scene, &job, weighting.as_ref(), renderer, &options, rate, &progress);
         on_threads(arguments.picture.threads, render)??;
@@ -127,6 +131,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &before);
     writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
+    leaving.into_iter().for_each(|warning| writer.warn(warning));
     let files: Vec<&Path> = arguments.model.file().into_iter().chain(before.file()).collect();
     // Frames that follow from one another are not continued.
     let job = if arguments.sequence.is_empty() {
@@ -138,7 +143,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
         job
     };
     // A frame of a video takes a part of the time that it took to render.
-    let (frames, formats) = (10 * job.targets.len().max(1), &arguments.outputs.video);
+    let frames = 10 * job.targets.len().max(1);
     let of = frames + job.targets.len() * formats.len();
     let part = Part::begin(&progress, "", 0..frames, of);
     let (record, videos) = on_threads(arguments.picture.threads, || -> anyhow::Result<(RunRecord, Vec<String>)> {
@@ -155,7 +160,7 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
                 auto::render(&scene, &job, renderer, &options, &part, write)?.0
             }
         };
-        let videos = videos(&writer, formats, rate, &Part::begin(&progress, "", frames..of, of))?;
+        let videos = videos(&writer, &formats, rate, &Part::begin(&progress, "", frames..of, of))?;
         let circumstances = Circumstances {
             program: env!("CARGO_PKG_VERSION"),
             device_reason: reason,
@@ -173,6 +178,33 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     Ok(ExitCode::SUCCESS)
 }
 
+/// A warning if cameras without a photograph leave what the sources show. Not with a network, which is there to guess what
+/// they do not.
+fn leaving(arguments: &Arguments, scene: &Scene, job: &FewShot) -> Option<String> {
+    let new = job.targets.iter().filter(|target| target.truth.is_none());
+    let pictures = new.map(|target| (target.name.as_str(), &target.camera));
+    let is_learned = arguments.model.label().is_some();
+    if is_learned { None } else { Coverage::of(&job.source_cameras(scene)).warning(pictures) }
+}
+
+/// The formats of videos, y4m in place of MP4 where there is no ffmpeg: a person learns it before the work.
+fn video_formats(arguments: &Arguments) -> Vec<VideoFormat> {
+    let mut formats = Vec::new();
+    for format in &arguments.outputs.video {
+        let format = if format.is_possible() {
+            *format
+        } else {
+            let path = arguments.output.join("video.y4m");
+            complain(format_args!("{}, not mp4, is written: there is no ffmpeg on the path", path.display()));
+            VideoFormat::Y4m
+        };
+        if !formats.contains(&format) {
+            formats.push(format);
+        }
+    }
+    formats
+}
+
 /// Writes the pictures as videos; returns a line about each.
 fn videos(
     writer: &RunWriter,
@@ -183,13 +215,7 @@ fn videos(
     let mut lines = Vec::new();
     for (index, format) in formats.iter().enumerate() {
         progress.stage(&format!("writing video.{format}"), index..index + 1, formats.len());
-        match writer.write_video(*format, rate, progress) {
-            Err(error @ VideoError::NoProgram) => {
-                let path = writer.write_video(VideoFormat::Y4m, rate, progress)?;
-                lines.push(format!("{}: instead of mp4: {error}", path.display()));
-            }
-            written => lines.push(written?.display().to_string()),
-        }
+        lines.push(writer.write_video(*format, rate, progress)?.display().to_string());
     }
     Ok(lines)
 }
@@ -222,22 +248,20 @@ fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
     say(format_args!("device: {}, {}", record.device, record.device_reason))
 }
 
-/// What was chosen for the scene, and from what.
+/// What was chosen for the scene, and what it gained.
 fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     let ChosenRecord { settings, candidates, left_out } = chosen;
     if left_out.is_empty() {
         return format!("chosen: {weighting}, the default: too few sources to leave one out");
     }
-    let settings: String = settings.iter().map(|Setting { name, value }| format!(", {name} {value}")).collect();
-    let tried = candidates.len();
-    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.settings == chosen.settings;
-    let score = |candidate: &Candidate| format!(" {:.2} dB", candidate.psnr);
-    let (own, first) = (candidates.iter().find(|candidate| of(candidate)), candidates.first());
+    let of = |candidate: &Candidate| candidate.weighting == weighting && candidate.settings == *settings;
+    let own = candidates.iter().find(|candidate| of(candidate)).map_or(0.0, |candidate| candidate.psnr);
+    let gain = own - candidates.first().map_or(own, |first| first.psnr);
+    let with = if settings.is_empty() { "" } else { " with settings for these photographs" };
+    let more = if gain > 0.0 { format!(", {gain:.2} dB more than by default") } else { String::new() };
+    let count = left_out.len();
     format!(
-        "chosen: {weighting}{settings}: {} sources left out, one at a time:{}, by default{}; {tried} tried",
-        left_out.len(),
-        own.map(score).unwrap_or_default(),
-        first.map(score).unwrap_or_default(),
+        "chosen: {weighting}{with}: {count} photographs that were left out have {own:.1} dB{more} (what was tried: {RECORD})"
     )
 }
 

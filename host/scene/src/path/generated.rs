@@ -7,6 +7,7 @@ use viewfuse_core::Vec3;
 use viewfuse_core::camera::{Camera, Pinhole, PinholeError};
 use viewfuse_core::pose::{Pose, PoseError};
 
+use super::arc::Arc;
 use crate::rig::{Rig, nearest_point_to_lines};
 
 /// Turns of a spiral, as in LLFF.
@@ -20,26 +21,22 @@ const FAR_SHARE: f32 = 0.75;
 /// Least length of the mean principal axis of forward-facing cameras: 45 degrees from it on average.
 const MIN_COMMON: f32 = 0.7;
 
-/// `count` cameras on a full circle around the focus of some cameras (at least one), at their mean height and distance,
-/// their principal axes through the focus, with the rig's up direction; frame 0 is on the side of the first camera.
+/// `count` cameras on an arc around the focus of some cameras (at least one), at the mean height and distance of those that
+/// stand on it, their principal axes through the focus, with the rig's up direction.
 ///
 /// # Errors
 /// [`PoseError`] if the circle degenerates (all cameras at the focus, or straight above it).
-pub fn orbit(cameras: &[Camera], pinhole: Pinhole, count: usize) -> Result<Vec<Camera>, PoseError> {
-    let Rig { focus, up, distance, .. } = Rig::of(cameras);
-    let height =
-        cameras.iter().map(|c| (c.pose.centre_world() - focus).dot(up)).sum::<f32>() / cameras.len().max(1) as f32;
+pub fn orbit(cameras: &[Camera], arc: &Arc, pinhole: Pinhole, count: usize) -> Result<Vec<Camera>, PoseError> {
+    let Rig { focus, up, .. } = Rig::of(cameras);
+    let offsets = || arc.cameras.iter().filter_map(|&index| Some(cameras.get(index)?.pose.centre_world() - focus));
+    let mean = |value: &dyn Fn(Vec3) -> f32| offsets().map(value).sum::<f32>() / offsets().count().max(1) as f32;
+    let (distance, height) = (mean(&Vec3::length), mean(&|offset| offset.dot(up)));
     let radius = (distance * distance - height * height).max(0.0).sqrt();
-    let first = cameras.first().map_or(Vec3::X, |c| c.pose.centre_world() - focus);
-    let start = (first - up * first.dot(up)).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
-    let side = up.cross(start);
-    (0..count)
-        .map(|frame| {
-            let angle = TAU * frame as f32 / count as f32;
-            let centre = focus + up * height + (start * angle.cos() + side * angle.sin()) * radius;
-            Ok(Camera { pose: Pose::look_at(centre, focus, up)?, pinhole })
-        })
-        .collect()
+    let camera = |direction: Vec3| {
+        let centre = focus + up * height + direction * radius;
+        Ok(Camera { pose: Pose::look_at(centre, focus, up)?, pinhole })
+    };
+    arc.directions(count).map(camera).collect()
 }
 
 /// `count` cameras from the first to the last one, both included (one alone is the first).

@@ -5,7 +5,7 @@ use clap::Args;
 use viewfuse_output::depth::{DepthFormat, UnknownDepthFormat};
 use viewfuse_output::rate::FrameRate;
 use viewfuse_output::run::Outputs;
-use viewfuse_output::video::VideoFormat;
+use viewfuse_output::video::{UnknownVideoFormat, VideoFormat};
 
 /// Heading of these options in the help.
 const FILES: &str = "Files";
@@ -25,9 +25,9 @@ pub(crate) struct OutputOptions {
     /// Remove what an earlier run wrote to the folder and this one does not replace
     #[arg(long, help_heading = FILES)]
     pub(crate) replace: bool,
-    /// Write all pictures, in order, also as video.FORMAT: webp (animated), y4m (not compressed), mp4 (by the ffmpeg on the
-    /// path; without one y4m)
-    #[arg(long, value_name = "FORMATS", value_delimiter = ',', help_heading = FILES)]
+    /// Write all pictures, in order, also as video.FORMAT: webp and gif (animated; gif is a feature), y4m (not compressed), mp4
+    /// (by the ffmpeg on the path; without one y4m)
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', value_parser = parse_video, help_heading = FILES)]
     pub(crate) video: Vec<VideoFormat>,
     /// Frames per second of a video [default: those of the camera path's file, else 30]
     #[arg(long, value_name = "N", value_parser = parse_rate, help_heading = FILES)]
@@ -48,6 +48,13 @@ impl OutputOptions {
 fn parse_depth(text: &str) -> Result<DepthFormat, String> {
     text.parse().map_err(|error: UnknownDepthFormat| match text {
         "exr" => told("OpenEXR", "exr"),
+        _ => error.to_string(),
+    })
+}
+
+fn parse_video(text: &str) -> Result<VideoFormat, String> {
+    text.parse().map_err(|error: UnknownVideoFormat| match text {
+        "gif" => told("GIF", "gif"),
         _ => error.to_string(),
     })
 }

@@ -1,0 +1,117 @@
+//! Where photographs are, and what they show: the arc of an orbit, and the share of a picture that was seen.
+
+use std::f32::consts::TAU;
+use viewfuse::scene::coverage::Coverage;
+use viewfuse::scene::path::arc::Arc;
+use viewfuse::scene::path::generated::orbit;
+use viewfuse_core::Vec3;
+use viewfuse_core::camera::{Camera, Pinhole};
+use viewfuse_core::pose::Pose;
+
+/// A camera 4 from the origin, which it looks at, at these degrees around and above.
+fn camera(around: f32, above: f32) -> Camera {
+    let (around, above) = (around.to_radians(), above.to_radians());
+    let centre = 4.0 * Vec3::new(above.cos() * around.cos(), above.cos() * around.sin(), above.sin());
+    let pinhole = Pinhole::new([200.0; 2], [80.0, 60.0], 160, 120).expect("a pinhole");
+    Camera { pose: Pose::look_at(centre, Vec3::ZERO, Vec3::Z).expect("a pose"), pinhole }
+}
+
+fn cameras(around: &[f32]) -> Vec<Camera> {
+    around.iter().map(|around| camera(*around, 20.0)).collect()
+}
+
+/// Degrees around the origin.
+fn around(camera: &Camera) -> f32 {
+    let centre = camera.pose.centre_world();
+    centre.y.atan2(centre.x).to_degrees()
+}
+
+#[track_caller]
+fn assert_around(cameras: &[Camera], count: usize, expected: &[f32]) {
+    let orbit = orbit(cameras, &Arc::covered(cameras), cameras[0].pinhole, count).expect("an orbit");
+    let found: Vec<f32> = orbit.iter().map(around).collect();
+    let is_near = |(a, b): (&f32, &f32)| ((a - b + 540.0).rem_euclid(360.0) - 180.0).abs() < 0.1;
+    assert!(found.len() == expected.len() && found.iter().zip(expected).all(is_near), "{found:?} {expected:?}");
+    for camera in orbit {
+        let centre = camera.pose.centre_world();
+        assert!((centre.length() - 4.0).abs() < 1.0e-3 && (centre.z - 4.0 * 20_f32.to_radians().sin()).abs() < 1.0e-3);
+    }
+}
+
+#[test]
+fn an_orbit_is_the_arc_from_photograph_to_photograph() {
+    // In any order, and over the place where angles begin anew.
+    assert_around(&cameras(&[0.0, 40.0, -50.0, 20.0]), 4, &[-50.0, -20.0, 10.0, 40.0]);
+    assert_around(&cameras(&[170.0, -150.0]), 3, &[170.0, -170.0, -150.0]);
+    // The larger group of two; one frame is in its middle.
+    assert_around(&cameras(&[0.0, 180.0, 200.0, 230.0]), 1, &[205.0]);
+    // One place has room to move.
+    assert_around(&cameras(&[30.0]), 2, &[20.0, 40.0]);
+    assert_around(&cameras(&[30.0, 36.0, 32.0]), 2, &[23.0, 43.0]);
+    // Up to 60 degrees apart they are a circle, which begins at the first and does not come there twice.
+    let circle = [90.0, 30.0, 150.0, 210.0, 270.0, 330.0];
+    assert_around(&cameras(&circle), 3, &[90.0, 210.0, 330.0]);
+    assert!(Arc::covered(&cameras(&circle)).is_full() && !Arc::covered(&cameras(&circle[..5])).is_full());
+    let full = Arc::full(&cameras(&circle[..2]));
+    assert!(full.is_full() && full.width == TAU);
+    // Straight above there is no angle.
+    let mut tops = cameras(&[0.0, 10.0]);
+    tops.push(camera(120.0, 89.99));
+    assert_eq!(Arc::covered(&tops).cameras, [0, 1]);
+}
+
+#[test]
+fn what_photographs_show() {
+    let coverage = Coverage::of(&cameras(&[-20.0, 0.0, 20.0]));
+    assert!(coverage.seen(&camera(10.0, 20.0)) > 0.95);
+    assert!(coverage.seen(&camera(40.0, 20.0)) > 0.8, "in reach of the last one");
+    for (around, above) in [(180.0, 20.0), (90.0, 20.0), (0.0, 80.0)] {
+        assert_eq!(coverage.seen(&camera(around, above)), 0.0, "{around} {above}");
+    }
+    // It looks away from all of them, to the side that no photograph shows.
+    let away = Pose::look_at(Vec3::new(4.0, 0.0, 1.0), Vec3::new(8.0, 0.0, 2.0), Vec3::Z).expect("a pose");
+    assert_eq!(coverage.seen(&Camera { pose: away, ..camera(0.0, 20.0) }), 0.0);
+    // From farther away the photographs do not fill the picture.
+    let near = camera(0.0, 20.0);
+    let far = Pose::look_at(3.0 * near.pose.centre_world(), Vec3::ZERO, Vec3::Z).expect("a pose");
+    let share = coverage.seen(&Camera { pose: far, ..near });
+    assert!(0.05 < share && share < 0.5, "{share}");
+}
+
+#[test]
+fn a_depth_map_says_where_the_surfaces_are() {
+    let coverage = Coverage::of(&cameras(&[-20.0, 0.0, 20.0]));
+    let camera = camera(10.0, 20.0);
+    let size = [40, 30];
+    let map = |depth: f32| vec![depth; 40 * 30];
+    assert!(coverage.seen_surfaces(&camera, size, &map(4.0)).expect("surfaces") > 0.95);
+    // Just in front of this camera nothing is in another one's picture.
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.2)), Some(0.0));
+    // The left half has no surface: only the right one counts.
+    let half: Vec<f32> = (0..40 * 30).map(|pixel| if pixel % 40 < 20 { 0.0 } else { 4.0 }).collect();
+    assert!(coverage.seen_surfaces(&camera, size, &half).expect("surfaces") > 0.95);
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(0.0)), None);
+    assert_eq!(coverage.seen_surfaces(&camera, size, &map(4.0)[1..]), None);
+    assert_eq!(coverage.seen_in(&camera, size, &[]), coverage.seen(&camera));
+}
+
+#[test]
+fn a_warning_names_the_pictures() {
+    let coverage = Coverage::of(&cameras(&[-20.0, 0.0, 20.0]));
+    let warning = |around: &[f32]| {
+        let pictures: Vec<(String, Camera)> =
+            cameras(around).into_iter().enumerate().map(|(index, camera)| (format!("p{index}"), camera)).collect();
+        coverage.warning(pictures.iter().map(|(name, camera)| (name.as_str(), camera)))
+    };
+    assert_eq!(warning(&[0.0, 10.0]), None);
+    assert_eq!(warning(&[]), None);
+    let one = warning(&[0.0, 180.0]).expect("a warning");
+    let text =
+        "1 of 2 pictures leave what was photographed: p1; of p1, 0 % is in a photograph taken from within 30 degrees";
+    assert_eq!(one, text);
+    let runs = warning(&[90.0, 120.0, 0.0, 180.0, 0.0, 100.0, 0.0, 100.0]).expect("a warning");
+    assert!(
+        runs.starts_with("5 of 8 pictures leave what was photographed: p0 to p1, p3, p5 and others; of p0, 0 %"),
+        "{runs}"
+    );
+}
