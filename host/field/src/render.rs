@@ -4,17 +4,20 @@
 //! options   the options, and the sizes that follow from them
 //! stage     sources on a device, from which targets are rendered
 //! frame     the result
+//! seen      how many photographs show what it shows
 //! error     errors
 //! ```
 
 mod error;
 mod frame;
 mod options;
+mod seen;
 mod stage;
 
 pub use error::RenderError;
 pub use frame::{Frame, Truth};
 pub use options::{DEFAULT_EARLY_TERMINATION, DEFAULT_LEAVE_OUT, RenderOptions, open_album, working_side};
+pub use seen::Seen;
 pub(crate) use stage::SceneSources;
 pub use stage::{Stage, StageCosts};
 

@@ -5,7 +5,7 @@ use std::time::Duration;
 use viewfuse_device::{KernelTime, Transfers};
 use viewfuse_field::auto::{Candidate, Chosen, Expected, LeftOutSource};
 use viewfuse_field::budget::Kept;
-use viewfuse_field::render::{Frame, RenderOptions, StageCosts};
+use viewfuse_field::render::{Frame, RenderOptions, Seen, StageCosts};
 use viewfuse_field::{Denoising, LeftOut, Setting};
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::few_shot::FewShot;
@@ -201,6 +201,9 @@ pub struct FrameRecord {
     /// a field without depths, of points as far away as what the sources look at.
     #[serde(default)]
     pub seen: f32,
+    /// What share of its surfaces few photographs show, by the depths that the field found; null for fields without depths.
+    #[serde(default)]
+    pub seen_by: Option<Seen>,
     /// Sum of their weights: a bound on the change of a fusion of all views by leaving them out, as a share of the range
     /// of its inputs.
     pub left_out_weight: f32,
@@ -240,6 +243,7 @@ impl FrameRecord {
                 .map(|(name, _)| name.clone())
                 .collect(),
             seen: coverage.seen_in(&frame.target.camera, frame.picture.dimensions().into(), &frame.depths),
+            seen_by: frame.seen,
             left_out_weight: frame.omission.omitted_weight,
             psnr: frame.truth.as_ref().map(|truth| truth.psnr).filter(|psnr| psnr.is_finite()),
             expected: None,

@@ -21,7 +21,7 @@ use std::time::Instant;
 use viewfuse_device::choice::Chosen;
 use viewfuse_field::auto::{self, Candidate, Expected};
 use viewfuse_field::budget::{Estimate, Kept};
-use viewfuse_field::render::{Frame, render};
+use viewfuse_field::render::{Frame, Seen, render};
 use viewfuse_job::files::check_writable;
 use viewfuse_job::progress::{Part, Progress};
 use viewfuse_output::folder::check_folder;
@@ -34,6 +34,9 @@ use viewfuse_scene::few_shot::{FewShot, Target};
 use viewfuse_scene::photographs::SourceImages;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_weighting::{Weighting, WeightingChoice};
+
+/// From which share on a picture that few photographs show is said to be one.
+const MIN_FEW: f32 = 0.2;
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -223,7 +226,7 @@ fn videos(
 /// Prints the summary of a run.
 fn print(record: &RunRecord, folder: &Path) -> std::io::Result<()> {
     for frame in &record.frames {
-        say(format_args!("{}", summary(frame, folder)))?;
+        say(format_args!("{}", summary(frame, &record.sources, folder)))?;
     }
     say(format_args!(
         "{} from {} sources, {}, {} on {}: {:.2} s",
@@ -265,7 +268,7 @@ fn choice(chosen: &ChosenRecord, weighting: &str) -> String {
     )
 }
 
-fn summary(frame: &FrameRecord, folder: &Path) -> String {
+fn summary(frame: &FrameRecord, sources: &[String], folder: &Path) -> String {
     let score = match (frame.psnr, frame.ssim) {
         (Some(psnr), Some(ssim)) => format!("  PSNR {psnr:.2} dB  SSIM {ssim:.3}"),
         (Some(psnr), None) => format!("  PSNR {psnr:.2} dB"),
@@ -280,7 +283,23 @@ fn summary(frame: &FrameRecord, folder: &Path) -> String {
         count => format!("  {count} sources left out (weight {:.4})", frame.left_out_weight),
     };
     let kept = frame.kept.as_ref().map_or_else(String::new, kept);
-    format!("{}{score}{expected}{left_out}{kept}", folder.join(format!("{}.png", frame.target)).display())
+    let few = few_photographs(frame, sources).unwrap_or_default();
+    format!("{}{score}{expected}{few}{left_out}{kept}", folder.join(format!("{}.png", frame.target)).display())
+}
+
+/// What a picture lacks, and where to photograph: between the two sources that matter most to it.
+fn few_photographs(frame: &FrameRecord, sources: &[String]) -> Option<String> {
+    let Seen { by_none, by_one } = frame.seen_by.filter(|seen| seen.by_none + seen.by_one >= MIN_FEW)?;
+    let mut order: Vec<usize> = (0..sources.len().min(frame.weights.len())).collect();
+    order.sort_by(|a, b| frame.weights[*b].total_cmp(&frame.weights[*a]));
+    let [first, second, ..] = order[..] else { return None };
+    Some(format!(
+        "  {:.0} % of it seen by fewer than two photographs, {:.0} % by none: photograph from between {} and {}",
+        100.0 * (by_none + by_one),
+        100.0 * by_none,
+        sources[first],
+        sources[second]
+    ))
 }
 
 /// How a frame keeps its bound.

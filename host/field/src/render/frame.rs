@@ -1,5 +1,6 @@
 //! The result of a render: a picture with its weights and scores.
 
+use super::Seen;
 use crate::budget::Kept;
 use crate::scores::{psnr_of_seen, ssim_of_seen};
 use image::{GrayImage, RgbImage};
@@ -27,6 +28,8 @@ pub struct Frame {
     pub depths: Vec<f32>,
     /// How far each pixel can be relied on, in `[0, 1]`; empty for fields that do not tell.
     pub confidences: Vec<f32>,
+    /// What share of its surfaces few photographs show; `None` for fields without depths, and for coarse pictures.
+    pub seen: Option<Seen>,
     /// The ground truth at the same size and the scores, if there is a photograph.
     pub truth: Option<Truth>,
     /// Time for this frame alone.

@@ -1,5 +1,6 @@
 //! Sources on a device, from which targets are rendered.
 
+use super::seen::seen;
 use super::{Frame, RenderError, RenderOptions, Truth, working_side};
 use crate::budget::{Controller, View};
 use crate::session::Session;
@@ -271,7 +272,14 @@ impl<'a> Stage<'a> {
         progress: &dyn Progress,
     ) -> Result<Frame, RenderError> {
         let camera = self.at_working_size(&target.camera)?;
-        self.frame_at(weighting, target, &camera, progress)
+        let mut frame = self.frame_at(weighting, target, &camera, progress)?;
+        if !frame.depths.is_empty() {
+            let maps = self.source_depths()?;
+            let is_used = |(source, _): &(usize, DepthMap)| frame.omission.weights.get(*source as u32) > 0.0;
+            let used: Vec<DepthMap> = maps.into_iter().enumerate().filter(is_used).map(|(_, map)| map).collect();
+            frame.seen = seen(&camera, frame.picture.dimensions().into(), &frame.depths, &used);
+        }
+        Ok(frame)
     }
 
     /// As [`Stage::frame`] without a truth, with a picture of another size than the options': for coarse pictures.
@@ -327,7 +335,20 @@ impl<'a> Stage<'a> {
             _ => None,
         };
         let target = target.clone();
-        Ok(Frame { target, weights, omission, colours, picture, depths, confidences, truth, time, encode, kept })
+        Ok(Frame {
+            target,
+            weights,
+            omission,
+            colours,
+            picture,
+            depths,
+            confidences,
+            seen: None,
+            truth,
+            time,
+            encode,
+            kept,
+        })
     }
 
     /// Width and height of the picture that is rendered at a camera.
