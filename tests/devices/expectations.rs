@@ -49,7 +49,7 @@ const PROPERTIES: [(&str, Property); 4] = [
 
 /// A part of a device's name, and which of [`PROPERTIES`] hold there.
 const EXPECTED: [(&str, [bool; PROPERTIES.len()]); 2] =
-    [("llvmpipe", [true, true, true, true]), ("SwiftShader", [false, false, true, true])];
+    [("llvmpipe", [true, false, true, true]), ("SwiftShader", [false, false, true, true])];
 
 /// Elements of a dispatch that has more than one piece, if pieces are short.
 const MANY: u32 = 1 << 17;

@@ -34,7 +34,8 @@ fn by_value(source: &str) -> Vec<String> {
     // `a != a` is the tokens a, !, =, a.
     let with_itself = words.windows(4).filter(|four| {
         let [left, sign, equal, right] = four else { return false };
-        let is_name = left.chars().all(|own| own.is_alphanumeric() || own == '_') && left.parse::<f64>().is_err();
+        // Of a constant, what stands before it is compared: `x & BITS != BITS`.
+        let is_name = left.starts_with(|own: char| own.is_lowercase());
         is_name && left == right && matches!(sign.as_str(), "!" | "=") && equal == "="
     });
     named.chain(with_itself.map(|four| four.concat())).collect()
@@ -60,12 +61,13 @@ fn a_test_by_value_in_a_source_is_seen() {
     assert_eq!(by_value("fn f(x: f32, y: f32) -> bool { x == y } // is_nan, x != x"), Vec::<String>::new());
 }
 
-/// Instructions that test for NaN or infinity, and comparisons of a number with itself.
+/// Instructions that test for NaN or infinity, and `x != x`.
 fn tests_by_value(module: &Module) -> Vec<&Instruction> {
-    const EQUALITIES: [Op; 4] = [Op::FOrdEqual, Op::FUnordEqual, Op::FOrdNotEqual, Op::FUnordNotEqual];
+    // Not `x == x`: the compiler writes it for every conversion to a whole number, whose result for NaN is 0.
+    const INEQUALITIES: [Op; 2] = [Op::FOrdNotEqual, Op::FUnordNotEqual];
     let is_one = |own: &&Instruction| match own.class.opcode {
         Op::IsNan | Op::IsInf | Op::IsFinite | Op::IsNormal | Op::Ordered | Op::Unordered => true,
-        code => EQUALITIES.contains(&code) && own.operands[0] == own.operands[1],
+        code => INEQUALITIES.contains(&code) && own.operands[0] == own.operands[1],
     };
     module.all_inst_iter().filter(is_one).collect()
 }

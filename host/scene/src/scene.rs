@@ -101,8 +101,9 @@ pub struct ScenePoint {
 /// Rounding to `f32` would lose the distances between cameras far from the origin (surveyed coordinates). The origin is
 /// therefore moved before rounding, if the centroid of their centres is more than 16 times their spread (root mean square
 /// distance from it) away from the origin: to the point nearest to their principal axes, or to the centroid if these are
-/// parallel or meet further off. Cameras in one place are moved if it is further than 1e4 from the origin. The scale is a
-/// power of two, other than 1 only where the spread is below 1e-3 or above 1e4. An ordinary scene keeps its numbers bit for
+/// parallel or meet further off. Cameras in one place are moved if it is further than 1e4 from the origin. The scale is
+/// other than 1 only where the spread is below 1e-3 or above 1e4: then it makes the cameras' mean distance from what they look at
+/// that of SRN's (1.3), for which networks were trained. An ordinary scene keeps its numbers bit for
 /// bit, because learned fields depend on the unit and on the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneFrame {

@@ -6,6 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::SceneFrame;
+use crate::unit::SRN_DISTANCE;
 
 /// Largest distance of the cameras' centroid from the origin, as a multiple of their spread.
 const FAR_FROM_ORIGIN: f64 = 16.0;
@@ -43,7 +44,7 @@ pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
         true => nearest_point_to_lines(axes).filter(near).unwrap_or(centroid),
         false => DVec3::ZERO,
     };
-    let scale = if USUAL_SPREADS.contains(&spread) { 1.0 } else { spread.log2().floor().exp2() };
+    let scale = if USUAL_SPREADS.contains(&spread) { 1.0 } else { unit(axes, spread) };
     let digits = (spread / (far * f64::EPSILON)).log10();
     let warning = (digits < MIN_DIGITS).then(|| {
         format!(
@@ -53,6 +54,14 @@ pub(super) fn of(axes: &[(DVec3, DVec3)]) -> (SceneFrame, Option<String>) {
         )
     });
     (SceneFrame { origin, scale }, warning)
+}
+
+/// The unit in which cameras, which spread so far, are as far from what they look at as SRN's; where they look at nothing in
+/// common, in which their spread is that distance.
+fn unit(axes: &[(DVec3, DVec3)], spread: f64) -> f64 {
+    let mean = |focus: DVec3| axes.iter().map(|(centre, _)| centre.distance(focus)).sum::<f64>() / axes.len() as f64;
+    let distance = nearest_point_to_lines(axes).map(mean).filter(|distance| distance.is_normal());
+    distance.unwrap_or(spread) / f64::from(SRN_DISTANCE)
 }
 
 /// The point nearest to lines given by a point and a unit direction each, in the sense of least squares, or `None`
