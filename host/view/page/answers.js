@@ -14,8 +14,8 @@ export async function unpacked(buffer) {
   const start = 4 + new DataView(buffer).getUint32(0, true);
   const answer = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, start - 4)));
   const end = start + answer.picture.bytes;
-  const blob = new Blob([buffer.slice(start, end)], { type: answer.picture.media_type });
-  answer.bitmap = await createImageBitmap(blob);
+  answer.file = new Blob([buffer.slice(start, end)], { type: answer.picture.media_type });
+  answer.bitmap = await createImageBitmap(answer.file);
   if (answer.layer) answer.layer.bitmap = await coloured(answer.size, new Uint8Array(buffer, end), answer.layer.has_gaps);
   return answer;
 }

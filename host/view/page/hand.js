@@ -1,5 +1,6 @@
 // The hand: pointers, wheel, keys.
 
+import { stop } from './keyframes.js';
 import { drawMapSoon } from './map.js';
 import { turnedPose } from './poses.js';
 import { changed } from './requests.js';
@@ -10,8 +11,10 @@ const TURN = Math.PI * 0.75; // radians for the width of the picture
 const STEP = Math.PI / 60;   // radians for a key
 const TOP = 0.05;            // radians that are kept from the pole
 
-export function goTo(own) {
+// Takes the view to a pose, and to what it turns around from there.
+export function goTo(own, focus = state.focus) {
   state.pose = own;
+  state.focus = focus;
   changed();
 }
 
@@ -43,7 +46,7 @@ function pan(across, below) {
   changed();
 }
 
-function back() {
+export function back() {
   state.pose = state.scene.start;
   state.focus = state.scene.focus;
   changed();
@@ -59,6 +62,7 @@ export function listenToPicture(canvas) {
   };
   canvas.addEventListener('pointerdown', (event) => {
     if (state.scene === null) return;
+    stop();
     canvas.focus({ preventScroll: true });
     canvas.setPointerCapture(event.pointerId);
     hands.set(event.pointerId, [event.clientX, event.clientY]);
@@ -89,6 +93,7 @@ export function listenToPicture(canvas) {
   canvas.addEventListener('wheel', (event) => {
     if (state.scene === null) return;
     event.preventDefault();
+    stop();
     const lines = event.deltaMode === 1 ? 16 * event.deltaY : event.deltaY;
     move(Math.exp(clamp(lines, -200, 200) / 600));
   }, { passive: false });
@@ -128,6 +133,7 @@ export function listenToKeys() {
     const action = actions[event.key];
     if (state.scene === null || isTyping || !action || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
+    stop();
     action();
   });
 }

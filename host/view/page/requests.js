@@ -1,7 +1,8 @@
 // Requests for pictures and weights: what is asked, newest first.
 
 import { release, unpacked } from './answers.js';
-import { tellCommand } from './elsewhere.js';
+import { saveWantedPicture, tellCommand } from './elsewhere.js';
+import { tellPath } from './keyframes.js';
 import { drawMapSoon } from './map.js';
 import { drawPicture, tellStatus } from './picture.js';
 import { matrixOf } from './poses.js';
@@ -40,7 +41,8 @@ async function askPicture(moving, arrived) {
   asked += 1;
   const number = asked;
   const at = state.pose;
-  const body = { tab, pose: matrixOf(at), scheme: state.scheme, layer: state.layer, moving };
+  const { scheme } = state;
+  const body = { tab, pose: matrixOf(at), scheme, layer: state.layer, moving };
   if (moving) body.side = COARSE_SIDE;
   try {
     const response = await post('picture', body);
@@ -55,10 +57,11 @@ async function askPicture(moving, arrived) {
     }
     drawn = number;
     release(state.shown);
-    state.shown = { pose: at, number, ...answer };
+    state.shown = { pose: at, number, scheme, ...answer };
     tellWeights(answer.weights, number);
     drawPicture();
     tellStatus(answer);
+    saveWantedPicture();
   } catch (error) {
     told(error);
   }
@@ -116,5 +119,6 @@ export function changed() {
   clearTimeout(restTimer);
   restTimer = setTimeout(askFull, REST);
   tellCommand();
+  tellPath();
   drawMapSoon();
 }

@@ -5,23 +5,24 @@ import { clamp } from './vectors.js';
 
 const isWhole = (row) => !row.parameter && !row.choice;
 
-export function showSchemes() {
+// The menu, with the scheme that is shown first.
+export function showSchemes(first) {
   const menu = element('scheme');
-  const [name] = state.scene.scheme.split(':');
+  const [name] = first.split(':');
   const isKnown = state.scene.schemes.some((row) => row.name === name);
-  const names = state.scene.schemes.map((row) => row.name).concat(isKnown ? [] : [state.scene.scheme]);
+  const names = state.scene.schemes.map((row) => row.name).concat(isKnown ? [] : [first]);
   menu.replaceChildren(...names.map((own) => new Option(own, own)));
-  menu.value = isKnown ? name : state.scene.scheme;
+  menu.value = isKnown ? name : first;
   chooseScheme();
-  // The values that the program was started with.
-  const given = new Map((state.scene.scheme.split(':')[1] || '').split(',').map((pair) => pair.split('=')));
+  // Its own values.
+  const given = new Map((first.split(':')[1] || '').split(',').map((pair) => pair.split('=')));
   const row = rowOf(menu.value);
   if (row && row.choice && given.has(row.choice.key)) element('choice').value = given.get(row.choice.key);
   if (row && row.parameter && given.has(row.parameter.key)) {
     element('parameter').value = placeOf(row.parameter, Number(given.get(row.parameter.key)));
   }
   schemeText();
-  state.scheme = state.scene.scheme;
+  state.scheme = first;
 }
 
 const rowOf = (name) => state.scene.schemes.find((row) => row.name === name);
@@ -60,6 +61,8 @@ export function schemeText() {
   if (row.parameter) {
     const value = valueOf(row.parameter, Number(element('parameter').value));
     element('parameter-value').textContent = value;
+    // The slider itself counts steps.
+    element('parameter').setAttribute('aria-valuetext', `${row.parameter.key} ${value}`);
     pairs.push(`${row.parameter.key}=${value}`);
   }
   if (row.choice && element('choice').value !== row.choice.options[0]) pairs.push(`${row.choice.key}=${element('choice').value}`);

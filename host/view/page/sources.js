@@ -4,6 +4,12 @@ import { css } from './colours.js';
 import { drawMapSoon } from './map.js';
 import { element, state } from './state.js';
 
+// A long name without its middle: names of photographs differ at their ends.
+function shortened(name) {
+  const letters = [...name];
+  return letters.length <= 14 ? name : `${letters.slice(0, 6).join('')}…${letters.slice(-7).join('')}`;
+}
+
 // `go` takes the view to a pose.
 export function showSources(go) {
   element('sources').replaceChildren(...state.scene.sources.map((source, i) => {
@@ -12,17 +18,20 @@ export function showSources(go) {
     const image = document.createElement('img');
     const name = document.createElement('span');
     const label = document.createElement('b');
+    const share = document.createElement('span');
     const value = document.createElement('output');
     const bar = document.createElement('div');
     button.type = 'button';
     button.title = `Go to the camera of ${source.name}`;
     image.alt = `Photograph ${source.name}`;
     name.className = 'name';
-    label.textContent = source.name;
+    label.textContent = shortened(source.name);
+    share.className = 'share';
     bar.className = 'bar';
     bar.append(document.createElement('span'));
-    name.append(label, value);
-    button.append(image, name, bar);
+    name.append(label);
+    share.append(bar, value);
+    button.append(image, name, share);
     button.addEventListener('click', () => go(source.pose));
     item.append(button);
     source.parts = { image, value, bar: bar.firstChild, number: i };

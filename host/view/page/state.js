@@ -11,7 +11,10 @@ export const state = {
   focus: null,      // what it turns around
   weights: [],      // of the sources, for `pose` or a pose shortly before
   scheme: '',
+  isSchemeGiven: false, // by the person, in the menu
+  first: null,      // the scheme that the command line began with, or that was chosen for the scene; null while it is not known
   layer: 'none',
   shown: null,      // { pose, bitmap, size, layer } of the picture on the screen
   observer: null,   // the camera of the map
+  keyframes: [],    // { pose, focus } of a camera path
 };

@@ -3,16 +3,20 @@
 //   vectors, poses     cameras in the world
 //   colours, canvas    what is drawn with
 //   state              what the page shows
-//   frusta, picture, map, sources, schemes, elsewhere, answers
+//   frusta, picture, map, sources, schemes, answers
 //                      parts of the page
+//   rotations, path    the way between keyframes
+//   files, elsewhere, keyframes
+//                      what is saved and copied
 //   requests           what the program is asked
 //   hand, work, view   what a person does, what the program does, and the beginning
 //
 // A module imports from those above it only.
 
 import { drawScale } from './colours.js';
-import { copy, save } from './elsewhere.js';
-import { goTo, listenToKeys, listenToMap, listenToPicture } from './hand.js';
+import { copy, savePicture, savePose } from './elsewhere.js';
+import { back, goTo, listenToKeys, listenToMap, listenToPicture } from './hand.js';
+import { listenToKeyframes, stop } from './keyframes.js';
 import { drawMap, firstObserver } from './map.js';
 import { drawPicture } from './picture.js';
 import { poseOf } from './poses.js';
@@ -25,6 +29,7 @@ import { watch } from './work.js';
 
 function schemeChanged() {
   state.scheme = schemeText();
+  state.isSchemeGiven = true;
   changed();
 }
 
@@ -33,9 +38,14 @@ function listenToSettings() {
   element('choice').addEventListener('change', schemeChanged);
   element('parameter').addEventListener('input', schemeChanged);
   element('overlay').addEventListener('change', drawPicture);
-  element('strength').addEventListener('input', drawPicture);
+  element('strength').addEventListener('input', (event) => {
+    event.target.setAttribute('aria-valuetext', `${event.target.value} %`);
+    drawPicture();
+  });
   element('layers').addEventListener('change', (event) => { state.layer = event.target.value; changed(); });
-  element('save').addEventListener('click', save);
+  element('home').addEventListener('click', () => { stop(); back(); });
+  element('save-picture').addEventListener('click', savePicture);
+  element('save').addEventListener('click', savePose);
   element('copy').addEventListener('click', copy);
   const redraw = () => { drawPicture(); drawMap(); };
   new ResizeObserver(redraw).observe(element('picture'));
@@ -57,6 +67,9 @@ async function begin() {
   listenToKeys();
   drawScale(element('scale'));
   drawScale(element('layer-scale'));
+  if (matchMedia('(pointer: coarse)').matches) {
+    element('picture').setAttribute('aria-label', 'The novel view. Drag with a finger to turn around the subject.');
+  }
   watch();
   try {
     const found = await (await fetch('scene')).json();
@@ -76,9 +89,11 @@ async function begin() {
   state.pose = state.scene.start;
   state.focus = state.scene.focus;
   state.observer = firstObserver();
-  showSources(goTo);
-  showSchemes();
+  showSources((own) => { stop(); goTo(own); });
+  showSchemes(state.scene.scheme);
+  state.first = state.scene.chooses ? null : state.scene.scheme;
   listenToSettings();
+  listenToKeyframes(goTo);
   changed();
   const photographs = setInterval(() => {
     if (state.shown === null) return;

@@ -7,6 +7,7 @@
 //! layer              one byte a pixel, row-major; if one was requested and the field has it
 //! ```
 
+use crate::record::PictureRecord;
 use crate::request::Layer;
 use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ImageError, RgbImage};
@@ -39,6 +40,8 @@ struct Header<'a> {
     /// The layers that the field has.
     layers: Vec<Layer>,
     layer: Option<LayerPart>,
+    /// Of a full picture.
+    record: Option<PictureRecord>,
 }
 
 #[derive(Serialize)]
@@ -57,11 +60,17 @@ struct LayerPart {
     has_gaps: bool,
 }
 
-/// The bytes of an answer.
+/// The bytes of an answer: of a full picture if there is a record of it.
 ///
 /// # Errors
 /// If the picture cannot be encoded.
-pub(crate) fn bytes(frame: &Frame, coverage: &Coverage, layer: Layer, is_full: bool) -> Result<Vec<u8>, ImageError> {
+pub(crate) fn bytes(
+    frame: &Frame,
+    coverage: &Coverage,
+    layer: Layer,
+    record: Option<PictureRecord>,
+) -> Result<Vec<u8>, ImageError> {
+    let is_full = record.is_some();
     let (media_type, picture) = match is_full {
         true => ("image/png", encode_png(&DynamicImage::ImageRgb8(frame.picture.clone()))?),
         false => ("image/jpeg", jpeg(&frame.picture)?),
@@ -87,6 +96,7 @@ pub(crate) fn bytes(frame: &Frame, coverage: &Coverage, layer: Layer, is_full: b
             range: *range,
             has_gaps: layer == Layer::Depth,
         }),
+        record,
     };
     let json = serde_json::to_vec(&header).unwrap_or_default();
     let mut bytes = Vec::with_capacity(4 + json.len() + picture.len());

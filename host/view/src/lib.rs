@@ -5,6 +5,8 @@
 //! page         the page's files, which are part of the program
 //! request      requests of the page, checked
 //! answer       a frame as the page gets it
+//! record       what belongs to a picture that is saved
+//! choice       the scheme that suits the scene, chosen beside the pictures
 //! status       what is being done
 //! mailbox      of each tab only the newest request waits
 //! pace         how coarse a picture has to be to come in time
@@ -20,6 +22,7 @@
 #![forbid(unsafe_code)]
 
 mod answer;
+mod choice;
 mod coarse;
 mod connection;
 mod connections;
@@ -28,6 +31,7 @@ mod message;
 mod pace;
 mod page;
 pub mod protocol;
+mod record;
 mod render_loop;
 mod request;
 mod response;
@@ -48,8 +52,8 @@ use subject::Subject;
 use viewfuse_core::camera::{Camera, Pinhole};
 use viewfuse_core::sources::SourcesError;
 use viewfuse_device::choice::AnyDevice;
+use viewfuse_field::AnyField;
 use viewfuse_field::render::{RenderError, RenderOptions};
-use viewfuse_field::{AnyField, Setting};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::unit::RigUnit;
@@ -83,18 +87,11 @@ pub struct Viewed<'a> {
     pub device: &'a AnyDevice,
     /// Size, background and omissions of full pictures.
     pub options: &'a RenderOptions,
-    /// The weighting that the page begins with; the page can choose any other that needs no file.
+    /// The weighting that the page begins with; the page can take any other that needs no file.
     pub weighting: &'a Weighting,
-    /// The field's scalars that were chosen along with this weighting. Other weightings have those of the options.
-    pub settings: Option<&'a [Setting]>,
-}
-
-impl<'a> Viewed<'a> {
-    /// The field's scalars under a weighting.
-    pub(crate) fn settings_of(&self, scheme: &str) -> &'a [Setting] {
-        let chosen = self.settings.filter(|_| scheme == self.weighting.to_string());
-        chosen.unwrap_or(&self.options.settings)
-    }
+    /// Whether the weighting and the field's scalars are chosen for the scene ([`viewfuse_field::auto`]) after the first full
+    /// picture, and shown from then on.
+    pub chooses: bool,
 }
 
 /// A listening server with everything that it shows.
@@ -120,7 +117,7 @@ impl<'a> Viewer<'a> {
     /// # Errors
     /// [`ViewError`].
     pub fn listen(viewed: Viewed<'a>, commands: Commands, port: u16) -> Result<Viewer<'a>, ViewError> {
-        let Viewed { scene, sources, field, device, options, weighting, .. } = viewed;
+        let Viewed { scene, sources, field, device, options, .. } = viewed;
         let first = sources.first().ok_or(RenderError::Sources(SourcesError::Empty))?;
         let camera = scene.views[*first].camera;
         let unit = RigUnit::of_scene(scene);
@@ -133,7 +130,7 @@ impl<'a> Viewer<'a> {
         let pinhole = pinhole.map_err(|error| RenderError::Size { width, height, error })?;
         let device_name = field.on(device).device_name();
         let full = Camera { pinhole, ..camera };
-        let subject = Subject::of(scene, sources, &full, &about, device_name.clone(), weighting.to_string(), commands);
+        let subject = Subject::of(&viewed, &full, &about, device_name.clone(), commands);
         let server = Server::listen(port)?;
         Ok(Viewer { viewed, pinhole: camera.pinhole, size, device_name, unit, sources: source_poses, subject, server })
     }

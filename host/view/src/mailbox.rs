@@ -87,6 +87,11 @@ impl<L: Queued> Mailbox<L> {
         state.is_superseded || state.waiting.iter().any(Queued::is_urgent)
     }
 
+    /// Whether a request waits.
+    pub(crate) fn is_waiting(&self) -> bool {
+        !self.state().waiting.is_empty()
+    }
+
     /// The request that was taken last is answered.
     pub(crate) fn finish(&self) {
         self.state().at_work = None;

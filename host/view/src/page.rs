@@ -16,7 +16,7 @@ const fn script(name: &'static str, text: &'static str) -> PageFile {
 }
 
 /// All of them. Scripts are modules in the order of their imports.
-pub(crate) const FILES: [PageFile; 18] = [
+pub(crate) const FILES: [PageFile; 22] = [
     PageFile { name: "", media_type: "text/html; charset=utf-8", text: include_str!("../page/index.html") },
     PageFile { name: "view.css", media_type: "text/css; charset=utf-8", text: include_str!("../page/view.css") },
     script("vectors.js", include_str!("../page/vectors.js")),
@@ -29,7 +29,11 @@ pub(crate) const FILES: [PageFile; 18] = [
     script("map.js", include_str!("../page/map.js")),
     script("sources.js", include_str!("../page/sources.js")),
     script("schemes.js", include_str!("../page/schemes.js")),
+    script("rotations.js", include_str!("../page/rotations.js")),
+    script("path.js", include_str!("../page/path.js")),
+    script("files.js", include_str!("../page/files.js")),
     script("elsewhere.js", include_str!("../page/elsewhere.js")),
+    script("keyframes.js", include_str!("../page/keyframes.js")),
     script("answers.js", include_str!("../page/answers.js")),
     script("requests.js", include_str!("../page/requests.js")),
     script("hand.js", include_str!("../page/hand.js")),

@@ -4,12 +4,15 @@
 //! cheaper form of the field, or, for fields without such a form, is a smaller picture from the same sources. A full
 //! picture has the size and the values of `viewfuse_field::render` for the same camera and weighting. It makes way for
 //! coarse ones, at the points where the field checks for cancellation, and is begun again later; sources that are
-//! encoded by then stay encoded.
+//! encoded by then stay encoded. While nothing is requested, the scheme that suits the scene is chosen, if that is left to
+//! the scene.
 
 use crate::answer;
+use crate::choice::Choice;
 use crate::coarse;
 use crate::mailbox::{Mailbox, Queued};
 use crate::pace::{Pace, TIME_OF_A_PICTURE};
+use crate::record::PictureRecord;
 use crate::request::{COARSE_SIDE, Request};
 use crate::response::Answer;
 use crate::status::Status;
@@ -19,7 +22,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 use viewfuse_core::camera::Camera;
 use viewfuse_field::render::{Frame, RenderError, RenderOptions, Stage, open_album, working_side};
-use viewfuse_field::{FieldError, Renderer};
+use viewfuse_field::{FieldError, Renderer, Setting, auto};
 use viewfuse_job::progress::Progress;
 use viewfuse_scene::Scene;
 use viewfuse_scene::coverage::Coverage;
@@ -65,12 +68,21 @@ impl Queued for Job {
     }
 }
 
-/// Progress of a piece of work: shown on the page, and stopped when the program ends or, if it `makes_way`, when a
-/// request presses.
+/// Progress of a piece of work: shown on the page, and stopped when the program ends or the work has to make way.
 struct Watch<'a> {
     shared: &'a Shared,
     outer: &'a dyn Progress,
-    makes_way: bool,
+    makes_way: MakesWay,
+}
+
+/// For what a piece of work stops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum MakesWay {
+    Never,
+    /// For a newer request of the same tab, or a coarse picture of another one.
+    ToPressing,
+    /// For any request.
+    ToAll,
 }
 
 impl Progress for Watch<'_> {
@@ -88,28 +100,42 @@ impl Progress for Watch<'_> {
     }
 
     fn is_cancelled(&self) -> bool {
-        self.outer.is_cancelled() || (self.makes_way && self.shared.mailbox.is_pressing())
+        let has_to = match self.makes_way {
+            MakesWay::Never => false,
+            MakesWay::ToPressing => self.shared.mailbox.is_pressing(),
+            MakesWay::ToAll => self.shared.mailbox.is_waiting(),
+        };
+        has_to || self.outer.is_cancelled()
     }
 }
 
-/// A stage and the scheme that its sources are encoded under.
+/// A stage, and the scheme and scalars that its sources are encoded under; none before the first.
 struct Weighed<'a> {
     stage: Stage<'a>,
-    scheme: String,
+    under: Option<(String, Vec<Setting>)>,
 }
 
-impl Weighed<'_> {
+impl<'a> Weighed<'a> {
+    fn new(stage: Stage<'a>) -> Weighed<'a> {
+        Weighed { stage, under: None }
+    }
+
+    /// Whether this weighting has begun.
+    fn is_under(&self, scheme: &str, settings: &[Setting]) -> bool {
+        self.under.as_ref().is_some_and(|(own, scalars)| own == scheme && scalars == settings)
+    }
+
     /// Begins a weighting, unless it has begun. Sources that it does not encode are encoded by the frames that use them.
     fn weigh(
         &mut self,
         weighting: &Weighting,
-        viewed: &Viewed<'_>,
+        settings: &[Setting],
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
         let scheme = weighting.to_string();
-        if self.scheme != scheme {
-            self.stage.tune(viewed.settings_of(&scheme));
-            self.scheme = scheme;
+        if !self.is_under(&scheme, settings) {
+            self.stage.tune(settings);
+            self.under = Some((scheme, settings.to_vec()));
             self.stage.weigh(weighting, progress)?;
         }
         Ok(())
@@ -131,6 +157,7 @@ struct RenderLoop<'a> {
     pace: Pace,
     /// Time of the last full picture.
     full_time: Option<Duration>,
+    choice: Choice,
 }
 
 /// Width and height of full pictures at a camera of a view.
@@ -153,7 +180,7 @@ pub(crate) fn full_size(
 /// [`RenderError`] if the sources cannot be prepared, or if the device fails.
 pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) -> Result<(), RenderError> {
     let Viewed { scene, sources, field, device, options, weighting, .. } = viewer.viewed;
-    let watch = Watch { shared, outer, makes_way: false };
+    let watch = Watch { shared, outer, makes_way: MakesWay::Never };
     let stopped = |result: Result<(), RenderError>| match result {
         Err(error) if is_interruption(&error) => Ok(()),
         result => result,
@@ -187,19 +214,29 @@ pub(crate) fn run(viewer: &Viewer<'_>, shared: &Shared, outer: &dyn Progress) ->
             full: None,
             pace: Pace::default(),
             full_time: None,
+            choice: Choice::of(&viewer.viewed),
         };
         match &cheap_renderer {
             Some(renderer) => {
                 shared.status.begin("preparing coarse pictures");
                 let stage = coarse::stage(scene, &album, sources, small, renderer.as_ref(), &coarse_options, &watch)?;
-                let mut coarse = Weighed { stage, scheme: String::new() };
-                coarse.weigh(weighting, &viewer.viewed, &watch)?;
+                let mut coarse = Weighed::new(stage);
+                coarse.weigh(weighting, &options.settings, &watch)?;
                 pictures.coarse = Some(coarse);
             }
             None => pictures.prepare(&watch)?,
         }
         pictures.serve()
     })())
+}
+
+/// The answer to a request whose picture failed: 503 if the device did, with which the program ends; else 422, for another
+/// view, scheme or size may well have a picture.
+fn refusal(error: &RenderError) -> Answer {
+    match error.is_of_device() {
+        true => Answer::error(503, &format!("the device failed, and the program ends: {error}")),
+        false => Answer::error(422, &format!("there is no picture of this view: {error}")),
+    }
 }
 
 /// Whether work was stopped, by the person or by another request.
@@ -214,37 +251,72 @@ impl<'a> RenderLoop<'a> {
     fn serve(&mut self) -> Result<(), RenderError> {
         while !self.outer.is_cancelled() {
             self.shared.status.begin("");
-            let Some(job) = self.shared.mailbox.take(PATIENCE) else { continue };
+            let Some(job) = self.shared.mailbox.take(PATIENCE) else {
+                self.choose()?;
+                continue;
+            };
             let request = &job.request;
             let picture = if request.is_moving { self.soon(request) } else { self.at_rest(request) };
-            let bytes = match picture {
+            let answer = match picture {
                 Err(error) if is_interruption(&error) => {
                     self.shared.mailbox.put_back(job);
                     continue;
                 }
                 Err(error) if error.is_of_device() => {
-                    job.reply.send(Answer::error(500, &error.to_string())).ok();
+                    job.reply.send(refusal(&error)).ok();
                     return Err(error);
                 }
-                picture => picture.map_err(|error| error.to_string()).and_then(|(frame, is_full)| {
-                    answer::bytes(&frame, &self.coverage, request.layer, is_full).map_err(|error| error.to_string())
-                }),
+                Err(error) => refusal(&error),
+                Ok((frame, is_full)) => self.answer(&frame, request, is_full),
             };
             self.shared.mailbox.finish();
-            let answer = match bytes {
-                Ok(bytes) => Answer::of("application/octet-stream", bytes),
-                Err(message) => Answer::error(500, &message),
-            };
             job.reply.send(answer).ok();
+        }
+        Ok(())
+    }
+
+    fn answer(&self, frame: &Frame, request: &Request, is_full: bool) -> Answer {
+        let record = is_full.then(|| {
+            let Viewer { viewed, device_name, .. } = self.viewer;
+            let scheme = request.weighting.to_string();
+            let chosen = self.choice.made(&scheme);
+            PictureRecord::of(frame, viewed, &self.coverage, device_name, scheme, chosen, self.images.background)
+        });
+        match answer::bytes(frame, &self.coverage, request.layer, record) {
+            Ok(bytes) => Answer::of("application/octet-stream", bytes),
+            Err(error) => Answer::error(503, &format!("the picture cannot be encoded: {error}")),
+        }
+    }
+
+    /// Chooses the scheme for the scene, if that is due and full pictures are prepared. Makes way for every request; then it
+    /// is begun again later.
+    fn choose(&mut self) -> Result<(), RenderError> {
+        let (Choice::Due, Some(full)) = (&self.choice, &self.full) else { return Ok(()) };
+        self.shared.status.begin("choosing the scheme for the scene");
+        let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToAll };
+        match auto::choose(&full.stage, self.renderer, self.viewer.viewed.options, &watch) {
+            Err(error) if is_interruption(&error) => {}
+            Err(error) if error.is_of_device() => return Err(error),
+            Err(error) => {
+                watch.warn(&format!("no scheme could be chosen for the scene: {error}"));
+                self.shared.status.choose(self.viewer.viewed.weighting.to_string());
+                self.choice = Choice::None;
+            }
+            Ok(chosen) => {
+                self.shared.status.choose(chosen.weighting.to_string());
+                self.choice = Choice::Made(Box::new(chosen));
+            }
         }
         Ok(())
     }
 
     /// A picture at once: as fine as time allows. And whether it is a full one.
     fn soon(&mut self, request: &Request) -> Result<(Frame, bool), RenderError> {
-        let watch = Watch { shared: self.shared, outer: self.outer, makes_way: false };
+        let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::Never };
         let is_fast = self.full_time.is_some_and(|time| time < TIME_OF_A_PICTURE);
-        let is_ready = self.full.as_ref().is_some_and(|full| full.scheme == request.weighting.to_string());
+        let scheme = request.weighting.to_string();
+        let settings = self.choice.settings(&scheme, &self.viewer.viewed);
+        let is_ready = self.full.as_ref().is_some_and(|full| full.is_under(&scheme, settings));
         if is_fast && is_ready {
             return Ok((self.full_frame(request, &watch)?, true));
         }
@@ -263,10 +335,11 @@ impl<'a> RenderLoop<'a> {
 
     /// The full picture. Makes way for requests that press.
     fn at_rest(&mut self, request: &Request) -> Result<(Frame, bool), RenderError> {
-        let watch = Watch { shared: self.shared, outer: self.outer, makes_way: true };
+        let watch = Watch { shared: self.shared, outer: self.outer, makes_way: MakesWay::ToPressing };
         if let Some(coarse) = &mut self.coarse {
             self.shared.status.begin("encoding sources for coarse pictures");
-            coarse.weigh(&request.weighting, &self.viewer.viewed, &watch)?;
+            let settings = self.choice.settings(&request.weighting.to_string(), &self.viewer.viewed);
+            coarse.weigh(&request.weighting, settings, &watch)?;
             // A frame that has to encode sources first would come late.
             coarse.stage.encode_all(&watch)?;
         }
@@ -282,7 +355,7 @@ impl<'a> RenderLoop<'a> {
         let Viewed { scene, sources, options, .. } = self.viewer.viewed;
         let images = Arc::clone(&self.images);
         let stage = Stage::of_images(scene, self.album, sources, images, self.renderer, options, watch)?;
-        self.full = Some(Weighed { stage, scheme: String::new() });
+        self.full = Some(Weighed::new(stage));
         Ok(())
     }
 
@@ -293,7 +366,8 @@ impl<'a> RenderLoop<'a> {
             return self.full_frame(request, watch);
         };
         self.shared.status.begin("encoding sources");
-        full.weigh(&request.weighting, &self.viewer.viewed, watch)?;
+        let settings = self.choice.settings(&request.weighting.to_string(), &self.viewer.viewed);
+        full.weigh(&request.weighting, settings, watch)?;
         self.shared.status.begin("rendering");
         let start = Instant::now();
         let frame = full.stage.frame(&request.weighting, &target, watch)?;
@@ -304,5 +378,28 @@ impl<'a> RenderLoop<'a> {
     /// The requested camera, with the intrinsics of the viewer.
     fn camera(&self, request: &Request) -> Camera {
         Camera { pose: request.pose, pinhole: self.viewer.pinhole }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::refusal;
+    use viewfuse_core::camera::PinholeError;
+    use viewfuse_core::sources::SourcesError;
+    use viewfuse_device::DeviceError;
+    use viewfuse_field::FieldError;
+    use viewfuse_field::render::RenderError;
+
+    #[test]
+    fn nothing_that_a_person_does_is_an_error_of_the_server() {
+        let unsuitable =
+            RenderError::Unsuitable { scene: "photos".to_owned(), reason: "the views do not overlap".into() };
+        let size = RenderError::Size { width: 0, height: 0, error: PinholeError::Size };
+        for error in [unsuitable, size, RenderError::Sources(SourcesError::Empty)] {
+            let answer = refusal(&error);
+            assert_eq!(answer.status(), 422, "{error}");
+        }
+        let device = RenderError::Field(FieldError::Device(DeviceError::Other("lost".into())));
+        assert_eq!(refusal(&device).status(), 503);
     }
 }

@@ -188,7 +188,7 @@ impl Server {
 }
 
 fn json(value: &impl Serialize) -> Answer {
-    serde_json::to_vec(value).map_or_else(|error| Answer::error(500, &error.to_string()), Answer::json)
+    serde_json::to_vec(value).map_or_else(|error| Answer::error(503, &error.to_string()), Answer::json)
 }
 
 fn not_found() -> Answer {

@@ -18,6 +18,8 @@ struct StageStatus {
     /// So many pieces in all; 0 if that is not known.
     pieces: usize,
     warnings: Vec<String>,
+    /// The scheme that was chosen for the scene, once it is.
+    chosen: Option<String>,
 }
 
 impl Status {
@@ -45,6 +47,11 @@ impl Status {
         if shown.warnings.len() < MAX_WARNINGS && !shown.warnings.iter().any(|known| known == warning) {
             shown.warnings.push(warning.to_owned());
         }
+    }
+
+    /// The scheme for the scene is known.
+    pub(crate) fn choose(&self, scheme: String) {
+        self.shown().chosen = Some(scheme);
     }
 
     pub(crate) fn json(&self) -> Vec<u8> {

@@ -1,5 +1,6 @@
 //! What the page has to know of the scene before the first picture: cameras, their arrangement, schemes.
 
+use crate::Viewed;
 use serde::Serialize;
 use viewfuse_core::Vec3;
 use viewfuse_core::camera::Camera;
@@ -7,11 +8,11 @@ use viewfuse_core::pose::Pose;
 use viewfuse_core::weighting::ROWS;
 use viewfuse_field::About;
 use viewfuse_job::shell::quoted;
+use viewfuse_scene::View;
 use viewfuse_scene::coverage::Coverage;
 use viewfuse_scene::path::arc::Arc;
 use viewfuse_scene::path::generated::orbit;
 use viewfuse_scene::rig::Rig;
-use viewfuse_scene::{Scene, View};
 use viewfuse_weighting::scheme_names;
 
 /// A greater limit of a parameter than this is none.
@@ -43,7 +44,10 @@ pub(crate) struct Subject {
     /// The scene's other views.
     others: Vec<CameraRow>,
     schemes: Vec<SchemeRow>,
+    /// The one that the page begins with.
     scheme: String,
+    /// Whether another one may be chosen for the scene.
+    chooses: bool,
     commands: Commands,
 }
 
@@ -112,15 +116,8 @@ pub struct Commands {
 
 impl Subject {
     /// `full` is a camera of the size of full pictures.
-    pub(crate) fn of(
-        scene: &Scene,
-        sources: &[usize],
-        full: &Camera,
-        about: &About,
-        device: String,
-        scheme: String,
-        commands: Commands,
-    ) -> Subject {
+    pub(crate) fn of(viewed: &Viewed<'_>, full: &Camera, about: &About, device: String, commands: Commands) -> Subject {
+        let Viewed { scene, sources, weighting, chooses, .. } = *viewed;
         let cameras: Vec<Camera> = sources.iter().map(|&view| scene.views[view].camera).collect();
         let rig = Rig::of(&cameras);
         let others = (0..scene.views.len()).filter(|view| !sources.contains(view));
@@ -140,7 +137,8 @@ impl Subject {
             sources: sources.iter().map(|&view| CameraRow::of(&scene.views[view])).collect(),
             others: others.map(|view| CameraRow::of(&scene.views[view])).collect(),
             schemes: scheme_rows(),
-            scheme,
+            scheme: weighting.to_string(),
+            chooses,
             commands,
         }
     }

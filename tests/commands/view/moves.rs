@@ -57,7 +57,7 @@ const WATCH: &str = "(() => { window.drawnSizes = []; window.drawnNumbers = []; 
 /// the sizes that there are, of which `finest` is the largest; once it lets go, the picture is that of the last view. How many
 /// come in a second is a figure of `cargo bench -p viewfuse-cli --bench view`.
 fn pictures_follow_the_hand(browser: &Browser, scene: &str, finest: [f64; 2], kept: &str) {
-    let program = start(&repository(), scene);
+    let program = start(&repository(), &format!("{scene} --weights error:alpha=1"));
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [1280, 860], false);
     tab.wait_for(COUNT_IS_SOME);
@@ -104,7 +104,7 @@ fn memory(program: &Program, tab: &Tab<'_>) -> [f64; 2] {
 }
 
 fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
-    let program = room("--sources 003..006 --size 96x72");
+    let program = room("--sources 003..006 --size 96x72 --weights error:alpha=1");
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [900, 700], false);
     tab.wait_for("window.shows && shows.shown && shows.shown.full");
@@ -142,7 +142,7 @@ fn many_moves_of_a_hand_take_no_memory(browser: &Browser) {
 /// The same by requests alone, each of which gets a picture.
 fn memory_does_not_grow() {
     let moves = moves();
-    let program = room("--sources 003..006");
+    let program = room("--sources 003..006 --weights error:alpha=1");
     let (scene, empty) = (program.scene(), program.memory());
     let (start, focus): (&Value, _) = (&scene["start"], numbers(&scene["focus"]));
     let mut connection = program.connect();

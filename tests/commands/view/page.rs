@@ -6,8 +6,9 @@ use super::devtools::{Chromium, Tab};
 use super::{COARSE, COUNT, NOTE_COARSE, WEIGHTS, done_with_warnings, keep, room, weights};
 use image::{RgbImage, RgbaImage};
 use libtest_mimic::Trial;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 use std::time::Duration;
 use viewfuse_tests::command::{command, names_in, toy};
@@ -16,12 +17,14 @@ use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::viewer::{Program, request};
 
-pub(super) fn trials() -> [Trial; 5] {
-    let tests: [(&str, InBrowser); 5] = [
+pub(super) fn trials() -> [Trial; 7] {
+    let tests: [(&str, InBrowser); 7] = [
         ("view::browser::a_hand_turns_the_view", a_hand_turns_the_view),
         ("view::browser::tabs_come_and_go", tabs_come_and_go),
         ("view::browser::a_phone_shows_all_of_it", a_phone_shows_all_of_it),
         ("view::browser::a_view_is_taken_elsewhere", a_view_is_taken_elsewhere),
+        ("view::browser::a_path_goes_through_keyframes", a_path_goes_through_keyframes),
+        ("view::browser::the_scheme_becomes_that_of_render", the_scheme_becomes_that_of_render),
         ("view::browser::names_from_files_are_no_commands", names_from_files_are_no_commands),
     ];
     browser::trials(tests)
@@ -31,7 +34,7 @@ pub(super) fn trials() -> [Trial; 5] {
 const FULL: &str = "window.shows && shows.shown && shows.shown.full && shows.shown.pose === shows.pose";
 
 /// Small enough that a full picture comes soon.
-const SMALL: &str = "--sources 003..007 --size 96x72";
+const SMALL: &str = "--sources 003..007 --size 96x72 --weights error:alpha=1";
 
 /// The pixels of the picture on the page.
 fn canvas(tab: &Tab<'_>) -> RgbaImage {
@@ -120,6 +123,7 @@ fn schemes_and_layers(tab: &Tab<'_>) {
     choose("scheme", "gaussian", "change");
     choose("parameter", "700", "input");
     tab.wait_for("document.getElementById('parameter-value').textContent === '6.31'");
+    assert_eq!(tab.text("document.getElementById('parameter').getAttribute('aria-valuetext')"), "beta 6.31");
     tab.wait_for(&format!("Math.max(...{WEIGHTS}) > 0.25"));
     weights(tab);
     tab.wait_for(FULL);
@@ -178,6 +182,9 @@ fn a_phone_shows_all_of_it(browser: &Browser) {
     let first = canvas(&tab);
     assert_eq!(tab.number("document.documentElement.scrollWidth"), 390.0, "it is wider than the phone");
     keep(&tab, "phone.png");
+    let help = tab.text("document.getElementById('keys').innerText");
+    assert!(help.contains("finger") && !help.contains("Shift") && !help.contains("Drag"), "{help}");
+    assert!(!tab.text("document.getElementById('picture').getAttribute('aria-label')").contains("keys"));
     // One finger turns, two move.
     let [x, y] = tab.middle_of("#picture");
     tab.evaluate(NOTE_COARSE);
@@ -243,10 +250,139 @@ fn a_view_is_taken_elsewhere(browser: &Browser) {
     let (_, picture) =
         program.connect().picture(&request("x", &tab.evaluate("matrixOf(shows.pose)"), false)).unpacked();
     assert!(rendered == picture, "the command line renders another picture");
+    // The picture is saved with the values that the run recorded.
+    tab.evaluate("document.getElementById('save-picture').click()");
+    let files = chromium.folder().join("saved");
+    wait_until("no picture is saved", || names_in(&files).len() == 3 && files.join("run.json").exists());
+    let of_page = image::open(files.join("view.png")).expect("a picture").to_rgb8();
+    assert!(of_page == rendered, "another picture is saved");
+    let record = |path: &Path| -> Value { serde_json::from_slice(&fs::read(path).expect("a record")).expect("JSON") };
+    let (own, run) = (record(&files.join("run.json")), record(&folder.path().join("out/run.json")));
+    for key in ["viewfuse", "device", "field", "weighting", "chosen", "size", "background", "sources", "depth_units"] {
+        assert_eq!(own[key], run[key], "{key}");
+    }
+    for key in ["world_from_camera", "weights", "left_out", "depth_step"] {
+        assert_near_all(&own["frames"][0][key], &run["frames"][0][key], key);
+    }
     // A view of the scene that is no source has a name.
     tab.evaluate("goTo(shows.scene.others[0].pose)");
     let line = tab.text("document.getElementById('command').textContent");
     assert!(line.contains("render tests/data/room --targets 000 --sources"), "{line}");
+    assert_eq!(tab.console(), [""; 0]);
+}
+
+/// Values of two records are the same but for the rounding of a pose that went through a file.
+#[track_caller]
+fn assert_near_all(own: &Value, other: &Value, what: &str) {
+    match (own.as_array(), other.as_array()) {
+        (Some(all), Some(others)) => {
+            assert_eq!(all.len(), others.len(), "{what}");
+            all.iter().zip(others).for_each(|(own, other)| assert_near_all(own, other, what));
+        }
+        _ => match (own.as_f64(), other.as_f64()) {
+            (Some(own), Some(other)) => assert_near(own, other, 1.0e-5),
+            _ => assert_eq!(own, other, "{what}"),
+        },
+    }
+}
+
+/// Views are added, removed and played, and the path that is saved is one that `render` takes.
+fn a_path_goes_through_keyframes(browser: &Browser) {
+    let program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(FULL);
+    let downloads = json!({"behavior": "allow", "downloadPath": chromium.folder().join("saved").display().to_string()});
+    chromium.call(None, "Browser.setDownloadBehavior", downloads);
+    let click = |id: &str| tab.evaluate(&format!("document.getElementById('{id}').click()"));
+    assert_eq!(tab.evaluate("document.getElementById('play').disabled"), true);
+    let centre = "shows.pose.centre";
+    let first = numbers(&tab.evaluate(centre));
+    for _ in 0..3 {
+        click("add-keyframe");
+        (0..4).for_each(|_| tab.key("ArrowLeft"));
+    }
+    let last = numbers(&tab.evaluate("shows.keyframes[2].pose.centre"));
+    tab.evaluate("document.querySelector('#keyframes li:nth-child(2) button:last-child').click()");
+    assert_eq!(tab.number("shows.keyframes.length"), 2.0);
+    tab.evaluate(
+        "(() => { const own = document.getElementById('frames'); own.value = 3; \
+         own.dispatchEvent(new Event('input', {bubbles: true})); })()",
+    );
+    keep(&tab, "keyframes.png");
+    // Played to its end, it is at the last keyframe.
+    click("play");
+    tab.wait_for("document.getElementById('play').textContent === 'Play'");
+    let played = numbers(&tab.evaluate(centre));
+    (0..3).for_each(|i| assert_near(played[i], last[i], 1.0e-6));
+    // A key stops it.
+    tab.evaluate(
+        "(() => { const own = document.getElementById('frames'); own.value = 2000; \
+         own.dispatchEvent(new Event('input', {bubbles: true})); })()",
+    );
+    click("play");
+    tab.wait_for("document.getElementById('play').textContent === 'Stop'");
+    tab.key("ArrowLeft");
+    assert_eq!(tab.text("document.getElementById('play').textContent"), "Play");
+    tab.evaluate(
+        "(() => { const own = document.getElementById('frames'); own.value = 3; \
+         own.dispatchEvent(new Event('input', {bubbles: true})); })()",
+    );
+    click("save-path");
+    let saved = chromium.folder().join("saved/path.json");
+    wait_until("no path is saved", || saved.exists() && names_in(saved.parent().expect("a folder")).len() == 1);
+    let folder = Folder::new();
+    fs::copy(&saved, folder.file("path.json")).expect("a copy");
+    let line = tab.text("document.getElementById('path-command').textContent");
+    let line = line.replacen("tests/data/room", &data("room").display().to_string(), 1);
+    done_with_warnings(folder.path(), line.strip_prefix("viewfuse ").expect("the command"));
+    let written = names_in(&folder.path().join("out"));
+    for name in ["view_0.png", "view_1.png", "view_2.png", "video.webp"] {
+        assert!(written.iter().any(|own| own == name), "{name} is not in {written:?}");
+    }
+    // Around the subject: in the middle as far from it as at both ends, within the scene's own units.
+    let scene: Value = serde_json::from_slice(&fs::read(&saved).expect("the path")).expect("JSON");
+    let about = tab.evaluate("({focus: shows.focus, origin: shows.scene.origin, scale: shows.scene.scale})");
+    let (focus, origin) = (numbers(&about["focus"]), numbers(&about["origin"]));
+    let scale = about["scale"].as_f64().expect("a number");
+    let place = |frame: usize, axis: usize| {
+        let matrix = &scene["frames"][frame]["transform_matrix"];
+        (matrix[axis][3].as_f64().expect("a number") - origin[axis]) / scale
+    };
+    let distance = |frame: usize| (0..3).map(|axis| (place(frame, axis) - focus[axis]).powi(2)).sum::<f64>().sqrt();
+    assert_near(distance(1), distance(0), 1.0e-6);
+    (0..3).for_each(|axis| assert_near(place(0, axis), first[axis], 1.0e-6));
+    assert_eq!(tab.console(), [""; 0]);
+}
+
+/// Without `--weights` the page begins at once, and shows the scheme that `render` takes when it is known.
+fn the_scheme_becomes_that_of_render(browser: &Browser) {
+    let folder = toy();
+    let options = "--sources 000000..000011 --size 48x48";
+    let program = super::start(folder.path(), &format!("toy {options}"));
+    let chromium = Chromium::start(browser);
+    let tab = chromium.open(&program.address(), [1280, 860], false);
+    tab.wait_for(FULL);
+    tab.wait_for("shows.first !== null");
+    tab.wait_for(&format!("{FULL} && shows.shown.scheme === shows.first"));
+    let chosen = tab.text("shows.first");
+    let told = tab.text("document.getElementById('choosing').textContent");
+    assert!(told.starts_with(&chosen), "{told}");
+    assert!(chosen.starts_with(&tab.text("document.getElementById('scheme').value")));
+    let line = tab.text("document.getElementById('command').textContent");
+    assert!(line.ends_with(" --weights auto -o out"), "{line}");
+    done_with_warnings(folder.path(), &format!("render toy --targets 000020 {options} --device cpu -o out"));
+    let record = fs::read(folder.path().join("out/run.json")).expect("a record");
+    let record: Value = serde_json::from_slice(&record).expect("JSON");
+    assert_eq!(record["weighting"], chosen.as_str());
+    // What the person chooses is kept, and its command line names it.
+    tab.evaluate(
+        "(() => { const own = document.getElementById('scheme'); own.value = 'mean'; \
+         own.dispatchEvent(new Event('change', {bubbles: true})); })()",
+    );
+    tab.wait_for("shows.shown.scheme === 'mean'");
+    let line = tab.text("document.getElementById('command').textContent");
+    assert!(line.ends_with(" --weights mean -o out"), "{line}");
     assert_eq!(tab.console(), [""; 0]);
 }
 
@@ -256,17 +392,27 @@ fn names_from_files_are_no_commands(browser: &Browser) {
     let folder = toy();
     let scene = folder.path().join("{view}$'{weights}");
     fs::rename(folder.path().join("toy"), &scene).expect("renamed");
+    const LONG: &str = "DSC_2024_a_long_name_of_a_photograph_000001";
     for (part, ending) in [("rgb", "png"), ("pose", "txt")] {
         let path = |name: &str| scene.join(part).join(format!("{name}.{ending}"));
-        fs::rename(path("000020"), path(NAME)).expect("renamed");
+        for (before, name) in [("000020", NAME), ("000001", LONG)] {
+            fs::rename(path(before), path(name)).expect("renamed");
+        }
     }
-    let mut arguments =
-        command(BINARY, folder.path(), "view --sources 000000..000003 --size 24x24 --no-browser --device cpu");
+    let mut arguments = command(
+        BINARY,
+        folder.path(),
+        &format!("view --sources 000000,000002,{LONG} --size 24x24 --no-browser --device cpu"),
+    );
     arguments.arg("{view}$'{weights}");
     let program = Program::of(arguments);
     let chromium = Chromium::start(browser);
     let tab = chromium.open(&program.address(), [1280, 860], false);
     tab.wait_for(FULL);
+    // A long name takes no room of another one, and its end can be read.
+    let names = "[...document.querySelectorAll('#sources .name')]";
+    assert_eq!(tab.evaluate(&format!("{names}.every((own) => own.scrollWidth <= own.clientWidth)")), true);
+    assert!(tab.text(&format!("{names}.map((own) => own.textContent).join(' ')")).contains("_000001"));
     let name = serde_json::to_string(NAME).expect("JSON");
     tab.evaluate(&format!("goTo(shows.scene.others.find((own) => own.name === {name}).pose)"));
     let line = tab.text("document.getElementById('command').textContent");

@@ -7,6 +7,7 @@ use serde_json::json;
 use std::time::Duration;
 use viewfuse_tests::command::{assert_refused, files_below, toy};
 use viewfuse_tests::devices::vulkan_devices;
+use viewfuse_tests::patience::wait_until;
 use viewfuse_tests::places::{data, repository};
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::trials::{is_required, needing, trial};
@@ -21,6 +22,7 @@ pub(super) fn trials() -> Vec<Trial> {
         trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
         trial("commands::view::every_module_of_the_page_is_served", every_module_of_the_page_is_served),
         trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
+        trial("commands::view::no_view_is_an_error_of_the_server", no_view_is_an_error_of_the_server),
         trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
         trial("commands::view::the_newest_request_wins", the_newest_request_wins),
         trial("commands::view::many_connections_at_once_are_answered", many_connections_at_once_are_answered),
@@ -101,7 +103,7 @@ fn full_pictures_are_those_of_render() {
             format!("render {} --targets 005 --weights {scheme} {options} --device cpu -o out", scene.display());
         done_with_warnings(folder.path(), &arguments);
     }
-    let program = start(folder.path(), &format!("{} {options}", scene.display()));
+    let program = start(folder.path(), &format!("{} {options} --weights error:alpha=1", scene.display()));
     let found = program.scene();
     let others = found["others"].as_array().expect("other views");
     let pose = &others.iter().find(|view| view["name"] == "005").expect("view 005")["pose"];
@@ -124,6 +126,29 @@ fn full_pictures_are_those_of_render() {
     assert!(pictures[0] != pictures[1] && pictures[0] != rendered);
 }
 
+/// Whatever a person does with the camera, there is a picture or a sentence that says why not.
+fn no_view_is_an_error_of_the_server() {
+    let folder = toy();
+    let program = start(folder.path(), "toy --sources 0..3 --size 24x24 --weights mean");
+    let found = program.scene();
+    let mut connection = program.connect();
+    for (axis, value) in [(0, 0.0), (2, -1.0e3), (1, 1.0e6), (0, 1.0e12), (2, 1.0e30), (1, -3.0e38), (0, 1.0e39)] {
+        for is_moving in [true, false] {
+            let mut pose = found["start"].clone();
+            pose[axis][3] = json!(value);
+            let answer = connection.picture(&request("a", &pose, is_moving));
+            let text = String::from_utf8_lossy(&answer.body);
+            assert!(matches!(answer.status, 200 | 400 | 422), "{value}: {} {text}", answer.status);
+            assert!(answer.status == 200 || text.contains(' '), "{value}: a sentence: {text}");
+        }
+    }
+    // In the middle of the subject, and from there away from it.
+    let mut inside = found["start"].clone();
+    (0..3).for_each(|axis| inside[axis][3] = found["focus"][axis].clone());
+    assert_eq!(connection.picture(&request("a", &inside, false)).status, 200);
+    connection.picture(&request("a", &found["start"], false)).unpacked();
+}
+
 /// What `--weights auto` chooses is what `render` chooses, with the field's scalars; other schemes have the usual ones.
 fn the_scheme_can_be_chosen_for_the_scene() {
     let folder = toy();
@@ -131,6 +156,12 @@ fn the_scheme_can_be_chosen_for_the_scene() {
     let program = start(folder.path(), &format!("toy {options} --weights auto"));
     let found = program.scene();
     let pose = &found["others"][8]["pose"];
+    assert_eq!((&found["scheme"], &found["chooses"]), (&json!("error:alpha=1"), &json!(true)));
+    // It is chosen beside the pictures, from the first full one on.
+    program.connect().picture(&request("a", pose, false)).unpacked();
+    let chosen = || program.get("status").json()["chosen"].clone();
+    wait_until("no scheme is chosen", || !chosen().is_null());
+    let chosen = chosen();
     assert_eq!(found["others"][8]["name"], "000020");
     assert_eq!(found["commands"]["first_weights"], "auto");
     let picture = |scheme: &serde_json::Value| {
@@ -138,7 +169,7 @@ fn the_scheme_can_be_chosen_for_the_scene() {
         request["scheme"] = scheme.clone();
         program.connect().picture(&request).unpacked().1
     };
-    let shown = [&found["scheme"], &json!("mean"), &found["scheme"]].map(picture);
+    let shown = [&chosen, &json!("mean"), &chosen].map(picture);
     for (scheme, own) in ["auto", "mean"].into_iter().zip(&shown) {
         let arguments = format!("render toy --targets 000020 --weights {scheme} {options} --device cpu -o {scheme}");
         done_with_warnings(folder.path(), &arguments);

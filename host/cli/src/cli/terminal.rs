@@ -83,11 +83,11 @@ impl Terminal {
 
 impl Progress for Terminal {
     fn stage(&self, name: &str, place: Range<usize>, of: usize) {
-        self.display.change(|course| course.begin(name, place, of));
+        self.display.change(|course, now| course.begin(name, place, of, now));
     }
 
     fn expect(&self, pieces: usize) {
-        self.display.change(|course| course.expect(pieces));
+        self.display.change(|course, _| course.expect(pieces));
     }
 
     fn step(&self) {

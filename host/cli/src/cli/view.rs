@@ -3,18 +3,16 @@
 use super::model::ModelOptions;
 use super::options::{BoundOptions, DeviceOptions, PictureOptions, SourceOptions};
 use super::terminal::Terminal;
+use super::weighting::choice_help;
 use super::{on_threads, say};
 use clap::Args;
 use std::path::PathBuf;
 use std::process::{Command, ExitCode, Stdio};
 use viewfuse_device::choice::Chosen;
-use viewfuse_field::render::{RenderOptions, Stage, open_album};
-use viewfuse_field::{Renderer, auto};
-use viewfuse_job::progress::Progress;
 use viewfuse_job::shell::quoted;
 use viewfuse_scene::{READERS, Scene, looked_for};
 use viewfuse_view::{Commands, ViewError, Viewed, Viewer};
-use viewfuse_weighting::{WeightingChoice, WeightingSpec, choice_grammar};
+use viewfuse_weighting::{Weighting, WeightingChoice};
 
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
@@ -27,8 +25,8 @@ pub(crate) struct Arguments {
     scene: PathBuf,
     #[command(flatten)]
     sources: SourceOptions,
-    #[arg(long, value_name = "SCHEME", default_value_t = WeightingChoice::Given(WeightingSpec::default()), help = weights_help())]
-    weights: WeightingChoice,
+    #[arg(long, value_name = "SCHEME", help = choice_help())]
+    weights: Option<WeightingChoice>,
     #[command(flatten)]
     picture: PictureOptions,
     #[command(flatten)]
@@ -55,15 +53,13 @@ fn scene_help() -> String {
     format!("The scene: {}", looked_for(&READERS))
 }
 
-fn weights_help() -> String {
-    format!("Weighting scheme at the beginning; the page can choose another: {}", choice_grammar())
-}
-
 /// `given` are the options on the command line, by long name, each with its value if it takes one.
 pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> anyhow::Result<ExitCode> {
-    let given_weighting = match &arguments.weights {
-        WeightingChoice::Given(spec) => Some(spec.open()?),
-        WeightingChoice::Auto => None,
+    let (weighting, chooses) = match &arguments.weights {
+        Some(WeightingChoice::Given(spec)) => (spec.open()?, false),
+        Some(WeightingChoice::Auto) => (Weighting::default_scheme(), true),
+        // As `render`: a network's pictures take too long to try out schemes unasked.
+        None => (Weighting::default_scheme(), arguments.model.label().is_none()),
     };
     let scene = Scene::open(&arguments.scene)?;
     let field = arguments.model.open(arguments.seed, None)?;
@@ -72,14 +68,6 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
     let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let Chosen { device, reason } = arguments.device.open()?;
     on_threads(arguments.picture.threads, || -> anyhow::Result<()> {
-        let (weighting, settings) = match given_weighting {
-            Some(weighting) => (weighting, None),
-            None => {
-                let chosen = chosen(&scene, &sources, field.on(&device).as_ref(), &options)?;
-                say(format_args!("chosen: {}", chosen.weighting))?;
-                (chosen.weighting, Some(chosen.settings))
-            }
-        };
         let viewed = Viewed {
             scene: &scene,
             sources: &sources,
@@ -87,7 +75,7 @@ pub(crate) fn run(arguments: &Arguments, given: &[(String, Option<String>)]) -> 
             device: &device,
             options: &options,
             weighting: &weighting,
-            settings: settings.as_deref(),
+            chooses,
         };
         let commands = commands(arguments, given, &viewed);
         let viewer = Viewer::listen(viewed, commands, arguments.port).map_err(plain)?;
@@ -114,22 +102,6 @@ fn start_browser(address: &str) -> bool {
     command.spawn().is_ok()
 }
 
-/// What is best for the sources.
-fn chosen(
-    scene: &Scene,
-    sources: &[usize],
-    renderer: &dyn Renderer,
-    options: &RenderOptions,
-) -> anyhow::Result<auto::Chosen> {
-    let progress = Terminal::new("reading the photographs");
-    progress.stage("reading the photographs", 0..1, 10);
-    let album = open_album(scene, sources.iter().copied(), renderer, options, &progress)?;
-    progress.stage("preparing the sources", 1..4, 10);
-    let stage = Stage::prepare(scene, &album, sources, renderer, options, &progress)?;
-    progress.stage("choosing the scheme", 4..10, 10);
-    Ok(auto::choose(&stage, renderer, options, &progress)?)
-}
-
 /// The error behind a viewer's, so that its hint is found.
 fn plain(error: ViewError) -> anyhow::Error {
     match error {
@@ -150,10 +122,7 @@ fn commands(arguments: &Arguments, given: &[(String, Option<String>)], viewed: &
         options += &format!(" --{name}");
         options.extend(value.iter().map(|value| format!(" {}", quoted(value))));
     }
-    let first_weights = match &arguments.weights {
-        WeightingChoice::Auto => arguments.weights.to_string(),
-        WeightingChoice::Given(_) => first.to_string(),
-    };
+    let first_weights = if viewed.chooses { WeightingChoice::Auto.to_string() } else { first.to_string() };
     let render = format!("viewfuse render {}", quoted(&arguments.scene));
     Commands { render, options, first_weights: quoted(first_weights) }
 }

@@ -71,9 +71,9 @@ impl ProgressDisplay {
     }
 
     /// Changes the course and shows it.
-    pub(super) fn change(&self, change: impl FnOnce(&mut Course)) {
+    pub(super) fn change(&self, change: impl FnOnce(&mut Course, Instant)) {
         if let Ok(mut course) = self.course.lock() {
-            change(&mut course);
+            change(&mut course, Instant::now());
         }
         self.show();
     }
@@ -82,7 +82,9 @@ impl ProgressDisplay {
     pub(super) fn show(&self) {
         let Ok(mut style) = self.style.lock() else { return };
         let now = Instant::now();
-        let Ok((share, words)) = self.course.lock().map(|course| (course.share(), course.words(now))) else { return };
+        let Ok((share, words)) = self.course.lock().map(|mut course| (course.share(), course.words(now))) else {
+            return;
+        };
         match &mut *style {
             #[cfg(feature = "view")]
             ProgressStyle::Hidden => {}
