@@ -25,7 +25,7 @@ use viewfuse_weighting::Weighting;
 
 const ROUNDS: usize = 5;
 /// Other sources that a source is compared with, and itself.
-const VIEWS_OF_A_SOURCE: usize = 5;
+const VIEWS_OF_A_SOURCE: usize = 3;
 /// Most views that a target's frustum is compared with.
 const MAX_MATCHED: usize = 8;
 
