@@ -97,7 +97,7 @@ fn commands_in_the_text_have_these_options() {
             }
         }
     }
-    assert!(count >= 6, "{count}");
+    assert!(count >= 5, "{count}");
 }
 
 /// The documents with pictures' lines.
