@@ -51,8 +51,8 @@ fn an_orbit_is_the_arc_from_photograph_to_photograph() {
     let alone = Arc::covered(&cameras(&[30.0]));
     assert!((alone.width.to_degrees() - 20.0).abs() < 0.01 && (alone.start + 0.5 * alone.width).abs() < 1.0e-4);
     assert_around(&cameras(&[30.0, 36.0, 32.0]), 2, &[23.0, 43.0]);
-    // Up to 60 degrees apart they are a circle, which begins at the first and does not come there twice.
-    let circle = [90.0, 30.0, 150.0, 210.0, 270.0, 330.0];
+    // Less than 60 degrees apart they are a circle, which begins at the first and does not come there twice.
+    let circle = [90.0, 45.0, 135.0, 180.0, 225.0, 270.0, 315.0, 0.0];
     assert_around(&cameras(&circle), 3, &[90.0, 210.0, 330.0]);
     assert!(Arc::covered(&cameras(&circle)).is_full() && !Arc::covered(&cameras(&circle[..5])).is_full());
     let full = Arc::full(&cameras(&circle[..2]));
