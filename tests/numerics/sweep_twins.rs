@@ -1,9 +1,9 @@
 //! The CPU's own loops of the plane sweep beside the bodies: the same bits.
 
-use viewfuse_check::swept::{Swept, band};
-use viewfuse_check::world::Numbers;
-use viewfuse_device::cpu::Cpu;
-use viewfuse_device::{Device, Memory};
+use viewfuse::check::swept::{Swept, band};
+use viewfuse::check::world::Numbers;
+use viewfuse::device::cpu::Cpu;
+use viewfuse::device::{Device, Memory};
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};

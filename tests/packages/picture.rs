@@ -9,8 +9,8 @@ use std::fmt::Write;
 use viewfuse_tests::places::repository;
 
 /// Width and height of a box, and from one to the next.
-const BOX: [usize; 2] = [236, 68];
-const STEP: [usize; 2] = [262, 100];
+const BOX: [usize; 2] = [262, 68];
+const STEP: [usize; 2] = [286, 100];
 const MARGIN: usize = 14;
 /// Characters of a line of a description.
 const LINE: usize = 40;

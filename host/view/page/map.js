@@ -2,6 +2,7 @@
 
 import { fitted } from './canvas.js';
 import { drawFrustum, drawSources, frustum } from './frusta.js';
+import { MIN_SEEN } from './picture.js';
 import { inCamera, lookAt } from './poses.js';
 import { element, state } from './state.js';
 import { add, cross, dot, length, sub, times, turned, unit } from './vectors.js';
@@ -40,6 +41,23 @@ export function firstObserver() {
   return { target, pose: lookAt(add(target, times(direction, 4 * state.scene.distance)), target, state.scene.up) };
 }
 
+// The sides from which nothing was photographed, around the subject.
+function shadeUnseen(context, eye, project, colour) {
+  const { ring, focus } = state.scene;
+  context.fillStyle = colour;
+  context.globalAlpha = 0.3;
+  context.beginPath();
+  ring.forEach((own, i) => {
+    const next = ring[(i + 1) % ring.length];
+    const corners = [focus, own.place, next.place].map((point) => inCamera(eye, point));
+    if (Math.max(own.seen, next.seen) >= MIN_SEEN || corners.some((point) => point[2] <= 0)) return;
+    corners.forEach((point, k) => (k === 0 ? context.moveTo(...project(point)) : context.lineTo(...project(point))));
+    context.closePath();
+  });
+  context.fill();
+  context.globalAlpha = 1;
+}
+
 let isMapDue = false;
 
 // Once for each picture of the screen, however often something changes.
@@ -65,6 +83,7 @@ export function drawMap() {
     eye = { ...eye, centre: add(state.observer.target, times(sub(eye.centre, state.observer.target), 1.05)) };
   }
   context.font = `${12 * ratio}px system-ui, sans-serif`;
+  shadeUnseen(context, eye, project, style.getPropertyValue('--faint'));
 
   // A ring around the focus, so that the ground can be told.
   const side = unit(cross(state.scene.up, eye.forward));

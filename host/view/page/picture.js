@@ -31,10 +31,29 @@ export function drawPicture() {
     drawSources(context, state.shown.pose, project, ratio, state.shown.weights, false);
     context.restore();
   }
+  if (tellSupport()) {
+    context.fillStyle = 'rgba(0, 0, 0, 0.5)';
+    context.fillRect(left, top, own * scale, tall * scale);
+  }
   tellLayer();
   canvas.dataset.pictures = Number(canvas.dataset.pictures || 0) + 1;
   canvas.dataset.kind = state.shown.full ? 'full' : 'coarse';
   canvas.dataset.size = state.shown.size.join('x');
+}
+
+// A picture of which less was photographed is said to be one; below half of it, it is dimmed.
+const MOSTLY_SEEN = 0.9;
+export const MIN_SEEN = 0.5;
+
+// Whether the picture leaves what the photographs show.
+function tellSupport() {
+  const { seen } = state.shown;
+  const percent = Math.round(100 * seen);
+  element('support').hidden = seen >= MOSTLY_SEEN;
+  element('support').textContent = seen < MIN_SEEN
+    ? `Not photographed from here: the photographs show ${percent} % of this.`
+    : `The photographs show ${percent} % of this.`;
+  return seen < MIN_SEEN;
 }
 
 const recent = [];           // when the last coarse pictures were drawn

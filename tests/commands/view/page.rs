@@ -17,14 +17,15 @@ use viewfuse_tests::places::data;
 use viewfuse_tests::scenes::Folder;
 use viewfuse_tests::viewer::{Program, request};
 
-pub(super) fn trials() -> [Trial; 7] {
-    let tests: [(&str, InBrowser); 7] = [
+pub(super) fn trials() -> [Trial; 8] {
+    let tests: [(&str, InBrowser); 8] = [
         ("view::browser::a_hand_turns_the_view", a_hand_turns_the_view),
         ("view::browser::tabs_come_and_go", tabs_come_and_go),
         ("view::browser::a_phone_shows_all_of_it", a_phone_shows_all_of_it),
         ("view::browser::a_view_is_taken_elsewhere", a_view_is_taken_elsewhere),
         ("view::browser::a_path_goes_through_keyframes", a_path_goes_through_keyframes),
         ("view::browser::the_scheme_becomes_that_of_render", the_scheme_becomes_that_of_render),
+        ("view::browser::where_nothing_was_photographed_it_is_said", where_nothing_was_photographed_it_is_said),
         ("view::browser::names_from_files_are_no_commands", names_from_files_are_no_commands),
     ];
     browser::trials(tests)
@@ -207,6 +208,39 @@ fn a_phone_shows_all_of_it(browser: &Browser) {
     let smallest = "Math.min(...[...document.querySelectorAll('p, label, legend, output, b, pre')].map((own) => parseFloat(getComputedStyle(own).fontSize)))";
     assert!(tab.number(smallest) >= 12.0, "{}", tab.number(smallest));
     assert_eq!(tab.console(), [""; 0]);
+}
+
+/// From behind the wall: words, a dimmed picture, and the same again when the view is back. For people who see it dark and small, too.
+fn where_nothing_was_photographed_it_is_said(browser: &Browser) {
+    let program = room(SMALL);
+    let chromium = Chromium::start(browser);
+    for (size, is_phone, name) in [([1280, 800], false, "unseen.png"), ([390, 844], true, "unseen_phone.png")] {
+        let tab = chromium.open(&program.address(), size, is_phone);
+        tab.wait_for(FULL);
+        let support = "document.getElementById('support')";
+        assert_eq!(tab.evaluate(&format!("{support}.hidden")), true);
+        // Half a turn around the subject.
+        tab.evaluate(
+            "window.back = { ...shows.pose, centre: shows.focus.map((own, i) => 2 * own - shows.pose.centre[i]) }",
+        );
+        for _ in 0..60 {
+            tab.key("ArrowLeft");
+            let is_there = tab.evaluate(
+                "Math.hypot(...shows.pose.centre.map((own, i) => own - back.centre[i])) < 0.5 * shows.scene.distance",
+            );
+            if is_there == true {
+                break;
+            }
+        }
+        tab.wait_for(&format!("!{support}.hidden && {FULL}"));
+        let said = tab.text(&format!("{support}.textContent"));
+        assert!(said.starts_with("Not photographed from here: the photographs show "), "{said}");
+        keep(&tab, name);
+        tab.key("0");
+        tab.wait_for(&format!("{support}.hidden && {FULL}"));
+        assert_eq!(tab.console(), [""; 0]);
+        tab.close();
+    }
 }
 
 /// A pose is saved as a file that viewfuse reads, and the command line says how this view is rendered.

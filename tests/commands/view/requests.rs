@@ -3,7 +3,7 @@
 use super::super::{BINARY, assert_near, numbers};
 use super::{done_with_warnings, room, start};
 use libtest_mimic::Trial;
-use serde_json::json;
+use serde_json::{Value, json};
 use std::time::Duration;
 use viewfuse_tests::command::{assert_refused, files_below, toy};
 use viewfuse_tests::devices::vulkan_devices;
@@ -21,6 +21,7 @@ pub(super) fn trials() -> Vec<Trial> {
         needing(missing, is_required("VIEWFUSE_REQUIRE_VULKAN"), on_vulkan),
         trial("commands::view::other_hosts_and_addresses_get_nothing", other_hosts_and_addresses_get_nothing),
         trial("commands::view::every_module_of_the_page_is_served", every_module_of_the_page_is_served),
+        trial("commands::view::how_much_was_photographed_is_told", how_much_was_photographed_is_told),
         trial("commands::view::full_pictures_are_those_of_render", full_pictures_are_those_of_render),
         trial("commands::view::no_view_is_an_error_of_the_server", no_view_is_an_error_of_the_server),
         trial("commands::view::the_scheme_can_be_chosen_for_the_scene", the_scheme_can_be_chosen_for_the_scene),
@@ -92,6 +93,31 @@ fn every_module_of_the_page_is_served() {
         }
     }
     assert!(modules.len() > 10, "{modules:?}");
+}
+
+/// The ring around the subject, and a picture from its other side.
+fn how_much_was_photographed_is_told() {
+    let program = start(&repository(), &format!("{} --size 24x18", data("room").display()));
+    let scene = program.scene();
+    let ring = scene["ring"].as_array().expect("places");
+    let seen: Vec<f64> = ring.iter().map(|place| place["seen"].as_f64().expect("a share")).collect();
+    assert_eq!(seen.len(), 36);
+    let count = |is: &dyn Fn(f64) -> bool| seen.iter().filter(|share| is(**share)).count();
+    assert!(count(&|share| share > 0.9) >= 3 && count(&|share| share < 0.1) >= 15, "{seen:?}");
+    let share = |pose: &Value, is_moving: bool| {
+        let (answer, _) = program.connect().picture(&request("a", pose, is_moving)).unpacked();
+        answer["seen"].as_f64().expect("a share")
+    };
+    // Looking back, over its own shoulder: the first two columns are turned around.
+    let (there, mut away) = (scene["start"].clone(), scene["start"].clone());
+    for row in 0..3 {
+        for column in [0, 2] {
+            away[row][column] = (-away[row][column].as_f64().expect("a number")).into();
+        }
+    }
+    for is_moving in [true, false] {
+        assert!(share(&there, is_moving) > 0.8 && share(&away, is_moving) < 0.2);
+    }
 }
 
 fn full_pictures_are_those_of_render() {

@@ -112,7 +112,6 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let job = selection.resolve(&scene, about.least_sources)?;
     let options = arguments.bound.bounded(arguments.picture.to_render_options(arguments.model.exact, &about)?);
     let rate = arguments.outputs.rate(job.frames_per_second);
-    arguments.path.tell_arc(&job.source_cameras(&scene));
     if !is_stream {
         check_writable(&arguments.output.join(RECORD))?;
         check_folder(&arguments.output, &job.targets, arguments.outputs.replace)?;
@@ -121,17 +120,15 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     let renderer = field.on(&device);
     let renderer = renderer.as_ref();
     let progress = Terminal::new("rendering");
-    let leaving = leaving(arguments, &scene, &job);
-    leaving.iter().for_each(|warning| progress.warn(warning));
-    let formats = if is_stream { Vec::new() } else { video_formats(arguments) };
+    let leaving = leaving(arguments, &scene, &job, &progress);
+    let formats = if is_stream { Vec::new() } else { progress.aside(|| video_formats(arguments)) };
     if is_stream {
         let render = || stream::render_to_stdout(&scene, &job, weighting.as_ref(), renderer, &options, rate, &progress);
         on_threads(arguments.picture.threads, render)??;
         return Ok(ExitCode::SUCCESS);
     }
-    let label = arguments.scene.display().to_string();
     let before = weighting.clone().unwrap_or_else(Weighting::default_scheme);
-    let mut writer = RunWriter::new(&arguments.output, &scene, label, &job, &before);
+    let mut writer = RunWriter::new(&arguments.output, &scene, arguments.scene.display().to_string(), &job, &before);
     writer.lock()?;
     writer.set_outputs(arguments.outputs.outputs());
     leaving.into_iter().for_each(|warning| writer.warn(warning));
@@ -181,13 +178,17 @@ pub(crate) fn run(arguments: &Arguments, values: &BTreeMap<String, String>) -> a
     Ok(ExitCode::SUCCESS)
 }
 
-/// A warning if cameras without a photograph leave what the sources show. Not with a network, which is there to guess what
-/// they do not.
-fn leaving(arguments: &Arguments, scene: &Scene, job: &FewShot) -> Option<String> {
+/// Says where an orbit ends, and warns if cameras without a photograph leave what the sources show. Not with a network, which is
+/// there to guess what they do not.
+fn leaving(arguments: &Arguments, scene: &Scene, job: &FewShot, progress: &Terminal) -> Option<String> {
+    let cameras = job.source_cameras(scene);
+    progress.aside(|| arguments.path.tell_arc(&cameras));
     let new = job.targets.iter().filter(|target| target.truth.is_none());
     let pictures = new.map(|target| (target.name.as_str(), &target.camera));
     let is_learned = arguments.model.label().is_some();
-    if is_learned { None } else { Coverage::of(&job.source_cameras(scene)).warning(pictures) }
+    let warning = if is_learned { None } else { Coverage::of(&cameras).warning(pictures) };
+    warning.iter().for_each(|warning| progress.warn(warning));
+    warning
 }
 
 /// The formats of videos, y4m in place of MP4 where there is no ffmpeg: a person learns it before the work.
