@@ -1,6 +1,6 @@
 """Few-shot novel view synthesis: scenes, weights and pictures as numpy arrays."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, Optional, Union, final
@@ -76,6 +76,7 @@ class Scene:
         background: str = "auto",
         leave_out: float = 0.01,
         seed: int = 0,
+        progress: Union[None, bool, Callable[[float, str], object]] = None,
         targets: Optional[str] = None,
         sources: Optional[str] = None,
         views: Optional[int] = None,
@@ -94,6 +95,8 @@ class Scene:
         background: auto, none, black, white, or "RED,GREEN,BLUE" (0 to 255).
         leave_out: sources of least weight are left out while their weights together stay at or below this.
         seed: of every random draw (the training-free field makes none).
+        progress: a function that is called with the share that is done, from 0 to 1, and what is being done; what it raises
+            ends the render. True: a bar of tqdm. None: one in a notebook, where tqdm is installed.
         targets, sources: lists of views, as the command takes them: "2,5,8", "0..9/3", "all".
         views: at most so many sources, as far apart as possible.
         orbit, between, spiral, camera_path: targets along a path of cameras, one of the four.
@@ -187,6 +190,9 @@ class Frame:
     def save(self, path: Union[str, PathLike[str]]) -> None:
         """Writes the picture as a PNG, whole or not at all: the bytes that the command writes. OSError if it cannot."""
     def __repr__(self) -> str: ...
+
+def open(path: Union[str, PathLike[str]]) -> Scene:
+    """Opens a scene: a folder, or a file that describes one, in any of the layouts. The same as Scene(path)."""
 
 def psnr(prediction: NDArray[np.uint8], truth: NDArray[np.uint8]) -> float:
     """Peak signal to noise ratio of two pictures [height][width][3] in decibels; infinite if they are equal."""

@@ -9,7 +9,7 @@ import viewfuse
 folder, picture = sys.argv[1:]
 
 # Poses and headers are read; photographs are decoded when they are needed.
-scene = viewfuse.Scene(folder)
+scene = viewfuse.open(folder)
 print(scene)
 print("first view:", scene.names[0], "size", scene.sizes[0], "centre", scene.poses[0, :3, 3].round(3))
 

@@ -4,13 +4,15 @@
 //! has a thread of its own, and the calling one looks after Python until it is done.
 
 use crate::error::Failure;
+use crate::progress::{Course, Reporter};
 use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use std::ffi::CString;
+use std::ops::Range;
 use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 use viewfuse::job::progress::Progress;
@@ -24,9 +26,28 @@ struct Watched {
     is_cancelled: AtomicBool,
     /// Each once.
     warnings: Mutex<Vec<String>>,
+    course: Mutex<Course>,
+}
+
+impl Watched {
+    fn course(&self) -> MutexGuard<'_, Course> {
+        self.course.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 impl Progress for Watched {
+    fn stage(&self, name: &str, place: Range<usize>, of: usize) {
+        self.course().begin(name, place, of);
+    }
+
+    fn expect(&self, pieces: usize) {
+        self.course().expect(pieces);
+    }
+
+    fn step(&self) {
+        self.course().step();
+    }
+
     fn warn(&self, warning: &str) {
         let mut warnings = self.warnings.lock().unwrap_or_else(PoisonError::into_inner);
         if !warnings.iter().any(|known| known == warning) {
@@ -39,6 +60,26 @@ impl Progress for Watched {
     }
 }
 
+/// Runs short work that cannot be cancelled while other Python threads run. After Ctrl-C nobody waits for its end.
+///
+/// # Errors
+/// What a signal handler raised.
+pub(crate) fn left_alone<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    let (sender, done) = channel();
+    thread::spawn(move || sender.send(work()).ok());
+    py.detach(move || {
+        loop {
+            match done.recv_timeout(EVERY) {
+                Ok(result) => return Ok(result),
+                Err(RecvTimeoutError::Timeout) => Python::attach(|py| py.check_signals())?,
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(Failure::Other("the work ended without a result".to_owned()).into());
+                }
+            }
+        }
+    })
+}
+
 /// Runs `work` while other Python threads run; its warnings become Python's.
 ///
 /// # Errors
@@ -47,7 +88,29 @@ pub(crate) fn interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&dyn Progress) -> Result<T, Failure> + Send,
 ) -> PyResult<T> {
+    reported(py, None, work)
+}
+
+/// As [`interruptible`], and the course of the work is reported from the calling thread.
+///
+/// # Errors
+/// The same, and what the report raised, which ends the work.
+pub(crate) fn reported<T: Send>(
+    py: Python<'_>,
+    reporter: Option<&Reporter>,
+    work: impl FnOnce(&dyn Progress) -> Result<T, Failure> + Send,
+) -> PyResult<T> {
     let watched = Watched::default();
+    let mut last = Course::default();
+    let mut look = |py: Python<'_>| {
+        py.check_signals()?;
+        let course = watched.course().clone();
+        if let Some(reporter) = reporter.filter(|_| course != last) {
+            reporter.report(py, &course)?;
+            last = course;
+        }
+        PyResult::Ok(())
+    };
     let (outcome, signal) = py.detach(|| {
         thread::scope(|scope| {
             let (working, done) = channel::<()>();
@@ -60,7 +123,7 @@ pub(crate) fn interruptible<T: Send>(
             let mut signal = None;
             while done.recv_timeout(EVERY) == Err(RecvTimeoutError::Timeout) {
                 if signal.is_none() {
-                    signal = Python::attach(|py| py.check_signals()).err();
+                    signal = Python::attach(&mut look).err();
                     watched.is_cancelled.store(signal.is_some(), Ordering::Relaxed);
                 }
             }
@@ -71,6 +134,11 @@ pub(crate) fn interruptible<T: Send>(
         return Err(signal);
     }
     let result = outcome.unwrap_or_else(|panic| resume_unwind(panic))?;
+    if let Some(reporter) = reporter {
+        let mut course = watched.course().clone();
+        course.share = 1.0;
+        reporter.report(py, &course)?;
+    }
     for warning in watched.warnings.into_inner().unwrap_or_else(PoisonError::into_inner) {
         let warning = CString::new(warning.replace('\0', " "))?;
         PyErr::warn(py, &py.get_type::<PyUserWarning>(), &warning, 1)?;

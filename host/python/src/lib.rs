@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! error       errors as Python exceptions
+//! progress    the course of long work, as a bar or for a function
 //! interrupt   work without Python's lock, which Ctrl-C ends
 //! arrays      arrays in and out
 //! request     what to render: targets and sources from Python's arguments
@@ -16,6 +17,7 @@ mod arrays;
 mod error;
 mod frame;
 mod interrupt;
+mod progress;
 mod render;
 mod request;
 mod scene;
@@ -30,7 +32,7 @@ mod module {
     #[pymodule_export]
     use crate::frame::PyFrame;
     #[pymodule_export]
-    use crate::scene::PyScene;
+    use crate::scene::{PyScene, open};
     #[pymodule_export]
     use crate::scores::{psnr, ssim};
     #[pymodule_export]

@@ -3,7 +3,8 @@
 use crate::arrays::{array, intrinsic_matrix};
 use crate::error::Failure;
 use crate::frame::{PyFrame, to_python};
-use crate::interrupt::interruptible;
+use crate::interrupt::{interruptible, reported};
+use crate::progress::Reporter;
 use crate::render::Order;
 use crate::request::Request;
 use crate::weights::{PyWeights, Schemes, weigh};
@@ -26,7 +27,7 @@ pub(crate) struct PyScene {
 impl PyScene {
     /// Opens a folder, or a file that describes one, in any of the layouts.
     #[new]
-    fn open(py: Python<'_>, path: PathBuf) -> PyResult<PyScene> {
+    pub(crate) fn open(py: Python<'_>, path: PathBuf) -> PyResult<PyScene> {
         let scene = interruptible(py, |_| Ok(Scene::open(path)?))?;
         Ok(PyScene { scene })
     }
@@ -110,8 +111,9 @@ impl PyScene {
         weigh(py, &self.scene, schemes, &request)
     }
 
-    /// Renders targets; all frames stay in memory. Ctrl-C ends it.
-    #[pyo3(signature = (weights=None, *, size=None, model=None, device="auto", background="auto", leave_out=0.01, seed=0, **selection))]
+    /// Renders targets; all frames stay in memory. Ctrl-C ends it. In a notebook a bar shows the progress, where tqdm is
+    /// installed.
+    #[pyo3(signature = (weights=None, *, size=None, model=None, device="auto", background="auto", leave_out=0.01, seed=0, progress=None, **selection))]
     #[allow(clippy::too_many_arguments)]
     fn render(
         &self,
@@ -123,12 +125,18 @@ impl PyScene {
         background: &str,
         leave_out: f32,
         seed: u64,
+        progress: Option<&Bound<'_, PyAny>>,
         selection: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Vec<PyFrame>> {
         let request = Request::of("render", selection)?;
         let (device, background) = (device.to_owned(), background.to_owned());
         let order = Order { request, weights, size, model, device, background, leave_out, seed };
-        let (sources, frames) = interruptible(py, |progress| order.carry_out(&self.scene, progress))?;
+        let reporter = Reporter::of(py, progress)?;
+        let rendered = reported(py, reporter.as_ref(), |progress| order.carry_out(&self.scene, progress));
+        if let Some(reporter) = reporter {
+            reporter.end(py)?;
+        }
+        let (sources, frames) = rendered?;
         frames.into_iter().map(|frame| to_python(py, &self.scene, &sources, frame)).collect()
     }
 
@@ -140,4 +148,10 @@ impl PyScene {
         let Scene { path, layout, views, .. } = &self.scene;
         format!("<viewfuse.Scene {}, {layout}, {} views>", path.display(), views.len())
     }
+}
+
+/// Opens a scene: a folder, or a file that describes one, in any of the layouts.
+#[pyfunction]
+pub(crate) fn open(py: Python<'_>, path: PathBuf) -> PyResult<PyScene> {
+    PyScene::open(py, path)
 }

@@ -2,6 +2,7 @@
 
 use crate::arrays::Picture;
 use crate::error::Failure;
+use crate::interrupt::left_alone;
 use pyo3::prelude::*;
 use viewfuse::core::metrics;
 
@@ -16,17 +17,23 @@ fn pair<'py>(prediction: &Bound<'py, PyAny>, truth: &Bound<'py, PyAny>) -> PyRes
     Ok(pair)
 }
 
+/// Copies, which another thread of Python cannot change meanwhile.
+fn values(pair: [Picture<'_>; 2]) -> [Vec<u8>; 2] {
+    pair.map(|picture| picture.values().into_owned())
+}
+
 /// Peak signal to noise ratio of two uint8 pictures in decibels; infinite if they are equal.
 #[pyfunction]
-pub(crate) fn psnr(prediction: &Bound<'_, PyAny>, truth: &Bound<'_, PyAny>) -> PyResult<f64> {
-    let [prediction, truth] = pair(prediction, truth)?;
-    Ok(metrics::psnr(&prediction.values(), &truth.values()))
+pub(crate) fn psnr(py: Python<'_>, prediction: &Bound<'_, PyAny>, truth: &Bound<'_, PyAny>) -> PyResult<f64> {
+    let [prediction, truth] = values(pair(prediction, truth)?);
+    left_alone(py, move || metrics::psnr(&prediction, &truth))
 }
 
 /// Structural similarity of two uint8 pictures (uniform 7x7 window); None if they are smaller than that.
 #[pyfunction]
-pub(crate) fn ssim(prediction: &Bound<'_, PyAny>, truth: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
-    let [prediction, truth] = pair(prediction, truth)?;
-    let [width, height] = truth.size();
-    Ok(metrics::ssim(&prediction.values(), &truth.values(), width, height, 3))
+pub(crate) fn ssim(py: Python<'_>, prediction: &Bound<'_, PyAny>, truth: &Bound<'_, PyAny>) -> PyResult<Option<f64>> {
+    let pair = pair(prediction, truth)?;
+    let [width, height] = pair[0].size();
+    let [prediction, truth] = values(pair);
+    left_alone(py, move || metrics::ssim(&prediction, &truth, width, height, 3))
 }

@@ -13,7 +13,9 @@ import sys
 import tempfile
 import threading
 import time
+import types
 import unittest
+import unittest.mock
 import warnings
 import zlib
 from pathlib import Path
@@ -215,6 +217,81 @@ class Pictures(unittest.TestCase):
         expected, low, high = frame.expected
         self.assertTrue(low < expected < high)
 
+    def test_progress(self):
+        scene, told = viewfuse.open(ROOM), []
+        arguments = {"targets": "5", "sources": "4,6", "size": SMALL}
+        (plain,) = scene.render("mean", **arguments)
+        (frame,) = scene.render("mean", progress=lambda share, stage: told.append((share, stage)), **arguments)
+        np.testing.assert_array_equal(frame.picture, plain.picture)
+        shares = [share for share, _ in told]
+        self.assertEqual(shares, sorted(shares))
+        self.assertEqual(shares[-1], 1.0)
+        self.assertTrue(all(isinstance(stage, str) for _, stage in told))
+
+        def stop(share, stage):
+            raise RuntimeError("enough")
+
+        with self.assertRaisesRegex(RuntimeError, "enough"):
+            scene.render("mean", progress=stop, **arguments)
+        with self.assertRaisesRegex(TypeError, "progress: True, False, None or a function"):
+            scene.render("mean", progress=3, **arguments)
+
+    def test_a_bar_where_tqdm_is_installed(self):
+        closed = []
+
+        class Bar:
+            def __init__(self, total, bar_format):
+                self.n, self.total = 0, total
+
+            def set_description_str(self, text):
+                self.text = text
+
+            def close(self):
+                closed.append((self.n, self.total))
+
+        auto = types.ModuleType("tqdm.auto")
+        auto.tqdm = Bar
+        scene, arguments = viewfuse.open(ROOM), {"targets": "5", "sources": "4,6", "size": SMALL}
+        with unittest.mock.patch.dict(sys.modules, {"tqdm": types.ModuleType("tqdm"), "tqdm.auto": auto}):
+            scene.render("mean", **arguments)
+            self.assertEqual(closed, [], "no notebook")
+            scene.render("mean", progress=True, **arguments)
+            self.assertEqual(closed, [(100, 100)])
+            with unittest.mock.patch.dict(sys.modules, {"ipykernel": types.ModuleType("ipykernel")}):
+                scene.render("mean", **arguments)
+                self.assertEqual(len(closed), 2)
+                scene.render("mean", progress=False, **arguments)
+                self.assertEqual(len(closed), 2)
+        with unittest.mock.patch.dict(sys.modules, {"tqdm": None, "tqdm.auto": None}):
+            with self.assertRaises(ImportError):
+                scene.render("mean", progress=True, **arguments)
+
+    def test_the_notebook_runs(self):
+        """Its cells one after another; with nbclient and a kernel also as Jupyter runs it."""
+        path = REPOSITORY / "host/python/examples/room.ipynb"
+        notebook = json.loads(path.read_text())
+        cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+        self.assertGreater(len(cells), 3)
+        self.assertTrue(all(not cell.get("outputs") for cell in notebook["cells"]), "it is kept without outputs")
+        with tempfile.TemporaryDirectory() as folder:
+            code = "\n".join(cells)
+            place = {**os.environ, "VIEWFUSE_SCENE": str(ROOM)}
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=folder, env=place)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("PSNR", done.stdout)
+            self.assertTrue((Path(folder) / "view.png").is_file())
+        try:
+            import ipykernel  # noqa: F401
+            import nbclient
+            import nbformat
+        except ImportError as error:
+            print(f"not run by Jupyter, its cells alone: {error}", file=sys.stderr)
+            return
+        with tempfile.TemporaryDirectory() as folder, unittest.mock.patch.dict(os.environ, VIEWFUSE_SCENE=str(ROOM)):
+            run_by_jupyter = nbclient.NotebookClient(nbformat.read(path, 4), resources={"metadata": {"path": folder}})
+            run_by_jupyter.execute()
+            self.assertTrue((Path(folder) / "view.png").is_file())
+
     def test_paths(self):
         scene = viewfuse.Scene(ROOM)
         for path, name in [({"orbit": 2}, "orbit-001"), ({"between": ("3", "7", 2)}, "between-001")]:
@@ -241,6 +318,25 @@ class Scores(unittest.TestCase):
         self.assertEqual(viewfuse.psnr(wide[:, :30], truth), viewfuse.psnr(other, truth))
         self.assertEqual(viewfuse.ssim(wide[:, :30], truth), viewfuse.ssim(other, truth))
         self.assertIsNone(viewfuse.ssim(truth[:6], other[:6]))
+
+    def test_other_threads_run_and_ctrl_c_ends_it(self):
+        # Seconds of work.
+        picture = np.zeros((4000, 6000, 3), np.uint8)
+        counts, is_done = [0], threading.Event()
+
+        def other():
+            while not is_done.wait(0.001):
+                counts[0] += 1
+
+        thread = threading.Thread(target=other)
+        thread.start()
+        threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+        with self.assertRaises(KeyboardInterrupt):
+            for _ in range(1000):
+                viewfuse.ssim(picture, picture)
+        is_done.set()
+        thread.join()
+        self.assertGreater(counts[0], 10)
 
     def test_what_is_no_pair(self):
         picture = np.zeros((4, 5, 3), np.uint8)

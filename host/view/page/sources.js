@@ -7,7 +7,7 @@ import { element, state } from './state.js';
 // A long name without its middle: names of photographs differ at their ends.
 function shortened(name) {
   const letters = [...name];
-  return letters.length <= 14 ? name : `${letters.slice(0, 6).join('')}…${letters.slice(-7).join('')}`;
+  return letters.length <= 11 ? name : `${letters.slice(0, 3).join('')}…${letters.slice(-7).join('')}`;
 }
 
 // `go` takes the view to a pose.
