@@ -1,7 +1,7 @@
 //! What is expected of the drivers that the tests know, and that it is neither less nor more: a driver that begins to do what
 //! it did not do fails as well, so that the table stays true and what was left out for it comes back.
 //!
-//! With it: the size of subgroups that a driver reports, forms that are compared while they are measured, and dispatches that
+//! With it: the size of subgroups that a driver reports, and dispatches that
 //! are small before a kernel's time is known. All of that holds on every device.
 
 use crate::candidate::{Candidate, Test};
@@ -15,7 +15,7 @@ use viewfuse_vulkan::{Gpu, GpuOptions, VulkanError};
 
 pub(crate) const TESTS: &[Test] = &[
     Test::new("the_driver_is_as_expected", the_driver_is_as_expected),
-    Test::new("forms_are_compared_while_they_are_measured", forms_are_compared_while_they_are_measured),
+    Test::new("measured_forms_give_the_same_bits", measured_forms_give_the_same_bits),
     Test::new("pipelines_have_the_subgroups_that_were_asked_for", pipelines_have_the_subgroups_that_were_asked_for),
     Test::new("an_unknown_kernel_begins_with_a_small_dispatch", an_unknown_kernel_begins_with_a_small_dispatch),
 ];
@@ -96,11 +96,11 @@ fn fused(gpu: &Gpu, count: u32) -> Result<Vec<u32>, VulkanError> {
     Ok(gpu.download(&fused)?.into_iter().map(f32::to_bits).collect())
 }
 
-fn forms_are_compared_while_they_are_measured(candidate: &Candidate) -> Result<(), Failed> {
+fn measured_forms_give_the_same_bits(candidate: &Candidate) -> Result<(), Failed> {
     let measured = candidate.gpu(&GpuOptions::default())?;
     let single = candidate.gpu(&GpuOptions { form: Some(Form::Single), ..GpuOptions::default() })?;
     let (found, expected) = (linear(&measured)?, linear(&single)?);
-    // Several forms were measured: the spoilt outputs and their comparison leave nothing behind.
+    // Several forms were measured: that leaves nothing behind.
     assert!(measured.submission_count() > single.submission_count());
     assert!(found == expected && found.iter().any(|bits| *bits != 0));
     assert_eq!(measured.refused_forms(), []);

@@ -27,7 +27,7 @@ fn words(source: &str) -> Vec<String> {
     found
 }
 
-/// What tests a value by comparing it: names of the library, and `x != x` or `x == x`.
+/// What tests a value by comparing it: names of the library, and `x != x`.
 fn by_value(source: &str) -> Vec<String> {
     let words = words(source);
     let named = words.iter().filter(|word| BY_VALUE.contains(&word.as_str())).cloned();
@@ -36,7 +36,7 @@ fn by_value(source: &str) -> Vec<String> {
         let [left, sign, equal, right] = four else { return false };
         // Of a constant, what stands before it is compared: `x & BITS != BITS`.
         let is_name = left.starts_with(|own: char| own.is_lowercase());
-        is_name && left == right && matches!(sign.as_str(), "!" | "=") && equal == "="
+        is_name && left == right && sign == "!" && equal == "="
     });
     named.chain(with_itself.map(|four| four.concat())).collect()
 }

@@ -15,8 +15,6 @@ use std::sync::Arc;
 const STAGING: u64 = 16 << 20;
 /// Most bytes that are recorded with the commands: the most of an update.
 const INLINE: usize = 64 << 10;
-/// Bytes of an output by which forms of a kernel are compared.
-const COMPARED: usize = 1 << 20;
 
 impl Gpu {
     /// An array with these values.
@@ -102,59 +100,34 @@ impl Gpu {
     fn read(&self, array: &Arc<Array>, bytes: &mut [u8]) -> Result<(), VulkanError> {
         self.with_state(|gpu, state| {
             for_each_stretch(array, gpu.staging_bytes(), |memory, offset, range| {
-                gpu.read_piece(state, array, memory, offset, &mut bytes[range])
+                gpu.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
+                let (to, _) = gpu.mapped(&mut state.download)?;
+                let copy = [vk::BufferCopy::default().src_offset(offset).size(range.len() as u64)];
+                let from = memory.buffer;
+                gpu.record(state, &[(array, Access::Read)], |device, submission, _| {
+                    let seen = [vk::MemoryBarrier::default()
+                        .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
+                        .dst_access_mask(vk::AccessFlags::HOST_READ)];
+                    // SAFETY: both ranges exist; the submission is waited for before staging is read.
+                    unsafe {
+                        device.cmd_copy_buffer(submission.commands, from, to, &copy);
+                        device.cmd_pipeline_barrier(
+                            submission.commands,
+                            vk::PipelineStageFlags::TRANSFER,
+                            vk::PipelineStageFlags::HOST,
+                            vk::DependencyFlags::empty(),
+                            &seen,
+                            &[],
+                            &[],
+                        );
+                    }
+                    Ok(())
+                })?;
+                state.wait()?;
+                let (_, mapped) = gpu.mapped(&mut state.download)?;
+                bytes[range.clone()].copy_from_slice(&mapped[..range.len()]);
+                Ok(())
             })
-        })
-    }
-
-    /// Reads bytes of one of an array's buffers, at most those of a staging buffer.
-    fn read_piece(
-        &self,
-        state: &mut State,
-        array: &Arc<Array>,
-        memory: &Memory,
-        offset: u64,
-        bytes: &mut [u8],
-    ) -> Result<(), VulkanError> {
-        self.staging(&mut state.download, MemoryLocation::GpuToCpu)?;
-        let (to, _) = self.mapped(&mut state.download)?;
-        let copy = [vk::BufferCopy::default().src_offset(offset).size(bytes.len() as u64)];
-        let from = memory.buffer;
-        self.record(state, &[(array, Access::Read)], |device, submission, _| {
-            let seen = [vk::MemoryBarrier::default()
-                .src_access_mask(vk::AccessFlags::TRANSFER_WRITE)
-                .dst_access_mask(vk::AccessFlags::HOST_READ)];
-            let (transfer, host) = (vk::PipelineStageFlags::TRANSFER, vk::PipelineStageFlags::HOST);
-            // SAFETY: both ranges exist; the submission is waited for before staging is read.
-            unsafe {
-                device.cmd_copy_buffer(submission.commands, from, to, &copy);
-                let none = vk::DependencyFlags::empty();
-                device.cmd_pipeline_barrier(submission.commands, transfer, host, none, &seen, &[], &[]);
-            }
-            Ok(())
-        })?;
-        state.wait()?;
-        let (_, mapped) = self.mapped(&mut state.download)?;
-        bytes.copy_from_slice(&mapped[..bytes.len()]);
-        Ok(())
-    }
-
-    /// The first bytes of an array, at most [`COMPARED`].
-    pub(crate) fn read_start(&self, state: &mut State, array: &Arc<Array>) -> Result<Vec<u8>, VulkanError> {
-        let len = (array.len.min(array.chunk_len) * array.stride).min(COMPARED).min(self.staging_bytes());
-        let mut bytes = vec![0; len];
-        self.read_piece(state, array, &array.chunks[0], 0, &mut bytes)?;
-        Ok(bytes)
-    }
-
-    /// Overwrites the first bytes of an array, at least those that [`Gpu::read_start`] reads, with NaN.
-    pub(crate) fn spoil_start(&self, state: &mut State, array: &Arc<Array>) -> Result<(), VulkanError> {
-        let memory = &array.chunks[0];
-        let bytes = memory.bytes.min(COMPARED as u64);
-        self.record(state, &[(array, Access::Write)], |device, submission, _| {
-            // SAFETY: the range is the buffer's, and a multiple of four bytes long.
-            unsafe { device.cmd_fill_buffer(submission.commands, memory.buffer, 0, bytes, u32::MAX) };
-            Ok(())
         })
     }
 
