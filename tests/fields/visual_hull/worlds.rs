@@ -21,7 +21,7 @@ use viewfuse_core::weights::Weights;
 pub(crate) const RADIUS: f32 = 0.4;
 
 /// Everything about a run that a test may change.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(crate) struct Run {
     pub(crate) field: TrainingFree,
     pub(crate) scheme: &'static str,
