@@ -2,8 +2,8 @@
 
 use viewfuse::check::swept::{Swept, band};
 use viewfuse::check::world::Numbers;
-use viewfuse::device::cpu::Cpu;
 use viewfuse::device::Device;
+use viewfuse::device::cpu::Cpu;
 use viewfuse_kernels::bodies;
 use viewfuse_kernels::plane_sweep::frustum::FrustumBlock;
 use viewfuse_kernels::plane_sweep::{PLANES, Planes};
